@@ -12,11 +12,11 @@ from numba import njit
 
 from benchmarks.markdown import number, table
 from benchmarks.timing import seconds_per_call
-from gearmbs.dae.linalg.analyse import analyse
+from gearmbs.dae.linalg.lu_plan import analyse
 from gearmbs.dae.linalg.sparse_lu import factor, new_factors
 from gearmbs.dae.linalg.sparse_lu import solve as substitute
 from gearmbs.studies import Case, simulate_case
-from gearmbs.studies.simulation import record
+from gearmbs.studies.run.simulation import record
 
 TITLE = "Gear cases: WSTIFF and IDA"
 STATES = {

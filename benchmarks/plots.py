@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks import precision
-from gearmbs.view.figure_style import COLOURS, GREY, look, new_figure, save_figure
+from gearmbs.view.figures.style import COLOURS, GREY, look, new_figure, save_figure
 
 MARKS = "osD^vP*X"
 

@@ -12,7 +12,7 @@ from types import ModuleType
 from benchmarks import contact, digits, gear_pair, plots, precision, size, step_parts
 from benchmarks.machine import describe
 from benchmarks.store import Store
-from gearmbs.view.files import write_whole
+from gearmbs.files import write_whole
 
 PARTS: dict[str, ModuleType] = {
     "gear": gear_pair,

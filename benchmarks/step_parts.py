@@ -11,11 +11,11 @@ from numba import njit
 from benchmarks.markdown import number, table
 from benchmarks.problems.reference import chain_problem, reference_problems
 from benchmarks.timing import seconds_per_call
-from gearmbs.dae.integrators import run_state, start, step
+from gearmbs.dae.integrators import driver, run_state, step
+from gearmbs.dae.integrators.corrector import set_weights
 from gearmbs.dae.integrators.driver import Run
-from gearmbs.dae.integrators.history import rows_from
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.weights import set_weights
+from gearmbs.dae.integrators.run_state import rows_from
 from gearmbs.dae.linalg.sparse_lu import factor, solve
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.studies import Case, simulate_case
@@ -98,7 +98,7 @@ def _weights(n, st):
 def warm(problem: DAEProblem, options: Options, t_end: float) -> Run:
     """Return a run that stands before a step after the first half of its span."""
     run = Run(problem, None, t_end, options)
-    failure = start.begin(run)
+    failure = driver.begin(run)
     if failure is not None:
         raise RuntimeError(failure[1])
     code = run_state.RUNNING

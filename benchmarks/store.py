@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.machine import stamp
-from gearmbs.view.files import write_whole
+from gearmbs.files import write_whole
 
 
 class Store:

@@ -33,12 +33,12 @@ PLOTS = {
 
 TABLES = {
     "GearSpec": "gearmbs.gears.show:wheel_html",
-    "Mechanism": "gearmbs.mechanism.show:mechanism_html",
-    "Solution": "gearmbs.dae.results.show:solution_html",
+    "Mechanism": "gearmbs.mechanism.solve.measures:mechanism_html",
+    "Solution": "gearmbs.dae.results.solution:solution_html",
     "Case": "gearmbs.studies.show:case_html",
     **dict.fromkeys(
         ("AnalysisReport", "VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport"),
-        "gearmbs.view.report_page:report_body",
+        "gearmbs.view.scenes.pages:report_body",
     ),
 }
 """What makes a table of an object for notebooks, where its class does not do so itself."""

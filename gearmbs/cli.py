@@ -14,12 +14,9 @@ import typer
 from gearmbs import _command
 from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
-from gearmbs.identify.commands import identify
-from gearmbs.signals.commands import analyse, compare, trend
-from gearmbs.signals.speed_commands import waterfall
-from gearmbs.studies.commands import bench, gearbox, resonance
-from gearmbs.studies.run_commands import paper, run
-from gearmbs.studies.speed_commands import campbell, sweep
+from gearmbs.identify.study import identify
+from gearmbs.signals.commands import analyse, compare, trend, waterfall
+from gearmbs.studies.commands import bench, campbell, gearbox, paper, resonance, run, sweep
 
 app = typer.Typer(
     name="gearmbs",

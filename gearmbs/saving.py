@@ -11,7 +11,7 @@ from typing import Any
 from gearmbs.progress import waiting
 
 WRITERS: dict[str, dict[str, str]] = {
-    "Case": {".toml": "gearmbs.studies.case_file:write_case"},
+    "Case": {".toml": "gearmbs.studies.case.case:write_case"},
     "GearSpec": {
         ".dxf": "gearmbs.view:write_dxf",
         ".step": "gearmbs.view:write_step",
@@ -25,7 +25,7 @@ WRITERS: dict[str, dict[str, str]] = {
     "DataFrame": {".csv": "gearmbs.saving:_table"},
     "AnalysisReport": {
         ".md": "gearmbs.saving:_report",
-        ".html": "gearmbs.view.report_page:write_report_page",
+        ".html": "gearmbs.view.scenes.pages:write_report_page",
         ".csv": "gearmbs.saving:_report_tables",
         ".json": "gearmbs.saving:_report_data",
     },
@@ -83,7 +83,7 @@ def _saved(thing: Any, path: Path) -> Path | list[Path]:
     if name:
         return _by_ending(thing, path, type(thing).__name__, WRITERS[name])
     if "DataArray" in kinds:
-        endings = importlib.import_module("gearmbs.signals.io").written_endings()
+        endings = importlib.import_module("gearmbs.signals.files.formats").written_endings()
         return _by_ending(thing, path, "signal", dict.fromkeys(endings, "gearmbs.signals:write_signal"))
     if "Figure" in kinds:
         return _by_ending(thing, path, "figure", dict.fromkeys(FIGURE_ENDINGS, "gearmbs.saving:_figure"))
@@ -109,7 +109,7 @@ def _by_ending(thing: Any, path: Path, kind: str, writers: dict[str, str]) -> Pa
 
 
 def _dataset(data: Any, path: Path) -> Path:
-    from gearmbs.studies.store import write_dataset
+    from gearmbs.studies.run.store import write_dataset
 
     return write_dataset(path, data)
 
@@ -119,19 +119,19 @@ def _solution(solution: Any, path: Path) -> Path:
 
 
 def _table(table: Any, path: Path) -> Path:
-    from gearmbs.view.files import write_whole
+    from gearmbs.files import write_whole
 
     return write_whole(path, table.to_csv(index=table.index.name is not None))
 
 
 def _report(report: Any, path: Path) -> Path:
-    from gearmbs.view.files import write_whole
+    from gearmbs.files import write_whole
 
     return write_whole(path, report.to_markdown())
 
 
 def _report_tables(report: Any, path: Path) -> list[Path]:
-    from gearmbs.view.files import write_whole
+    from gearmbs.files import write_whole
 
     return [
         write_whole(path.with_name(f"{path.stem}_{name}.csv"), table.to_csv(index=False))
@@ -140,7 +140,7 @@ def _report_tables(report: Any, path: Path) -> list[Path]:
 
 
 def _report_data(report: Any, path: Path) -> Path:
-    from gearmbs.view.files import write_whole
+    from gearmbs.files import write_whole
 
     data = {name: getattr(report, name) for name in REPORT_FACTS if hasattr(report, name)}
     # numbers that are not known are null, as JSON has it
@@ -152,8 +152,8 @@ def _report_data(report: Any, path: Path) -> Path:
 
 
 def _figure(figure: Any, path: Path) -> Path:
-    from gearmbs.view.figure_style import DPI, look
-    from gearmbs.view.files import whole_file
+    from gearmbs.files import whole_file
+    from gearmbs.view.figures.style import DPI, look
 
     with look(), whole_file(path) as part:
         figure.savefig(part, dpi=DPI)

@@ -14,9 +14,9 @@ from gearmbs.flexible import Support
 from gearmbs.gears import ContactLaw, GearPair, GearSpec, OperatingPoint
 from gearmbs.gears.faults import RootCrack
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.given import has_quantity
+from gearmbs.mechanism.parts.quantities import has_quantity
 from gearmbs.studies import Case, case_mechanism, make_case, run_case
-from gearmbs.studies.section import CaseWarning
+from gearmbs.studies.case.section import CaseWarning
 from gearmbs.units import Given, shown, to_si
 
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 import gearmbs
-from gearmbs import _kernel_cache, _kernel_calls
-from gearmbs import compile as compiling
-from gearmbs.compile import compile_entries
+from gearmbs.kernels import ahead as compiling
+from gearmbs.kernels import cache, calls
+from gearmbs.kernels.ahead import compile_entries
 
 ROOT = Path(gearmbs.__file__).parent
 
@@ -23,46 +23,46 @@ ROOT = Path(gearmbs.__file__).parent
 @pytest.fixture(scope="module")
 def found():
     """Return all kernels of the package."""
-    _kernel_calls.import_all()
-    return _kernel_calls.kernels(_kernel_calls.kernel_modules())
+    calls.import_all()
+    return calls.kernels(calls.kernel_modules())
 
 
 def test_every_module_that_compiles_is_known():
-    known = set(_kernel_calls.kernel_modules())
+    known = set(calls.kernel_modules())
     for path in ROOT.rglob("*.py"):
         if re.search(r"^\s*@(?:njit|kernel|inlined|summing)\b", path.read_text("utf-8"), re.M):
             assert ".".join(("gearmbs", *path.relative_to(ROOT).with_suffix("").parts)) in known
 
 
 def test_kernels_are_declared_one_way():
-    """numba's own decorator would compile at import; `gearmbs._jit` does not."""
+    """numba's own decorator would compile at import; `gearmbs.kernels.jit` does not."""
     for path in ROOT.rglob("*.py"):
-        if path.name != "_jit.py":
+        if path != ROOT / "kernels" / "jit.py":
             assert not re.search(r"from numba import .*\bnjit\b|numba\.njit\(", path.read_text("utf-8")), path
 
 
 def test_entries_and_parts(found):
     """Whatever has a signature is an entry, or is reached from one; helpers are reached from one."""
-    entries = _kernel_calls.entries(found)
-    names = {_kernel_calls.address(kernel) for kernel in entries}
+    entries = calls.entries(found)
+    names = {calls.address(kernel) for kernel in entries}
     for address in (
         "gearmbs.dae.equations.residual:residual",
         "gearmbs.dae.equations.jacobian:jacobian",
         "gearmbs.dae.integrators.step:advance",
         "gearmbs.dae.linalg.sparse_lu:factor",
         "gearmbs.contact.kernel:gear_contact",
-        "gearmbs.gears.history:_run",
+        "gearmbs.gears.pattern:_run",
     ):
         assert address in names
-    reached = {*entries}.union(*(_kernel_calls.below(kernel) for kernel in entries))
-    assert not [_kernel_calls.address(k) for k in found if k.declared is not None and k not in reached]
+    reached = {*entries}.union(*(calls.below(kernel) for kernel in entries))
+    assert not [calls.address(k) for k in found if k.declared is not None and k not in reached]
 
 
 def test_a_mechanism_does_not_need_the_contact(found):
     """No kernel of the equations or integrators calls one of the contact."""
     for kernel in found:
         if kernel.__module__.startswith("gearmbs.dae"):
-            below = {callee.__module__ for callee in _kernel_calls.below(kernel)}
+            below = {callee.__module__ for callee in calls.below(kernel)}
             assert not any(module.startswith(("gearmbs.contact", "gearmbs.gears")) for module in below)
 
 
@@ -83,7 +83,7 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess:
 PROGRAM = f"""
 import sys
 sys.path[:0] = {[path for path in sys.path if path]}
-from gearmbs.dae.equations.rotation import rotation_matrix
+from gearmbs.dae.equations.kinematics.rotation import rotation_matrix
 import numpy as np
 a = np.zeros((3, 3))
 print(rotation_matrix.ready() is rotation_matrix)
@@ -109,8 +109,8 @@ def test_a_program_says_that_it_compiles(tmp_path):
 
 LOADED_LATER = """
 import sys
-from gearmbs._jit import Kernel
-from gearmbs._kernel_calls import address, kernel_modules, kernels
+from gearmbs.kernels.jit import Kernel
+from gearmbs.kernels.calls import address, kernel_modules, kernels
 
 compiling, first = Kernel.compile, set()
 
@@ -148,7 +148,7 @@ def test_what_a_run_needs_is_known_at_once(program):
 
 def test_looking_for_calls_imports_nothing():
     """Packages whose names are imported late stay as they are: their kernels would be compiled, too."""
-    code = "import sys; from gearmbs._kernel_calls import entries, kernels; import gearmbs.mechanism.simulate; "
+    code = "import sys; from gearmbs.kernels.calls import entries, kernels; import gearmbs.mechanism.simulate; "
     code += "loaded = [n for n in sys.modules if n.startswith('gearmbs.')]; entries(kernels(loaded), loaded); "
     code += "print(*({n for n in sys.modules if n.startswith('gearmbs.')} - {*loaded}))"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -157,9 +157,9 @@ def test_looking_for_calls_imports_nothing():
 
 def test_failing_helpers(monkeypatch):
     """What a helper cannot compile is told with its traceback."""
-    kernel = _kernel_calls.find("gearmbs.dae.equations.rotation", "rotation_matrix")
-    monkeypatch.setattr(_kernel_cache, "stored", lambda *rest: False)
-    monkeypatch.setattr(_kernel_calls, "address", lambda kernel: f"{kernel.__module__}:not_there")
+    kernel = calls.find("gearmbs.dae.equations.kinematics.rotation", "rotation_matrix")
+    monkeypatch.setattr(cache, "stored", lambda *rest: False)
+    monkeypatch.setattr(calls, "address", lambda kernel: f"{kernel.__module__}:not_there")
     with pytest.raises(RuntimeError, match=r"not_there could not be compiled[\s\S]*LookupError"):
         compile_entries([kernel], workers=1)
 
@@ -167,11 +167,11 @@ def test_failing_helpers(monkeypatch):
 @pytest.fixture
 def missing(monkeypatch):
     """Return a kernel that seems to be missing, in a process that has said nothing yet."""
-    monkeypatch.setattr(_kernel_cache, "stored", lambda *rest: False)
+    monkeypatch.setattr(cache, "stored", lambda *rest: False)
     monkeypatch.setattr(compiling, "_said", set())
     monkeypatch.setattr(compiling, "_failures", [])
     monkeypatch.delenv(compiling.HELPER, raising=False)
-    return _kernel_calls.find("gearmbs.dae.equations.rotation", "rotation_matrix")
+    return calls.find("gearmbs.dae.equations.kinematics.rotation", "rotation_matrix")
 
 
 def test_announced_once(missing, monkeypatch, capsys):
@@ -199,7 +199,7 @@ def test_helpers_of_another_checkout_are_refused():
     for line, reason in (
         ("", "ended"),
         ("Traceback", "another version"),
-        (json.dumps(["/other/gearmbs/compile.py", own[1]]), "/other/gearmbs/compile.py instead of"),
+        (json.dumps(["/other/gearmbs/kernels/ahead.py", own[1]]), "/other/gearmbs/kernels/ahead.py instead of"),
         (json.dumps([own[0], "other"]), "another setting"),
     ):
         with pytest.raises(RuntimeError, match=reason):
@@ -214,15 +214,15 @@ def test_kernels_that_nobody_compiled(missing, monkeypatch):
 
 def test_kernels_that_cannot_be_kept(missing, monkeypatch):
     """The command does not claim that kernels are ready that the next process has to compile again."""
-    monkeypatch.setattr(_kernel_cache, "writable", lambda package: False)
+    monkeypatch.setattr(cache, "writable", lambda package: False)
     monkeypatch.setattr(compiling, "compile_all", lambda *rest, **options: compile_entries([missing]))
-    with pytest.raises(SystemExit, match=re.escape(str(_kernel_cache.folders("gearmbs")[-1]))):
+    with pytest.raises(SystemExit, match=re.escape(str(cache.folders("gearmbs")[-1]))):
         compiling.main(["--quiet"])
 
 
 def test_pruning(tmp_path, monkeypatch, capsys):
     """Kernels that nobody has read for some time go, and what killed processes left; other files stay."""
-    monkeypatch.setattr(_kernel_cache, "folders", lambda package: (tmp_path / "none", tmp_path))
+    monkeypatch.setattr(cache, "folders", lambda package: (tmp_path / "none", tmp_path))
     now = time.time()
     for name, days in (("a.entry", 40), ("b.part", 40), ("b.part.lock", 40), ("c.entry", 20), ("notes.txt", 40)):
         (tmp_path / name).write_bytes(b"12345")
@@ -238,8 +238,8 @@ def test_pruning(tmp_path, monkeypatch, capsys):
 
 
 NEEDED = """
-import gearmbs._jit as jit
-from gearmbs import _kernel_calls as calls
+import gearmbs.kernels.jit as jit
+from gearmbs.kernels import calls
 used, compile_ = set(), jit.Kernel.compile
 def noted(kernel, signature):
     used.add(calls.address(kernel))

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import pytest
 
-from gearmbs import _kernel_cache
+from gearmbs.kernels import cache
 
 CALLEES = """
     from typing import NamedTuple
-    from gearmbs._jit import njit
+    from gearmbs.kernels.jit import njit
     from . import numbers
 
     class Pair(NamedTuple):
@@ -40,7 +40,7 @@ CALLEES = """
 CALLERS = """
     import numpy as np
     from numba import float64, types
-    from gearmbs._jit import njit
+    from gearmbs.kernels.jit import njit
     from smallpackage.callees import Pair, scaled, unrelated
 
     PAIR = types.NamedUniTuple(float64, 2, Pair)
@@ -62,13 +62,13 @@ CALLERS = """
 
 RUN = """
     import json, sys
-    from gearmbs import _jit
+    from gearmbs.kernels import jit
     made = []
-    compile_ = _jit.Kernel._compile
+    compile_ = jit.Kernel._compile
     def counted(self, *rest):
         made.append(self.__name__)
         return compile_(self, *rest)
-    _jit.Kernel._compile = counted
+    jit.Kernel._compile = counted
     from smallpackage import callees, callers
     result = {expression}
     print(json.dumps([result, sorted(made)]))
@@ -201,12 +201,12 @@ def test_folders_that_cannot_be_written(package, tmp_path):
     before = {path.name: path.stat().st_mtime_ns for path in kernels.iterdir()}
     # a file in the place of a folder stands for one that is read-only, which root could write
     package.environment["GEARMBS_READ_ONLY"] = "1"
-    package.edit("callees", "from typing", "from gearmbs import _kernel_cache\nfrom typing")
+    package.edit("callees", "from typing", "from gearmbs.kernels import cache\nfrom typing")
     package.edit(
         "callees",
         "class Pair",
-        "_can = _kernel_cache._writable\n"
-        "_kernel_cache._writable = lambda f: 'smallpackage/__pycache__' not in str(f) and _can(f)\n"
+        "_can = cache._writable\n"
+        "cache._writable = lambda f: 'smallpackage/__pycache__' not in str(f) and _can(f)\n"
         "class Pair",
     )
     assert package.call() == [7.0, []]
@@ -232,14 +232,14 @@ def test_damaged_files(package):
 
 
 def test_what_makes_the_files_is_in_their_names(tmp_path, monkeypatch):
-    for name in _kernel_cache.MAKERS:
-        shutil.copy(Path(_kernel_cache.__file__).with_name(f"{name}.py"), tmp_path)
-    known = _kernel_cache.setting()
-    monkeypatch.setattr(_kernel_cache, "__file__", str(tmp_path / "_kernel_cache.py"))
-    assert _kernel_cache.setting.__wrapped__() == known
-    with (tmp_path / "_jit.py").open("a") as stream:
+    for name in cache.MAKERS:
+        shutil.copy(Path(cache.__file__).with_name(f"{name}.py"), tmp_path)
+    known = cache.setting()
+    monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
+    assert cache.setting.__wrapped__() == known
+    with (tmp_path / "jit.py").open("a") as stream:
         stream.write("CHANGED = True\n")
-    assert _kernel_cache.setting.__wrapped__() != known
+    assert cache.setting.__wrapped__() != known
 
 
 def test_interrupted_description(monkeypatch):
@@ -252,10 +252,10 @@ def test_interrupted_description(monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(_kernel_cache, "_described", interrupted)
+        patch.setattr(cache, "_described", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            _kernel_cache.identity(function)
-    assert len(_kernel_cache.identity(function)) == 64
+            cache.identity(function)
+    assert len(cache.identity(function)) == 64
 
 
 EACH_OTHER = """
@@ -273,8 +273,8 @@ def test_functions_that_call_each_other():
     def digests(last, *order):
         module = types.ModuleType("own.module")
         exec(EACH_OTHER.format(last=last), module.__dict__)
-        _kernel_cache._identities.clear()
-        return {name: _kernel_cache.identity(getattr(module, name)) for name in order}
+        cache._identities.clear()
+        return {name: cache.identity(getattr(module, name)) for name in order}
 
     known = digests(1.0, "first", "second")
     assert digests(1.0, "second", "first") == known
@@ -290,11 +290,11 @@ def test_lock_after_it_was_removed(tmp_path):
     seen = []
 
     def second():
-        with _kernel_cache._lock(path):
+        with cache._lock(path):
             seen.append(path.exists())
 
     thread = threading.Thread(target=second)
-    with _kernel_cache._lock(path):
+    with cache._lock(path):
         thread.start()
         time.sleep(0.2)
         assert seen == []

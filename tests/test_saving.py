@@ -10,9 +10,10 @@ import xarray as xr
 
 import gearmbs as gm
 from gearmbs.mechanism import Mechanism
-from gearmbs.signals.io import SUFFIXES, written_endings
-from gearmbs.view import film, gear_scene, spectrum_plot
-from gearmbs.view.figure_style import new_figure
+from gearmbs.signals.files.formats import SUFFIXES, written_endings
+from gearmbs.view import gear_scene, spectrum_plot
+from gearmbs.view.figures import animation
+from gearmbs.view.figures.style import new_figure
 
 
 def pendulum():
@@ -99,7 +100,7 @@ def test_other_things_are_refused(tmp_path):
 
 
 def test_a_film_without_ffmpeg_says_what_to_do(tmp_path, monkeypatch):
-    monkeypatch.setattr(film.shutil, "which", lambda name: None)
+    monkeypatch.setattr(animation.shutil, "which", lambda name: None)
     with pytest.raises(ValueError, match=r"films need the program ffmpeg, .*; save as \.html or \.gif instead"):
         gm.mesh_animation(gm.GearPair.paper(), frames=2).save(tmp_path / "mesh.mp4")
     assert not list(tmp_path.iterdir())
@@ -119,7 +120,7 @@ def test_films_play(tmp_path):
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_what_ffmpeg_refuses_is_told(tmp_path):
     with pytest.raises(RuntimeError, match="ffmpeg failed: "):
-        film.write_film(tmp_path / "broken.mp4", [b"no picture"], 1)
+        animation.write_film(tmp_path / "broken.mp4", [b"no picture"], 1)
     assert not list(tmp_path.iterdir())
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from gearmbs._kernel_cache import folders
+from gearmbs.kernels.cache import folders
 
 ROOT = Path(__file__).parent.parent
 

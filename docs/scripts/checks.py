@@ -11,7 +11,7 @@ from scipy.special import ellipk
 from gearmbs.gears import GearPair, loaded_transmission_error
 from gearmbs.mechanism import Mechanism, ramp
 from gearmbs.studies import Case
-from gearmbs.studies.simulation import case_mechanism, simulate_case
+from gearmbs.studies.run.simulation import case_mechanism, simulate_case
 
 Rows = list[tuple[str, float, float, str]]
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from gearmbs.adams.parse.commands import Script, parse_script, read_script
     from gearmbs.adams.parse.deck import Deck
     from gearmbs.adams.parse.reader import parse_deck, read_deck
-    from gearmbs.adams.results.res_file import ResultSet, ResultsFile, read_results
+    from gearmbs.adams.results.res import ResultSet, ResultsFile, read_results
     from gearmbs.adams.results.result import AdamsResult
     from gearmbs.adams.run.deck_plant import linear_plant
     from gearmbs.adams.run.runner import run_deck
@@ -42,8 +42,8 @@ late(
     __name__,
     {
         "AdamsResult": ".results.result",
-        "ResultSet": ".results.res_file",
-        "ResultsFile": ".results.res_file",
+        "ResultSet": ".results.res",
+        "ResultsFile": ".results.res",
         "Deck": ".parse.deck",
         "DeckError": ".errors",
         "Diagnostic": ".errors",
@@ -54,7 +54,7 @@ late(
         "parse_deck": ".parse.reader",
         "parse_script": ".parse.commands",
         "read_deck": ".parse.reader",
-        "read_results": ".results.res_file",
+        "read_results": ".results.res",
         "read_script": ".parse.commands",
         "run_deck": ".run.runner",
         "support_table": ".support",

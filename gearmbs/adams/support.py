@@ -11,9 +11,8 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS, WITHOUT_EFFECT
 from gearmbs.adams.parse.grammar import CHOICE, specs_of
 from gearmbs.adams.parse.remedies import INSTEAD, INSTEAD_OF_ARGUMENTS, INSTEAD_OF_FUNCTIONS
-from gearmbs.mechanism.expression_functions import BINARY, ELEMENT_FORCES, UNARY
-from gearmbs.mechanism.expression_functions import UNSUPPORTED as REFUSED_FUNCTIONS
-from gearmbs.mechanism.expression_library import FUNCTIONS
+from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, FUNCTIONS, UNARY
+from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
 
 READ, OVER, REFUSED = "read", "read over", "refused"
 READ_THERE = "read, see the last column"

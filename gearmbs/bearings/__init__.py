@@ -17,13 +17,12 @@ if TYPE_CHECKING:
         UnevenSpacing,
         Waviness,
     )
-    from gearmbs.bearings.element import RollingBearing
+    from gearmbs.bearings.element import RollingBearing, add_bearing
     from gearmbs.bearings.errors import BearingError
     from gearmbs.bearings.geometry import Bearing
-    from gearmbs.bearings.hertz import PointContact, groove_contact
+    from gearmbs.bearings.laws_kernel import PointContact, groove_contact
+    from gearmbs.bearings.layout import spall_depth
     from gearmbs.bearings.life import bearing_lives
-    from gearmbs.bearings.loose import add_bearing
-    from gearmbs.bearings.profiles import spall_depth
     from gearmbs.bearings.ratings import equivalent_load, mean_load, rating_life
     from gearmbs.bearings.statics import BearingState, BearingStatics, stiffness_matrix
 
@@ -68,18 +67,18 @@ late(
         "Misalignment": ".defects",
         "OffSize": ".defects",
         "Pit": ".defects",
-        "PointContact": ".hertz",
+        "PointContact": ".laws_kernel",
         "RollingBearing": ".element",
         "Spall": ".defects",
         "UnevenSpacing": ".defects",
         "Waviness": ".defects",
-        "add_bearing": ".loose",
+        "add_bearing": ".element",
         "bearing_lives": ".life",
         "equivalent_load": ".ratings",
-        "groove_contact": ".hertz",
+        "groove_contact": ".laws_kernel",
         "mean_load": ".ratings",
         "rating_life": ".ratings",
-        "spall_depth": ".profiles",
+        "spall_depth": ".layout",
         "stiffness_matrix": ".statics",
     },
 )

@@ -10,7 +10,7 @@ from typing import Any
 
 from gearmbs._shown import Written
 from gearmbs.bearings.errors import BearingError, require
-from gearmbs.bearings.hertz import (
+from gearmbs.bearings.laws_kernel import (
     BALL_EXPONENT,
     ROLLER_EXPONENT,
     PointContact,

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from gearmbs.kernels.jit import njit
+
 BALL, ROLLER = 0, 1
 """Kinds of contact: point contact along the line of the groove centres, line contact with a fixed normal."""
 
@@ -129,3 +133,115 @@ def scratch(spins: int) -> int:
     # generalised forces, their derivatives, vectors of one contact, its profiles; then the variations of the forces,
     # of F and N locally and turned, and the angle's derivatives
     return S_LOCAL + n * (12 + 2 * n) + 8 + (n + 7) * (VARIATIONS + 1 + spins) + 32
+
+
+# Periodic profiles by cubic B-splines: value, slope and curvature.
+
+
+MARGIN = 3
+"""Coefficients beyond the nodes of a turn, so that no index wraps."""
+
+
+@njit(cache=True, error_model="numpy")
+def place_of(nodes, angle):
+    """Return the interval of a profile with so many nodes in which an angle lies, and where in it, 0 to 1."""
+    x = angle * (nodes / (2.0 * np.pi))
+    x -= nodes * np.floor(x / nodes)
+    k = int(x)
+    if k >= nodes:
+        k = nodes - 1
+    return k, x - k
+
+
+@njit(cache=True, error_model="numpy")
+def profile_value(reals, at, k, f):
+    """Return the profile whose coefficients begin at ``at``, in interval k at f."""
+    g = 1.0 - f
+    a, b, c, d = reals[at + k], reals[at + k + 1], reals[at + k + 2], reals[at + k + 3]
+    b_weight = (3.0 * f - 6.0) * f * f + 4.0
+    c_weight = ((3.0 - 3.0 * f) * f + 3.0) * f + 1.0
+    return (g * g * g * a + b_weight * b + c_weight * c + f * f * f * d) / 6.0
+
+
+@njit(cache=True, error_model="numpy")
+def profile_slope(reals, at, nodes, k, f):
+    """Return its slope by the angle."""
+    g = 1.0 - f
+    a, b, c, d = reals[at + k], reals[at + k + 1], reals[at + k + 2], reals[at + k + 3]
+    total = -g * g * a + (3.0 * f - 4.0) * f * b + ((2.0 - 3.0 * f) * f + 1.0) * c + f * f * d
+    return total * (nodes / (4.0 * np.pi))
+
+
+@njit(cache=True, error_model="numpy")
+def profile_curvature(reals, at, nodes, k, f):
+    """Return its second derivative by the angle."""
+    a, b, c, d = reals[at + k], reals[at + k + 1], reals[at + k + 2], reals[at + k + 3]
+    total = (1.0 - f) * a + (3.0 * f - 2.0) * b + (1.0 - 3.0 * f) * c + f * d
+    return total * (nodes / (2.0 * np.pi)) ** 2
+
+
+# Material that is missing from rings and elements, as periodic splines over their angle.
+#
+# A ball that rolls over a gap stands on its edges: at a distance e from the nearer edge its centre has dropped by
+#
+#     r - sqrt(r^2 - e^2)    (r: radius of the element),
+#
+# at most by the depth of the gap. In the middle of a gap of width B this is r - sqrt(r^2 - B^2/4), and the path has a
+# kink there, where the element strikes the far edge. Edges are rounded by a smooth average over their width.
+
+
+LEAST_NODES = 1024
+MOST_NODES = 1 << 16
+PER_EDGE = 6
+"""Nodes of the spline over the width of the finest edge."""
+
+
+def drop(distance: np.ndarray, radius: float, depth: float) -> np.ndarray:
+    """Return how far an element's centre has dropped at a distance inside the edge of a gap, m."""
+    inside = np.clip(distance, 0.0, radius)
+    return np.minimum(radius - np.sqrt(radius**2 - inside**2), depth)
+
+
+def spall_depth(width: float, radius: float) -> float:
+    """Return how far an element of a radius drops into the middle of a gap without bottom, m.
+
+    Examples
+    --------
+    >>> [round(1e6 * spall_depth(1e-3 * width, 3.97e-3), 2) for width in (0.2, 0.5, 1.0, 2.0)]
+    [1.26, 7.88, 31.61, 128.01]
+    """
+    return float(drop(np.array(0.5 * width), radius, np.inf))
+
+
+def node_count(edge: float, radius: float) -> int:
+    """Return the number of nodes, a power of two, that resolves an edge on a ring of a radius."""
+    wanted = PER_EDGE * 2.0 * np.pi * radius / edge
+    return int(np.clip(2 ** int(np.ceil(np.log2(max(wanted, 1.0)))), LEAST_NODES, MOST_NODES))
+
+
+def angles(nodes: int) -> np.ndarray:
+    """Return the angles of the nodes, rad."""
+    return np.arange(nodes) * (2.0 * np.pi / nodes)
+
+
+def rounded(values: np.ndarray, width: float) -> np.ndarray:
+    """Return a periodic profile averaged over a width in rad, by the smooth bump (1 - x^2)^3."""
+    nodes = values.size
+    half = 0.5 * width * nodes / (2.0 * np.pi)
+    if half < 0.5:
+        return values
+    reach = int(np.ceil(half))
+    x = np.arange(-reach, reach + 1) / half
+    bump = np.clip(1.0 - x**2, 0.0, None) ** 3
+    kernel = np.zeros(nodes)
+    np.add.at(kernel, np.arange(-reach, reach + 1) % nodes, bump / bump.sum())
+    return np.fft.irfft(np.fft.rfft(values) * np.fft.rfft(kernel), nodes)
+
+
+def spline_coefficients(values: np.ndarray) -> np.ndarray:
+    """Return the coefficients of the periodic cubic B-spline through values at even nodes, the first three repeated."""
+    nodes = values.size
+    response = (4.0 + 2.0 * np.cos(2.0 * np.pi * np.arange(nodes // 2 + 1) / nodes)) / 6.0
+    inner = np.fft.irfft(np.fft.rfft(values) / response, nodes)
+    # the kernel begins one node before the interval
+    return np.take(inner, np.arange(-1, nodes + MARGIN - 1), mode="wrap")

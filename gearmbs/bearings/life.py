@@ -2,20 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearmbs.bearings.element import RollingBearing
 from gearmbs.bearings.errors import require
 from gearmbs.bearings.ratings import equivalent_load, mean_load, rating_life
+from gearmbs.bearings.settings import BearingSettings
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism import Mechanism
-    from gearmbs.mechanism.parts import Body
+    from gearmbs.mechanism.parts.bodies import Body
+
+# Rolling bearings of a mechanism as plain data, for storing beside results.
+
+
+def described(mechanism: Mechanism) -> dict[str, dict[str, Any]]:
+    """Return of each rolling bearing by name its ``bearing``, ``settings`` other than the defaults and ``defects``."""
+    return {
+        name: {
+            "bearing": asdict(element.bearing),
+            "settings": _settings(element.settings),
+            "defects": [dict(defect.description) for defect in element.defects],
+        }
+        for name, element in mechanism.elements.items()
+        if isinstance(element, RollingBearing)
+    }
+
+
+def _settings(settings: BearingSettings) -> dict[str, Any]:
+    given = {item.name: (getattr(settings, item.name), item.default) for item in fields(settings)}
+    return {name: value for name, (value, default) in given.items()
+            if name not in ("bearing", "defects") and value != default}  # fmt: skip
 
 
 def bearing_lives(

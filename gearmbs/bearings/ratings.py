@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.bearings.errors import require
-from gearmbs.bearings.hertz import groove_contact
+from gearmbs.bearings.laws_kernel import groove_contact
 
 if TYPE_CHECKING:
     from gearmbs.bearings.geometry import Bearing

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gearmbs.bearings.defect_tables import as_defects
-from gearmbs.bearings.defects import Defect, LooseFit
+from gearmbs.bearings.defects import Defect, LooseFit, as_defects
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
 from gearmbs.units import Quantity, to_si

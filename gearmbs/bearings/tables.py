@@ -11,8 +11,7 @@ from gearmbs.bearings import defects as df
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
-from gearmbs.bearings.profile_kernel import MARGIN
-from gearmbs.bearings.profiles import spline_coefficients
+from gearmbs.bearings.layout import MARGIN, spline_coefficients
 from gearmbs.bearings.settings import BearingSettings
 
 TYPICAL_LOAD = 0.025

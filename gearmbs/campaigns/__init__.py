@@ -17,17 +17,21 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.campaigns.bounds import TotalBounds, total_bounds
     from gearmbs.campaigns.campaign import Campaign
-    from gearmbs.campaigns.canonical import canonical, content_key
-    from gearmbs.campaigns.chaos import PolynomialChaos, fit_chaos
-    from gearmbs.campaigns.errors import CampaignError
     from gearmbs.campaigns.factors import Choice, Factor, Specimens, choose
-    from gearmbs.campaigns.plan import Plan
-    from gearmbs.campaigns.planning import load_plan, make_plan
-    from gearmbs.campaigns.response import ResponseSurface, condition_figure, condition_map, fit_surface
+    from gearmbs.campaigns.plan import Plan, load_plan, make_plan
     from gearmbs.campaigns.runners.dask import dask_client
-    from gearmbs.campaigns.sensitivity import SobolIndices, main_effects, morris_effects, sobol_indices
+    from gearmbs.campaigns.sensitivity.bounds import TotalBounds, total_bounds
+    from gearmbs.campaigns.sensitivity.indices import SobolIndices, main_effects, morris_effects, sobol_indices
+    from gearmbs.campaigns.sensitivity.surrogates import (
+        PolynomialChaos,
+        ResponseSurface,
+        condition_figure,
+        condition_map,
+        fit_chaos,
+        fit_surface,
+    )
+    from gearmbs.campaigns.settings import CampaignError, canonical, content_key
     from gearmbs.campaigns.status import CampaignStatus
     from gearmbs.campaigns.subjects import (
         BearingSubject,
@@ -85,20 +89,20 @@ __all__ = [
 late(
     __name__,
     {
-        "sobol_indices": ".sensitivity",
-        "TotalBounds": ".bounds",
-        "total_bounds": ".bounds",
-        "morris_effects": ".sensitivity",
-        "main_effects": ".sensitivity",
-        "SobolIndices": ".sensitivity",
-        "PolynomialChaos": ".chaos",
-        "fit_chaos": ".chaos",
-        "fit_surface": ".response",
-        "condition_figure": ".response",
-        "condition_map": ".response",
-        "ResponseSurface": ".response",
+        "sobol_indices": ".sensitivity.indices",
+        "TotalBounds": ".sensitivity.bounds",
+        "total_bounds": ".sensitivity.bounds",
+        "morris_effects": ".sensitivity.indices",
+        "main_effects": ".sensitivity.indices",
+        "SobolIndices": ".sensitivity.indices",
+        "PolynomialChaos": ".sensitivity.surrogates",
+        "fit_chaos": ".sensitivity.surrogates",
+        "fit_surface": ".sensitivity.surrogates",
+        "condition_figure": ".sensitivity.surrogates",
+        "condition_map": ".sensitivity.surrogates",
+        "ResponseSurface": ".sensitivity.surrogates",
         "Campaign": ".campaign",
-        "CampaignError": ".errors",
+        "CampaignError": ".settings",
         "CampaignStatus": ".status",
         "Choice": ".factors",
         "BearingSubject": ".subjects",
@@ -113,12 +117,12 @@ late(
         "Plan": ".plan",
         "Specimens": ".factors",
         "Subject": ".subjects",
-        "canonical": ".canonical:canonical",
+        "canonical": ".settings:canonical",
         "choose": ".factors",
-        "content_key": ".canonical",
+        "content_key": ".settings",
         "dask_client": ".runners.dask",
-        "load_plan": ".planning",
-        "make_plan": ".planning",
+        "load_plan": ".plan",
+        "make_plan": ".plan",
         "make_subject": ".subjects",
         "subject_kinds": ".subjects",
     },

@@ -12,10 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
 from gearmbs.campaigns.plan import Plan
-from gearmbs.campaigns.settings import limit, whole
+from gearmbs.campaigns.settings import CampaignError, limit, whole
 from gearmbs.campaigns.status import CampaignStatus, read_status
 from gearmbs.campaigns.work import ALREADY, CLAIMED, DIED, STOPPED, UnitReport
 from gearmbs.progress import alone, bars, watched
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from gearmbs.campaigns.response import ResponseSurface
+    from gearmbs.campaigns.sensitivity.surrogates import ResponseSurface
 
 MOST_TRIES = 8
 """Attempts of a unit that end with a worker's death, after which the run gives up."""
@@ -102,7 +101,7 @@ class Campaign:
             If workers die again and again over the same unit, or with ``on_failure="stop"`` at the first failed case.
         """
         from gearmbs.campaigns.runners import DaskRunner, ProcessRunner, SerialRunner
-        from gearmbs.studies.parallel import available_cores
+        from gearmbs.studies.run.parallel import available_cores
 
         runner: Any
         if workers is not None:
@@ -212,20 +211,20 @@ class Campaign:
         return open_dataset(self.folder)
 
     def sensitivity(self, result: str) -> Any:
-        """Return what decides a result, by the design; see `gearmbs.campaigns.sensitivity.sensitivity`."""
-        from gearmbs.campaigns.sensitivity import sensitivity
+        """Return what decides a result, by the design; see `gearmbs.campaigns.sensitivity.indices.sensitivity`."""
+        from gearmbs.campaigns.sensitivity.indices import sensitivity
 
         return sensitivity(self, result)
 
     def response_surface(self, result: str, degree: int = 2) -> ResponseSurface:
         """Return a polynomial of a result over the factors, with its error at points left out."""
-        from gearmbs.campaigns.response import response_surface
+        from gearmbs.campaigns.sensitivity.surrogates import response_surface
 
         return response_surface(self, result, degree)
 
     def export(self, target: str | Path, format: str = "parquet", **settings: Any) -> list[Path]:
-        """Write the campaign as CSV, NetCDF, MATLAB or parquet; see `gearmbs.campaigns.exports.export`."""
-        from gearmbs.campaigns.exports import export
+        """Write the campaign as CSV, NetCDF, MATLAB or parquet; see `gearmbs.campaigns.results.export`."""
+        from gearmbs.campaigns.results import export
 
         return export(self, target, format, **settings)
 

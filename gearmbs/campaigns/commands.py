@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gearmbs._command import fail, guarded
-from gearmbs.campaigns.datasets.commands import baseline, dataset
+from gearmbs.campaigns.datasets.make import baseline, dataset
 
 app = typer.Typer(
     name="campaign", help="Plan, run and evaluate campaigns of many cases.", no_args_is_help=True, add_completion=False
@@ -242,7 +242,7 @@ def slurm(
 ) -> None:
     """Print a job script for Slurm or PBS that works on a campaign as a job array; nothing is submitted."""
     with guarded():
-        from gearmbs.campaigns.job_script import job_script
+        from gearmbs.campaigns.runners.dask import job_script
 
         typer.echo(job_script(folder, elements, minutes, system))
 

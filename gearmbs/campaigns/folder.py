@@ -13,21 +13,28 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import hashlib
 import json
+import os
+import platform
 import shutil
+import socket
+import time
 import uuid
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.plan import FORMAT, Plan
-from gearmbs.campaigns.settings import whole
+from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.campaigns.subjects.base import SignalSpec
-from gearmbs.view.files import whole_file, write_whole
+from gearmbs.files import whole_file, write_whole
 
 UNITS_A_FILE = 64
 """Units whose cases stand in one file."""
@@ -191,8 +198,6 @@ def _fill(path: Path, plan: Plan) -> None:
         (path / name).mkdir(parents=True, exist_ok=True)
     extent = _write_cases(path, plan, plan.n, [])
     if specs:
-        from gearmbs.campaigns.signal_store import make_store
-
         make_store(path / "signals.zarr", specs, plan.unit, extent.units(plan.unit))
     tree = {
         "format": FORMAT,
@@ -219,8 +224,6 @@ def extend_folder(folder: Folder, n: int) -> Folder:
         raise CampaignError(f"extend: n = {n}, but {last.points} points have been drawn; give more")
     extent = _write_cases(folder.path, plan, n, folder.extents)
     if folder.specs:
-        from gearmbs.campaigns.signal_store import grow_store
-
         grow_store(folder.signals, folder.specs, plan.unit * (extent.first_unit + extent.units(plan.unit)))
     tree = {**folder.tree, "extents": [*folder.tree["extents"], asdict(extent)]}
     write_whole(folder.path / "plan.json", json.dumps(tree, indent=1))
@@ -266,3 +269,212 @@ def _write_cases(path: Path, plan: Plan, n: int, before: list[Extent]) -> Extent
     if count == 0:
         raise CampaignError("plan: not one of the points satisfies the constraints; widen them or the ranges")
     return Extent(n, first_point, first, first + count, first_unit)
+
+
+# Claims and ledgers of units, as files.
+#
+# A unit is done if and only if its ledger is there; it is written last, under its final name only when whole. A claim
+# says who is at work, so that two workers rarely do the same; should they, they write the same bits.
+
+
+LEASE = 1800.0
+"""Seconds without a sign of life after which a claim of another machine is void."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Who works on a unit, and how often it was tried before."""
+
+    path: Path
+    attempts: int
+
+    def beat(self) -> None:
+        """Give a sign of life."""
+        with contextlib.suppress(FileNotFoundError):
+            os.utime(self.path)
+
+    def release(self) -> None:
+        """Give the unit back."""
+        self.path.unlink(missing_ok=True)
+
+
+def take(path: Path) -> Claim | None:
+    """Claim a unit; None if somebody is at work on it.
+
+    A claim whose process has died, or that has shown no sign of life for `LEASE`, is taken over, and the attempts
+    counted.
+    """
+    me = {"host": socket.gethostname(), "pid": os.getpid(), "started": _started(os.getpid())}
+    attempts = 0
+    for _ in range(3):
+        try:
+            handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
+        except FileExistsError:
+            old = _read(path)
+            if old is None:
+                # being written, or taken away, at this moment; or cut short by a kill
+                if time.time() - _age_mark(path) < 5.0:
+                    return None
+                old = {}
+            if old and _alive(old, path):
+                return None
+            attempts = max(attempts, int(old.get("attempts", 0)) + 1)
+            path.unlink(missing_ok=True)
+            continue
+        with os.fdopen(handle, "w") as file:
+            json.dump({**me, "attempts": attempts}, file)
+        return Claim(path, attempts)
+    return None
+
+
+def owner(path: Path) -> dict[str, Any] | None:
+    """Return who has claimed a unit and is alive, or None."""
+    old = _read(path)
+    return old if old and _alive(old, path) else None
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError):
+        return None
+
+
+def _age_mark(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return time.time()
+
+
+def _alive(claim: dict[str, Any], path: Path) -> bool:
+    if claim.get("host") == socket.gethostname():
+        started = _started(int(claim["pid"]))
+        return started is not None and started == claim.get("started")
+    return time.time() - _age_mark(path) < LEASE
+
+
+def _started(pid: int) -> str | None:
+    """Return when a process of this machine began, in its own units; None if there is none."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        if Path("/proc/self/stat").exists():
+            return None
+        try:
+            os.kill(pid, 0)
+        except OSError:
+            return None
+        return "unknown"
+    return None if fields[0] == "Z" else fields[19]
+
+
+def surroundings() -> dict[str, str]:
+    """Return versions and machine, which decide the last bits of a result."""
+    found = {"host": socket.gethostname(), "machine": platform.machine(), "python": platform.python_version()}
+    found["processor"] = _processor()
+    for name in ("gearmbs", "numpy", "scipy", "numba"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+# Signals of a campaign: one Zarr array a signal, a chunk a case, a shard a unit.
+#
+# Two writers in one shard lose data without a word, so that a unit is a shard and is written in one piece. The axis of
+# cases is one of *slots*: unit u has slots [u size, (u + 1) size), of which the last unit of an extent may leave some
+# empty.
+
+
+def make_store(path: Path, specs: Sequence[SignalSpec], unit: int, units: int) -> None:
+    """Make empty arrays (slot, channel, time) in float32, filled with NaN."""
+    import zarr
+
+    group = zarr.open_group(path, mode="w", zarr_format=3)
+    for spec in specs:
+        array = group.create_array(
+            spec.name,
+            shape=(unit * units, len(spec.channels), spec.samples),
+            chunks=(1, len(spec.channels), spec.samples),
+            shards=(unit, len(spec.channels), spec.samples),
+            dtype="float32",
+            fill_value=float("nan"),
+            dimension_names=("slot", f"{spec.name}_channel", f"{spec.name}_time"),
+        )
+        array.attrs.update({"units": spec.units, "sampling_rate": spec.rate, "channels": list(spec.channels)})
+
+
+def grow_store(path: Path, specs: Sequence[SignalSpec], slots: int) -> None:
+    """Give the arrays more slots."""
+    import zarr
+
+    group = zarr.open_group(path, mode="r+")
+    for spec in specs:
+        array: Any = group[spec.name]
+        array.resize((slots, *array.shape[1:]))
+
+
+def check_signals(specs: Sequence[SignalSpec], signals: Mapping[str, np.ndarray]) -> None:
+    """Refuse the signals of a case that have no room in the arrays.
+
+    Raises
+    ------
+    CampaignError
+    """
+    for spec in specs:
+        if spec.name not in signals:
+            continue
+        shape = signals[spec.name].shape
+        if len(shape) != 2 or shape[0] != len(spec.channels):
+            raise CampaignError(f"signal {spec.name!r}: shape {shape}, planned for {len(spec.channels)} channels")
+        if shape[1] > spec.samples:
+            raise CampaignError(
+                f"signal {spec.name!r}: {shape[1]} samples, planned for {spec.samples} from the corners; make a plan "
+                "whose longest record is at a corner"
+            )
+
+
+def write_signals(
+    path: Path, specs: Sequence[SignalSpec], unit: int, number: int, signals: Sequence[dict[str, np.ndarray]]
+) -> dict[str, str]:
+    """Write the signals of the cases of a unit; return the digest of each array's block.
+
+    Parameters
+    ----------
+    signals : sequence of dict
+        Of each case its signals, shape (channels, samples); nothing for a case that failed. See `check_signals`.
+    """
+    import zarr
+
+    group = zarr.open_group(path, mode="r+") if specs else None
+    digests = {}
+    for spec in specs:
+        block = np.full((unit, len(spec.channels), spec.samples), np.nan, dtype=np.float32)
+        for k, case in enumerate(signals):
+            if spec.name not in case:
+                continue
+            values = case[spec.name]
+            block[k, :, : values.shape[1]] = values
+        assert group is not None
+        array: Any = group[spec.name]
+        array[number * unit : (number + 1) * unit] = block
+        digests[spec.name] = hashlib.sha256(block.tobytes()).hexdigest()
+    return digests
+
+
+def stored_digest(path: Path, name: str, unit: int, number: int) -> str:
+    """Return the digest of what is stored of a unit."""
+    import zarr
+
+    array: Any = zarr.open_group(path, mode="r")[name]
+    return hashlib.sha256(np.asarray(array[number * unit : (number + 1) * unit]).tobytes()).hexdigest()

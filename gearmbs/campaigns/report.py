@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.chaos import PolynomialChaos
-from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.factors import Factor
-from gearmbs.campaigns.given_data import first_indices, probability
 from gearmbs.campaigns.results import factor_names, result_names
-from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
-from gearmbs.view.files import write_whole
+from gearmbs.campaigns.sensitivity.bounds import first_indices, probability
+from gearmbs.campaigns.sensitivity.indices import SobolIndices, sensitivity
+from gearmbs.campaigns.sensitivity.surrogates import PolynomialChaos
+from gearmbs.campaigns.settings import CampaignError
+from gearmbs.files import write_whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,7 +93,7 @@ def _numbers(values: pd.Series) -> str:
 
 def _scatter(campaign: Campaign, table: pd.DataFrame, result: str) -> str:
     """Return a picture of the result over each factor."""
-    from gearmbs.view.figure_style import new_figure
+    from gearmbs.view.figures.style import new_figure
 
     names = [n for n in factor_names(campaign.folder) if not n.endswith("severity")][:8]
     rows = -(-len(names) // 4)
@@ -148,7 +148,7 @@ def _at_hand(campaign: Campaign, result: str) -> str:
 
 
 def _surface(campaign: Campaign, result: str) -> str:
-    from gearmbs.campaigns.response import response_surface
+    from gearmbs.campaigns.sensitivity.surrogates import response_surface
 
     for degree in (2, 1):
         try:

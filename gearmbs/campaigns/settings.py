@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import difflib
+import hashlib
+import json
 import math
+import operator
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from numbers import Integral, Real
 from typing import Any
 
-from gearmbs.campaigns.errors import CampaignError
+import numpy as np
+
 from gearmbs.units import to_si
+
+# The error of campaigns.
+
+
+class CampaignError(ValueError):
+    """A plan or a campaign that cannot be worked on; the message names what is wrong and the remedy."""
+
 
 OPTIONS = {
     "grid": ("levels",),
@@ -116,3 +129,155 @@ def fields_error(cls: type, error: TypeError) -> str:
     known = [f.name for f in dataclasses.fields(cls)]
     word = str(error).rpartition("argument ")[2].strip("'")
     return f"unknown key {word!r}{near(word, known)}" if "unexpected keyword" in str(error) else str(error)
+
+
+# Constraints of a plan: comparisons of arithmetic expressions of its columns, as texts.
+#
+# ``"operation.torque * operation.speed <= 20e3"`` is in SI. Texts, since they are stored with the plan; they are
+# parsed, never executed.
+
+
+OPERATORS: dict[type, Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.And: np.logical_and,
+    ast.Or: np.logical_or,
+    ast.Not: np.logical_not,
+}
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "abs", "minimum", "maximum")
+}
+
+
+def satisfied(text: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return which rows of a table satisfy a constraint.
+
+    Raises
+    ------
+    CampaignError
+        For a text that is no comparison of the columns.
+    """
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except SyntaxError as error:
+        raise CampaignError(f"constraint {text!r}: {error.msg}; write for instance operation.torque <= 100") from None
+    result = np.asarray(_value(tree, columns, text))
+    if result.dtype != bool:
+        raise CampaignError(f"constraint {text!r}: is no comparison; write for instance operation.torque <= 100")
+    size = len(next(iter(columns.values())))
+    return np.broadcast_to(result, (size,))
+
+
+def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
+    def sub(part: ast.AST) -> Any:
+        return _value(part, columns, text)
+
+    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float, str)):
+        return node.value
+    if isinstance(node, (ast.Name, ast.Attribute)):
+        name = ast.unparse(node)
+        if name not in columns:
+            raise CampaignError(f"constraint {text!r}: no column {name!r}; columns are {', '.join(columns)}")
+        return columns[name]
+    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+        return OPERATORS[type(node.op)](sub(node.left), sub(node.right))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
+        return OPERATORS[type(node.op)](sub(node.operand))
+    if isinstance(node, ast.BoolOp):
+        result = sub(node.values[0])
+        for part in node.values[1:]:
+            result = OPERATORS[type(node.op)](result, sub(part))
+        return result
+    if isinstance(node, ast.Compare):
+        left, result = sub(node.left), True
+        for op, part in zip(node.ops, node.comparators):
+            if type(op) not in OPERATORS:
+                break
+            right = sub(part)
+            result = np.logical_and(result, OPERATORS[type(op)](left, right))
+            left = right
+        else:
+            return result
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
+        return FUNCTIONS[node.func.id](*(sub(arg) for arg in node.args))
+    raise CampaignError(
+        f"constraint {text!r}: {ast.unparse(node)!r} is not understood; it takes columns, numbers, + - * / **, "
+        f"comparisons, and, or, not, and {', '.join(FUNCTIONS)}"
+    )
+
+
+# One content identity for everything that is simulated: equal physics, equal text, equal key.
+#
+# A canonical form is a tree of dictionaries, lists, numbers, texts and truth values in SI with all defaults filled in
+# and no names. Numbers are rounded to twelve digits, since the same quantity written in two units may differ in the
+# last bit; minus zero is zero; tuples are lists. The key is the SHA-256 of that tree as JSON with sorted keys, of the
+# kind of subject and of `PHYSICS`.
+
+
+PHYSICS = 1
+"""Counted up by whoever changes what a simulation returns for the same case, so that no stored result is taken for
+one of the new code. A test holds stored numbers against this code and asks for it."""
+
+DIGITS = 12
+
+
+def rounded(value: float) -> float:
+    """Return a number to twelve significant digits, minus zero as zero."""
+    number = float(value)
+    if not math.isfinite(number):
+        return number
+    return float(f"{number:.{DIGITS - 1}e}") + 0.0
+
+
+def canonical(value: Any) -> Any:
+    """Return a value as a canonical tree.
+
+    Raises
+    ------
+    CampaignError
+        For a value that is none of dictionary, sequence, number, text, truth value or None.
+
+    Examples
+    --------
+    >>> canonical({"b": (1, -0.0), "a": 1000 * 0.1})
+    {'a': 100.0, 'b': [1, 0.0]}
+    """
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): canonical(value[key]) for key in sorted(value, key=str)}
+    if isinstance(value, (list, tuple)):
+        return [canonical(item) for item in value]
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        return rounded(float(value))
+    if hasattr(value, "tolist"):
+        return canonical(value.tolist())
+    raise CampaignError(f"{value!r} of type {type(value).__name__} has no canonical form; give numbers and texts")
+
+
+def content_key(kind: str, tree: Any) -> str:
+    """Return the key of a canonical tree: 64 hexadecimal digits.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the subject, as "pair".
+    tree
+        Anything `canonical` understands.
+    """
+    text = json.dumps(
+        {"kind": kind, "physics": PHYSICS, "content": canonical(tree)}, sort_keys=True, separators=(",", ":")
+    )
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -11,9 +11,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from gearmbs.campaigns.errors import CampaignError
-from gearmbs.campaigns.folder import Folder
-from gearmbs.campaigns.ledger import owner
+from gearmbs.campaigns.folder import Folder, owner
+from gearmbs.campaigns.settings import CampaignError
 
 REMEDY = "gearmbs campaign check --sweep takes out what is damaged, and run does it again"
 
@@ -155,7 +154,7 @@ def _eta(rows: list[tuple], left: int) -> float | None:
 
 def check_folder(folder: Folder, *, sweep: bool = False) -> list[str]:
     """Return what is wrong with what is stored and what was left by killed workers; see `Campaign.check`."""
-    from gearmbs.campaigns.signal_store import stored_digest
+    from gearmbs.campaigns.folder import stored_digest
 
     found = []
     for unit in folder.done():
@@ -183,7 +182,7 @@ def check_folder(folder: Folder, *, sweep: bool = False) -> list[str]:
             if sweep:
                 folder.ledger(unit).unlink(missing_ok=True)
     if sweep and folder.specs and not folder.signals.exists():
-        from gearmbs.campaigns.signal_store import make_store
+        from gearmbs.campaigns.folder import make_store
 
         make_store(folder.signals, folder.specs, folder.plan.unit, folder.unit_count)
     litter = [p for p in folder.path.rglob(".*") if p.is_file()]

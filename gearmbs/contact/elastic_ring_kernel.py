@@ -20,18 +20,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.contact.force_kernel import contact_at
-from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations.force_elements import (
-    DERIVATIVES,
-    FORCE_SIG,
-    FRAME_A,
-    FRAME_COLUMNS,
-    FRAME_P,
-    FRAME_V,
-    FRAME_W,
-)
+from gearmbs.contact.kernel import contact_at
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_COLUMNS, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import matrix_at, vector_at
 
 MESHES, MODES, PLACES = 1, 2, 3
 """In the integers, after the address of the contact: planets, modes, then four numbers a planet: where its pair's

@@ -14,20 +14,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
 from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import roll_of_flanks
-from gearmbs.contact.force_kernel import wheel_frame
-from gearmbs.contact.jit import kernel
-from gearmbs.contact.kernel import relative_twist, slopes_of_sums, wrench_of_sums
+from gearmbs.contact.gaps.sections import gap_rates
+from gearmbs.contact.kernel import relative_twist, slopes_of_sums, wheel_frame, wrench_of_sums
 from gearmbs.contact.laws import normal_law
+from gearmbs.contact.loads import clear_sums, mirror
 from gearmbs.contact.pose import pose_rates, relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.search import facing_teeth, middle_section, open_side, set_twist
-from gearmbs.contact.sections import gap_rates
-from gearmbs.contact.sums import clear_sums, mirror
-from gearmbs.dae.compiled.views import vector_at
-from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.records import kernel
+from gearmbs.kernels.structs import vector_at
 
 STIFFNESS, DAMPING, DEPTH, COSINE, BACKLASH, PLACES, TABLES = range(7)
 """Places of the element's own reals behind the pair's table: N/m, N s/m, m, cosine of the base helix angle, 1 with
@@ -227,7 +226,7 @@ def ideal_mesh(ints, reals, t, frames, states, inputs, want, work, wrench, rates
     work : ndarray
         Scratch.
     wrench, jac, diagnostics : ndarray
-        Out; see `gearmbs.dae.equations.force_elements`.
+        Out; see `gearmbs.dae.equations.loads.forces`.
     """
     behind = ints[0]
     own = vector_at(reals, behind, reals.size - behind)

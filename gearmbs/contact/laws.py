@@ -1,6 +1,6 @@
 """Force laws of the contact: normal pressure by penetration and its rate; friction by speed.
 
-IMPACT, eq. (10) and (11), and its friction are `gearmbs.dae.equations.impact`.
+IMPACT, eq. (10) and (11), and its friction are `gearmbs.dae.equations.loads.forces`.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.jit import inlined, kernel
-from gearmbs.dae.equations.impact import friction_over_speed, impact, stored_energy
+from gearmbs.dae.equations.loads.forces import friction_over_speed, impact, stored_energy
+from gearmbs.kernels.records import inlined, kernel
 
 LAW_HUNT_CROSSLEY = L.LAW_HUNT_CROSSLEY
 FRICTION_ADAMS = L.FRICTION_ADAMS

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.face import end_roll, limit_slopes
-from gearmbs.contact.jit import kernel
+from gearmbs.contact.gaps.face import end_roll, limit_slopes
+from gearmbs.contact.gaps.points import lay_directions, lay_slopes
+from gearmbs.contact.laws import friction_law
 from gearmbs.contact.slices import (
     Cut,
     end_force,
@@ -17,6 +18,8 @@ from gearmbs.contact.slices import (
     slice_slopes,
     touching_parts,
 )
+from gearmbs.dae.equations.loads.forces import friction_over_speed
+from gearmbs.kernels.records import inlined, kernel, summing
 
 
 @kernel
@@ -128,3 +131,343 @@ def finish_softness(sums, pair, energy, want):
         for k in range(6):
             moved = pair.moved[k] / pair.soft
             sums.q_x[i, k] -= ratio * pair.soft_xx[i, k] + moved * pair.soft_x[i]
+
+
+# Products of small matrices, and sums over the sections of a strip of products of rows.
+
+
+@inlined
+def row_of(matrix, i):
+    """Row of a matrix, six numbers."""
+    return matrix[i, 0], matrix[i, 1], matrix[i, 2], matrix[i, 3], matrix[i, 4], matrix[i, 5]
+
+
+@inlined
+def column_of(matrix, i):
+    """Column of a matrix, six numbers."""
+    return matrix[0, i], matrix[1, i], matrix[2, i], matrix[3, i], matrix[4, i], matrix[5, i]
+
+
+@inlined
+def dot(a, b):
+    """Scalar product of six numbers and six others."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+
+
+@inlined
+def add_product(out, left, right, n):
+    """Add the product of a 6 x 6 matrix and one of ``n`` columns, all columns side by side: ``out += left right``."""
+    a, b, c = row_of(left, 0), row_of(left, 1), row_of(left, 2)
+    d, e, f = row_of(left, 3), row_of(left, 4), row_of(left, 5)
+    for j in range(n):
+        x = column_of(right, j)
+        out[0, j] += dot(a, x)
+        out[1, j] += dot(b, x)
+        out[2, j] += dot(c, x)
+        out[3, j] += dot(d, x)
+        out[4, j] += dot(e, x)
+        out[5, j] += dot(f, x)
+
+
+@inlined
+def add_transposed_product(out, left, right, n):
+    """Add the product of a transposed 6 x 6 matrix and one of ``n`` columns: ``out += left^T right``."""
+    a, b, c = column_of(left, 0), column_of(left, 1), column_of(left, 2)
+    d, e, f = column_of(left, 3), column_of(left, 4), column_of(left, 5)
+    for j in range(n):
+        x = column_of(right, j)
+        out[0, j] += dot(a, x)
+        out[1, j] += dot(b, x)
+        out[2, j] += dot(c, x)
+        out[3, j] += dot(d, x)
+        out[4, j] += dot(e, x)
+        out[5, j] += dot(f, x)
+
+
+@inlined
+def add_six(total, i, row):
+    """Add six numbers to a row of a matrix."""
+    v0, v1, v2, v3, v4, v5 = row
+    total[i, 0] += v0
+    total[i, 1] += v1
+    total[i, 2] += v2
+    total[i, 3] += v3
+    total[i, 4] += v4
+    total[i, 5] += v5
+
+
+@summing
+def add_outer(total, a, b, n):
+    """Add the sum over the sections of ``a b^T``, the product of all rows of two quantities."""
+    for i in range(6):
+        v0 = v1 = v2 = v3 = v4 = v5 = 0.0
+        for j in range(n):
+            x = a[i, j]
+            v0 += x * b[0, j]
+            v1 += x * b[1, j]
+            v2 += x * b[2, j]
+            v3 += x * b[3, j]
+            v4 += x * b[4, j]
+            v5 += x * b[5, j]
+        add_six(total, i, (v0, v1, v2, v3, v4, v5))
+
+
+@summing
+def add_two_outers(total, a, b, c, d, n):
+    """Add the sum over the sections of ``a b^T + c d^T``."""
+    for i in range(6):
+        v0 = v1 = v2 = v3 = v4 = v5 = 0.0
+        for j in range(n):
+            x, y = a[i, j], c[i, j]
+            v0 += x * b[0, j] + y * d[0, j]
+            v1 += x * b[1, j] + y * d[1, j]
+            v2 += x * b[2, j] + y * d[2, j]
+            v3 += x * b[3, j] + y * d[3, j]
+            v4 += x * b[4, j] + y * d[4, j]
+            v5 += x * b[5, j] + y * d[5, j]
+        add_six(total, i, (v0, v1, v2, v3, v4, v5))
+
+
+@summing
+def add_stack(total, stack, n):
+    """Add the sum over the sections of a matrix a section."""
+    for i in range(6):
+        v0 = v1 = v2 = v3 = v4 = v5 = 0.0
+        for j in range(n):
+            v0 += stack[i, 0, j]
+            v1 += stack[i, 1, j]
+            v2 += stack[i, 2, j]
+            v3 += stack[i, 3, j]
+            v4 += stack[i, 4, j]
+            v5 += stack[i, 5, j]
+        add_six(total, i, (v0, v1, v2, v3, v4, v5))
+
+
+@summing
+def add_curvatures(total, weight, hess, n):
+    """Add the sum over the sections of symmetric matrices, given by their upper triangles, times a weight."""
+    for i in range(6):
+        for k in range(i, 6):
+            value = 0.0
+            for j in range(n):
+                value += weight[j] * hess[i, k, j]
+            total[i, k] += value
+            if k > i:
+                total[k, i] += value
+
+
+# From nodal forces to generalised forces and the friction wrench, and their derivatives.
+
+
+@kernel
+def clear_sums(sums, want):
+    """Set all sums to nothing."""
+    for i in range(6):
+        sums.q[i] = sums.f[i] = 0.0
+        if want != 0:
+            for j in range(6):
+                sums.q_x[i, j] = sums.q_xd[i, j] = 0.0
+                sums.f_x[i, j] = sums.f_twist[i, j] = sums.f_xd[i, j] = 0.0
+
+
+@summing
+def total_force(loads, n):
+    """Sum of the nodal forces."""
+    total = 0.0
+    for j in range(n):
+        total += loads.force[j]
+    return total
+
+
+@summing
+def add_normal(sums, strip, loads, n, want):
+    """Add the nodes' normal forces: Q grows by f dg/dx."""
+    force, grad = loads.force, strip.grad
+    for i in range(6):
+        value = 0.0
+        for j in range(n):
+            value += force[j] * grad[i, j]
+        sums.q[i] += value
+    if want == 0:
+        return
+    add_outer(sums.q_x, grad, loads.force_x, n)
+    add_curvatures(sums.q_x, force, strip.hess, n)
+    add_outer(sums.q_xd, grad, loads.force_xd, n)
+
+
+@kernel
+def friction_directions(side, strip, loads, n):
+    """Fill unit wrenches of friction forces along the profile and the face, and the sliding velocity along them.
+
+    The sliding velocity is that of wheel 1 against wheel 2 at the point, without its part along the normal.
+    """
+    twist = side.twist
+    v0, v1, v2, v3, v4, v5 = twist[0], twist[1], twist[2], twist[3], twist[4], twist[5]
+    half_h = 0.5 * side.x[L.H]
+    profile, axial = loads.profile, loads.axial
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        pn, pt = loads.normal[j], loads.tangent[j]
+        zp = strip.zeta[j] + half_h
+        t3, t4 = zp * sa, zp * ca
+        z3, z4 = pn * ca - pt * sa, -pn * sa - pt * ca
+        profile[0, j], profile[1, j], profile[2, j] = ca, -sa, 0.0
+        profile[3, j], profile[4, j], profile[5, j] = t3, t4, -pn
+        axial[0, j], axial[1, j], axial[2, j] = 0.0, 0.0, 1.0
+        axial[3, j], axial[4, j], axial[5, j] = z3, z4, 0.0
+        loads.v_profile[j] = ca * v0 - sa * v1 + t3 * v3 + t4 * v4 - pn * v5
+        loads.v_axial[j] = v2 + z3 * v3 + z4 * v4
+
+
+@kernel
+def friction_ratios(wheels, kind, loads, n):
+    """Fill the friction coefficient over the sliding speed, and the derivative of that ratio."""
+    mu_s, mu_d, v_s, v_d = wheels.static_friction, wheels.dynamic_friction, wheels.static_speed, wheels.dynamic_speed
+    if kind != L.FRICTION_ADAMS:
+        for j in range(n):
+            vt, vz = loads.v_profile[j], loads.v_axial[j]
+            loads.ratio[j], loads.ratio_slope[j] = friction_law(kind, mu_s, mu_d, v_s, v_d, np.sqrt(vt * vt + vz * vz))
+        return
+    for j in range(n):
+        vt, vz = loads.v_profile[j], loads.v_axial[j]
+        loads.ratio[j], loads.ratio_slope[j] = friction_over_speed(mu_s, mu_d, v_s, v_d, np.sqrt(vt * vt + vz * vz))
+
+
+@summing
+def friction_forces(sums, loads, n, totals):
+    """Fill the friction forces, and add their wrench and their power."""
+    power = 0.0
+    for j in range(n):
+        vt, vz, scale = loads.v_profile[j], loads.v_axial[j], -loads.ratio[j] * loads.force[j]
+        loads.f_profile[j] = scale * vt
+        loads.f_axial[j] = scale * vz
+        power += scale * (vt * vt + vz * vz)
+    totals.friction_power -= power
+    for i in range(6):
+        value = 0.0
+        for j in range(n):
+            value += loads.f_profile[j] * loads.profile[i, j] + loads.f_axial[j] * loads.axial[i, j]
+        sums.f[i] += value
+
+
+@inlined
+def friction_slope(strip, loads, j, k, spin, dz, half_h):
+    """Fill derivatives of the friction forces of section ``j`` by pose number ``k`` and by that number of the twist.
+
+    Parameters
+    ----------
+    strip, loads : record
+    j, k : int
+    spin : tuple of float
+        Twist, without the velocity along the axis.
+    dz : float
+        Derivative of the contact point's place along the axis.
+    half_h : float
+        Half the axial offset.
+    """
+    v0, v1, v3, v4, v5 = spin
+    sa, ca = strip.sin[j], strip.cos[j]
+    pn, pt, zp = loads.normal[j], loads.tangent[j], strip.zeta[j] + half_h
+    vt, vz, ratio = loads.v_profile[j], loads.v_axial[j], loads.ratio[j]
+    tt, tz, zz = loads.pp[j], loads.pa[j], loads.aa[j]
+    da, dn, dt = strip.alpha_x[k, j], loads.normal_x[k, j], loads.tangent_x[k, j]
+    # how the unit wrenches turn with the pose
+    t3 = dz * sa + zp * ca * da
+    t4 = dz * ca - zp * sa * da
+    un = dn - pt * da
+    ut = dt + pn * da
+    z3 = un * ca - ut * sa
+    z4 = -un * sa - ut * ca
+    dvt = t3 * v3 + t4 * v4 - dn * v5 - da * (sa * v0 + ca * v1)
+    dvz = z3 * v3 + z4 * v4
+    df = loads.force_x[k, j]
+    loads.profile_x[k, j] = -ratio * vt * df + tt * dvt + tz * dvz
+    loads.axial_x[k, j] = -ratio * vz * df + tz * dvt + zz * dvz
+    t, z = loads.profile[k, j], loads.axial[k, j]
+    loads.profile_v[k, j] = tt * t + tz * z
+    loads.axial_v[k, j] = tz * t + zz * z
+    loads.sliding[k, j] = -ratio * (vt * t + vz * z)
+    ft, fz = loads.f_profile[j], loads.f_axial[j]
+    loads.turned[0, k, j] = -ft * sa * da
+    loads.turned[1, k, j] = -ft * ca * da
+    loads.turned[2, k, j] = 0.0
+    loads.turned[3, k, j] = ft * t3 + fz * z3
+    loads.turned[4, k, j] = ft * t4 + fz * z4
+    loads.turned[5, k, j] = -ft * dn
+
+
+@kernel
+def friction_slopes(side, strip, loads, n):
+    """Fill derivatives of the friction forces by the pose and the twist, row by row."""
+    half_h = 0.5 * side.x[L.H]
+    spin = (side.twist[0], side.twist[1], side.twist[3], side.twist[4], side.twist[5])
+    for j in range(n):
+        vt, vz, force = loads.v_profile[j], loads.v_axial[j], loads.force[j]
+        straight, curve = -force * loads.ratio[j], -force * loads.ratio_slope[j]
+        loads.pp[j] = straight + curve * vt * vt
+        loads.pa[j] = curve * vt * vz
+        loads.aa[j] = straight + curve * vz * vz
+    for j in range(n):
+        friction_slope(strip, loads, j, 0, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 1, spin, 0.5, half_h)
+        friction_slope(strip, loads, j, 2, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 3, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 4, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 5, spin, 0.0, half_h)
+
+
+@kernel
+def add_friction(wheels, kind, side, sums, strip, loads, n, totals, want):
+    """Add the nodes' friction on wheel 1 at their contact points.
+
+    It has a component along the profile and one along the face.
+
+    Parameters
+    ----------
+    wheels : record
+        The pair's table.
+    kind : int
+        Friction law.
+    side, sums, strip, loads : record
+    n : int
+        Sections.
+    totals : record
+        Diagnostics.
+    want : int
+        Nonzero to add derivatives.
+    """
+    friction_directions(side, strip, loads, n)
+    if side.twist_1 != 0.0:
+        lay_directions(side, strip, loads, n)
+    friction_ratios(wheels, kind, loads, n)
+    friction_forces(sums, loads, n, totals)
+    if want == 0:
+        return
+    friction_slopes(side, strip, loads, n)
+    if side.twist_1 != 0.0:
+        lay_slopes(side, strip, loads, n)
+    profile, axial = loads.profile, loads.axial
+    add_two_outers(sums.f_x, profile, loads.profile_x, axial, loads.axial_x, n)
+    add_stack(sums.f_x, loads.turned, n)
+    add_two_outers(sums.f_twist, profile, loads.profile_v, axial, loads.axial_v, n)
+    add_outer(sums.f_xd, loads.sliding, loads.force_xd, n)
+
+
+@kernel
+def mirror(sums, want):
+    """Reflect all sums in the plane of the axes: the other flanks are the same problem seen in a mirror."""
+    for i in range(6):
+        si = -1.0 if i > 2 else 1.0
+        fi = -1.0 if i % 2 == 1 else 1.0
+        sums.q[i] *= si
+        sums.f[i] *= fi
+        if want == 0:
+            continue
+        for j in range(6):
+            sj = -1.0 if j > 2 else 1.0
+            fj = -1.0 if j % 2 == 1 else 1.0
+            sums.q_x[i, j] *= si * sj
+            sums.q_xd[i, j] *= si * sj
+            sums.f_x[i, j] *= fi * sj
+            sums.f_twist[i, j] *= fi * fj
+            sums.f_xd[i, j] *= fi * sj

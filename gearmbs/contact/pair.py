@@ -5,14 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.centroid import centroid_force
-from gearmbs.contact.deviations import pair_softness, tooth_flank
-from gearmbs.contact.face import end_roll, limit_slopes, limit_value, roll_difference
-from gearmbs.contact.jit import kernel
-from gearmbs.contact.loads import add_softness, finish_softness
-from gearmbs.contact.pair_slices import add_loads, pair_part, slice_contact
-from gearmbs.contact.pair_strips import copy_rows, pair_sections, strip_count
-from gearmbs.contact.records import strip_at
+from gearmbs.contact.deviations import add_deviations, pair_softness, tip_roll, tooth_flank
+from gearmbs.contact.gaps.corners import copy_corner, corner_gaps, set_corner
+from gearmbs.contact.gaps.face import end_roll, limit_slopes, limit_value, roll_difference
+from gearmbs.contact.gaps.helical_sections import helical_flanks, helical_normals, set_edges
+from gearmbs.contact.gaps.points import contact_points, helical_points
+from gearmbs.contact.gaps.sections import gap_rates, set_sections
+from gearmbs.contact.loads import (
+    add_friction,
+    add_normal,
+    add_softness,
+    finish_softness,
+    mirror,
+    strip_forces,
+    total_force,
+)
+from gearmbs.contact.records import rows_of, strip_at
 from gearmbs.contact.search import (
     face_pair,
     facing_teeth,
@@ -21,12 +29,359 @@ from gearmbs.contact.search import (
     pair_reach,
     path_excess,
     reach_of_face,
+    strip_in_reach,
     strips_between,
     teeth_in_reach,
 )
-from gearmbs.contact.sections import gap_rates
-from gearmbs.contact.slices import law_of, plane_force
-from gearmbs.contact.sums import mirror
+from gearmbs.contact.slices import centroid_force, law_of, plane_force
+from gearmbs.kernels.records import inlined, kernel
+
+# What bears in the sections of one tooth pair: flanks, or the corner of either tooth; and its deviations.
+
+
+PARTS = 4
+"""Parts into which a slice is divided where a helical tip edge bears."""
+
+
+@kernel
+def strip_count(slices):
+    """Return how many strips the scratch holds of either sort; `layout.strip_count`."""
+    return max(1, -(-slices // (L.LANES - 1)))
+
+
+@kernel
+def copy_rows(source, target, n, want):
+    """Copy sections, without derivatives of second order unless wanted."""
+    a, b = rows_of(source), rows_of(target)
+    for r in range(a.shape[0] if want != 0 else L.VALUE_ROWS):
+        for j in range(n):
+            b[r, j] = a[r, j]
+
+
+@kernel
+def pair_sections(options, wheels, scratch, flanks, own, n, low, high, want):
+    """Choose and fill the sections of the tooth pair at work.
+
+    Parameters
+    ----------
+    options, wheels, scratch : record
+        Tables of the pair of wheels, and scratch.
+    flanks : record
+        Strip of flank-on-flank sections.
+    own : record
+        Strip that is filled if the pair differs from it.
+    n : int
+        Sections.
+    low, high : int
+        First and last section that counts.
+    want : int
+        Nonzero to fill derivatives.
+
+    Returns
+    -------
+    bool
+        Whether the pair's sections are in ``own``; else they are those in ``flanks``.
+    """
+    pair = scratch.pair
+    teeth = options.flanks != 0
+    corners_1, corners_2 = pair_kinds(options, wheels, scratch, flanks, n, low, high)
+    pair.corner_bears = 1.0 if corners_1 > 0 else 0.0
+    if corners_1 + corners_2 == 0 and not teeth:
+        return False
+    counting = high - low + 1
+    whole = corners_1 == counting or corners_2 == counting
+    if not whole:
+        copy_rows(flanks, own, n, want)
+    if corners_1 > 0:
+        pair_corners(wheels, scratch, flanks, own, n, 1, corners_1 == counting, want)
+    if corners_2 > 0:
+        pair_corners(wheels, scratch, flanks, own, n, 2, corners_2 == counting, want)
+    if teeth:
+        for j in range(low, high + 1):
+            add_deviations(options, wheels, scratch, own, j, want)
+    gap_rates(scratch.side, own, n, want)
+    return True
+
+
+@kernel
+def pair_kinds(options, wheels, scratch, flanks, n, low, high):
+    """Find what bears in each section: ``loads.kind``, and the lengths of roll at the tips in the corners' records.
+
+    Parameters
+    ----------
+    options, wheels, scratch, flanks, n, low, high
+        As in `pair_sections`.
+
+    Returns
+    -------
+    corners_1, corners_2 : int
+        Sections in which a corner of wheel 1 or 2 bears.
+    """
+    pair, loads = scratch.pair, scratch.loads
+    teeth = options.flanks != 0
+    tip_1, tip_2, shift = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll, pair.shift
+    corners_1 = 0
+    corners_2 = 0
+    for j in range(n):
+        loads.kind[j] = 0.0
+    for j in range(low, high + 1):
+        if teeth:
+            zeta = flanks.zeta[j]
+            tip_1 = tip_roll(options, wheels, wheels.wheel_1, 0, int(pair.flank_1), zeta)
+            tip_2 = tip_roll(options, wheels, wheels.wheel_2, 1, int(pair.flank_2), zeta)
+        over_1 = flanks.roll_1[j] + shift - tip_1
+        over_2 = flanks.roll_2[j] - shift - tip_2
+        if over_1 > over_2:
+            if over_1 > 0.0:
+                loads.kind[j] = 1.0
+                scratch.corner_1.roll[j] = tip_1
+                scratch.corner_1.mate_tip[j] = tip_2
+                corners_1 += 1
+        elif over_2 > 0.0:
+            loads.kind[j] = 2.0
+            scratch.corner_2.roll[j] = tip_2
+            scratch.corner_2.mate_tip[j] = tip_1
+            corners_2 += 1
+    return corners_1, corners_2
+
+
+@kernel
+def pair_corners(wheels, scratch, flanks, own, n, kind, whole, want):
+    """Fill the sections of the pair at work in which a corner of one wheel bears.
+
+    Parameters
+    ----------
+    wheels, scratch, flanks : record
+    own : record
+        Out.
+    n : int
+        Sections.
+    kind : int
+        The wheel whose corner bears, 1 or 2.
+    whole : bool
+        Whether it bears in all sections that count; the others become repetitions of one that does.
+    want : int
+        Nonzero to fill derivatives.
+    """
+    pair, loads = scratch.pair, scratch.loads
+    first, helical = kind == 1, scratch.side.twist_1 != 0.0
+    corner = scratch.corner_1 if first else scratch.corner_2
+    wheel = wheels.wheel_1 if first else wheels.wheel_2
+    f, f_mate = (pair.f_1, pair.f_2) if first else (pair.f_2, pair.f_1)
+    strip = own if whole else scratch.corners
+    reference = -1
+    for j in range(n):
+        if loads.kind[j] != kind:
+            continue
+        roll = corner.roll[j]
+        if reference >= 0 and roll == corner.roll[reference]:
+            own_mate = corner.mate_tip[j]
+            copy_corner(corner, reference, j)
+            corner.mate_tip[j] = own_mate
+        else:
+            set_corner(wheel, corner, j, f, roll)
+            reference = j
+    for j in range(n):
+        source = j if loads.kind[j] == kind else reference
+        if source != j:
+            copy_corner(corner, source, j)
+        strip.zeta[j] = flanks.zeta[source]
+    if helical:
+        set_edges(scratch.side, corner, strip, n, first)
+    corner_gaps(scratch.side, wheels, corner, strip, n, kind, f_mate, scratch.middle, scratch.lookup_1, want)
+    if whole:
+        return
+    a, b = rows_of(strip), rows_of(own)
+    mark = float(kind)
+    for r in range(a.shape[0] if want != 0 else L.VALUE_ROWS):
+        for j in range(n):
+            b[r, j] = a[r, j] if loads.kind[j] == mark else b[r, j]
+
+
+@inlined
+def between(row, j):
+    """Value of a row of the undivided slices at node ``j`` of the divided ones, on the straight line between nodes."""
+    i = min(j // PARTS, L.LANES - 2)
+    u = j / PARTS - i
+    return (1.0 - u) * row[i] + u * row[i + 1]
+
+
+@kernel
+def bending(coarse, fine, n, start):
+    """Return how much the straight lines between the nodes of undivided slices run below the gaps of divided ones.
+
+    ``start`` is the number of the first node of ``fine``, counted from the first one of ``coarse``.
+    """
+    most = 0.0
+    for j in range(n):
+        most = max(most, fine.gap[j] - between(coarse.gap, min(start + j, PARTS * (L.LANES - 1))))
+    return most
+
+
+@kernel
+def straighten(coarse, fine, strip, n, start, want):
+    """Take from a strip of divided slices by how much their flanks' gap is bent between the undivided nodes.
+
+    With this, dividing changes nothing where flanks bear on flanks, so that forces do not jump when it begins.
+
+    Parameters
+    ----------
+    coarse, fine : record
+        Flanks' gaps at the nodes of the undivided and of the divided slices.
+    strip : record
+        In, out; may be ``fine``.
+    n : int
+        Sections.
+    start : int
+        Number of the first node of ``fine``, counted from the first one of ``coarse``.
+    want : int
+        Nonzero to correct second derivatives, too.
+    """
+    for j in range(n):
+        at = min(start + j, PARTS * (L.LANES - 1))
+        strip.gap[j] += between(coarse.gap, at) - fine.gap[j]
+        for k in range(6):
+            strip.grad[k, j] += between(coarse.grad[k], at) - fine.grad[k, j]
+            if want != 0:
+                for i in range(k, 6):
+                    strip.hess[k, i, j] += between(coarse.hess[k, i], at) - fine.hess[k, i, j]
+
+
+# The contact of one tooth pair over its slices; those in which a helical tip edge bears are divided.
+
+
+@kernel
+def slice_contact(options, wheels, scratch, law, totals, want):
+    """Integrate the pressure of the pair at work over its slices, strip by strip; returns its largest penetration."""
+    depth = 0.0
+    for k in range(strips_between(scratch.side.first, scratch.side.last)):
+        node, low, high = pair_part(scratch, k)
+        if high <= low:
+            continue
+        flanks, own = strip_at(scratch, k), strip_at(scratch, strip_count(options.slices) + k)
+        if divides(options, wheels, scratch, flanks, int(low), int(high)):
+            deepest = divided_contact(options, wheels, scratch, law, flanks, own, node, low, high, totals, want)
+        else:
+            chosen = pair_sections(options, wheels, scratch, flanks, own, L.LANES, int(low), int(high), want)
+            strip = own if chosen else flanks
+            deepest = strip_contact(options, wheels, scratch, law, strip, node, low, high, totals, want)
+        depth = max(depth, deepest)
+    return depth
+
+
+@kernel
+def strip_contact(options, wheels, scratch, law, strip, node, low, high, totals, want):
+    """Add the contact of the pair at work over one strip; returns its largest penetration.
+
+    Parameters
+    ----------
+    options, wheels, scratch : record
+    law : Law
+    strip : record
+        The pair's sections.
+    node, low, high : float
+        The strip's first node, and the first and last of its nodes that count.
+    totals : record
+    want : int
+        Nonzero to add derivatives.
+    """
+    depth = strip_forces(wheels, scratch, law, strip, node, low, high, 1.0, totals, want)
+    if depth > 0.0:
+        if options.compliances != 0:
+            add_softness(scratch.sums, scratch.pair, strip, scratch.loads, L.LANES, want)
+        add_loads(options, wheels, scratch, strip, L.LANES, totals, want)
+    return depth
+
+
+@kernel
+def divides(options, wheels, scratch, flanks, low, high):
+    """Whether the slices of a strip are divided: those of perfect helical teeth where a tip edge bears.
+
+    Along a contact line that runs off the tip the gap grows as a parabola, through which the end of the line moves from
+    slice to slice.
+    """
+    if scratch.side.twist_1 == 0.0 or options.flanks != 0:
+        return False
+    corners_1, corners_2 = pair_kinds(options, wheels, scratch, flanks, L.LANES, low, high)
+    return corners_1 + corners_2 > 0
+
+
+@kernel
+def divided_contact(options, wheels, scratch, law, flanks, own, node, low, high, totals, want):
+    """Add the contact of the pair at work over one strip, each of its slices divided.
+
+    Parameters
+    ----------
+    options, wheels, scratch : record
+    law : Law
+    flanks, own : record
+        As in `pair_strips.pair_sections`.
+    node, low, high : float
+        The strip's first node, and the first and last of its nodes that count.
+    totals : record
+    want : int
+        Nonzero to add derivatives.
+
+    Returns
+    -------
+    float
+        Largest penetration.
+    """
+    side, pair, fine = scratch.side, scratch.pair, scratch.divided
+    n, parts = L.LANES, float(PARTS)
+    side.step /= parts
+    side.slices *= parts
+    pair.low *= parts
+    pair.high *= parts
+    depth = 0.0
+    first, last = parts * (node + low), parts * (node + high)
+    for k in range(strips_between(first, last)):
+        start = first + k * (n - 1)
+        count = min(last - start + 1.0, float(n))
+        set_sections(fine, n, side, start, count, scratch.middle)
+        helical_normals(side, fine, n)
+        helical_flanks(side, fine, n, want)
+        bent = 0.0
+        if side.spread != 0.0:
+            bent = bending(flanks, fine, n, int(start - parts * node))
+        if not strip_in_reach(wheels, side, pair, fine, start, int(count), bent):
+            continue
+        chosen = pair_sections(options, wheels, scratch, fine, own, n, 0, int(count) - 1, want)
+        strip = own if chosen else fine
+        if side.spread != 0.0:
+            straighten(flanks, fine, strip, n, int(start - parts * node), want)
+        gap_rates(side, strip, n, want)
+        depth = max(depth, strip_contact(options, wheels, scratch, law, strip, start, 0.0, count - 1.0, totals, want))
+    side.step *= parts
+    side.slices /= parts
+    pair.low /= parts
+    pair.high /= parts
+    return depth
+
+
+@kernel
+def pair_part(scratch, k):
+    """Return the first node of strip ``k`` and which of its nodes the pair at work may touch, from the first on."""
+    side, pair = scratch.side, scratch.pair
+    node = side.first + k * (L.LANES - 1)
+    nodes = min(side.last - node + 1.0, float(L.LANES))
+    return node, max(pair.first - node, 0.0), min(pair.last - node, nodes - 1.0)
+
+
+@kernel
+def add_loads(options, wheels, scratch, strip, n, totals, want):
+    """Add the nodal forces of the pair at work in a strip, and their friction, to the sums."""
+    side, pair, sums, loads = scratch.side, scratch.pair, scratch.sums, scratch.loads
+    totals.normal_force += wheels.secant * total_force(loads, n)
+    add_normal(sums, strip, loads, n, want)
+    if options.friction == L.FRICTION_NONE:
+        return
+    f = pair.f_1 + wheels.wheel_1.half_angle
+    if side.twist_1 != 0.0:
+        helical_points(side, scratch.corner_1, strip, loads, n, f, pair.corner_bears != 0.0, want)
+    else:
+        contact_points(side, scratch.corner_1, strip, loads, n, f, pair.corner_bears != 0.0, want)
+    add_friction(wheels, options.friction, side, sums, strip, loads, n, totals, want)
 
 
 @kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.contact.jit import kernel
+from gearmbs.kernels.records import kernel
 
 
 @kernel

@@ -5,20 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import float64, int64
 
-from gearmbs._jit import njit
 from gearmbs.contact import layout as L
-from gearmbs.contact.corners import corner_gaps, set_corner
 from gearmbs.contact.deviations import add_deviations, pair_softness, roll_under_corner, tip_roll
-from gearmbs.contact.face import end_roll, limit_value, roll_difference
-from gearmbs.contact.helical_friction import helical_points
-from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edges
-from gearmbs.contact.jit import CONTRACT, kernel
+from gearmbs.contact.gaps.corners import corner_gaps, set_corner
+from gearmbs.contact.gaps.face import end_roll, limit_value, roll_difference
+from gearmbs.contact.gaps.helical_sections import helical_flanks, helical_normals, set_edges
+from gearmbs.contact.gaps.points import contact_points, helical_points
+from gearmbs.contact.gaps.sections import flank_normals, flank_sections
 from gearmbs.contact.pair import set_pair
-from gearmbs.contact.points import contact_points
 from gearmbs.contact.pose import relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.search import face_pair, facing_teeth, open_side, set_twist, teeth_in_reach
-from gearmbs.contact.sections import flank_normals, flank_sections
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.records import CONTRACT, kernel
 
 _VEC, _MATRIX = float64[::1], float64[:, ::1]
 

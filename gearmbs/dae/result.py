@@ -4,11 +4,259 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numba import float64, int64, types
 
-from gearmbs.dae.dense_output import DenseOutput
+from gearmbs.kernels.jit import njit
+
+# Dense output: the BDF polynomials of all steps, evaluated anywhere in the span.
+
+
+_VEC = float64[::1]
+_MAT = float64[:, ::1]
+_IVEC = int64[::1]
+
+
+@njit(types.void(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def lagrange_weights(t, nodes, count, value, slope):
+    """Weights of the polynomial through ``count`` nodes, for its value and its slope at ``t``.
+
+    Parameters
+    ----------
+    t : float
+        Where the polynomial is wanted.
+    nodes : ndarray
+        Distinct times; the first ``count`` are used.
+    count : int
+        Number of nodes, one more than the degree.
+    value, slope : ndarray
+        Written in the first ``count`` places.
+    """
+    for j in range(count):
+        # value and derivative of prod_m (t - t_m)/(t_j - t_m) by the product rule
+        v = 1.0
+        d = 0.0
+        tj = nodes[j]
+        for m in range(count):
+            if m != j:
+                q = 1.0 / (tj - nodes[m])
+                d = (d * (t - nodes[m]) + v) * q
+                v *= (t - nodes[m]) * q
+        value[j] = v
+        slope[j] = d
+
+
+@njit(types.void(_VEC, _VEC, int64, _MAT, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def combine(value, slope, count, rows, first, y, yp):
+    """Write ``y = sum value[j] rows[first + j]`` and ``yp`` likewise with ``slope``."""
+    n = y.shape[0]
+    for i in range(n):
+        y[i] = value[0] * rows[first, i]
+        yp[i] = slope[0] * rows[first, i]
+    for j in range(1, count):
+        a = value[j]
+        b = slope[j]
+        for i in range(n):
+            y[i] += a * rows[first + j, i]
+            yp[i] += b * rows[first + j, i]
+
+
+@njit(types.void(_VEC, _IVEC, _IVEC, _VEC, _MAT, _MAT, _MAT), cache=True, nogil=True, error_model="numpy")
+def evaluate_many(times, ends, orders, nodes, rows, y, yp):
+    """Write value and slope at each of ``times``, on the polynomial of the step that ends in row ``ends[i]``."""
+    value = np.empty(8)
+    slope = np.empty(8)
+    for i in range(times.shape[0]):
+        k = orders[ends[i]]
+        lagrange_weights(times[i], nodes[ends[i] - k : ends[i] + 1], k + 1, value, slope)
+        combine(value, slope, k + 1, rows, ends[i] - k, y[i], yp[i])
+
+
+DENSE_LEVELS = 24
+"""Halvings of a step at most: a kink is placed within 1e-7 of it, beyond which a table would not be worth its room."""
+
+
+class Settles(Protocol):
+    """What solves for unknowns that the polynomials say nothing about."""
+
+    unknowns: np.ndarray
+    atol: np.ndarray
+    rtol: float
+
+    def __call__(self, times, ends, orders, nodes, rows, y, yp) -> None:
+        """Write y and y' at ``times``; arguments are those of `evaluate_many`."""
+        ...
+
+
+class Table:
+    """Cubic polynomials over intervals that are as short as the tolerance asks for, for some unknowns.
+
+    Parameters
+    ----------
+    unknowns : ndarray of int, shape (a,)
+    t : ndarray, shape (m,)
+        Ends of intervals, increasing.
+    left, right : ndarray, shape (m - 1, 2, a)
+        Values and slopes just inside both ends of each interval.
+    """
+
+    def __init__(self, unknowns: np.ndarray, t: np.ndarray, left: np.ndarray, right: np.ndarray) -> None:
+        self.unknowns, self.t, self.left, self.right = unknowns, t, left, right
+
+    def write(self, times: np.ndarray, y: np.ndarray, yp: np.ndarray) -> None:
+        """Write values and slopes of the unknowns at ``times``."""
+        k = np.clip(np.searchsorted(self.t, times, side="left") - 1, 0, len(self.t) - 2)
+        y[:, self.unknowns], yp[:, self.unknowns] = hermite(
+            times, self.t[k], self.t[k + 1], self.left[k], self.right[k]
+        )
+
+
+def hermite(t: np.ndarray, a: np.ndarray, b: np.ndarray, left: np.ndarray, right: np.ndarray) -> tuple[Any, Any]:
+    """Return value and slope of the cubic with values and slopes ``left`` at a, ``right`` at b, shape (m, 2, unknowns).
+
+    Returns
+    -------
+    y, yp : ndarray, shape (m, unknowns)
+    """
+    h = (b - a)[:, None]
+    s = (t - a)[:, None] / h
+    d = right[:, 0] - left[:, 0]
+    p, q = left[:, 1] * h - d, d - right[:, 1] * h
+    # Hermite's form: the chord, and s (1 - s) times what the slopes at both ends leave of it
+    y = left[:, 0] + s * d + s * (1.0 - s) * ((1.0 - s) * p + s * q)
+    yp = (d + (1.0 - 2.0 * s) * ((1.0 - s) * p + s * q) + s * (1.0 - s) * (q - p)) / h
+    return y, yp
+
+
+class DenseOutput:
+    """Piecewise polynomial through the stored points of a BDF run.
+
+    Each step of order k is the polynomial through its end point and the k points stored before it. Where the
+    stored history was rewritten (a change of coordinates, a restart, a re-interpolation) the new history
+    precedes the next step as rows of order 0.
+
+    Parameters
+    ----------
+    t : ndarray, shape (r,)
+        Times of the stored points.
+    y : ndarray, shape (r, n)
+        Values of the stored points.
+    orders : ndarray of int, shape (r,)
+        Order of the step that ends in each point, 0 for points that only serve as history.
+    between : Settles, optional
+        Solves for algebraic unknowns outside error control, about which the polynomials say nothing. It needs the
+        functions of the problem, which do not travel: a pickled solution holds a `Table` of these unknowns instead, as
+        fine as their tolerances ask for.
+    """
+
+    def __init__(self, t: np.ndarray, y: np.ndarray, orders: np.ndarray, between: Settles | None = None):
+        self._between = between
+        self._table: Table | None = None
+        self._t = np.ascontiguousarray(t, dtype=float)
+        self._y = np.ascontiguousarray(y, dtype=float)
+        self._orders = np.ascontiguousarray(orders, dtype=np.int64)
+        self._steps = np.flatnonzero(self._orders > 0)
+        self._ends = self._t[self._steps]
+        self.t_min = float(self._t[self._steps[0] - 1]) if len(self._steps) else float(self._t[0])
+        self.t_max = float(self._ends[-1]) if len(self._steps) else float(self._t[0])
+
+    def evaluate(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return y and y' at ``t``.
+
+        Parameters
+        ----------
+        t : float or ndarray, shape (m,)
+            Times within ``[t_min, t_max]``.
+
+        Returns
+        -------
+        y, yp : ndarray, shape (n,) or (m, n)
+
+        Raises
+        ------
+        ValueError
+            If a time lies outside the span of the run.
+        """
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        slack = 1e-12 * max(abs(self.t_min), abs(self.t_max))
+        if times.size and (times.min() < self.t_min - slack or times.max() > self.t_max + slack):
+            raise ValueError(
+                f"t = {times.min():g} .. {times.max():g} leaves the integrated span {self.t_min:g} .. {self.t_max:g}; "
+                "integrate further to evaluate there"
+            )
+        y = np.empty((times.size, self._y.shape[1]))
+        yp = np.empty_like(y)
+        if not len(self._steps):
+            y[:] = self._y[0]
+            yp[:] = 0.0
+        else:
+            pieces = np.minimum(np.searchsorted(self._ends, times, side="left"), len(self._steps) - 1)
+            self._evaluate_on(self._steps[pieces], times, y, yp)
+        if np.ndim(t) == 0:
+            return y[0], yp[0]
+        return y, yp
+
+    def __call__(self, t: float | np.ndarray) -> np.ndarray:
+        """Return y at ``t``, shape (n,) or (m, n)."""
+        return self.evaluate(t)[0]
+
+    def derivative(self, t: float | np.ndarray) -> np.ndarray:
+        """Return y' at ``t``, shape (n,) or (m, n)."""
+        return self.evaluate(t)[1]
+
+    def _evaluate_on(self, ends: np.ndarray, times: np.ndarray, y: np.ndarray, yp: np.ndarray) -> None:
+        """Write y and y' at times within the steps that end in the rows ``ends``."""
+        if self._between is not None:
+            self._between(times, ends, self._orders, self._t, self._y, y, yp)
+            return
+        evaluate_many(times, ends, self._orders, self._t, self._y, y, yp)
+        if self._table is not None:
+            self._table.write(times, y, yp)
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = self.__dict__.copy()
+        if self._between is not None and len(self._steps):
+            state["_table"] = self._tabulated(self._between)
+        state["_between"] = None
+        return state
+
+    def _tabulated(self, between: Settles) -> Table:
+        """Return a table of what is solved for: intervals are halved until cubics meet a tenth of the tolerance.
+
+        They are compared where they are the furthest from the values that made them, in the middle, and at a quarter.
+        """
+        columns, atol, rtol = between.unknowns, between.atol, between.rtol
+
+        def solved(times: np.ndarray, ends: np.ndarray) -> np.ndarray:
+            y, yp = np.empty((times.size, self._y.shape[1])), np.empty((times.size, self._y.shape[1]))
+            self._evaluate_on(ends, times, y, yp)
+            return np.stack((y[:, columns], yp[:, columns]), axis=1)
+
+        ends = self._steps
+        a, b = np.append(self.t_min, self._ends[:-1]), self._ends
+        left, right = solved(a, ends), solved(b, ends)
+        done: list[tuple[np.ndarray, ...]] = []
+        for level in range(DENSE_LEVELS + 1):
+            middle = 0.5 * (a + b)
+            exact = solved(middle, ends)
+            off = np.zeros(a.size, dtype=bool)
+            for t, value in ((middle, exact), (quarter := a + 0.25 * (b - a), solved(quarter, ends))):
+                cubic = hermite(t, a, b, left, right)[0]
+                off |= (np.abs(cubic - value[:, 0]) > 0.1 * (atol + rtol * np.abs(value[:, 0]))).any(axis=1)
+            if level == DENSE_LEVELS:
+                off[:] = False
+            done.append((a[~off], b[~off], left[~off], right[~off]))
+            if not off.any():
+                break
+            a, b, middle = a[off], b[off], middle[off]
+            left, right, exact = left[off], right[off], exact[off]
+            a, b, ends = np.concatenate((a, middle)), np.concatenate((middle, b)), np.tile(ends[off], 2)
+            left, right = np.concatenate((left, exact)), np.concatenate((exact, right))
+        a, b, left, right = (np.concatenate(parts) for parts in zip(*done, strict=True))
+        order = np.argsort(a)
+        return Table(columns, np.append(a[order], b.max()), left[order], right[order])
 
 
 class Status(enum.IntEnum):

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numba.core.registry import CPUDispatcher
 
 from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.integrators.options import Options
@@ -30,7 +29,7 @@ def _event_rules(events: Sequence[Callable]) -> dict[str, Any]:
     """
     direction, action, count = [], [], []
     for g in events:
-        attributes = g.py_func if isinstance(g, CPUDispatcher) else g
+        attributes = getattr(g, "py_func", g)
         direction.append(int(np.sign(getattr(attributes, "direction", 0))))
         terminal = getattr(attributes, "terminal", False)
         if isinstance(terminal, bool | np.bool_):

@@ -7,16 +7,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numba.core.registry import CPUDispatcher
+from numba.extending import is_jitted
 from scipy.sparse import csc_array, issparse
 
-from gearmbs.dae.compiled.python_callback import PythonCallback
 from gearmbs.dae.integrators import differences
 from gearmbs.dae.integrators.messages import moved_rates, unknown_name
-from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
-from gearmbs.dae.linalg.lu_plan import LUPlan
+from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import DAEProblem
+from gearmbs.kernels.pointers import PythonCallback
 
 RATES_STEP = 1e-12
 RATES_SWEEPS = 3
@@ -46,7 +45,7 @@ differences, whose entries are right to 1e-8 where the tolerance allows an incre
 
 def _takes(function: Callable, fewest: int, what: str) -> bool:
     """Return whether ``function`` takes the parameters ``p`` beside its ``fewest`` arguments."""
-    inner = function.py_func if isinstance(function, CPUDispatcher) else function
+    inner = getattr(function, "py_func", function)
     try:
         count = len(inspect.signature(inner).parameters)
     except (TypeError, ValueError):
@@ -87,7 +86,7 @@ class _UserFunctions:
 
     def residual(self, fun: Callable) -> Callable:
         takes_p = _takes(fun, 4, "the residual")
-        if isinstance(fun, CPUDispatcher):
+        if is_jitted(fun):
             return differences.adapt_residual(fun, takes_p)
         extra = (self.parameters,) if takes_p else ()
 
@@ -106,7 +105,7 @@ class _UserFunctions:
         if jac is None:
             return differences.differenced(residual)
         takes_p = _takes(jac, 5, "the Jacobian")
-        if isinstance(jac, CPUDispatcher):
+        if is_jitted(jac):
             return differences.adapt_jacobian(jac, takes_p, dense)
         extra = (self.parameters,) if takes_p else ()
         n = self.n
@@ -119,7 +118,7 @@ class _UserFunctions:
 
     def events(self, functions: Sequence[Callable]) -> Callable:
         takes_p = [_takes(g, 3, "an event function") for g in functions]
-        if all(isinstance(g, CPUDispatcher) for g in functions):
+        if all(is_jitted(g) for g in functions):
             return differences.adapt_events(list(functions), takes_p)
         extras = [(self.parameters,) if p else () for p in takes_p]
 

@@ -29,17 +29,7 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
     from gearmbs.drivetrain.errors import DrivetrainError
     from gearmbs.drivetrain.kinematics import KinematicTable
-    from gearmbs.drivetrain.loads import (
-        LOADS,
-        Brake,
-        Drag,
-        Fan,
-        Load,
-        Pump,
-        TableLoad,
-        TorqueLoad,
-        gear_pump_ripple,
-    )
+    from gearmbs.drivetrain.loads import LOADS, Brake, Drag, Fan, Load, Pump, TableLoad, TorqueLoad, gear_pump_ripple
     from gearmbs.drivetrain.parts import GearMesh, Housing, HousingMode, Mount, Shaft, Wheel
     from gearmbs.drivetrain.sensors import SENSORS, Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor
     from gearmbs.drivetrain.torque_element import ShaftTorque

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearmbs._jit import njit
 from gearmbs.drivetrain.errors import require
+from gearmbs.kernels.jit import njit
 
 STEPS_PER_PERIOD = 60
 """Steps in a period of the natural vibration, or of the excitation where that is faster."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from gearmbs.drivetrain.errors import require, told_of
 from gearmbs.drivetrain.part import Part
-from gearmbs.mechanism.elements import ForceElement
-from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.elements import ForceElement
 from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
@@ -261,7 +261,7 @@ class RollingContactBearing(Bearing):
         super().__post_init__()
         require(self.rolling is not None, f"{self.label}: rolling is missing; give a designation such as '6205'")
         from gearmbs.bearings import LooseFit
-        from gearmbs.bearings.defect_tables import as_defects
+        from gearmbs.bearings.defects import as_defects
         from gearmbs.bearings.errors import require_fields
         from gearmbs.bearings.settings import BearingSettings
 
@@ -271,7 +271,7 @@ class RollingContactBearing(Bearing):
             BearingSettings(bearing=self.rolling, **{**self.settings, "defects": on_rings})
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
-        from gearmbs.bearings.loose import add_bearing
+        from gearmbs.bearings.element import add_bearing
 
         add_bearing(m, self.name, shaft, seat, self.rolling, **self.settings)
 

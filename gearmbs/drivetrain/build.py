@@ -3,22 +3,246 @@
 from __future__ import annotations
 
 import warnings
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.drivetrain.attached import Attached
 from gearmbs.drivetrain.bearings import Bearing
-from gearmbs.drivetrain.errors import told_of
+from gearmbs.drivetrain.couplings import Coupling
+from gearmbs.drivetrain.drives import Drive
+from gearmbs.drivetrain.errors import DrivetrainError, require, told_of
+from gearmbs.drivetrain.kinematics import walk
+from gearmbs.drivetrain.loads import Load
+from gearmbs.drivetrain.part import Attached, Part
 from gearmbs.drivetrain.parts import Housing, Shaft, Wheel, turn_z
-from gearmbs.drivetrain.placement import Layout
+from gearmbs.drivetrain.placement import Layout, Seat, order, seats
+from gearmbs.drivetrain.sensors import Accelerometer, Laser, SpeedSensor, TorqueSensor
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.mechanism.mechanism import Mechanism
-from gearmbs.mechanism.modal import Mode
-from gearmbs.mechanism.parts import Body, Marker
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.modal import Mode
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
+
+# What cannot be, found before anything is compiled.
+
+
+MM = 1e3
+COAXIAL = 1e-6
+HELD = 1e-9
+"""Part of the largest singular value below which a motion counts as free."""
+
+
+def check(train: Drivetrain) -> None:
+    """Check a drivetrain; see :class:`gearmbs.drivetrain.Drivetrain` for what is refused.
+
+    Raises
+    ------
+    DrivetrainError
+        One line that names the part, the value and the remedy.
+    """
+    if not train.shafts:
+        raise DrivetrainError(f"{train.name}: there are no shafts; give at least one")
+    _names(train)
+    _stations(train)
+    _ = train.speeds
+    _driven(train)
+    pairs = train.pairs
+    places, _ = seats(train, pairs)
+    _groups(train)
+    for shaft in train.shafts:
+        _held(train, shaft)
+    _collisions(train, places)
+
+
+def _names(train: Drivetrain) -> None:
+    """Every name a part gives must be that of a part of the right kind."""
+    attached: tuple[Any, ...] = (*train.wheels, *train.bearings, *train.drives, *train.loads)
+    for part in attached:
+        train.part(part.shaft, Shaft, part.label)
+        on = getattr(part, "on", None)
+        if on is not None and on != "ground":
+            found: Part = train.part(on, None, part.label)
+            require(
+                isinstance(found, Housing | Shaft),
+                f"{part.label}: on is '{on}', a {found.title}; give a housing, a shaft or 'ground'",
+            )
+            require(on != part.shaft, f"{part.label}: on is its own shaft '{on}'; give another part or 'ground'")
+    for mesh in train.meshes:
+        driver, driven = train.wheels_of(mesh)
+        require(driver.shaft != driven.shaft, f"{mesh.label}: both wheels are on shaft '{driver.shaft}'")
+    for coupling in train.couplings:
+        require(
+            coupling.first != coupling.second, f"{coupling.label}: first and second are one shaft, '{coupling.first}'"
+        )
+    for sensor in train.sensors:
+        if isinstance(sensor, Laser | SpeedSensor):
+            train.part(sensor.shaft, Shaft, sensor.label)
+        elif isinstance(sensor, TorqueSensor):
+            source: Part = train.part(sensor.of, None, sensor.label)
+            require(
+                isinstance(source, Coupling | Load | Drive),
+                f"{sensor.label}: of is '{sensor.of}', a {source.title}; give a coupling, load or drive",
+            )
+        elif isinstance(sensor, Accelerometer):
+            bearing = train.part(sensor.bearing, Bearing, sensor.label)
+            require(
+                isinstance(train.parts.get(train.carrier(bearing)), Housing),
+                f"{sensor.label}: the seat of '{bearing.name}' is on {train.carrier(bearing)!r}, which "
+                "an accelerometer cannot be on; give a housing",
+            )
+    for housing in train.housings:
+        for mode in housing.modes:
+            for place in mode.shape:
+                train.part(place, Bearing, mode.label)
+
+
+def _stations(train: Drivetrain) -> None:
+    parts: tuple[Any, ...] = (*train.wheels, *train.bearings, *train.drives, *train.loads)
+    for part in (*parts, *(s for s in train.sensors if isinstance(s, Laser))):
+        length = train.part(part.shaft, Shaft).length
+        if part.station is not None:
+            require(
+                -1e-12 <= part.station <= length * (1.0 + 1e-12),
+                f"{part.label}: station {MM * part.station:.6g} mm is not on shaft '{part.shaft}', which is "
+                f"{MM * length:.6g} mm long",
+            )
+
+
+def _driven(train: Drivetrain) -> None:
+    """Every load must be on a train with a drive, and every mesh."""
+    reached: set[str] = set()
+    for drive in train.drives:
+        reached.add(drive.shaft)
+        for link, _ in walk(train, drive.shaft):
+            reached |= {link.first, link.second}
+    for load in train.loads:
+        carried = load.shaft in reached or (load.nominal(0.0) == 0.0 and load.on in reached)
+        require(
+            carried,
+            f"{load.label}: nothing carries its torque: shaft '{load.shaft}' is joined to no drive; "
+            "give a drive, a mesh or a coupling",
+        )
+    for mesh in train.meshes:
+        driver, _ = train.wheels_of(mesh)
+        require(
+            driver.shaft in reached,
+            f"{mesh.label}: nothing turns it: shaft '{driver.shaft}' is joined to no drive; give one",
+        )
+
+
+def _groups(train: Drivetrain) -> None:
+    """Parts of a drivetrain that are not placed by each other need places of their own."""
+    placed = {(tie.second if forward else tie.first) for tie, forward, new in order(train) if new}
+    free = [s.name for s in train.shafts if s.name not in placed and s.position is None]
+    if len(free) > 1 or (free and any(s.position is not None for s in train.shafts if s.name not in placed)):
+        raise DrivetrainError(
+            f"{train.name}: shafts {', '.join(map(repr, free))} are not joined: the chain is open; join them by meshes "
+            "or couplings, or give all but one of them a position"
+        )
+
+
+def _held(train: Drivetrain, shaft: Shaft) -> None:
+    """The bearings of a shaft must hold its five motions but the rotation, alone or through rigid couplings."""
+    group = {shaft.name}
+    for coupling in train.couplings:
+        if coupling.kind == "rigid" and group & {coupling.first, coupling.second}:
+            group |= {coupling.first, coupling.second}
+    if len(group) > 1:
+        return
+    mine = [b for b in train.bearings if b.shaft == shaft.name]
+    require(bool(mine), f"{shaft.label}: nothing holds it; give it a bearing")
+    ideal = [b for b in mine if b.kind == "ideal"]
+    require(
+        len(ideal) <= 2,
+        f"{shaft.label}: {len(ideal)} ideal bearings hold it more than once, so that their forces are not determined; "
+        "give two of them, or elastic ones",
+    )
+    rows = []
+    for bearing in mine:
+        z = train.station(bearing) - 0.5 * shaft.length
+        # a tilt moves the point: x by tilt y times z, y by minus tilt x times z
+        point = np.eye(5)
+        point[0, 4], point[1, 3] = z, -z
+        held = bearing.holds(len(ideal)) @ point
+        size = np.abs(held).max()
+        rows.append(held / (size if size > 0.0 else 1.0))
+    _, sizes, motions = np.linalg.svd(np.vstack(rows))
+    sizes = np.concatenate([sizes, np.zeros(5 - sizes.size)])
+    if sizes[-1] < HELD * sizes[0]:
+        names = ("move across it", "move across it", "move along its axis", "tilt", "tilt")
+        free = names[int(np.argmax(np.abs(motions[-1])))]
+        raise DrivetrainError(
+            f"{shaft.label}: its bearings {', '.join(repr(b.name) for b in mine)} leave it free to {free}; "
+            "add a bearing, or stiffness in that direction"
+        )
+
+
+def _collisions(train: Drivetrain, places: dict[str, Seat]) -> None:
+    """No wheel may run through a shaft or a wheel it does not mesh with."""
+    for wheel in train.wheels:
+        for shaft in train.shafts:
+            if shaft.name != wheel.shaft:
+                _wheel_and_shaft(train, wheel, shaft, places)
+    meshing = {frozenset((m.driver, m.driven)) for m in train.meshes}
+    for one, two in combinations(train.wheels, 2):
+        if one.shaft != two.shaft and frozenset((one.name, two.name)) not in meshing:
+            _wheel_and_wheel(train, one, two, places)
+    for shaft in train.shafts:
+        _wheels_of_one_shaft(train, shaft)
+
+
+def _between(a: Seat, b: Seat, point: np.ndarray) -> tuple[float, float]:
+    """Return the distance of a point of axis a from axis b, and the place along b."""
+    way = b.axes[:, 2]
+    apart = point - b.origin
+    along = float(apart @ way)
+    return float(np.linalg.norm(apart - along * way)), along
+
+
+def _wheel_and_shaft(train: Drivetrain, wheel: Wheel, shaft: Shaft, places: dict[str, Seat]) -> None:
+    mine, other = places[wheel.shaft], places[shaft.name]
+    distance, along = _between(mine, other, mine.at(train.station(wheel)))
+    if distance < COAXIAL or wheel.gear.sign < 0:
+        return
+    half = 0.5 * wheel.gear.face_width
+    start = 0.0
+    for length, radius in shaft.cylinders:
+        overlap = min(along + half, start + length) - max(along - half, start)
+        if overlap > COAXIAL and distance < wheel.gear.tip_radius + radius:
+            raise DrivetrainError(
+                f"{wheel.label}: it runs through shaft '{shaft.name}': the axes are {MM * distance:.6g} mm apart, its "
+                f"tip radius {MM * wheel.gear.tip_radius:.6g} mm and the shaft's radius {MM * radius:.6g} mm; make the "
+                "shaft shorter or thinner, or turn the direction of a mesh"
+            )
+        start += length
+
+
+def _wheel_and_wheel(train: Drivetrain, one: Wheel, two: Wheel, places: dict[str, Seat]) -> None:
+    a, b = places[one.shaft], places[two.shaft]
+    distance, along = _between(a, b, a.at(train.station(one)))
+    apart = abs(along - train.station(two))
+    if min(one.gear.sign, two.gear.sign) < 0 or apart >= 0.5 * (one.gear.face_width + two.gear.face_width):
+        return
+    if distance < one.gear.tip_radius + two.gear.tip_radius:
+        raise DrivetrainError(
+            f"{one.label}: it runs through wheel '{two.name}' without a mesh: the axes are {MM * distance:.6g} mm "
+            "apart; give a mesh, move a station, or turn the direction of a mesh"
+        )
+
+
+def _wheels_of_one_shaft(train: Drivetrain, shaft: Shaft) -> None:
+    mine = sorted((w for w in train.wheels if w.shaft == shaft.name), key=train.station)
+    for one, two in pairwise(mine):
+        free = train.station(two) - train.station(one) - 0.5 * (one.gear.face_width + two.gear.face_width)
+        require(
+            free > -COAXIAL,
+            f"{two.label}: its face overlaps wheel '{one.name}' on shaft '{shaft.name}' by {-MM * free:.4g} mm; "
+            "move its station",
+        )
+
 
 SAME_POINT = 1e-9
 

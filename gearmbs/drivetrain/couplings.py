@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from gearmbs.dae.equations.force_elements import Diagnostic
-from gearmbs.drivetrain.attached import Attached
+from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.errors import require
-from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.part import Attached, Part
 from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
 from gearmbs.units import Quantity
 

@@ -11,16 +11,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.dae.equations import constraint_terms as terms
-from gearmbs.dae.equations.force_elements import Diagnostic
-from gearmbs.drivetrain.attached import Attached, fixed_value, over_time, share_of
+from gearmbs.dae.equations.constraints import terms
+from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.curves import slopes
 from gearmbs.drivetrain.errors import DrivetrainError, require
-from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, share_of
 from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque
-from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.functions import as_function, constant, polyline_integral, ramp, step
-from gearmbs.mechanism.joints import Joint, Row, Term
+from gearmbs.mechanism.parts.elements import State
+from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
+from gearmbs.mechanism.parts.joints import Joint, Row, Term
 from gearmbs.units import Quantity
 
 SLIP = (Diagnostic("slip", "1"),)

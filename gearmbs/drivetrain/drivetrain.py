@@ -14,15 +14,13 @@ from gearmbs.drivetrain.couplings import Coupling
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.drivetrain.loads import Load
-from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.part import Part, parts_html
 from gearmbs.drivetrain.parts import GearMesh, Housing, Shaft, Wheel
 from gearmbs.drivetrain.sensors import Sensor
-from gearmbs.drivetrain.show import parts_html
 
 if TYPE_CHECKING:
-    from gearmbs.drivetrain.kinematics import KinematicTable
+    from gearmbs.drivetrain.kinematics import KinematicTable, PowerFlow
     from gearmbs.drivetrain.placement import Layout
-    from gearmbs.drivetrain.power import PowerFlow
     from gearmbs.drivetrain.torsional import MeshDynamics, TorsionalModel, TorsionalSpring
     from gearmbs.gears.spec import GearSpec
     from gearmbs.mechanism.mechanism import Mechanism
@@ -111,7 +109,7 @@ class Drivetrain:
                 known[part.name] = part
         object.__setattr__(self, "parts", known)
         require(self.run_up > 0.0, f"{self.name}: run_up is {self.run_up:g} s; it must be positive")
-        from gearmbs.drivetrain.checks import check
+        from gearmbs.drivetrain.build import check
 
         check(self)
 
@@ -180,14 +178,14 @@ class Drivetrain:
     @cached_property
     def speeds(self) -> dict[str, float]:
         """Operating speed of each shaft about its own z axis, rad/s; zero for those that nothing drives."""
-        from gearmbs.drivetrain.power import operating_speeds
+        from gearmbs.drivetrain.kinematics import operating_speeds
 
         return operating_speeds(self)
 
     @cached_property
     def power(self) -> PowerFlow:
         """Torques that the meshes and couplings transmit at the operating point, and who pushes."""
-        from gearmbs.drivetrain.power import power_flow
+        from gearmbs.drivetrain.kinematics import power_flow
 
         return power_flow(self)
 
@@ -264,7 +262,7 @@ class Drivetrain:
             are counted twice in wheels without a bore.
         """
         from gearmbs.drivetrain.build import build
-        from gearmbs.drivetrain.power import warn_of_lost_torques, warn_of_weak_drives
+        from gearmbs.drivetrain.kinematics import warn_of_lost_torques, warn_of_weak_drives
 
         warn_of_weak_drives(self)
         warn_of_lost_torques(self)

@@ -10,14 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.dae.equations.force_elements import DISSIPATED, Diagnostic
-from gearmbs.drivetrain.attached import Attached, fixed_value, over_time, share_of
+from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
 from gearmbs.drivetrain.curves import slopes
 from gearmbs.drivetrain.errors import require
-from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, share_of
 from gearmbs.drivetrain.torque_element import FROM_LOST, FROM_OWN, ShaftTorque
-from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.functions import TimeFunction, as_function, constant
+from gearmbs.mechanism.parts.elements import State
+from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.units import Quantity
 
 

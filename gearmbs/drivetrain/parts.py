@@ -13,8 +13,8 @@ import numpy as np
 
 from gearmbs.drivetrain.errors import require, told_of
 from gearmbs.drivetrain.part import Part
+from gearmbs.gears.contact_model import ContactLaw, FlankFriction
 from gearmbs.gears.ideal_mesh import IdealMesh
-from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
 from gearmbs.units import Quantity, doubt_of_density

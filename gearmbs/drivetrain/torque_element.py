@@ -7,10 +7,103 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numba import types
 
-from gearmbs.dae.equations.force_elements import DISSIPATED, STORED, Diagnostic
-from gearmbs.mechanism.elements import Compiled, ForceElement, State
-from gearmbs.mechanism.functions import TimeFunction
+from gearmbs.dae.equations.kinematics.update import angle_gradient, counted_angle
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, DISSIPATED, FORCE_SIG, FRAME_A, FRAME_W, STORED, Diagnostic
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import F8, VEC, caller
+from gearmbs.kernels.structs import vector_at
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
+from gearmbs.mechanism.parts.functions import TimeFunction
+
+# The kernel of all torques about a shaft's axis: geometry here, the law of the torque through an address.
+#
+# With the counted angle a of marker I about z_J, the relative speed w = (w_I - w_J) . z_J and one state z at most, a
+# law gives T(t, a, w, z) and z' = R(t, a, w, z) with their partial derivatives. The torque on I's body is N = T z_J,
+# and
+#
+#     dN = z_J dT + dpi_J x N,    dT = T_a da + T_w dw + T_z dz,
+#     dw = z_J . (dw_I - dw_J) + dpi_J . (z_J x (w_I - w_J)).
+
+
+LAW_SIG = types.void(VEC, F8, F8, F8, VEC, VEC, VEC)
+"""law(parameters, t, angle, speed, times, states, out); angle in rad, speed in rad/s."""
+
+TORQUE, BY_ANGLE, BY_SPEED, BY_STATE = 0, 1, 2, 3
+"""Places in ``out``: the torque on I (N m) and its derivatives."""
+STORED_TORQUE, LOST, TOLD = 4, 5, 6
+"""Energy stored (J), power dissipated (W), and one quantity of the law's own."""
+RATE, RATE_BY_ANGLE, RATE_BY_SPEED, RATE_BY_STATE = 7, 8, 9, 10
+"""The state's rate and its derivatives."""
+OUT_SIZE = 11
+
+TIMES = 1
+"""Place among the integers: how many functions of time are inputs."""
+COUNTS_ANGLE = 2
+"""Whether the law looks at the angle."""
+FIRST_TOLD = 3
+"""Place in ``out`` of the first diagnostic; the others follow."""
+WORK = OUT_SIZE + 9
+
+law_at = caller(LAW_SIG)
+
+
+@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
+def shaft_torque(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
+    """Write a torque about z_J by the law whose address is ``ints[0]``.
+
+    Arguments as in `gearmbs.dae.equations.loads.forces`; inputs are functions of time, then, if the law looks at the
+    angle, the reference of AZ.
+    """
+    out, z, w = work[0:OUT_SIZE], work[OUT_SIZE : OUT_SIZE + 3], work[OUT_SIZE + 3 : OUT_SIZE + 6]
+    speed = 0.0
+    for q in range(3):
+        z[q] = frames[1, FRAME_A + 3 * q + 2]
+        w[q] = frames[0, FRAME_W + q] - frames[1, FRAME_W + q]
+        speed += w[q] * z[q]
+    times = vector_at(inputs, 0, ints[TIMES])
+    angle = 0.0
+    if ints[COUNTS_ANGLE]:
+        angle = counted_angle(2, frames[0], frames[1], inputs[ints[TIMES]])
+    for q in range(OUT_SIZE):
+        out[q] = 0.0
+    law_at(ints[0])(reals, t, angle, speed, times, states, out)
+    for q in range(3):
+        wrench[0, 3 + q] = out[TORQUE] * z[q]
+    if states.size:
+        rates[0] = out[RATE]
+    for q in range(min(RATE - ints[FIRST_TOLD], diagnostics.size)):
+        diagnostics[q] = out[ints[FIRST_TOLD] + q]
+    if not want & DERIVATIVES:
+        return
+    if ints[COUNTS_ANGLE]:
+        angle_gradient(2, frames[0], frames[1], work, OUT_SIZE + 6)
+    else:
+        for q in range(3):
+            work[OUT_SIZE + 6 + q] = 0.0
+    for q in range(3):
+        q1, q2 = (q + 1) % 3, (q + 2) % 3
+        turn, tilt = work[OUT_SIZE + 6 + q], z[q1] * w[q2] - z[q2] * w[q1]
+        for r in range(3):
+            jac[3 + r, 3 + q] = z[r] * out[BY_ANGLE] * turn
+            jac[3 + r, 9 + q] = z[r] * out[BY_SPEED] * z[q]
+            jac[3 + r, 15 + q] = z[r] * (out[BY_SPEED] * tilt - out[BY_ANGLE] * turn)
+            jac[3 + r, 21 + q] = -z[r] * out[BY_SPEED] * z[q]
+        if states.size:
+            jac[3 + q, 24] = z[q] * out[BY_STATE]
+            jac[6, 3 + q] = out[RATE_BY_ANGLE] * turn
+            jac[6, 9 + q] = out[RATE_BY_SPEED] * z[q]
+            jac[6, 15 + q] = out[RATE_BY_SPEED] * tilt - out[RATE_BY_ANGLE] * turn
+            jac[6, 21 + q] = -out[RATE_BY_SPEED] * z[q]
+    if states.size:
+        jac[6, 24] = out[RATE_BY_STATE]
+    for q in range(3):
+        # dpi_J x N
+        q1, q2 = (q + 1) % 3, (q + 2) % 3
+        jac[3 + q1, 15 + q2] += wrench[0, 3 + q]
+        jac[3 + q2, 15 + q1] -= wrench[0, 3 + q]
+
 
 FROM_STORED, FROM_LOST, FROM_OWN = 4, 5, 6
 """Values of ``first_told``: all three, without the energy, the law's own quantity alone."""
@@ -69,8 +162,6 @@ class ShaftTorque(ForceElement):
 
     def compiled(self) -> Compiled:
         from importlib import import_module
-
-        from gearmbs.drivetrain.torque_kernel import LAW_SIG, WORK, shaft_torque
 
         module, _, name = self.law.partition(".")
         law: Any = getattr(import_module(f"gearmbs.drivetrain.laws.{module}"), name)

@@ -5,32 +5,31 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.flexible.ansys import read_ansys
     from gearmbs.flexible.beam import BeamSection, shear_coefficient
-    from gearmbs.flexible.bodies import box_housing, planet_carrier, thin_rimmed_wheel
-    from gearmbs.flexible.check import ModelReport, check_model
-    from gearmbs.flexible.damping import damping_ratios
-    from gearmbs.flexible.errors import FlexibleError
+    from gearmbs.flexible.check import ModelReport, ReductionReport, check_model, check_reduction
     from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
-    from gearmbs.flexible.interfaces import Interface
+    from gearmbs.flexible.files.ansys import read_ansys
+    from gearmbs.flexible.files.matrices import from_matrices, read_abaqus, read_calculix, read_nodes
+    from gearmbs.flexible.files.mnf import ModalNeutralFile, mnf_of, read_mnf, write_mnf
+    from gearmbs.flexible.files.nastran import read_op2, read_op4
+    from gearmbs.flexible.files.nastran_modes import read_op2_modes, read_op2_stresses
+    from gearmbs.flexible.interfaces import BodySurface, Interface
     from gearmbs.flexible.large_beam import BeamChain, LargeBeam, add_beam
-    from gearmbs.flexible.material import ElasticMaterial
-    from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix
-    from gearmbs.flexible.matrix_text import read_nodes
-    from gearmbs.flexible.mnf import mnf_of, read_mnf, write_mnf
-    from gearmbs.flexible.mnf_content import ModalNeutralFile
-    from gearmbs.flexible.modal_model import ModalModel
-    from gearmbs.flexible.nastran import read_op2, read_op4
-    from gearmbs.flexible.nastran_modes import read_op2_modes
-    from gearmbs.flexible.nastran_stress import read_op2_stresses
+    from gearmbs.flexible.material import ElasticMaterial, FlexibleError, damping_ratios
+    from gearmbs.flexible.modal_model import ModalModel, Seat
     from gearmbs.flexible.reduction import reduce_model
-    from gearmbs.flexible.reduction_check import ReductionReport, check_reduction
     from gearmbs.flexible.rotor import Campbell, Rotor, Support, UnbalanceResponse, WhirlModes
-    from gearmbs.flexible.seats import Seat
     from gearmbs.flexible.shaft import Disc, Shaft, ShaftSection
-    from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
+    from gearmbs.flexible.solid import (
+        block_mesh,
+        box_housing,
+        nodes_where,
+        planet_carrier,
+        ring_mesh,
+        solid_model,
+        thin_rimmed_wheel,
+    )
     from gearmbs.flexible.stress import StressModes
-    from gearmbs.flexible.surface import BodySurface
 
 __all__ = [
     "BeamChain",
@@ -88,21 +87,21 @@ late(
     {
         "BeamChain": ".large_beam",
         "BeamSection": ".beam",
-        "BodySurface": ".surface",
+        "BodySurface": ".interfaces",
         "Campbell": ".rotor",
         "Disc": ".shaft",
         "ElasticMaterial": ".material",
         "FiniteElementModel": ".fe_model",
-        "FlexibleError": ".errors",
+        "FlexibleError": ".material",
         "Interface": ".interfaces",
         "LargeBeam": ".large_beam",
         "MassProperties": ".fe_model",
         "ModalModel": ".modal_model",
-        "ModalNeutralFile": ".mnf_content",
+        "ModalNeutralFile": ".files.mnf",
         "ModelReport": ".check",
-        "ReductionReport": ".reduction_check",
+        "ReductionReport": ".check",
         "Rotor": ".rotor",
-        "Seat": ".seats",
+        "Seat": ".modal_model",
         "Shaft": ".shaft",
         "ShaftSection": ".shaft",
         "StressModes": ".stress",
@@ -111,28 +110,28 @@ late(
         "WhirlModes": ".rotor",
         "add_beam": ".large_beam",
         "block_mesh": ".solid",
-        "box_housing": ".bodies",
+        "box_housing": ".solid",
         "check_model": ".check",
-        "check_reduction": ".reduction_check",
-        "damping_ratios": ".damping",
-        "from_matrices": ".matrices",
-        "mnf_of": ".mnf",
+        "check_reduction": ".check",
+        "damping_ratios": ".material",
+        "from_matrices": ".files.matrices",
+        "mnf_of": ".files.mnf",
         "nodes_where": ".solid",
-        "planet_carrier": ".bodies",
-        "read_abaqus": ".matrices",
-        "read_ansys": ".ansys",
-        "read_calculix": ".matrices",
-        "read_mnf": ".mnf",
-        "read_nodes": ".matrix_text",
-        "read_op2": ".nastran",
-        "read_op2_modes": ".nastran_modes",
-        "read_op2_stresses": ".nastran_stress",
-        "read_op4": ".nastran",
+        "planet_carrier": ".solid",
+        "read_abaqus": ".files.matrices",
+        "read_ansys": ".files.ansys",
+        "read_calculix": ".files.matrices",
+        "read_mnf": ".files.mnf",
+        "read_nodes": ".files.matrices",
+        "read_op2": ".files.nastran",
+        "read_op2_modes": ".files.nastran_modes",
+        "read_op2_stresses": ".files.nastran_modes",
+        "read_op4": ".files.nastran",
         "reduce_model": ".reduction",
         "ring_mesh": ".solid",
         "shear_coefficient": ".beam",
         "solid_model": ".solid",
-        "thin_rimmed_wheel": ".bodies",
-        "write_mnf": ".mnf",
+        "thin_rimmed_wheel": ".solid",
+        "write_mnf": ".files.mnf",
     },
 )

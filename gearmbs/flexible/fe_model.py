@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearmbs.flexible.beam import Slices
-from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.stress import StressRecovery
 
 LARGE = 100.0

@@ -19,9 +19,9 @@ import scipy.linalg
 
 from gearmbs._shown import Written
 from gearmbs.flexible.beam import DOFS
-from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.shaft import Shaft
-from gearmbs.mechanism.quantities import quantities, quantity
+from gearmbs.mechanism.parts.quantities import quantities, quantity
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity
 

@@ -20,12 +20,11 @@ from gearmbs.flexible.beam import (
     geometric_stiffness,
     section_shapes,
 )
-from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
-from gearmbs.flexible.material import STEEL, ElasticMaterial
-from gearmbs.flexible.stress_recovery import ShaftStresses
-from gearmbs.flexible.surface import outline_of
-from gearmbs.mechanism.quantities import quantity
+from gearmbs.flexible.interfaces import outline_of
+from gearmbs.flexible.material import STEEL, ElasticMaterial, FlexibleError
+from gearmbs.flexible.stress import ShaftStresses
+from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.units import Quantity
 
 if TYPE_CHECKING:

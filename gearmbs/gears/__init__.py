@@ -7,15 +7,14 @@ from gearmbs._lazy import late
 if TYPE_CHECKING:
     from gearmbs.gears import faults
     from gearmbs.gears.contact_element import GearContact
-    from gearmbs.gears.contact_model import ContactModel
-    from gearmbs.gears.elastic_ring import ElasticRim, RimModes, RingMeshes
+    from gearmbs.gears.contact_model import ContactLaw, ContactModel, FlankFriction
     from gearmbs.gears.geometry import PairGeometry, Placement
     from gearmbs.gears.ideal_mesh import IdealMesh
-    from gearmbs.gears.laws import ContactLaw, FlankFriction
-    from gearmbs.gears.operating_point import OperatingPoint
+    from gearmbs.gears.mesh import OperatingPoint
     from gearmbs.gears.pair import GearPair
-    from gearmbs.gears.planetary_rig import Support, planetary_mechanism
-    from gearmbs.gears.planetary_set import PlanetarySet, planetary
+    from gearmbs.gears.planetary.elastic_ring import ElasticRim, RimModes, RingMeshes
+    from gearmbs.gears.planetary.planetary_set import PlanetarySet, planetary
+    from gearmbs.gears.planetary.rig import Support, planetary_mechanism
     from gearmbs.gears.spec import GearSpec, Material, involute
     from gearmbs.gears.transmission import TransmissionError, kinematic_transmission_error, loaded_transmission_error
 
@@ -48,28 +47,28 @@ __all__ = [
 late(
     __name__,
     {
-        "ContactLaw": ".laws",
+        "ContactLaw": ".contact_model",
         "ContactModel": ".contact_model",
-        "ElasticRim": ".elastic_ring",
-        "FlankFriction": ".laws",
+        "ElasticRim": ".planetary.elastic_ring",
+        "FlankFriction": ".contact_model",
         "GearContact": ".contact_element",
         "GearPair": ".pair",
         "GearSpec": ".spec",
         "IdealMesh": ".ideal_mesh",
         "Material": ".spec",
-        "OperatingPoint": ".operating_point",
+        "OperatingPoint": ".mesh",
         "PairGeometry": ".geometry",
         "Placement": ".geometry",
-        "PlanetarySet": ".planetary_set",
-        "RimModes": ".elastic_ring",
-        "RingMeshes": ".elastic_ring",
-        "Support": ".planetary_rig",
+        "PlanetarySet": ".planetary.planetary_set",
+        "RimModes": ".planetary.elastic_ring",
+        "RingMeshes": ".planetary.elastic_ring",
+        "Support": ".planetary.rig",
         "TransmissionError": ".transmission",
         "faults": ".faults:",
         "involute": ".spec",
         "kinematic_transmission_error": ".transmission",
         "loaded_transmission_error": ".transmission",
-        "planetary": ".planetary_set",
-        "planetary_mechanism": ".planetary_rig",
+        "planetary": ".planetary.planetary_set",
+        "planetary_mechanism": ".planetary.rig",
     },
 )

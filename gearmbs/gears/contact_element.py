@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.equations.force_elements import COUNT, DISSIPATED, STORED, Diagnostic
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
+from gearmbs.dae.problem import ModelError
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import pack
-from gearmbs.mechanism.elements import Compiled, ForceElement, StartOverlap
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, StartOverlap
 from gearmbs.units import shown
 
 DEEP = 0.02
@@ -23,7 +23,7 @@ DEEP = 0.02
 def contact_kernels() -> tuple[Any, tuple[Any, Any]]:
     """Return the kernel of the force, and that of the contact below it with its signature; they are imported now."""
     from gearmbs.contact import GEAR_CONTACT_SIG, gear_contact
-    from gearmbs.contact.force_kernel import contact_force
+    from gearmbs.contact.kernel import contact_force
 
     return contact_force, (gear_contact, GEAR_CONTACT_SIG)
 

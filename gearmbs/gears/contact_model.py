@@ -3,16 +3,196 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field
 from typing import Literal
 
 from gearmbs._shown import Written
-from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry
-from gearmbs.gears.laws import ContactLaw, FlankFriction
+from gearmbs.gears.modifications import Fault
 from gearmbs.gears.spec import require
-from gearmbs.units import shown
+from gearmbs.units import Quantity, shown, to_si
+
+# Contact and friction laws as users define them; the compiled forms are in ``gearmbs.contact.laws``.
+
+
+LawKind = Literal["impact", "hunt-crossley", "linear", "hertz"]
+
+DAMPING_RATIO = 0.07
+"""Of a mesh where none is given: the geometric mean of 0.03 and 0.17, the range commonly quoted in the literature on
+gear dynamics for meshes of steel gears. It is a convention, no measurement of the gears at hand: their own ratio, if
+known, is the one to give, and amplitudes at a resonance are in inverse proportion to it."""
+RATIO_DEPTH = 2e-6
+"""Penetration, m, at which the damping by a ratio is fully on: what a tooth pair yields under 25 to 30 N/mm, less than
+gears carry; below it damping falls to nothing, so that flanks meet without a blow."""
+
+
+@dataclass(frozen=True)
+class ContactLaw(Written):
+    """Normal force of one tooth pair over its face, against penetration and its rate.
+
+    Use the class methods; each states its own formula. ``stiffness`` and ``damping`` refer to the whole face of a
+    pair of parallel wheels whose faces stand opposite, that of the narrower one, and are distributed evenly over it:
+    what an axial shift takes out of mesh is missing.
+
+    Attributes
+    ----------
+    kind : {"impact", "hunt-crossley", "linear", "hertz"}
+    stiffness : float or str
+        K, N/m^exponent.
+    exponent : float
+    damping : float or str
+        C, N s/m; for Hunt-Crossley the factor on the penetration rate, s/m.
+    depth : float or str
+        Penetration at which the damping is fully on, m.
+    """
+
+    kind: LawKind
+    stiffness: Quantity
+    exponent: float
+    damping: Quantity
+    depth: Quantity
+
+    def __post_init__(self) -> None:
+        rate = "s/m" if self.kind == "hunt-crossley" else "N*s/m"
+        for name, unit in (("stiffness", f"N/m^{self.exponent!r}"), ("damping", rate), ("depth", "length")):
+            object.__setattr__(self, name, to_si(getattr(self, name), unit, f"ContactLaw.{name}"))
+        for name, low in (("stiffness", 0.0), ("exponent", 0.0), ("depth", 0.0)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > low):
+                raise ValueError(f"ContactLaw.{name} is {value}; it must be positive and finite")
+        if not (math.isfinite(self.damping) and self.damping >= 0):
+            raise ValueError(f"ContactLaw.damping is {self.damping}; it must not be negative")
+        if self.exponent < 1:
+            raise ValueError(
+                f"ContactLaw.exponent is {self.exponent}; below 1 the stiffness is infinite at first touch"
+            )
+
+    def __str__(self) -> str:
+        """Law, stiffness and damping in a line, in the units of a drawing."""
+        if self.kind == "hunt-crossley":
+            damping = f"Hunt-Crossley factor {self.damping:.4g} s/m"
+        elif self.damping == 0.0:
+            damping = "no damping"
+        else:
+            damping = f"damping {1e-3 * self.damping:.4g} N s/mm, fully on at {1e6 * self.depth:.4g} um"
+        unit = "N/mm" if self.exponent == 1.0 else f"N/mm^{self.exponent:.4g}"
+        return f"{self.kind}, {self.stiffness * 1e-3**self.exponent:.5g} {unit} a tooth pair, {damping}"
+
+    @classmethod
+    def impact(
+        cls,
+        stiffness: Quantity = "2.9852e5 N/mm^1.3",
+        exponent: float = 1.3,
+        damping: Quantity = None,
+        depth: Quantity = "0.1 mm",
+    ) -> ContactLaw:
+        """ADAMS's IMPACT, the paper's eq. (10)-(11): ``max(0, K x^e + C STEP(x, 0, 0, d, 1) dx/dt)``.
+
+        Parameters
+        ----------
+        stiffness : float or str
+            K in N/m^e, or text such as ``"2.9852e5 N/mm^1.3"``.
+        exponent : float
+            e.
+        damping : float or str, optional
+            C; default 0.001 of the stiffness, taken as the paper and ADAMS do: the number of K in N/mm^e times 0.001
+            is the number of C in N s/mm.
+        depth : float or str
+            d, the penetration of full damping.
+        """
+        k = to_si(stiffness, f"N/m^{exponent!r}", "ContactLaw.stiffness")
+        c = 0.001 * k * 1e-3**exponent * 1e3 if damping is None else to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("impact", k, float(exponent), c, to_si(depth, "length", "ContactLaw.depth"))
+
+    @classmethod
+    def hunt_crossley(
+        cls, stiffness: Quantity = "2.9852e5 N/mm^1.3", exponent: float = 1.3, factor: Quantity = "0.5 s/m"
+    ) -> ContactLaw:
+        """Hunt and Crossley's law ``max(0, K x^e (1 + c dx/dt))``; c is about 1.5 (1 - restitution) / impact speed."""
+        k = to_si(stiffness, f"N/m^{exponent!r}", "ContactLaw.stiffness")
+        return cls("hunt-crossley", k, float(exponent), to_si(factor, "s/m", "ContactLaw.factor"), 1.0)
+
+    @classmethod
+    def linear(cls, stiffness: Quantity, damping: Quantity = 0.0, depth: Quantity = "0.1 mm") -> ContactLaw:
+        """A linear spring per tooth pair with IMPACT's damping."""
+        k = to_si(stiffness, "N/m", "ContactLaw.stiffness")
+        c = to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("linear", k, 1.0, c, to_si(depth, "length", "ContactLaw.depth"))
+
+    @classmethod
+    def hertz_line(
+        cls,
+        face_width: Quantity = "20 mm",
+        youngs_modulus: Quantity = "2.07e5 MPa",
+        poisson_ratio: float = 0.29,
+        damping: Quantity = 0.0,
+        depth: Quantity = "0.1 mm",
+    ) -> ContactLaw:
+        """Line contact of two cylinders by Palmgren's formula, with IMPACT's damping.
+
+        ``x = 3.84e-5 F^0.9 / b^0.8`` (mm, N) for steel of 206 GPa and 0.3, scaled by the reduced modulus to the power
+        -0.9: F = K x^(10/9), independent of the flanks' curvature.
+        """
+        width = to_si(face_width, "length", "ContactLaw.face_width")
+        modulus = to_si(youngs_modulus, "Pa", "ContactLaw.youngs_modulus") / (1 - poisson_ratio**2)
+        relative = modulus / (206e9 / (1 - 0.3**2))
+        k = ((width * 1e3) ** 0.8 / 3.84e-5) ** (10 / 9) * relative * 1e3 ** (10 / 9)
+        c = to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("hertz", k, 10 / 9, c, to_si(depth, "length", "ContactLaw.depth"))
+
+
+@dataclass(frozen=True)
+class FlankFriction(Written):
+    """Coulomb friction between flanks, regularised in the sliding speed.
+
+    Parameters
+    ----------
+    static, dynamic : float
+        Coefficients; the static one is usually the larger.
+    static_speed, dynamic_speed : float or str
+        Speeds of full static and of dynamic friction (ADAMS law); the smooth law uses ``dynamic`` and the first.
+    kind : {"adams", "smooth", "none"}
+
+    Warns
+    -----
+    UserWarning
+        If the static coefficient of the ADAMS law is below the dynamic one.
+    """
+
+    static: float = 0.1
+    dynamic: float = 0.05
+    static_speed: Quantity = "100 mm/s"
+    dynamic_speed: Quantity = "1000 mm/s"
+    kind: Literal["adams", "smooth", "none"] = "adams"
+
+    def __post_init__(self) -> None:
+        for name in ("static_speed", "dynamic_speed"):
+            object.__setattr__(self, name, to_si(getattr(self, name), "speed", f"FlankFriction.{name}"))
+        for name in ("static", "dynamic"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0 <= value <= 2):
+                raise ValueError(f"FlankFriction.{name} is {value}; give 0 to 2")
+        if not 0 < self.static_speed < self.dynamic_speed:
+            raise ValueError(
+                f"FlankFriction.static_speed is {self.static_speed} m/s and dynamic_speed {self.dynamic_speed} m/s; "
+                "the first must be positive and below the second"
+            )
+        if self.kind not in ("adams", "smooth", "none"):
+            raise ValueError(f"FlankFriction.kind is {self.kind!r}; choose 'adams', 'smooth' or 'none'")
+        if self.kind == "adams" and self.static < self.dynamic:
+            warnings.warn(
+                f"FlankFriction.static is {self.static:g}, below dynamic {self.dynamic:g}: friction would grow where "
+                "flanks slide faster; are they exchanged? Give static as much as dynamic, or more",
+                stacklevel=3,
+            )
+
+    @classmethod
+    def none(cls) -> FlankFriction:
+        """No friction."""
+        return cls(kind="none")
+
 
 TILTED_SLICES = 11
 """Slices along the face where the gap varies linearly along it: tilted axes or faces that are not opposite."""

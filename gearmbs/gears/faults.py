@@ -12,13 +12,22 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.gears.fault import Fault, Flank
 from gearmbs.gears.geometry import PairGeometry
-from gearmbs.gears.iso1328 import random_pitch, tolerances
-from gearmbs.gears.modifications import Crowning, EndRelief, FlankMap, LeadCorrection, RootRelief, TipRelief
+from gearmbs.gears.modifications import (
+    Crowning,
+    EndRelief,
+    Fault,
+    Flank,
+    FlankMap,
+    LeadCorrection,
+    RootRelief,
+    TipRelief,
+    ToothDeviations,
+    random_pitch,
+    tolerances,
+)
 from gearmbs.gears.spec import require
 from gearmbs.gears.stiffness import Crack, pair_stiffness
-from gearmbs.gears.tooth_deviations import ToothDeviations
 from gearmbs.units import Quantity
 
 __all__ = [

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs._shown import Written
-from gearmbs.dae.equations.force_elements import DISSIPATED, STORED, Diagnostic
-from gearmbs.gears.contact_model import ContactModel
-from gearmbs.gears.fault import Fault
+from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED, Diagnostic
+from gearmbs.gears.contact_model import DAMPING_RATIO, ContactLaw, ContactModel, FlankFriction
 from gearmbs.gears.geometry import PairGeometry, Placement
-from gearmbs.gears.laws import DAMPING_RATIO, ContactLaw, FlankFriction
-from gearmbs.gears.operating_point import OperatingPoint
+from gearmbs.gears.mesh import OperatingPoint
+from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import convert_fields, require
 from gearmbs.gears.tables import pack
-from gearmbs.mechanism.elements import Compiled, ForceElement
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
-    from gearmbs.mechanism.parts import Marker
+    from gearmbs.mechanism.parts.bodies import Marker
 
 POINTS = 64
 """Least number of points of the tables over a mesh cycle."""
@@ -133,7 +132,7 @@ class IdealMesh(Written):
         stiffness : float or str
             Along the normal, N/m.
         ratio : float, optional
-            zeta; default `gearmbs.gears.laws.DAMPING_RATIO`, 0.07.
+            zeta; default `gearmbs.gears.contact_model.DAMPING_RATIO`, 0.07.
         **others
             Further fields of `IdealMesh`.
         """

@@ -5,16 +5,215 @@ They are described as faults are, and combine with them; see `gearmbs.gears.faul
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, ClassVar
+import math
+from dataclasses import asdict, dataclass, fields
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from gearmbs.gears.fault import Fault, Flank
+from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
-from gearmbs.gears.spec import require
-from gearmbs.gears.tooth_deviations import ToothDeviations
+from gearmbs.gears.settings import choice, real, switch, tooth_numbers, whole
+from gearmbs.gears.spec import GearSpec, convert_fields, require
 from gearmbs.units import Quantity, shown, to_si
+
+# Deviations of the tooth flanks of one wheel, to which every fault adds its own; packed into the contact tables.
+
+
+PROFILE_POINTS = 65
+FACE_SECTIONS = 33
+COMPLIANCE_POINTS = 65
+
+
+class ToothDeviations:
+    """Deviations of every tooth flank of one wheel.
+
+    Material missing from a flank, along its normal, is positive. Flank 0 is the one at the counter-clockwise side of
+    its tooth, seen against the wheel's axis; flank 1 the other.
+
+    Attributes
+    ----------
+    gear : GearSpec
+    drive : int
+        The flank that carries the load.
+    roll_length : ndarray, shape (ns,)
+        Points of the profile from the base circle (of an internal wheel: from the root) to the tip, by their length of
+        roll, m.
+    section : ndarray, shape (nz,)
+        Transverse sections along the face, from mid-face, m.
+    offset : ndarray, shape (2, z)
+        Constant material missing per flank, m.
+    shape : ndarray, shape (2, z, nz, ns)
+        Material missing over face and profile, m.
+    tip : ndarray, shape (2, z, nz)
+        Length of roll where the flank ends at the tip, m.
+    compliance : ndarray, shape (2, z, nc)
+        Compliance added to a tooth pair, relative to a healthy pair's, at `compliance_roll_length`.
+    compliance_roll_length : ndarray, shape (nc,)
+        Lengths of roll on this wheel, m.
+    """
+
+    def __init__(self, gear: GearSpec, rotation: int, along_face: bool, compliance_roll_length: np.ndarray) -> None:
+        z = gear.teeth
+        nz = FACE_SECTIONS if along_face else 2
+        self.gear = gear
+        self.drive = 0 if rotation > 0 else 1
+        start = gear.form_roll_length if gear.internal else 0.0
+        self.roll_length = np.linspace(start, gear.tip_roll_length, PROFILE_POINTS)
+        self.section = np.linspace(-0.5, 0.5, nz) * gear.face_width
+        self.offset = np.zeros((2, z))
+        self.shape = np.zeros((2, z, nz, PROFILE_POINTS))
+        self.tip = np.full((2, z, nz), gear.tip_roll_length)
+        self.compliance_roll_length = compliance_roll_length
+        self.compliance = np.zeros((2, z, compliance_roll_length.size))
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Radii of the points of the profile, m."""
+        return np.hypot(self.gear.base_radius, self.roll_length)
+
+    def flanks(self, which: str) -> list[int]:
+        """Flank numbers of ``"drive"``, ``"coast"`` or ``"both"``."""
+        choices = {"drive": [self.drive], "coast": [1 - self.drive], "both": [0, 1]}
+        if which not in choices:
+            raise ValueError(f"flank is {which!r}; choose 'drive', 'coast' or 'both'")
+        return choices[which]
+
+    def normal_angle(self, flank: int) -> np.ndarray:
+        """Direction of the outward normal in the wheel's frame, rad, shape (z, ns)."""
+        side = 1 - 2 * flank
+        middle = 2 * math.pi * np.arange(self.gear.teeth)[:, None] / self.gear.teeth
+        turned = self.gear.sign * self.roll_length / self.gear.base_radius
+        tangent = middle + side * (self.gear.base_half_angle - turned)
+        return tangent + side * 0.5 * math.pi
+
+    def shift(self, x: np.ndarray | float, y: np.ndarray | float) -> None:
+        """Displace the whole toothing by (x, y) in the wheel's frame, m; arrays run along the face."""
+        x = np.broadcast_to(np.asarray(x, dtype=float), self.section.shape)
+        y = np.broadcast_to(np.asarray(y, dtype=float), self.section.shape)
+        lead = (self.gear.twist_tangent / self.gear.base_radius * self.section)[None, :, None]
+        for flank in (0, 1):
+            angle = self.normal_angle(flank)[:, None, :] + lead
+            self.shape[flank] -= x[:, None] * np.cos(angle) + y[:, None] * np.sin(angle)
+
+    def shorten(self, tooth: int, radius: np.ndarray) -> None:
+        """Cut both flanks of a tooth at these radii along the face, m."""
+        roll_length = np.sqrt(np.maximum(radius**2 - self.gear.base_radius**2, 0.0))
+        # a shorter tooth ends at a larger radius where teeth point inwards
+        shorter = np.maximum if self.gear.internal else np.minimum
+        self.tip[:, tooth] = shorter(self.tip[:, tooth], roll_length)
+
+    def tooth_list(self, teeth: object) -> list[int]:
+        """Tooth numbers from ``"all"``, one number or several; numbers wrap around the wheel."""
+        if isinstance(teeth, str):
+            if teeth != "all":
+                raise ValueError(f"teeth is {teeth!r}; give 'all', a tooth number or several")
+            return list(range(self.gear.teeth))
+        numbers = [teeth] if isinstance(teeth, int) else list(teeth)  # type: ignore[call-overload]
+        return [int(n) % self.gear.teeth for n in numbers]
+
+
+# What all faults of teeth share: a wheel, a severity, a label, checked settings.
+
+
+Wheel = Literal["driver", "driven"]
+Flank = Literal["drive", "coast", "both"]
+
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "wheel": ("driver", "driven"),
+    "flank": ("drive", "coast", "both"),
+    "end": (1, -1),
+}
+COAST_ALIASES = {"back": "coast"}
+"""The former name of the coast flank, still understood."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault(Written):
+    """What all faults share.
+
+    Parameters
+    ----------
+    wheel : {"driver", "driven"}
+        The wheel that has it.
+
+    Raises
+    ------
+    ValueError
+        For a setting of the wrong kind; the message names the field, its value and what would do. What a wheel must
+        fit, such as a length along its face, is found when the fault is applied to its wheel.
+    """
+
+    label: ClassVar[str] = "fault"
+    units: ClassVar[dict[str, str]] = {}
+    least: ClassVar[dict[str, int]] = {}
+    along_face: ClassVar[bool] = False
+
+    wheel: Wheel = "driver"
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        for item in fields(self):
+            value, place = getattr(self, item.name), f"{name}.{item.name}"
+            if item.name in self.units:
+                require(value is not None or item.default is None, f"{place} is None; give a number")
+            elif item.name in CHOICES:
+                value = COAST_ALIASES.get(value, value) if item.name == "flank" and isinstance(value, str) else value
+                value = choice(value, place, CHOICES[item.name])
+            elif item.name == "teeth":
+                value = tooth_numbers(value, place)
+            elif isinstance(item.default, bool):
+                value = switch(value, place)
+            elif isinstance(item.default, int):
+                value = whole(value, place, self.least.get(item.name))
+            elif isinstance(item.default, float):
+                value = real(value, place)
+            object.__setattr__(self, item.name, value)
+        try:
+            convert_fields(self, self.units, name)
+        except TypeError as error:
+            raise ValueError(str(error)) from None
+        for key in self.units:
+            value = getattr(self, key)
+            require(value is None or math.isfinite(value), f"{name}.{key} is {value}; give a finite number")
+
+    def check_teeth(self, count: int) -> None:
+        """Refuse teeth that a wheel of so many teeth does not have; negative numbers count from its last.
+
+        Raises
+        ------
+        ValueError
+            Naming the field, the tooth and those that there are.
+        """
+        for name in ("tooth", "teeth"):
+            numbers = getattr(self, name, ())
+            for tooth in (numbers,) if isinstance(numbers, int) else () if isinstance(numbers, str) else numbers:
+                require(
+                    -count <= tooth < count,
+                    f"{type(self).__name__}.{name} is {tooth}; the {self.wheel} wheel has teeth 0 to {count - 1}",
+                )
+
+    @property
+    def severity(self) -> float:
+        """Size of the fault, by its own main parameter."""
+        return float(getattr(self, next(iter(self.units))))
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Label, severity and all parameters, for storing beside results."""
+        return {"label": self.label, "severity": self.severity, **asdict(self)}
+
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
+        """Add what the fault does to the deviations of its wheel.
+
+        Parameters
+        ----------
+        deviations : ToothDeviations
+            Of the wheel that has the fault.
+        pair : PairGeometry
+            The pair it is in.
+        """
+        raise TypeError(f"{type(self).__name__} does not say what it does to a tooth")
 
 
 def _require_removal(relief: Fault, amount: Quantity) -> None:
@@ -230,3 +429,71 @@ class FlankMap(Fault):
         shape = (1 - share) * profiles[places - 1] + share * profiles[places]
         for flank in deviations.flanks(self.flank):
             deviations.shape[flank, deviations.tooth_list(self.teeth)] += shape
+
+
+# Flank tolerances of ISO 1328-1:2013 and random deviations that just meet them.
+#
+# The tolerances are the standard's formulas for grade A (1 to 11), in metres, unrounded.
+
+
+MICRON = 1e-6
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Tolerances of one wheel, m.
+
+    Attributes
+    ----------
+    single_pitch, total_pitch : float
+        f_pT and F_pT.
+    profile_slope, profile_form : float
+        f_HalphaT and f_falphaT.
+    lead_slope, lead_form : float
+        f_HbetaT and f_fbetaT.
+    """
+
+    single_pitch: float
+    total_pitch: float
+    profile_slope: float
+    profile_form: float
+    lead_slope: float
+    lead_form: float
+
+
+def tolerances(gear: GearSpec, grade: int) -> Tolerances:
+    """Tolerances of a wheel for an ISO 1328-1:2013 grade.
+
+    Raises
+    ------
+    ValueError
+        For grades outside 1 to 11.
+    """
+    require(isinstance(grade, int) and 1 <= grade <= 11, f"grade is {grade!r}; ISO 1328-1 has grades 1 to 11")
+    d, m, b = 2e3 * gear.pitch_radius, 1e3 * gear.module, 1e3 * gear.face_width
+    step = math.sqrt(2) ** (grade - 5) * MICRON
+    return Tolerances(
+        single_pitch=(0.001 * d + 0.4 * m + 5) * step,
+        total_pitch=(0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12) * step,
+        profile_slope=(0.001 * d + 0.4 * m + 4) * step,
+        profile_form=(0.55 * m + 5) * step,
+        lead_slope=(0.05 * math.sqrt(d) + 0.35 * math.sqrt(b) + 4) * step,
+        lead_form=(0.07 * math.sqrt(d) + 0.45 * math.sqrt(b) + 4) * step,
+    )
+
+
+def random_pitch(gear: GearSpec, grade: int, generator: np.random.Generator) -> np.ndarray:
+    """Index deviations of all teeth (cumulative pitch), m, shape (z,), that use up the grade's pitch tolerances.
+
+    A once-per-revolution run-out and a random part, scaled so that neither the single pitch deviations nor the total
+    exceed their tolerances and the nearer of the two is met.
+    """
+    limit = tolerances(gear, grade)
+    z = gear.teeth
+    angle = 2 * math.pi * np.arange(z) / z
+    index = math.sin(1.0) * np.sin(angle + generator.uniform(0, 2 * math.pi))
+    noise = np.cumsum(generator.normal(size=z)) / math.sqrt(z)
+    index = index + noise - noise[-1] * np.arange(1, z + 1) / z
+    index -= index.mean()
+    single = np.abs(np.diff(np.append(index, index[0]))).max()
+    return index * min(limit.single_pitch / single, limit.total_pitch / np.ptp(index))

@@ -11,11 +11,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from gearmbs._shown import Shown
-from gearmbs.gears.contact_model import ContactModel, varying_along_face
-from gearmbs.gears.fault import Fault
+from gearmbs.gears.contact_model import (
+    DAMPING_RATIO,
+    RATIO_DEPTH,
+    ContactLaw,
+    ContactModel,
+    FlankFriction,
+    varying_along_face,
+)
 from gearmbs.gears.geometry import PairGeometry, Placement
-from gearmbs.gears.laws import DAMPING_RATIO, RATIO_DEPTH, ContactLaw, FlankFriction
-from gearmbs.gears.operating_point import OperatingPoint
+from gearmbs.gears.mesh import OperatingPoint
+from gearmbs.gears.modifications import Fault
 from gearmbs.gears.reach import fillet_clearance
 from gearmbs.gears.show import pair_html, pair_table
 from gearmbs.gears.spec import GearSpec, require
@@ -25,7 +31,7 @@ from gearmbs.units import Quantity, shown, to_si
 
 if TYPE_CHECKING:
     from gearmbs.gears.contact_element import GearContact
-    from gearmbs.mechanism.parts import Marker
+    from gearmbs.mechanism.parts.bodies import Marker
 
 
 @dataclass(frozen=True)
@@ -320,7 +326,7 @@ class GearPair(PairGeometry, Shown):
             ``iso``: the mean over a mesh cycle is ISO 6336-1's c_gamma. ``iso single``: each tooth pair has c'.
             ``potential-energy``: it varies along the path. Or a number: of a tooth pair, N/m.
         damping_ratio : float, optional
-            See `with_linear_stiffness`; default `gearmbs.gears.laws.DAMPING_RATIO`, 0.07.
+            See `with_linear_stiffness`; default `gearmbs.gears.contact_model.DAMPING_RATIO`, 0.07.
 
         Raises
         ------

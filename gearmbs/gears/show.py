@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from gearmbs.gears.spec import GearSpec
 
-
 SIZES = (
     ("module", "module"),
     ("pitch radius", "pitch_radius"),

@@ -29,9 +29,9 @@ import numpy as np
 
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
-from gearmbs.gears.rim import SHEAR, rim_compliance
+from gearmbs.gears.modifications import COMPLIANCE_POINTS
+from gearmbs.gears.planetary.rim import SHEAR, rim_compliance
 from gearmbs.gears.spec import GearSpec
-from gearmbs.gears.tooth_deviations import COMPLIANCE_POINTS
 
 POINTS = 200  # stations of the beam from root to tip
 # Sainsot's fits: coefficients of 1/theta^2, h^2, h/theta, 1/theta, h, 1
@@ -117,7 +117,7 @@ class ToothCompliance:
         Length of roll of the loaded point, m.
     bending, shear, axial, foundation : ndarray
     rim : ndarray
-        Of a ring's rim between its bolts, 0 where it is held all around; see `gearmbs.gears.rim`.
+        Of a ring's rim between its bolts, 0 where it is held all around; see `gearmbs.gears.planetary.rim`.
     depth : ndarray
         Distance of the loaded point from the tooth's middle line along the normal, m.
     """

@@ -11,10 +11,10 @@ from gearmbs.contact import layout as L
 from gearmbs.gears.contact_model import ContactModel
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, ToothDeviations
 from gearmbs.gears.reach import corner_reach
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
-from gearmbs.gears.tooth_deviations import COMPLIANCE_POINTS, PROFILE_POINTS, ToothDeviations
 
 LAWS = {
     "impact": L.LAW_IMPACT,

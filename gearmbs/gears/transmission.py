@@ -13,8 +13,8 @@ import numpy as np
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.contact_model import varying_along_face
 from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.modifications import FACE_SECTIONS
 from gearmbs.gears.tables import most_pairs, pack
-from gearmbs.gears.tooth_deviations import FACE_SECTIONS
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity, to_si
 

@@ -6,13 +6,11 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.identify.cases import CaseProblem, compare_models, identify
-    from gearmbs.identify.errors import IdentifyError
     from gearmbs.identify.experiments import rank_experiments
     from gearmbs.identify.fit import fit
-    from gearmbs.identify.identifiability import Identifiability
+    from gearmbs.identify.identifiability import Identifiability, Surrogate, posterior
     from gearmbs.identify.measured import harmonic_table
-    from gearmbs.identify.parameters import Free
-    from gearmbs.identify.posterior import Surrogate, posterior
+    from gearmbs.identify.parameters import Free, IdentifyError
     from gearmbs.identify.result import Fit
 
 __all__ = [
@@ -37,13 +35,13 @@ late(
         "Fit": ".result",
         "Free": ".parameters",
         "Identifiability": ".identifiability",
-        "IdentifyError": ".errors",
-        "Surrogate": ".posterior",
+        "IdentifyError": ".parameters",
+        "Surrogate": ".identifiability",
         "compare_models": ".cases",
         "fit": ".fit:fit",
         "harmonic_table": ".measured",
         "identify": ".cases",
-        "posterior": ".posterior:posterior",
+        "posterior": ".identifiability:posterior",
         "rank_experiments": ".experiments",
     },
 )

@@ -16,12 +16,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gearmbs.identify.differences import SIMULATION_STEP, central, noise_of_columns, steps
-from gearmbs.identify.errors import IdentifyError
-from gearmbs.identify.fit import fit
+from gearmbs.identify.fit import SIMULATION_STEP, central, fit, noise_of_columns, steps
 from gearmbs.identify.identifiability import LIMIT, Identifiability
 from gearmbs.identify.measured import check_table
-from gearmbs.identify.parameters import Free, Scale
+from gearmbs.identify.parameters import Free, IdentifyError, Scale
 from gearmbs.identify.result import Fit
 from gearmbs.units import to_si
 
@@ -79,7 +77,7 @@ class CaseProblem:
         workers: int = 1,
     ) -> None:
         from gearmbs.studies import Case as CaseClass
-        from gearmbs.studies.limits import HARMONICS
+        from gearmbs.studies.case.limits import HARMONICS
 
         self.table = check_table(measured)
         if isinstance(cases, CaseClass):
@@ -397,7 +395,7 @@ def _in_si(item: Free | str, cases: Mapping[str, Case]) -> Free:
 
 def _field(path: str, cases: Mapping[str, Case]) -> tuple[float, str]:
     """Return the value and the SI unit of a number of a case, whose name may stand before the path."""
-    from gearmbs.studies.case import units_of_fields
+    from gearmbs.studies.case.case import units_of_fields
 
     owner, _, place = path.rpartition(":")
     if owner and owner not in cases:

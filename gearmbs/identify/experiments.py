@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.identify.cases import CaseProblem
-from gearmbs.identify.errors import IdentifyError
+from gearmbs.identify.parameters import IdentifyError
 from gearmbs.progress import staged
 
 if TYPE_CHECKING:

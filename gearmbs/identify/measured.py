@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gearmbs.identify.errors import IdentifyError
+from gearmbs.identify.parameters import IdentifyError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gearmbs.identify.errors import IdentifyError
+# The error of identification.
+
+
+class IdentifyError(ValueError):
+    """A fit that cannot be made; the message names what is wrong and the remedy."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.identify.errors import IdentifyError
+from gearmbs.identify.parameters import IdentifyError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.dae.equations.force_elements import Diagnostic
-    from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
-    from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
-    from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
+    from gearmbs.dae.equations.loads.forces import Diagnostic
+    from gearmbs.dae.problem import AssemblyError, ModelError, SingularModelError
+    from gearmbs.mechanism.forces.friction import JointFriction
     from gearmbs.mechanism.forces.modal_force import add_modal_force
-    from gearmbs.mechanism.friction_parameters import JointFriction
-    from gearmbs.mechanism.functions import (
+    from gearmbs.mechanism.mechanism import Mechanism
+    from gearmbs.mechanism.parts.bodies import Body, Marker
+    from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Load, State, Torque
+    from gearmbs.mechanism.parts.functions import (
         TimeFunction,
         constant,
         curve,
@@ -24,11 +25,10 @@ if TYPE_CHECKING:
         ramp,
         step,
     )
-    from gearmbs.mechanism.joints import Joint
-    from gearmbs.mechanism.mechanism import Mechanism
-    from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals
-    from gearmbs.mechanism.parts import Body, Marker
-    from gearmbs.mechanism.simulate import simulate
+    from gearmbs.mechanism.parts.joints import Joint
+    from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals
+    from gearmbs.mechanism.solve.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
+    from gearmbs.mechanism.solve.simulate import simulate
 
 __all__ = [
     "AssemblyError",
@@ -70,39 +70,39 @@ __all__ = [
 late(
     __name__,
     {
-        "AssemblyError": "gearmbs.dae.errors",
-        "Body": ".parts",
-        "Compiled": ".elements",
-        "Diagnostic": "gearmbs.dae.equations.force_elements",
-        "ForceElement": ".elements",
-        "Joint": ".joints",
-        "JointFriction": ".friction_parameters",
-        "Load": ".elements",
-        "Marker": ".parts",
+        "AssemblyError": "gearmbs.dae.problem",
+        "Body": ".parts.bodies",
+        "Compiled": ".parts.elements",
+        "Diagnostic": "gearmbs.dae.equations.loads.forces",
+        "ForceElement": ".parts.elements",
+        "Joint": ".parts.joints",
+        "JointFriction": ".forces.friction",
+        "Load": ".parts.elements",
+        "Marker": ".parts.bodies",
         "Mechanism": ".mechanism",
-        "ModalBody": ".modal",
-        "Mode": ".modal",
-        "ModelError": "gearmbs.dae.errors",
-        "ShapeIntegrals": ".modal",
-        "SingularModelError": "gearmbs.dae.errors",
-        "State": ".elements",
-        "TimeFunction": ".functions",
-        "Torque": ".elements",
+        "ModalBody": ".parts.modal",
+        "Mode": ".parts.modal",
+        "ModelError": "gearmbs.dae.problem",
+        "ShapeIntegrals": ".parts.modal",
+        "SingularModelError": "gearmbs.dae.problem",
+        "State": ".parts.elements",
+        "TimeFunction": ".parts.functions",
+        "Torque": ".parts.elements",
         "add_modal_force": ".forces.modal_force",
-        "constant": ".functions",
-        "curve": ".functions",
-        "curve_integral": ".functions",
-        "polyline": ".functions",
-        "polyline_integral": ".functions",
-        "expression": ".functions",
-        "harmonic": ".functions",
-        "kinematic": ".analyses",
-        "linear_modes": ".analyses",
-        "polynomial": ".functions",
-        "quasi_static": ".analyses",
-        "ramp": ".functions",
-        "simulate": ".simulate",
-        "static_equilibrium": ".analyses",
-        "step": ".functions",
+        "constant": ".parts.functions",
+        "curve": ".parts.functions",
+        "curve_integral": ".parts.functions",
+        "polyline": ".parts.functions",
+        "polyline_integral": ".parts.functions",
+        "expression": ".parts.functions",
+        "harmonic": ".parts.functions",
+        "kinematic": ".solve.analyses",
+        "linear_modes": ".solve.analyses",
+        "polynomial": ".parts.functions",
+        "quasi_static": ".solve.analyses",
+        "ramp": ".parts.functions",
+        "simulate": ".solve.simulate",
+        "static_equilibrium": ".solve.analyses",
+        "step": ".parts.functions",
     },
 )

@@ -10,23 +10,19 @@ import numpy.typing as npt
 
 from gearmbs._shown import Shown
 from gearmbs.dae.equations.expressions import SplineData
-from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.system import System
-from gearmbs.mechanism import joints as jt
-from gearmbs.mechanism.elements import ForceElement, Load, State, Torque
-from gearmbs.mechanism.expression_syntax import Units
-from gearmbs.mechanism.forces.friction_force import FrictionForce
-from gearmbs.mechanism.forces.function_force import FunctionForce, function_force
-from gearmbs.mechanism.friction import add_friction, friction_of
-from gearmbs.mechanism.functions import TimeFunction, as_function
-from gearmbs.mechanism.geometry import Vector, frame_along, vector
-from gearmbs.mechanism.given import keeps_given
-from gearmbs.mechanism.joint_methods import JointMethods
-from gearmbs.mechanism.load_methods import Expression, LoadMethods
-from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
-from gearmbs.mechanism.parts import Body, Marker, make_body
-from gearmbs.mechanism.quantities import quantity
-from gearmbs.mechanism.user_functions import UserFunction
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.building.methods import Expression, JointMethods, LoadMethods
+from gearmbs.mechanism.forces.friction import FrictionForce, add_friction, friction_of
+from gearmbs.mechanism.forces.functions import FunctionForce, function_force
+from gearmbs.mechanism.language.syntax import Units
+from gearmbs.mechanism.language.user_functions import UserFunction
+from gearmbs.mechanism.parts import joints as jt
+from gearmbs.mechanism.parts.bodies import Body, Marker, Vector, frame_along, make_body, vector
+from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
+from gearmbs.mechanism.parts.functions import TimeFunction, as_function
+from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
+from gearmbs.mechanism.parts.quantities import keeps_given, quantity
 
 E = TypeVar("E", bound=ForceElement)
 
@@ -61,7 +57,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
     ----------
     redundancy : {"declared", "adams"}
         Which of redundant constraint rows are kept: those added first, or as in ADAMS, see
-        `gearmbs.mechanism.redundancy`. Only their reactions depend on it.
+        `gearmbs.mechanism.checks`. Only their reactions depend on it.
     lump : bool
         Whether `simulate` integrates bodies fixed to each other as one unless told otherwise; default False.
     turns : dict of (str, str, str) to float
@@ -150,7 +146,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         """Add a body that deforms by modes; its markers move and turn with their shapes.
 
         Deformations are small: displacements are linear in the modal coordinates. The equations are those of
-        `gearmbs.dae.equations.modal_inertia` and `gearmbs.dae.equations.elastic_frames`.
+        `gearmbs.dae.equations.bodies.inertia` and `gearmbs.dae.equations.bodies.frames`.
 
         Parameters
         ----------
@@ -228,7 +224,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         return self.add(pair.contact_element(name, i, j))
 
     def add(self, element: E) -> E:
-        """Add a force element made elsewhere, of a class derived from `gearmbs.mechanism.elements.ForceElement`.
+        """Add a force element made elsewhere, of a class derived from `gearmbs.mechanism.parts.elements.ForceElement`.
 
         Raises
         ------
@@ -373,14 +369,14 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         name : str
             Letters, digits and underscores; not that of a function that expressions have.
         function, partials, count
-            See `gearmbs.mechanism.user_functions.UserFunction`.
+            See `gearmbs.mechanism.language.user_functions.UserFunction`.
 
         Raises
         ------
         ModelError
             If the name is taken or none.
         """
-        from gearmbs.mechanism.expression_library import known_functions
+        from gearmbs.mechanism.language.library import known_functions
 
         key = name.upper()
         if not name.isidentifier() or key in self.functions or key in known_functions():
@@ -424,25 +420,25 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         ModelError
             If the mechanism has no bodies, or an expression cannot be read.
         """
-        from gearmbs.mechanism.compile import compile_mechanism
+        from gearmbs.mechanism.building.compile import compile_mechanism
 
         return compile_mechanism(self, t0)
 
     def simulate(self, t_end: float, **options):
         """Integrate from 0 to ``t_end`` seconds; see :func:`gearmbs.mechanism.simulate`."""
-        from gearmbs.mechanism.simulate import simulate
+        from gearmbs.mechanism.solve.simulate import simulate
 
         return simulate(self, t_end, **options)
 
     def linear_modes(self, **options):
         """Return the natural frequencies and mode shapes; see :func:`gearmbs.mechanism.linear_modes`."""
-        from gearmbs.mechanism.analyses import linear_modes
+        from gearmbs.mechanism.solve.analyses import linear_modes
 
         return linear_modes(self, **options)
 
     def measures(self, solution):
         """Return what can be measured on a solution of this mechanism; its methods offer it by name."""
-        from gearmbs.mechanism.measures import Measures
+        from gearmbs.mechanism.solve.measures import Measures
 
         return Measures(self, solution)
 

@@ -1,6 +1,6 @@
 """From a trajectory or a measurement to orders, GMF bands, averages and indicators.
 
-A signal is an `xarray.DataArray` with dimensions (time, channel); see `gearmbs.signals.signal`.
+A signal is an `xarray.DataArray` with dimensions (time, channel); see `gearmbs.signals.signal.signal`.
 """
 
 from typing import TYPE_CHECKING
@@ -8,26 +8,20 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.signals.analysis import AnalysisOptions, analyse, analyse_file
-    from gearmbs.signals.analysis_report import AnalysisReport
-    from gearmbs.signals.angular import angular_resample, order_spectrum, time_synchronous_average
-    from gearmbs.signals.bands import band_rms, gmf_rms, order_rms, rms
-    from gearmbs.signals.bearing_diagnosis import diagnose_bearing
-    from gearmbs.signals.bearing_lines import BearingLines, bearing_lines
-    from gearmbs.signals.bearing_report import BearingReport, PartFinding
-    from gearmbs.signals.campbell import campbell, critical_speeds
-    from gearmbs.signals.cepstrum import power_cepstrum
-    from gearmbs.signals.comparison import compare, compare_files
-    from gearmbs.signals.comparison_report import ComparisonReport
-    from gearmbs.signals.conversion import convert
-    from gearmbs.signals.door import to_signal
-    from gearmbs.signals.envelope import envelope, envelope_spectrum, kurtogram, spectral_kurtosis
-    from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
-    from gearmbs.signals.expectations import EXPECTED
-    from gearmbs.signals.features import features
-    from gearmbs.signals.filters import bandpass, decimate, resample
-    from gearmbs.signals.given import with_speed
-    from gearmbs.signals.indicators import (
+    from gearmbs.signals.analysis.analysis import AnalysisOptions, analyse, analyse_file
+    from gearmbs.signals.analysis.bands import band_rms, gmf_rms, order_rms, rms
+    from gearmbs.signals.analysis.campbell import campbell, critical_speeds
+    from gearmbs.signals.analysis.comparison import (
+        compare,
+        compare_files,
+        dynamic_rms,
+        remove_mean,
+        rms_factor,
+        scale,
+        scale_states,
+    )
+    from gearmbs.signals.analysis.comparison_report import EXPECTED, ComparisonReport, level_distance, ordinal_agreement
+    from gearmbs.signals.analysis.indicators import (
         INDICATORS,
         condition_indicators,
         crest_factor,
@@ -44,24 +38,49 @@ if TYPE_CHECKING:
         sideband_index,
         sideband_level,
     )
-    from gearmbs.signals.io import FORMATS, read_signal, write_signal
-    from gearmbs.signals.order_tracking import order_map, order_track
-    from gearmbs.signals.orders import harmonic_amplitudes
-    from gearmbs.signals.ordinal import level_distance, ordinal_agreement
-    from gearmbs.signals.phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
-    from gearmbs.signals.planetary import (
+    from gearmbs.signals.analysis.report import AnalysisReport, features
+    from gearmbs.signals.analysis.sections import sections, trend, trend_table
+    from gearmbs.signals.analysis.series import series
+    from gearmbs.signals.analysis.vibration import VibrationReport
+    from gearmbs.signals.bearings.diagnosis import diagnose_bearing
+    from gearmbs.signals.bearings.report import BearingLines, BearingReport, PartFinding, bearing_lines
+    from gearmbs.signals.conversion import convert
+    from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
+    from gearmbs.signals.files.formats import FORMATS, read_signal, write_signal
+    from gearmbs.signals.filters import bandpass, decimate, resample
+    from gearmbs.signals.planetary.averages import (
+        PlanetaryLines,
         PlanetaryModel,
         carrier_lines,
         fixed_sensor,
         mesh_bands,
         path_weight,
         planetary_average,
+        planetary_lines,
     )
-    from gearmbs.signals.planetary_diagnosis import diagnose_planetary
-    from gearmbs.signals.planetary_lines import PlanetaryLines, planetary_lines
-    from gearmbs.signals.planetary_report import PlanetaryFinding, PlanetaryReport
-    from gearmbs.signals.scaling import dynamic_rms, remove_mean, rms_factor, scale, scale_states
-    from gearmbs.signals.sections import sections, trend, trend_table
+    from gearmbs.signals.planetary.diagnosis import PlanetaryFinding, PlanetaryReport, diagnose_planetary
+    from gearmbs.signals.resampling import even_signal
+    from gearmbs.signals.rotation.angular import (
+        angular_resample,
+        difference_signal,
+        order_spectrum,
+        regular_signal,
+        remove_orders,
+        residual_signal,
+        time_synchronous_average,
+    )
+    from gearmbs.signals.rotation.order_tracking import order_map, order_track
+    from gearmbs.signals.rotation.orders import harmonic_amplitudes
+    from gearmbs.signals.rotation.phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
+    from gearmbs.signals.rotation.separation import (
+        discrete_random,
+        edit_cepstrum,
+        level_lines,
+        prewhiten,
+        remove_average,
+    )
+    from gearmbs.signals.rotation.shaft import shaft_phase
+    from gearmbs.signals.rotation.speed import SpeedEstimate, estimate_speed
     from gearmbs.signals.sensors import (
         FrfPath,
         ModalPath,
@@ -74,11 +93,10 @@ if TYPE_CHECKING:
         quantise,
         sample,
     )
-    from gearmbs.signals.separation import discrete_random, edit_cepstrum, level_lines, prewhiten, remove_average
-    from gearmbs.signals.series import series
-    from gearmbs.signals.shaft import shaft_phase
     from gearmbs.signals.shaft_force import COMPONENTS, force_components, force_to_acceleration
-    from gearmbs.signals.signal import (
+    from gearmbs.signals.signal.given import SpeedCurve, speed_curve, with_speed
+    from gearmbs.signals.signal.inputs import to_signal
+    from gearmbs.signals.signal.signal import (
         as_signal,
         common_unit,
         make_signal,
@@ -89,13 +107,15 @@ if TYPE_CHECKING:
         units_of,
         with_metadata,
     )
-    from gearmbs.signals.spectra import spectrum
-    from gearmbs.signals.speed import SpeedEstimate, estimate_speed
-    from gearmbs.signals.speed_curve import SpeedCurve, speed_curve
+    from gearmbs.signals.spectra import (
+        envelope,
+        envelope_spectrum,
+        kurtogram,
+        power_cepstrum,
+        spectral_kurtosis,
+        spectrum,
+    )
     from gearmbs.signals.time_frequency import spectrogram, waterfall
-    from gearmbs.signals.tsa import difference_signal, regular_signal, remove_orders, residual_signal
-    from gearmbs.signals.uneven import even_signal
-    from gearmbs.signals.vibration_report import VibrationReport
 
 __all__ = [
     "COMPONENTS",
@@ -228,130 +248,130 @@ __all__ = [
 late(
     __name__,
     {
-        "planetary_average": ".planetary",
-        "path_weight": ".planetary",
-        "mesh_bands": ".planetary",
-        "fixed_sensor": ".planetary",
-        "carrier_lines": ".planetary",
-        "PlanetaryModel": ".planetary",
-        "PlanetaryFinding": ".planetary_report",
-        "PlanetaryLines": ".planetary_lines",
-        "PlanetaryReport": ".planetary_report",
-        "diagnose_planetary": ".planetary_diagnosis",
-        "planetary_lines": ".planetary_lines",
-        "BearingLines": ".bearing_lines",
-        "BearingReport": ".bearing_report",
-        "PartFinding": ".bearing_report",
-        "bearing_lines": ".bearing_lines",
-        "diagnose_bearing": ".bearing_diagnosis",
-        "discrete_random": ".separation",
-        "edit_cepstrum": ".separation",
-        "prewhiten": ".separation",
-        "remove_average": ".separation",
+        "planetary_average": ".planetary.averages",
+        "path_weight": ".planetary.averages",
+        "mesh_bands": ".planetary.averages",
+        "fixed_sensor": ".planetary.averages",
+        "carrier_lines": ".planetary.averages",
+        "PlanetaryModel": ".planetary.averages",
+        "PlanetaryFinding": ".planetary.diagnosis",
+        "PlanetaryLines": ".planetary.averages",
+        "PlanetaryReport": ".planetary.diagnosis",
+        "diagnose_planetary": ".planetary.diagnosis",
+        "planetary_lines": ".planetary.averages",
+        "BearingLines": ".bearings.report",
+        "BearingReport": ".bearings.report",
+        "PartFinding": ".bearings.report",
+        "bearing_lines": ".bearings.report",
+        "diagnose_bearing": ".bearings.diagnosis",
+        "discrete_random": ".rotation.separation",
+        "edit_cepstrum": ".rotation.separation",
+        "prewhiten": ".rotation.separation",
+        "remove_average": ".rotation.separation",
         "COMPONENTS": ".shaft_force",
-        "EXPECTED": ".expectations",
-        "FORMATS": ".io",
-        "INDICATORS": ".indicators",
-        "AnalysisOptions": ".analysis",
-        "AnalysisReport": ".analysis_report",
-        "ComparisonReport": ".comparison_report",
+        "EXPECTED": ".analysis.comparison_report",
+        "FORMATS": ".files.formats",
+        "INDICATORS": ".analysis.indicators",
+        "AnalysisOptions": ".analysis.analysis",
+        "AnalysisReport": ".analysis.report",
+        "ComparisonReport": ".analysis.comparison_report",
         "FrfPath": ".sensors",
         "MissingMetadataError": ".errors",
         "ModalPath": ".sensors",
         "Mode": ".sensors",
         "SignalError": ".errors",
         "SignalFileError": ".errors",
-        "SpeedCurve": ".speed_curve",
-        "SpeedEstimate": ".speed",
-        "VibrationReport": ".vibration_report",
+        "SpeedCurve": ".signal.given",
+        "SpeedEstimate": ".rotation.speed",
+        "VibrationReport": ".analysis.vibration",
         "accelerometer": ".sensors",
         "add_noise": ".sensors",
-        "analyse": ".analysis",
-        "analyse_file": ".analysis",
-        "angular_resample": ".angular",
-        "as_signal": ".signal",
-        "band_rms": ".bands",
+        "analyse": ".analysis.analysis",
+        "analyse_file": ".analysis.analysis",
+        "angular_resample": ".rotation.angular",
+        "as_signal": ".signal.signal",
+        "band_rms": ".analysis.bands",
         "bandpass": ".filters",
-        "campbell": ".campbell",
-        "common_unit": ".signal",
-        "compare": ".comparison",
-        "compare_files": ".comparison",
-        "condition_indicators": ".indicators",
+        "campbell": ".analysis.campbell",
+        "common_unit": ".signal.signal",
+        "compare": ".analysis.comparison",
+        "compare_files": ".analysis.comparison",
+        "condition_indicators": ".analysis.indicators",
         "convert": ".conversion",
-        "crest_factor": ".indicators",
-        "critical_speeds": ".campbell",
+        "crest_factor": ".analysis.indicators",
+        "critical_speeds": ".analysis.campbell",
         "decimate": ".filters",
-        "difference_signal": ".tsa",
-        "dynamic_rms": ".scaling",
-        "energy_ratio": ".indicators",
-        "envelope": ".envelope",
-        "envelope_spectrum": ".envelope",
-        "estimate_speed": ".speed",
-        "even_signal": ".uneven",
-        "features": ".features",
-        "fm0": ".indicators",
-        "fm4": ".indicators",
+        "difference_signal": ".rotation.angular",
+        "dynamic_rms": ".analysis.comparison",
+        "energy_ratio": ".analysis.indicators",
+        "envelope": ".spectra",
+        "envelope_spectrum": ".spectra",
+        "estimate_speed": ".rotation.speed",
+        "even_signal": ".resampling",
+        "features": ".analysis.report",
+        "fm0": ".analysis.indicators",
+        "fm4": ".analysis.indicators",
         "force_components": ".shaft_force",
         "force_to_acceleration": ".shaft_force",
-        "gmf_rms": ".bands",
-        "harmonic_amplitudes": ".orders",
-        "instantaneous_speed": ".phase",
+        "gmf_rms": ".analysis.bands",
+        "harmonic_amplitudes": ".rotation.orders",
+        "instantaneous_speed": ".rotation.phase",
         "joint_force": ".sensors",
-        "kurtogram": ".envelope",
-        "kurtosis": ".indicators",
+        "kurtogram": ".spectra",
+        "kurtosis": ".analysis.indicators",
         "laser_vibrometer": ".sensors",
-        "level_distance": ".ordinal",
-        "level_lines": ".separation",
-        "m6a": ".indicators",
-        "m8a": ".indicators",
-        "make_signal": ".signal",
+        "level_distance": ".analysis.comparison_report",
+        "level_lines": ".rotation.separation",
+        "m6a": ".analysis.indicators",
+        "m8a": ".analysis.indicators",
+        "make_signal": ".signal.signal",
         "measure": ".sensors",
-        "mesh_envelope": ".indicators",
-        "mesh_frequency": ".signal",
-        "na4": ".indicators",
-        "nb4": ".indicators",
-        "order_map": ".order_tracking",
-        "order_rms": ".bands",
-        "order_spectrum": ".angular",
-        "order_track": ".order_tracking",
-        "ordinal_agreement": ".ordinal",
-        "peak_to_peak": ".indicators",
-        "phase_from_line": ".phase",
-        "phase_from_speed": ".phase",
-        "phase_from_tacho": ".phase",
-        "power_cepstrum": ".cepstrum",
+        "mesh_envelope": ".analysis.indicators",
+        "mesh_frequency": ".signal.signal",
+        "na4": ".analysis.indicators",
+        "nb4": ".analysis.indicators",
+        "order_map": ".rotation.order_tracking",
+        "order_rms": ".analysis.bands",
+        "order_spectrum": ".rotation.angular",
+        "order_track": ".rotation.order_tracking",
+        "ordinal_agreement": ".analysis.comparison_report",
+        "peak_to_peak": ".analysis.indicators",
+        "phase_from_line": ".rotation.phase",
+        "phase_from_speed": ".rotation.phase",
+        "phase_from_tacho": ".rotation.phase",
+        "power_cepstrum": ".spectra",
         "quantise": ".sensors",
-        "rate_of": ".signal",
-        "read_signal": ".io",
-        "regular_signal": ".tsa",
-        "remove_mean": ".scaling",
-        "remove_orders": ".tsa",
-        "require": ".signal",
+        "rate_of": ".signal.signal",
+        "read_signal": ".files.formats",
+        "regular_signal": ".rotation.angular",
+        "remove_mean": ".analysis.comparison",
+        "remove_orders": ".rotation.angular",
+        "require": ".signal.signal",
         "resample": ".filters",
-        "residual_signal": ".tsa",
-        "rms": ".bands",
-        "rms_factor": ".scaling",
+        "residual_signal": ".rotation.angular",
+        "rms": ".analysis.bands",
+        "rms_factor": ".analysis.comparison",
         "sample": ".sensors",
-        "scale": ".scaling",
-        "scale_states": ".scaling",
-        "sections": ".sections",
-        "series": ".series",
-        "shaft_phase": ".shaft",
-        "sideband_index": ".indicators",
-        "sideband_level": ".indicators",
-        "spectral_kurtosis": ".envelope",
+        "scale": ".analysis.comparison",
+        "scale_states": ".analysis.comparison",
+        "sections": ".analysis.sections",
+        "series": ".analysis.series",
+        "shaft_phase": ".rotation.shaft",
+        "sideband_index": ".analysis.indicators",
+        "sideband_level": ".analysis.indicators",
+        "spectral_kurtosis": ".spectra",
         "spectrogram": ".time_frequency",
         "spectrum": ".spectra",
-        "speed_curve": ".speed_curve",
-        "time_synchronous_average": ".angular",
-        "to_signal": ".door",
-        "trend": ".sections",
-        "trend_table": ".sections",
-        "trim": ".signal",
-        "units_of": ".signal",
+        "speed_curve": ".signal.given",
+        "time_synchronous_average": ".rotation.angular",
+        "to_signal": ".signal.inputs",
+        "trend": ".analysis.sections",
+        "trend_table": ".analysis.sections",
+        "trim": ".signal.signal",
+        "units_of": ".signal.signal",
         "waterfall": ".time_frequency",
-        "with_metadata": ".signal",
-        "with_speed": ".given",
-        "write_signal": ".io",
+        "with_metadata": ".signal.signal",
+        "with_speed": ".signal.given",
+        "write_signal": ".files.formats",
     },
 )

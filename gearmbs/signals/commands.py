@@ -2,29 +2,153 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gearmbs._command import check_kind, guarded, stage_bar
-from gearmbs.signals.command_parts import (
-    Gaps,
-    Rate,
-    ReportFile,
-    Speed,
-    Units,
-    bearings_asked,
-    check_targets,
-    hand_over,
-    pair_of,
-    sample_units,
-    save_figures,
-    save_tables,
-    tooth_counts,
-)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# What the commands on records share: options, readers of their texts, and how results are handed over.
+
+
+Rate = Annotated[str | None, typer.Option(help='Sampling rate, Hz or "12.8 kHz", if the file does not name it.')]
+Speed = Annotated[
+    str | None,
+    typer.Option(help='Shaft speed, e.g. "1780 rpm", or a file with the speed over time; default: from the GMF line.'),
+]
+Units = Annotated[
+    str | None, typer.Option(help='Units of the samples, e.g. "m/s^2", or of channels, "acc=g, n=rpm"; default: known.')
+]
+Gaps = Annotated[str | None, typer.Option(help='Missing samples: "refuse", "interpolate" or "longest" stretch.')]
+ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
+
+
+def bearings_asked(texts: list[str], shafts: list[str] | None, train: Path | None) -> dict[str, Any]:
+    """Return bearings, ratios of other shafts and, of a drivetrain, the speed, as `diagnose_bearing` takes them."""
+    asked: dict[str, Any] = {"bearing": {}, "shafts": None}
+    if train is not None:
+        from gearmbs.drivetrain.description import read_description
+
+        asked = read_description(train).train.kinematics.for_bearings()
+    asked["bearing"] = {**asked["bearing"], **bearing_list(texts)}
+    if shafts is not None:
+        asked["shafts"] = [*(asked["shafts"] or ()), *shaft_ratios(shafts)]
+    return asked
+
+
+def bearing_list(texts: list[str]) -> dict[str, tuple[str, float]]:
+    """Return bearings and the ratios of their shafts, given as "6205" or "6205@0.345"."""
+    found: dict[str, tuple[str, float]] = {}
+    for text in texts:
+        name, _, ratio = text.partition("@")
+        try:
+            value = float(ratio) if ratio else 1.0
+        except ValueError:
+            raise ValueError(f"--bearing {text!r}: {ratio!r} is no number; write for example 6205@0.345") from None
+        key = name.strip() if name.strip() not in found else text
+        found[key] = (name.strip(), value)
+    return found
+
+
+def shaft_ratios(texts: list[str]) -> list[float]:
+    """Return the ratios of other shafts, none for the word "none"."""
+    try:
+        return [] if [text.strip().lower() for text in texts] == ["none"] else [float(text) for text in texts]
+    except ValueError:
+        raise ValueError(f"--shaft {' '.join(texts)!r}: give ratios such as 0.345, or none") from None
+
+
+def pair_of(text: str) -> tuple[float, float]:
+    """Return a band in Hz given as "1000, 5000" or "1 kHz, 5 kHz"."""
+    from gearmbs.units import to_si
+
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 2:
+        raise ValueError(f"--band {text!r}: give two frequencies such as '1 kHz, 5 kHz'")
+    low, high = (
+        to_si(p if any(c.isalpha() for c in p.replace("e", "")) else f"{p} Hz", "frequency", "--band") for p in parts
+    )
+    return low, high
+
+
+def sample_units(text: str | None) -> str | dict[str, str] | None:
+    """Return the unit of a text such as "m/s^2", or those of channels, given as "acc=g, n=rpm"."""
+    if text is None or "=" not in text:
+        return text
+    found = {}
+    for part in text.split(","):
+        name, _, unit = (piece.strip() for piece in part.rpartition("="))
+        if not (name and unit):
+            raise ValueError(f"--units {text!r}: {part.strip()!r} names no channel; write for example acc=g, n=rpm")
+        found[name] = unit
+    return found
+
+
+def tooth_counts(text: str) -> tuple[int, ...]:
+    """Return the counts of a text such as "32" or "32,80"."""
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"--teeth is {text!r}; give a count, or both with a comma, for instance 32,80") from None
+
+
+def check_targets(report: Path | None = None, **folders: Path | None) -> None:
+    """Refuse, before the work, a report or folders of figures and tables, by their options, that cannot be written."""
+    from gearmbs.files import check_place
+
+    if report is not None:
+        check_place(report.parent, 0)
+    for name, folder in folders.items():
+        if folder is None:
+            continue
+        if folder.is_file():
+            raise NotADirectoryError(f"{folder}: is a file; name a folder (--{name})")
+        check_place(folder, 0, option=f"--{name}")
+
+
+def save_tables(tables: dict[str, Any], folder: Path | None) -> list[Path]:
+    """Write each table as CSV into the folder, if one is given."""
+    from gearmbs.files import write_whole
+
+    written = []
+    for name, table in tables.items() if folder is not None else ():
+        assert folder is not None
+        path = folder / f"{name}.csv"
+        write_whole(path, table.to_csv(index=False))
+        written.append(path)
+    return written
+
+
+def save_figures(figures: dict[str, Any], folder: Path) -> list[Path]:
+    """Write each figure as PNG and SVG into the folder."""
+    from gearmbs.view import save_figure
+
+    return [path for name, figure in figures.items() for path in save_figure(figure, folder / name.replace(" ", "_"))]
+
+
+def hand_over(report: str, out: Path | None, files: list[Path]) -> None:
+    """Print a report or write it, and name the files written; print it, too, where it cannot be written."""
+    if out is None:
+        typer.echo(report)
+    else:
+        from gearmbs.files import write_whole
+
+        with guarded():
+            try:
+                write_whole(out, report)
+            except OSError:
+                typer.echo(report)
+                raise
+        files = [out, *files]
+    if files:
+        typer.echo("\n".join(f"wrote {path}" for path in files), err=out is None)
 
 
 def analyse(
@@ -70,8 +194,8 @@ def analyse(
     with guarded(), stage_bar(file.name) as move:
         check_kind(file, "record")
         check_targets(out, tables=tables, figures=figures)
-        from gearmbs.signals.simulated import read_any
-        from gearmbs.signals.speed_file import parse_speed
+        from gearmbs.signals.files.simulated import read_any
+        from gearmbs.signals.rotation.speed_file import parse_speed
 
         helpers = [name for name in (tacho, speed_channel) if name and name not in (channel or ())]
         signal = read_any(
@@ -185,10 +309,10 @@ def trend(
         for file in files:
             check_kind(file, "record")
         check_targets(out)
+        from gearmbs.files import write_whole
         from gearmbs.signals import series, trend_table
         from gearmbs.signals import trend as follow
-        from gearmbs.signals.speed_file import parse_speed
-        from gearmbs.view.files import write_whole
+        from gearmbs.signals.rotation.speed_file import parse_speed
 
         known: dict[str, Any] = {
             "teeth": None if teeth is None else tooth_counts(teeth),
@@ -204,7 +328,7 @@ def trend(
             known["speed_channel"] = speed_channel
             chosen = files[0] if len(files) == 1 else files
             if out is not None:
-                from gearmbs.signals.series import finished_files
+                from gearmbs.signals.analysis.series import finished_files
 
                 done, count = finished_files(chosen, out)
                 if done:
@@ -254,8 +378,8 @@ def compare(
     with guarded(), stage_bar("comparison") as move:
         check_targets(out, tables=tables, figures=figures)
         from gearmbs.signals import compare as compare_signals
-        from gearmbs.signals.simulated import parse_models, parse_states, read_any
-        from gearmbs.signals.speed_file import parse_speed
+        from gearmbs.signals.files.simulated import parse_models, parse_states, read_any
+        from gearmbs.signals.rotation.speed_file import parse_speed
 
         for item in (*experiment, *(model or ())):
             check_kind(Path(item.partition("=")[2] or item), "record")
@@ -285,3 +409,103 @@ def compare(
 
             files += save_figures(comparison_figures(report), figures)
     hand_over(report.to_markdown(), out, files)
+
+
+# ``gearmbs waterfall``: what changes with the speed of records, as figures.
+
+
+Orders = Annotated[str | None, typer.Option(help='Orders of the shaft to mark, e.g. "1,29,58".')]
+Maximum = Annotated[str | None, typer.Option(help='Highest frequency shown, e.g. "6 kHz".')]
+Folder = Annotated[Path, typer.Option("--out", "-o", help="Folder for the figures.")]
+
+
+def waterfall(
+    files: Annotated[list[Path], typer.Argument(help="One run-up or coast-down, or records of constant speed.")],
+    speed: Annotated[
+        list[str] | None,
+        typer.Option(help='Speed, e.g. "1500 rpm", or a file with it over time; repeat, one for each file.'),
+    ] = None,
+    speed_channel: Annotated[str | None, typer.Option(help="Channel that holds the speed.")] = None,
+    tacho: Annotated[str | None, typer.Option(help="Channel with the tacho pulses.")] = None,
+    pulses: Annotated[float, typer.Option(help="Tacho pulses a revolution.")] = 1.0,
+    channel: Annotated[str | None, typer.Option(help="Channel to draw; default: the first.")] = None,
+    orders: Orders = None,
+    steps: Annotated[int | None, typer.Option(help="Spectra over equal intervals of the speed of a run-up.")] = None,
+    style: Annotated[str, typer.Option(help="lines or map.")] = "lines",
+    maximum: Maximum = None,
+    rate: Rate = None,
+    units: Units = None,
+    gaps: Gaps = None,
+    out: Folder = Path("waterfall"),
+) -> None:
+    """Draw spectra over speed; of a run-up spectrogram, order map and tracked orders, too."""
+    with guarded(), stage_bar(files[0].name) as move:
+        for file in files:
+            check_kind(file, "record")
+        check_targets(out=out)
+        from gearmbs.signals import waterfall as spectra_over_speed
+        from gearmbs.signals.files.simulated import read_any
+        from gearmbs.signals.rotation.speed_file import parse_speed
+        from gearmbs.view import changing_speed_figures, waterfall_plot
+
+        helpers = [name for name in (tacho, speed_channel) if name]
+        chosen = None if channel is None else [channel, *helpers]
+        known = [parse_speed(text) for text in speed or []]
+        if steps is not None and len(files) > 1:
+            raise ValueError(f"--steps divides the speed of one run-up; each of {len(files)} files gives one spectrum")
+        if known and len(known) != len(files):
+            raise ValueError(f"--speed is given {len(known)} times for {len(files)} files; give one for each")
+        signals = []
+        for k, file in enumerate(files):
+            signals.append(read_any(file, rate=rate, units=sample_units(units), channels=chosen, gaps=gaps))
+            move(0.5 * (k + 1) / len(files), "reading")
+        marked = numbers(orders, "--orders")
+        shown: dict[str, Any] = {"style": style, "maximum": maximum, "channel": channel}
+        told: dict[str, Any] = {"tacho": tacho, "pulses_per_rev": pulses} if tacho else {}
+        told |= {"speed_channel": speed_channel} if speed_channel else {}
+        if len(signals) > 1:
+            if helpers:
+                signals, known = _with_mean_speeds(signals, known, helpers, told)
+            data = spectra_over_speed(signals, known or None, maximum=maximum)
+            figures = {"waterfall": waterfall_plot(data, orders=marked, **shown)}
+        else:
+            shaft: dict[str, Any] = {"speed": known[0]} if known else {}
+            shaft |= told
+            kept = _vibration(signals[0], helpers)
+            if helpers:
+                from gearmbs.signals import shaft_phase
+
+                shaft = {"phase": shaft_phase(signals[0], **shaft)}
+            data = spectra_over_speed(kept, steps=steps, maximum=maximum, **shaft)
+            figures = changing_speed_figures(kept, orders=marked or None, title=files[0].name, **shaft)
+            figures["waterfall"] = waterfall_plot(data, orders=marked, **shown)
+        files_written = save_figures(figures, out)
+    low, high = (float(data["speed"][k]) * 30.0 / math.pi for k in (0, -1))
+    hand_over(f"{data.sizes['speed']} spectra from {low:.4g} to {high:.4g} rpm", None, files_written)
+
+
+def _vibration(signal: xr.DataArray, helpers: list[str]) -> xr.DataArray:
+    """Return a signal without the channels that tell its speed."""
+    return signal.drop_sel(channel=[name for name in helpers if name in signal["channel"].values])
+
+
+def _with_mean_speeds(
+    signals: list[xr.DataArray], known: list[Any], helpers: list[str], told: dict[str, Any]
+) -> tuple[list[xr.DataArray], list[float]]:
+    """Return records without the channels that tell their speeds, and each record's mean speed, rad/s."""
+    from gearmbs.signals import shaft_phase
+
+    speeds = []
+    for signal, given in zip(signals, known or [None] * len(signals), strict=True):
+        phase = shaft_phase(signal, given, **told)
+        span = float(phase["time"][-1] - phase["time"][0])
+        speeds.append(float(phase[-1] - phase[0]) / span)
+    return [_vibration(signal, helpers) for signal in signals], speeds
+
+
+def numbers(text: str | None, option: str) -> list[float]:
+    """Return the numbers of a text such as "1,29,58", none of None."""
+    try:
+        return [] if text is None else [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"{option} is {text!r}; give numbers with commas, for instance 1,29,58") from None

@@ -9,9 +9,8 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from .dimensions import DIMENSIONS, unit_dimension
-from .errors import SignalError
-from .signal import like, rate_of, units_of
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.signal.signal import DIMENSIONS, like, rate_of, unit_dimension, units_of
 
 Dimension = Literal["displacement", "velocity", "acceleration"]
 DERIVATIVE = {"displacement": 0, "velocity": 1, "acceleration": 2}

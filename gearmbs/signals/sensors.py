@@ -15,9 +15,9 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from .errors import SignalError
-from .filters import decimate, resample
-from .signal import check_rate, common_unit, like, make_signal, rate_of
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.filters import decimate, resample
+from gearmbs.signals.signal.signal import check_rate, common_unit, like, make_signal, rate_of
 
 XYZ = ("x", "y", "z")
 DECAY_TIMES = 10.0

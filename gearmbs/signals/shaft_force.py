@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import SignalError
-from .signal import common_unit, like, make_signal, rate_of
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.signal.signal import common_unit, like, make_signal, rate_of
 
 if TYPE_CHECKING:
     import xarray as xr

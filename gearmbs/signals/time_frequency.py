@@ -12,13 +12,12 @@ import scipy.signal as ss
 import xarray as xr
 
 from gearmbs.progress import waiting
-
-from .any_data import as_given, in_si, takes_data
-from .errors import MissingMetadataError, SignalError
-from .shaft import REMEDY, shaft_phase
-from .signal import common_unit, rate_of
-from .spectra import SCALINGS, spectral_unit, spectrum
-from .speed_curve import STEADY, speed_curve
+from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.rotation.shaft import REMEDY, shaft_phase
+from gearmbs.signals.signal.any_data import as_given, in_si, takes_data
+from gearmbs.signals.signal.given import STEADY, speed_curve
+from gearmbs.signals.signal.signal import common_unit, rate_of
+from gearmbs.signals.spectra import SCALINGS, spectral_unit, spectrum
 
 Scaling = Literal["amplitude", "rms", "power", "density"]
 SLICES = 200

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.solids.bodies import Body, Face, read_bodies
+    from gearmbs.solids.bodies import Body, Face, Primitive, primitive, read_bodies
     from gearmbs.solids.facets import faceted
-    from gearmbs.solids.primitives import Primitive, primitive
 
 __all__ = ["Body", "Face", "Primitive", "faceted", "primitive", "read_bodies"]
 
@@ -19,9 +18,9 @@ late(
     {
         "Body": ".bodies",
         "Face": ".bodies",
-        "Primitive": ".primitives",
+        "Primitive": ".bodies",
         "faceted": ".facets",
-        "primitive": ".primitives",
+        "primitive": ".bodies",
         "read_bodies": ".bodies",
     },
 )

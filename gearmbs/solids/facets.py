@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.solids.bodies import Body, Face
 from gearmbs.solids.faces import Crossed, cut
 

@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.solids.layouts import BASE, Field
 
 BASE_SCHEMA = "13006"

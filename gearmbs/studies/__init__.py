@@ -5,35 +5,42 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.signals.simulated import record_signal
-    from gearmbs.studies.bearing_rig import bearing_rig, housing_signal, rolling_rig
-    from gearmbs.studies.bench import BenchSettings, bench_choices, bench_train
-    from gearmbs.studies.bench_study import BenchStudy, run_bench
-    from gearmbs.studies.case import Case, CaseError, CaseWarning, load_case, make_case
-    from gearmbs.studies.claims import Claim
-    from gearmbs.studies.crank_slider import CrankSlider
-    from gearmbs.studies.flexible_rig import flexible_rig
-    from gearmbs.studies.gearbox import GearboxSettings, gearbox_choices, industrial_gearbox
-    from gearmbs.studies.gearbox_study import GearboxStudy, run_gearbox
-    from gearmbs.studies.paper import PaperStudy, run_paper
-    from gearmbs.studies.parallel import run_cases
-    from gearmbs.studies.preset import paper_cases
-    from gearmbs.studies.rattle import RattleSettings, rattle, rattle_map, rattle_table, rattle_train
-    from gearmbs.studies.resonance import ResonanceSettings, resonance_rig, sweep_resonance
-    from gearmbs.studies.resonance_study import ResonanceStudy, run_resonance, separation_load
-    from gearmbs.studies.rig import gear_rig
-    from gearmbs.studies.simulation import (
+    from gearmbs.signals.files.simulated import record_signal
+    from gearmbs.studies.case.case import Case, CaseError, CaseWarning, load_case, make_case
+    from gearmbs.studies.paper.paper import PaperStudy, run_paper
+    from gearmbs.studies.paper.preset import Claim, paper_cases
+    from gearmbs.studies.presets.bench import BenchSettings, BenchStudy, bench_choices, bench_train, run_bench
+    from gearmbs.studies.presets.crank_slider import CrankSlider
+    from gearmbs.studies.presets.gearbox import (
+        GearboxSettings,
+        GearboxStudy,
+        gearbox_choices,
+        industrial_gearbox,
+        run_gearbox,
+    )
+    from gearmbs.studies.presets.rattle import RattleSettings, rattle, rattle_map, rattle_table, rattle_train
+    from gearmbs.studies.presets.resonance import (
+        ResonanceSettings,
+        ResonanceStudy,
+        resonance_rig,
+        run_resonance,
+        separation_load,
+        sweep_resonance,
+    )
+    from gearmbs.studies.run.flexible_rig import flexible_rig
+    from gearmbs.studies.run.parallel import run_cases
+    from gearmbs.studies.run.rig import bearing_rig, gear_rig, housing_signal, rolling_rig
+    from gearmbs.studies.run.simulation import (
         SimulationFailed,
         SimulationInterrupted,
         case_mechanism,
         run_case,
         simulate_case,
     )
-    from gearmbs.studies.sweep import Sweep, sweep
-    from gearmbs.studies.train_figure import train_spectrum
-    from gearmbs.studies.train_modes import train_campbell, train_modes
-    from gearmbs.studies.train_report import train_report, train_scene
-    from gearmbs.studies.trains import load_train, run_train, train_signal
+    from gearmbs.studies.run.sweep import Sweep, sweep
+    from gearmbs.studies.trains.modes import train_campbell, train_modes
+    from gearmbs.studies.trains.report import train_report, train_scene, train_spectrum
+    from gearmbs.studies.trains.trains import load_train, run_train, train_signal
 
 __all__ = [
     "BenchSettings",
@@ -94,58 +101,58 @@ __all__ = [
 late(
     __name__,
     {
-        "CrankSlider": ".crank_slider",
-        "RattleSettings": ".rattle",
-        "ResonanceSettings": ".resonance",
-        "ResonanceStudy": ".resonance_study",
-        "resonance_rig": ".resonance",
-        "run_resonance": ".resonance_study",
-        "separation_load": ".resonance_study",
-        "sweep_resonance": ".resonance",
-        "rattle": ".rattle",
-        "rattle_map": ".rattle",
-        "rattle_table": ".rattle",
-        "rattle_train": ".rattle",
-        "run_train": ".trains",
-        "load_train": ".trains",
-        "train_signal": ".trains",
-        "train_report": ".train_report",
-        "train_spectrum": ".train_figure",
-        "train_scene": ".train_report",
-        "bench_train": ".bench",
-        "BenchSettings": ".bench",
-        "bench_choices": ".bench",
-        "BenchStudy": ".bench_study",
-        "run_bench": ".bench_study",
-        "Case": ".case",
-        "CaseError": ".case",
-        "CaseWarning": ".case",
-        "Claim": ".claims",
-        "PaperStudy": ".paper",
-        "SimulationFailed": ".simulation",
-        "SimulationInterrupted": ".simulation",
-        "Sweep": ".sweep",
-        "bearing_rig": ".bearing_rig",
-        "flexible_rig": ".flexible_rig",
-        "GearboxSettings": ".gearbox",
-        "GearboxStudy": ".gearbox_study",
-        "gearbox_choices": ".gearbox",
-        "industrial_gearbox": ".gearbox",
-        "run_gearbox": ".gearbox_study",
-        "train_campbell": ".train_modes",
-        "train_modes": ".train_modes",
-        "gear_rig": ".rig",
-        "housing_signal": ".bearing_rig",
-        "load_case": ".case",
-        "make_case": ".case",
-        "paper_cases": ".preset",
-        "record_signal": "gearmbs.signals.simulated",
-        "rolling_rig": ".bearing_rig",
-        "case_mechanism": ".simulation",
-        "run_case": ".simulation",
-        "run_cases": ".parallel",
-        "run_paper": ".paper",
-        "simulate_case": ".simulation",
-        "sweep": ".sweep",
+        "CrankSlider": ".presets.crank_slider",
+        "RattleSettings": ".presets.rattle",
+        "ResonanceSettings": ".presets.resonance",
+        "ResonanceStudy": ".presets.resonance",
+        "resonance_rig": ".presets.resonance",
+        "run_resonance": ".presets.resonance",
+        "separation_load": ".presets.resonance",
+        "sweep_resonance": ".presets.resonance",
+        "rattle": ".presets.rattle",
+        "rattle_map": ".presets.rattle",
+        "rattle_table": ".presets.rattle",
+        "rattle_train": ".presets.rattle",
+        "run_train": ".trains.trains",
+        "load_train": ".trains.trains",
+        "train_signal": ".trains.trains",
+        "train_report": ".trains.report",
+        "train_spectrum": ".trains.report",
+        "train_scene": ".trains.report",
+        "bench_train": ".presets.bench",
+        "BenchSettings": ".presets.bench",
+        "bench_choices": ".presets.bench",
+        "BenchStudy": ".presets.bench",
+        "run_bench": ".presets.bench",
+        "Case": ".case.case",
+        "CaseError": ".case.case",
+        "CaseWarning": ".case.case",
+        "Claim": ".paper.preset",
+        "PaperStudy": ".paper.paper",
+        "SimulationFailed": ".run.simulation",
+        "SimulationInterrupted": ".run.simulation",
+        "Sweep": ".run.sweep",
+        "bearing_rig": ".run.rig",
+        "flexible_rig": ".run.flexible_rig",
+        "GearboxSettings": ".presets.gearbox",
+        "GearboxStudy": ".presets.gearbox",
+        "gearbox_choices": ".presets.gearbox",
+        "industrial_gearbox": ".presets.gearbox",
+        "run_gearbox": ".presets.gearbox",
+        "train_campbell": ".trains.modes",
+        "train_modes": ".trains.modes",
+        "gear_rig": ".run.rig",
+        "housing_signal": ".run.rig",
+        "load_case": ".case.case",
+        "make_case": ".case.case",
+        "paper_cases": ".paper.preset",
+        "record_signal": "gearmbs.signals.files.simulated",
+        "rolling_rig": ".run.rig",
+        "case_mechanism": ".run.simulation",
+        "run_case": ".run.simulation",
+        "run_cases": ".run.parallel",
+        "run_paper": ".paper.paper",
+        "simulate_case": ".run.simulation",
+        "sweep": ".run.sweep",
     },
 )

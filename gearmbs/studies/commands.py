@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from gearmbs._command import case_bars, guarded
+from gearmbs._command import case_bars, check_kind, guarded, kind_of, stage_bar
+from gearmbs.signals.commands import check_targets, hand_over, save_figures
+
+if TYPE_CHECKING:
+    from gearmbs.studies.run.simulation import SimulationFailed
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
 
@@ -25,9 +29,9 @@ def bench(
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
-        from gearmbs.studies.bench import PRESSURES, STATES, BenchSettings, bench_train
-        from gearmbs.studies.store import check_place
-        from gearmbs.studies.trains import RunSettings, check_record
+        from gearmbs.studies.presets.bench import PRESSURES, STATES, BenchSettings, bench_train
+        from gearmbs.studies.run.store import check_place
+        from gearmbs.studies.trains.trains import RunSettings, check_record
 
         settings = BenchSettings(
             speed=speed, bearing_stiffness=stiffness, motor=motor, phase=phase, pump_teeth=pump_teeth
@@ -36,8 +40,8 @@ def bench(
         check_record(bench_train(settings=settings), run)
         check_place(out, 0)
 
-        from gearmbs.studies.bench_study import run_bench
-        from gearmbs.studies.preset import paper_cases
+        from gearmbs.studies.paper.preset import paper_cases
+        from gearmbs.studies.presets.bench import run_bench
 
         names = [f"bench, {state}, {load} load" for load in PRESSURES for state in STATES]
         if pair:
@@ -64,13 +68,13 @@ def resonance(
 ) -> None:
     """Sweep a spur pair up and down through its mesh resonance: jumps, hysteresis, loads at which teeth part."""
     with guarded():
-        from gearmbs.studies.resonance import DIRECTIONS, ResonanceSettings
-        from gearmbs.studies.store import check_place
+        from gearmbs.studies.presets.resonance import DIRECTIONS, ResonanceSettings
+        from gearmbs.studies.run.store import check_place
 
         settings = ResonanceSettings(torque=torque, damping_ratio=damping, addendum=addendum, span=span, cycles=cycles)
         check_place(out, 0)
 
-        from gearmbs.studies.resonance_study import run_resonance
+        from gearmbs.studies.presets.resonance import run_resonance
 
         with case_bars(list(DIRECTIONS)) as move:
             study = run_resonance(settings, progress=move)
@@ -89,17 +93,344 @@ def gearbox(
 ) -> None:
     """Study an industrial gearbox of two helical stages: modes, Campbell diagram, steady state, run-up, housing."""
     with guarded():
-        from gearmbs.studies.gearbox import GearboxSettings, industrial_gearbox
-        from gearmbs.studies.store import check_place
+        from gearmbs.studies.presets.gearbox import GearboxSettings, industrial_gearbox
+        from gearmbs.studies.run.store import check_place
 
         settings = GearboxSettings(speed=speed, power=power, helix_angle=helix)
         industrial_gearbox(settings)
         check_place(out, 0)
 
-        from gearmbs.studies.gearbox_study import run_gearbox
+        from gearmbs.studies.presets.gearbox import run_gearbox
 
         with case_bars(["steady", "run-up"]) as move:
             study = run_gearbox(settings, duration=duration, run_up=run_up, progress=move)
         paths = study.save(out)
         typer.echo("modes, Hz: " + ", ".join(f"{f:.4g}" for f in study.campbell()["frequency"].values[0]))
         typer.echo("\n".join(f"wrote {path}" for path in paths))
+
+
+# ``gearmbs paper`` and ``gearmbs run``: the study, and single cases, planetary sets and drivetrains from files.
+
+
+def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
+    """Write what a run has computed before it stopped, and end: with status 130 if the user interrupted it."""
+    from gearmbs.studies.run.simulation import SimulationInterrupted
+    from gearmbs.studies.run.store import KeptElsewhere, keep_dataset
+
+    partial = failure.partial()
+    if partial is None:
+        raise failure
+    try:
+        path = keep_dataset(path, partial)
+    except KeptElsewhere as error:
+        path = error.path
+    except OSError as error:
+        raise RuntimeError(f"{failure}\n{error}") from failure
+    if isinstance(failure, SimulationInterrupted):
+        end = float(partial.time[-1])
+        typer.secho(f"gearmbs: interrupted at t = {end:.6g} s; what was computed until then is in {path}", err=True)
+        raise typer.Exit(130) from None
+    raise RuntimeError(f"{failure}\nWhat was computed until then is in {path}") from failure
+
+
+def paper(
+    out: Out = Path("out/paper"),
+    speed: Annotated[str | None, typer.Option(help='Speed of the driver, e.g. "1000 rpm".')] = None,
+    duration: Annotated[str | None, typer.Option(help='Length of the record, e.g. "1 s".')] = None,
+    torque: Annotated[str | None, typer.Option(help='Low load, e.g. "100 N m"; the high load is twice that.')] = None,
+    depth: Annotated[str | None, typer.Option(help='Penetration d of full damping, e.g. "0.1 mm".')] = None,
+    backlash: Annotated[str | None, typer.Option(help='Normal backlash, e.g. "0.1 mm".')] = None,
+    face_width: Annotated[str | None, typer.Option(help='Face width, e.g. "20 mm".')] = None,
+    friction: Annotated[bool, typer.Option(help="Coulomb friction between the flanks.")] = True,
+    misalignment: Annotated[str, typer.Option(help='Plane of the misalignment: "skew" or "inclination".')] = "skew",
+    angle: Annotated[str, typer.Option(help="Angle of the misalignment.")] = "1 deg",
+    integrator: Annotated[str, typer.Option(help="WSTIFF, GSTIFF or IDA.")] = "WSTIFF",
+    tolerance: Annotated[float | None, typer.Option(help="Integrator tolerance.")] = None,
+    component: Annotated[str, typer.Option(help="Force component of the figures.")] = "line_of_action",
+    workers: Annotated[int | None, typer.Option(help="Cases at a time; default: the cores.")] = None,
+) -> None:
+    """Reproduce the paper: six cases, GMF table, figures 5 and 7, report."""
+    with guarded():
+        # on a busy machine imports alone take many seconds
+        typer.secho("gearmbs: the paper's six cases; loading", err=True)
+        # nothing that compiles is imported before all options are known to be right
+        from gearmbs.signals import COMPONENTS
+        from gearmbs.studies.case.case import CaseError, make_case
+        from gearmbs.studies.case.limits import check_record
+        from gearmbs.units import to_si
+
+        if component not in COMPONENTS:
+            raise CaseError(f"--component is {component!r}; choose one of {', '.join(COMPONENTS)}")
+        data: dict = {"solver": {"integrator": integrator.upper()}, "fault": {"plane": misalignment}}
+        for section, key, value in (
+            ("operation", "speed", speed),
+            ("operation", "duration", duration),
+            ("contact", "depth", depth),
+            ("fault", "backlash", backlash),
+            ("gears", "face_width", face_width),
+            ("solver", "tolerance", tolerance),
+        ):
+            if value is not None:
+                data.setdefault(section, {})[key] = value
+        data["friction"] = {"enabled": friction}
+        if torque is not None:
+            data.setdefault("operation", {})["torque"] = torque
+        base = make_case(data, "options")
+        low = base.operation.top_torque
+        tilt = to_si(angle, "angle", "--angle")
+        check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
+
+        from gearmbs.studies.paper.paper import run_paper
+        from gearmbs.studies.paper.preset import paper_cases
+        from gearmbs.studies.run.simulation import SimulationFailed
+        from gearmbs.studies.run.store import check_place, file_stem, keep, record_size, stored_record
+
+        settings: dict[str, Any] = {"torques": (low, 2.0 * low), "misalignment": tilt}
+        cases = paper_cases(base=base, **settings)
+        names = [case.name for case in cases]
+        single = out / "cases"
+        finished = [case.name for case in cases if stored_record(single, case) is not None]
+        # each record by itself, and all of them in one file
+        check_place(out, record_size(base) * (2 * len(cases) - len(finished)), "the study")
+        if finished:
+            typer.echo(f"taking up {len(finished)} finished of {len(cases)} cases from {single}", err=True)
+        with case_bars(names) as move:
+            try:
+                study = run_paper(
+                    base,
+                    component=component,
+                    workers=workers,
+                    progress=move,
+                    folder=single,
+                    **settings,
+                )
+            except SimulationFailed as failure:
+                name = file_stem(failure.case.name) if failure.case is not None else "failed"
+                keep_partial(failure, single / f"{name}.partial.nc")
+        paths = keep(study.save, out)
+        for claim in study.claims():
+            mark = "held    " if claim.held else "NOT HELD"
+            typer.echo(f"{mark}  {claim.name}\n          {claim.numbers}")
+        typer.echo("\n".join(f"wrote {path}" for path in paths))
+
+
+def run(
+    case_file: Annotated[Path, typer.Argument(help="Case in TOML.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="NetCDF file; default: beside the case.")] = None,
+    lump: Annotated[
+        bool,
+        typer.Option("--lump", help="Integrate gear and shaft as one body, as [solver] lump = true does."),
+    ] = False,
+) -> None:
+    """Simulate a case, a planetary set or a whole drivetrain, and write its record as NetCDF."""
+    kind = kind_of(case_file)
+    if kind == "planetary set":
+        run_planetary_set(case_file, out)
+        return
+    if kind == "drivetrain":
+        run_drivetrain(case_file, out)
+        return
+    with guarded():
+        from gearmbs.studies.case.case import load_case
+        from gearmbs.studies.case.limits import check_record, remarks
+
+        case = load_case(case_file)
+        if lump:
+            case = case.changed(solver={"lump": True})
+        check_record(case, str(case_file))
+
+        from gearmbs.studies.run.simulation import SimulationFailed, run_case
+        from gearmbs.studies.run.store import check_place, keep_dataset, record_size
+
+        target = out or case_file.with_suffix(".nc")
+        check_place(target.parent, record_size(case), "its record")
+        operation = case.operation
+        span = operation.run_up + operation.settling + operation.duration
+        with case_bars([case.name]) as move:
+            try:
+                data = run_case(case, lambda t: move(case.name, min(t / span, 1.0)))
+            except SimulationFailed as failure:
+                keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
+        keep_dataset(target, data)
+        typer.echo(_level_table(data))
+        for remark in remarks(case):
+            typer.echo(f"note: {remark}", err=True)
+        speed, cycle = data.attrs["solver_real_time_factor"], 1e3 * data.attrs["solver_time_per_mesh_cycle"]
+        typer.echo(f"solver: {speed:.3g} times real time, {cycle:.3g} ms a mesh cycle", err=True)
+        typer.echo(f"wrote {target}")
+
+
+def run_planetary_set(file: Path, out: Path | None) -> None:
+    """Simulate a planetary set; write its record and say how the load is shared."""
+    with guarded():
+        from gearmbs.studies.case.section import CaseError
+        from gearmbs.studies.run.store import check_place, keep_dataset
+        from gearmbs.studies.trains.planetary import load_planetary, run_planetary
+
+        found = load_planetary(file)
+        try:
+            # what does not go together is found when the mechanism is made
+            found.mechanism()
+        except ValueError as error:
+            raise CaseError(f"{file.name}: {error}") from None
+        target = out or file.with_suffix(".nc")
+        check_place(target.parent, 0, "its record")
+        span = found.run_up + found.settling + found.duration
+        with case_bars([found.gears.name]) as move:
+            data = run_planetary(found, lambda t: move(found.gears.name, min(t / span, 1.0)))
+        keep_dataset(target, data)
+        for planet in data.planet.values:
+            one = data.sel(planet=planet)
+            loads = "".join(f"{float(one['force'].sel(mesh=m).mean()):12.5g} N ({m})" for m in ("sun", "ring"))
+            typer.echo(f"planet {planet}: {loads}, share {float(one['share'].mean()):.4f}")
+        names = ("mesh", "sun_fault", "planet_fault", "ring_fault", "planet_pass")
+        typer.echo("Hz: " + ", ".join(f"{n.replace('_', ' ')} {data.attrs['frequency_' + n]:.5g}" for n in names))
+        typer.echo(f"wrote {target}")
+
+
+def run_drivetrain(file: Path, out: Path | None) -> None:
+    """Simulate a drivetrain; write its record, a report, a 3-D view and a spectrum with its lines named."""
+    with guarded():
+        from gearmbs.studies.trains.trains import check_record, load_train
+
+        found = load_train(file)
+        train, settings = found.train, found.run
+        check_record(train, settings)
+
+        from gearmbs.signals.files.simulated import holds_speed
+        from gearmbs.studies.run.simulation import SimulationFailed
+        from gearmbs.studies.run.store import check_place, keep_dataset, write_text
+        from gearmbs.studies.trains.report import train_report, train_scene, train_spectrum
+        from gearmbs.studies.trains.trains import run_train
+        from gearmbs.view import save_figure
+
+        target = out or file.with_suffix(".nc")
+        check_place(target.parent, 0, "its record")
+        span = train.run_up + settings.settling + settings.duration
+        with case_bars([train.name]) as move:
+            try:
+                data = run_train(train, settings, progress=lambda t: move(train.name, min(t / span, 1.0)))
+            except SimulationFailed as failure:
+                keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
+        keep_dataset(target, data)
+        report, scene = target.with_suffix(".md"), target.with_suffix(".html")
+        write_text(report, train_report(train, data))
+        train_scene(train).save_html(scene)
+        written = [target, report, scene]
+        if "mesh_rms" in data and train.meshes and holds_speed(data):
+            written += save_figure(train_spectrum(train, data), target.with_suffix(""))
+        for mesh in data.mesh.values:
+            if "mesh_track" in data:
+                # of a run-up the report says where which harmonic is highest
+                continue
+            levels = data["mesh_rms"].sel(mesh=mesh, signal=f"force of {mesh}")
+            shown = "".join(f"{v:10.4g}" for v in levels.values)
+            typer.echo(f"{mesh!s:<18}{float(levels.mesh_frequency):10.5g} Hz{shown}   RMS of the normal force, N")
+        if data.attrs.get("remarks", "none") != "none":
+            typer.echo(data.attrs["remarks"])
+        typer.echo("\n".join(f"wrote {path}" for path in written))
+
+
+def _level_table(data: Any) -> str:
+    """Return the levels of the mesh harmonics of a record as a table; of a run-up the highest, and where."""
+    if "gmf_rms" in data:
+        levels = data["gmf_rms"].sel(way="band")
+        lines = [f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2"]
+        for component in levels.component.values:
+            row = levels.sel(component=component).values
+            lines.append(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
+        return "\n".join(lines)
+    speed = data["speed"] * 30.0 / 3.141592653589793
+    lines = [f"driver from {float(speed[0]):.4g} to {float(speed[-1]):.4g} rpm, at most {float(speed.max()):.4g} rpm"]
+    levels, at = data["order_rms"], data["track_speed"] * 30.0 / 3.141592653589793
+    heads = "".join(f"{int(h):>8} x GMF   at rpm" for h in levels.harmonic.values)
+    lines.append(f"{'highest':<18}{heads}   RMS, m/s^2")
+    for component in levels.component.values:
+        row = levels.sel(component=component).transpose("harmonic", "track_time").values
+        best = [int(v.argmax()) for v in row]
+        lines.append(f"{component!s:<18}" + "".join(f"{v[k]:14.4g}{float(at[k]):9.4g}" for v, k in zip(row, best)))
+    return "\n".join(lines)
+
+
+# ``gearmbs sweep`` and ``gearmbs campbell``: a case over many values, and the modes of a drivetrain over its speed.
+
+
+def sweep(
+    case_file: Annotated[Path, typer.Argument(help="Case in TOML.")],
+    field: Annotated[str, typer.Argument(help='Section and setting, e.g. "operation.speed".')],
+    values: Annotated[list[str], typer.Argument(help='Its values, e.g. "600 rpm" "900 rpm"; two with --count.')],
+    count: Annotated[int | None, typer.Option(help="So many values, evenly from the first to the second.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Cases at a time; default: the cores.")] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for records, table and figure.")] = Path("sweep"),
+) -> None:
+    """Run a case over values of one setting, taken up again if interrupted; over speeds, draw a waterfall.
+
+    Several settings at once, samples of distributions and work of days are campaigns: gearmbs campaign.
+    """
+    with guarded():
+        check_kind(case_file, "case")
+        from gearmbs.studies.case.case import load_case
+        from gearmbs.studies.case.limits import check_record
+        from gearmbs.studies.run.store import check_place, record_size
+        from gearmbs.studies.run.sweep import between, cases_of_sweep
+        from gearmbs.studies.run.sweep import sweep as run_sweep
+
+        case = load_case(case_file)
+        chosen = values if count is None else between(values, count, case, field)
+        cases = cases_of_sweep(case, field, chosen)
+        for one in cases:
+            check_record(one, str(case_file))
+        check_place(out, sum(record_size(one) for one in cases), "the sweep")
+        with case_bars([one.name for one in cases]) as move:
+            study = run_sweep(case, field, chosen, folder=out, workers=workers, progress=move, errors="keep")
+        for name, error in study.failures.items():
+            typer.echo(f"gearmbs: {name} failed: {error}", err=True)
+        if not study.records:
+            raise RuntimeError("no case of the sweep came to its end")
+        paths = study.save(out)
+        typer.echo(study.table().to_string(float_format="{:.5g}".format))
+        typer.echo("\n".join(f"wrote {path}" for path in paths if path.suffix != ".nc"))
+        typer.echo(f"wrote {len(study.records)} records to {out}")
+
+
+def campbell(
+    train: Annotated[Path, typer.Argument(help="Drivetrain (TOML).")],
+    speeds: Annotated[
+        list[str] | None, typer.Option(help='Lowest and highest speed of the first drive, e.g. "3000 rpm"; repeat.')
+    ] = None,
+    harmonics: Annotated[int, typer.Option(help="Mesh harmonics that excite.")] = 2,
+    maximum: Annotated[str, typer.Option(help="Modes up to this frequency.")] = "2 kHz",
+    record: Annotated[Path | None, typer.Option(help="Record of a run-up to lay beneath.")] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the figure.")] = Path("campbell"),
+) -> None:
+    """Draw natural frequencies of a drivetrain over its speed, with what excites them; list the critical speeds."""
+    with guarded(), stage_bar(train.name) as move:
+        check_kind(train, "drivetrain")
+        if record is not None:
+            check_kind(record, "record")
+        check_targets(out=out)
+        import numpy as np
+
+        from gearmbs.drivetrain.description import read_description
+        from gearmbs.signals import critical_speeds
+        from gearmbs.studies.trains.modes import train_campbell
+        from gearmbs.units import to_si
+        from gearmbs.view import campbell_plot
+
+        top = to_si(maximum, "frequency", "--maximum")
+        limits = sorted(to_si(text, "angular speed", "--speeds") for text in speeds or [])
+        if len(limits) > 2:
+            raise ValueError(f"--speeds is given {len(limits)} times; give the highest, or the lowest and the highest")
+        turned = np.linspace(0.0 if len(limits) == 1 else limits[0], limits[-1], 13).tolist() if limits else None
+        move(0.1, "modes")
+        diagram = train_campbell(read_description(train).train, turned, harmonics=harmonics, maximum=top)
+        measured = None
+        if record is not None:
+            from gearmbs.signals import waterfall
+            from gearmbs.signals.files.simulated import read_any
+
+            measured = waterfall(read_any(record), maximum=top)
+        move(0.8, "drawing")
+        files = save_figures({"campbell": campbell_plot(diagram, measured=measured, maximum=top)}, out)
+        table = critical_speeds(diagram)
+    hand_over(table.to_string(index=False, float_format="{:.5g}".format), None, files)

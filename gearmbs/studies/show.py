@@ -9,15 +9,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gearmbs._shown import html_table
-from gearmbs.studies.case_file import readable
-from gearmbs.studies.section import Section
+from gearmbs.studies.case.case import readable
+from gearmbs.studies.case.section import Section
 from gearmbs.view import mesh_view
-from gearmbs.view.figure_style import BLUE, ORANGE, VERMILLION, look, new_figure
+from gearmbs.view.figures.style import BLUE, ORANGE, VERMILLION, look, new_figure
 
 if TYPE_CHECKING:
-    from gearmbs.studies.case import Case
-    from gearmbs.studies.paper import PaperStudy
-    from gearmbs.studies.sweep import Sweep
+    from gearmbs.studies.case.case import Case
+    from gearmbs.studies.paper.paper import PaperStudy
+    from gearmbs.studies.run.sweep import Sweep
 
 
 def case_html(case: Case) -> str:
@@ -82,7 +82,7 @@ def case_plot(case: Case, *, title: str | None = None) -> Figure:
 
 
 def _speed(case: Case, t: np.ndarray) -> np.ndarray:
-    from gearmbs.studies.drive import drive_angle
+    from gearmbs.studies.case.parts import drive_angle
 
     o = case.operation
     angle = drive_angle(o.speed, o.run_up, o.run_up + o.settling)
@@ -90,7 +90,7 @@ def _speed(case: Case, t: np.ndarray) -> np.ndarray:
 
 
 def _torque(case: Case, t: np.ndarray) -> np.ndarray:
-    from gearmbs.studies.drive import load_torque
+    from gearmbs.studies.case.parts import load_torque
 
     o = case.operation
     load = load_torque(o.torque, o.run_up, o.run_up + o.settling)

@@ -10,49 +10,45 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.view.animation import MeshAnimation, mesh_animation
-    from gearmbs.view.bars import comparison_bars, gmf_bars
-    from gearmbs.view.bearing_figure import bearing_plot
-    from gearmbs.view.campbell_figure import campbell_plot
-    from gearmbs.view.changing_speed import (
+    from gearmbs.view.figures.animation import MeshAnimation, mesh_animation
+    from gearmbs.view.figures.bodies import (
+        BodyAnimation,
+        campbell_plot,
+        deformation_animation,
+        deformed_plot,
+        modal_energy_plot,
+        mode_animation,
+        solution_plot,
+        stress_plot,
+        whirl_plot,
+    )
+    from gearmbs.view.figures.changing_speed import (
         changing_speed_figures,
         order_map_plot,
         order_track_plot,
         spectrogram_plot,
         waterfall_plot,
     )
-    from gearmbs.view.contacts import ContactPoints, ContactProbe
-    from gearmbs.view.curves import contact_pattern_plot, load_sharing_plot, stiffness_plot, transmission_error_plot
-    from gearmbs.view.export_dxf import write_dxf
-    from gearmbs.view.export_step import write_step
-    from gearmbs.view.export_stl import read_stl, write_stl
-    from gearmbs.view.figure_style import COLOURS, save_figure
-    from gearmbs.view.flexible_bodies import (
-        BodyAnimation,
-        deformation_animation,
-        deformed_plot,
-        modal_energy_plot,
-        mode_animation,
-        whirl_plot,
+    from gearmbs.view.figures.maps import (
+        contact_pattern_plot,
+        load_sharing_plot,
+        sensitivity_map,
+        stiffness_plot,
+        transmission_error_plot,
     )
-    from gearmbs.view.maps import sensitivity_map
-    from gearmbs.view.mesh import Mesh
-    from gearmbs.view.motion import PairMotion, solution_motion, static_motion
-    from gearmbs.view.named_lines import named_lines_plot
-    from gearmbs.view.outline import gear_outline, profile_area
-    from gearmbs.view.page import Page
-    from gearmbs.view.planetary import planetary_plot, planetary_scene
-    from gearmbs.view.reports import analysis_figures, comparison_figures, report_plot
-    from gearmbs.view.revolution import average_plot
-    from gearmbs.view.scene import Deflection, Part, Scene
-    from gearmbs.view.scenes import gear_scene, mechanism_scene, solution_scene
-    from gearmbs.view.signals import order_plot, spectrum_plot, time_plot
-    from gearmbs.view.solid import gear_solid, pair_solids
-    from gearmbs.view.solution_figures import solution_plot
-    from gearmbs.view.stress_figure import stress_plot
-    from gearmbs.view.topology import mechanism_plot
-    from gearmbs.view.transverse import mesh_view
-    from gearmbs.view.wheel import wheel_plot
+    from gearmbs.view.figures.records import average_plot, named_lines_plot, order_plot, spectrum_plot, time_plot
+    from gearmbs.view.figures.reports import analysis_figures, bearing_plot, comparison_figures, report_plot
+    from gearmbs.view.figures.style import COLOURS, comparison_bars, gmf_bars, save_figure
+    from gearmbs.view.figures.transverse import mechanism_plot, mesh_view, wheel_plot
+    from gearmbs.view.geometry.flat import read_stl, write_dxf, write_stl
+    from gearmbs.view.geometry.mesh import Mesh
+    from gearmbs.view.geometry.profile import gear_outline, profile_area
+    from gearmbs.view.geometry.solid import gear_solid, pair_solids
+    from gearmbs.view.geometry.step import write_step
+    from gearmbs.view.scenes.motion import ContactPoints, ContactProbe, PairMotion, solution_motion, static_motion
+    from gearmbs.view.scenes.pages import Page
+    from gearmbs.view.scenes.scene import Deflection, Part, Scene
+    from gearmbs.view.scenes.scenes import gear_scene, mechanism_scene, planetary_plot, planetary_scene, solution_scene
 
 __all__ = [
     "COLOURS",
@@ -120,65 +116,65 @@ __all__ = [
 late(
     __name__,
     {
-        "deformed_plot": ".flexible_bodies",
-        "deformation_animation": ".flexible_bodies",
-        "mode_animation": ".flexible_bodies",
-        "modal_energy_plot": ".flexible_bodies",
-        "stress_plot": ".stress_figure",
-        "whirl_plot": ".flexible_bodies",
-        "BodyAnimation": ".flexible_bodies",
-        "Deflection": ".scene",
-        "COLOURS": ".figure_style",
-        "ContactPoints": ".contacts",
-        "ContactProbe": ".contacts",
-        "Mesh": ".mesh",
-        "MeshAnimation": ".animation",
-        "Page": ".page",
-        "PairMotion": ".motion",
-        "Part": ".scene",
-        "Scene": ".scene",
-        "analysis_figures": ".reports",
-        "average_plot": ".revolution",
-        "bearing_plot": ".bearing_figure",
-        "campbell_plot": ".campbell_figure",
-        "changing_speed_figures": ".changing_speed",
-        "comparison_bars": ".bars",
-        "comparison_figures": ".reports",
-        "contact_pattern_plot": ".curves",
-        "gear_outline": ".outline",
-        "gear_scene": ".scenes",
-        "gear_solid": ".solid",
-        "gmf_bars": ".bars",
-        "planetary_plot": ".planetary",
-        "planetary_scene": ".planetary",
-        "load_sharing_plot": ".curves",
-        "mechanism_plot": ".topology",
-        "mechanism_scene": ".scenes",
-        "mesh_animation": ".animation",
-        "mesh_view": ".transverse",
-        "named_lines_plot": ".named_lines",
-        "order_map_plot": ".changing_speed",
-        "order_plot": ".signals",
-        "order_track_plot": ".changing_speed",
-        "pair_solids": ".solid",
-        "profile_area": ".outline",
-        "read_stl": ".export_stl",
-        "report_plot": ".reports",
-        "save_figure": ".figure_style",
-        "sensitivity_map": ".maps",
-        "solution_plot": ".solution_figures",
-        "solution_motion": ".motion",
-        "solution_scene": ".scenes",
-        "spectrogram_plot": ".changing_speed",
-        "spectrum_plot": ".signals",
-        "static_motion": ".motion",
-        "stiffness_plot": ".curves",
-        "time_plot": ".signals",
-        "transmission_error_plot": ".curves",
-        "waterfall_plot": ".changing_speed",
-        "wheel_plot": ".wheel",
-        "write_dxf": ".export_dxf",
-        "write_step": ".export_step",
-        "write_stl": ".export_stl",
+        "deformed_plot": ".figures.bodies",
+        "deformation_animation": ".figures.bodies",
+        "mode_animation": ".figures.bodies",
+        "modal_energy_plot": ".figures.bodies",
+        "stress_plot": ".figures.bodies",
+        "whirl_plot": ".figures.bodies",
+        "BodyAnimation": ".figures.bodies",
+        "Deflection": ".scenes.scene",
+        "COLOURS": ".figures.style",
+        "ContactPoints": ".scenes.motion",
+        "ContactProbe": ".scenes.motion",
+        "Mesh": ".geometry.mesh",
+        "MeshAnimation": ".figures.animation",
+        "Page": ".scenes.pages",
+        "PairMotion": ".scenes.motion",
+        "Part": ".scenes.scene",
+        "Scene": ".scenes.scene",
+        "analysis_figures": ".figures.reports",
+        "average_plot": ".figures.records",
+        "bearing_plot": ".figures.reports",
+        "campbell_plot": ".figures.bodies",
+        "changing_speed_figures": ".figures.changing_speed",
+        "comparison_bars": ".figures.style",
+        "comparison_figures": ".figures.reports",
+        "contact_pattern_plot": ".figures.maps",
+        "gear_outline": ".geometry.profile",
+        "gear_scene": ".scenes.scenes",
+        "gear_solid": ".geometry.solid",
+        "gmf_bars": ".figures.style",
+        "planetary_plot": ".scenes.scenes",
+        "planetary_scene": ".scenes.scenes",
+        "load_sharing_plot": ".figures.maps",
+        "mechanism_plot": ".figures.transverse",
+        "mechanism_scene": ".scenes.scenes",
+        "mesh_animation": ".figures.animation",
+        "mesh_view": ".figures.transverse",
+        "named_lines_plot": ".figures.records",
+        "order_map_plot": ".figures.changing_speed",
+        "order_plot": ".figures.records",
+        "order_track_plot": ".figures.changing_speed",
+        "pair_solids": ".geometry.solid",
+        "profile_area": ".geometry.profile",
+        "read_stl": ".geometry.flat",
+        "report_plot": ".figures.reports",
+        "save_figure": ".figures.style",
+        "sensitivity_map": ".figures.maps",
+        "solution_plot": ".figures.bodies",
+        "solution_motion": ".scenes.motion",
+        "solution_scene": ".scenes.scenes",
+        "spectrogram_plot": ".figures.changing_speed",
+        "spectrum_plot": ".figures.records",
+        "static_motion": ".scenes.motion",
+        "stiffness_plot": ".figures.maps",
+        "time_plot": ".figures.records",
+        "transmission_error_plot": ".figures.maps",
+        "waterfall_plot": ".figures.changing_speed",
+        "wheel_plot": ".figures.transverse",
+        "write_dxf": ".geometry.flat",
+        "write_step": ".geometry.step",
+        "write_stl": ".geometry.flat",
     },
 )

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import parse_deck, read_deck, run_deck
-from gearmbs.adams.results.facets import FacetedTouch, facets_remark
+from gearmbs.adams.results.remarks import TRACK_COLUMNS, FacetedTouch, facets_remark
 from gearmbs.adams.results.res import NAMESPACE
-from gearmbs.adams.results.tracks import TRACK_COLUMNS
 from gearmbs.mechanism.contacts import Box, Cylinder
 
 from .test_contacts import IMPACT, PLANE, deck

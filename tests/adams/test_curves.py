@@ -9,7 +9,7 @@ from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.builders.curve_data import matrix_values
 from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism import ModelError
-from gearmbs.mechanism.curves import Curve
+from gearmbs.mechanism.parts.curves import Curve
 
 RADIUS, OFF, ROLLER, SPEED, MASS, G = 50.0, 20.0, 10.0, 10.0, 0.5, 9810.0
 PHI = np.linspace(0.0, 2.0 * np.pi, 73)

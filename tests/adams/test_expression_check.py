@@ -50,10 +50,10 @@ RIGHT = {key: "0.1" for key in WRONG} | {"gcon": "DX(20,10)"}
 
 PROGRAM = """
 import sys, time
-import gearmbs._jit
+import gearmbs.kernels.jit
 def forbidden(*_):
     raise SystemExit("a kernel is wanted")
-gearmbs._jit.Kernel.compile = gearmbs._jit.Kernel._compile_for_args = forbidden
+gearmbs.kernels.jit.Kernel.compile = gearmbs.kernels.jit.Kernel._compile_for_args = forbidden
 from gearmbs.adams import DeckError, parse_deck, run_deck
 from tests.adams.test_expression_check import DECK, RIGHT, WRONG, gse
 run_deck  # loaded

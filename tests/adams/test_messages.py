@@ -5,7 +5,7 @@ import re
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
-from gearmbs.adams.results.assembly import Assembly
+from gearmbs.adams.results.remarks import Assembly
 from gearmbs.adams.support import REFUSED, function_rows
 
 PENDULUM = """a pendulum

@@ -7,7 +7,7 @@ import pytest
 
 from gearmbs.adams import parse_deck, run_deck
 from gearmbs.adams.results.msg import message_text
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 
 HEAD = """door

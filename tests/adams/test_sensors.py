@@ -9,7 +9,7 @@ from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.results.msg import message_text
 from gearmbs.adams.run.sensors import in_unit
 from gearmbs.mechanism import Mechanism, ModelError
-from gearmbs.mechanism.stops import StopAt
+from gearmbs.mechanism.solve.simulate import StopAt
 
 DECK = """thrown
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND

@@ -12,7 +12,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS
 from gearmbs.adams.parse.commands import UNSUPPORTED_COMMANDS
 from gearmbs.adams.parse.grammar import specs_of
-from gearmbs.mechanism.expression_functions import UNSUPPORTED as REFUSED_FUNCTIONS
+from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
 
 from .decks import PENDULUM
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import parse_deck
-from gearmbs.adams.results.req import read_requests
+from gearmbs.adams.results.msg import read_requests
 from gearmbs.adams.results.res import NAMESPACE
 from gearmbs.adams.run.runner import run_deck
 from gearmbs.adams.write.deck_writer import write_deck
 from gearmbs.adams.write.text import wrapped
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism, curve, curve_integral, harmonic, polynomial, ramp, step
-from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.language.syntax import Units
 
 from .decks import PENDULUM
 
@@ -82,10 +82,9 @@ def test_every_joint_is_written_and_read(kind):
                  curve([0.1, 0.3, 0.4], [1.0, 3.0, -2.0]), curve_integral([0.1, 0.3, 0.4], [1.0, 3.0, -2.0], 0.5)],
 )  # fmt: skip
 def test_functions_of_time_are_written_as_expressions(function):
-    from gearmbs.mechanism.expression_compiler import compile_expression
-    from gearmbs.mechanism.expression_syntax import Scope
-    from gearmbs.mechanism.function_text import function_text
-    from gearmbs.mechanism.functions import as_function
+    from gearmbs.mechanism.language.library import compile_expression
+    from gearmbs.mechanism.language.syntax import Scope
+    from gearmbs.mechanism.parts.functions import as_function, function_text
     from tests.dae.equations.expressions.support import time_series
 
     f = as_function(function)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, read_deck, run_deck, write_deck
-from gearmbs.adams.pairs import MARK, pair_comments, pair_of
-from gearmbs.dae.errors import ModelError
+from gearmbs.adams.commands import MARK, pair_comments, pair_of
+from gearmbs.dae.problem import ModelError
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair
 from gearmbs.gears.faults import BrokenTooth, Crowning, Fault, FlankMap, PitchError, TipRelief
 from gearmbs.mechanism import Mechanism, ramp, step
@@ -27,7 +27,7 @@ from gearmbs.mechanism.contacts import (
     Torus,
     extruded,
 )
-from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.language.syntax import Units
 
 MM = Units(length=1e-3)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

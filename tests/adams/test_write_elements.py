@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import parse_deck, read_deck, run_deck, write_deck
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism, Mode
-from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.language.syntax import Units
 
 from .test_run import model
 from .test_writers import ELEMENTS as STATEMENTS

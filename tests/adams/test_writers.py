@@ -9,10 +9,10 @@ import pytest
 import xarray as xr
 
 from gearmbs.adams import parse_deck, run_deck
-from gearmbs.adams.builders.element_pairs import KINDS
+from gearmbs.adams.builders.scopes import KINDS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
-from gearmbs.adams.results.req import read_requests
+from gearmbs.adams.results.msg import read_requests
 from gearmbs.adams.results.res import ENTITY_TYPES, NAMESPACE
 
 from .test_run import model

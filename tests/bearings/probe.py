@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.bearings.kernel import bearing_force
 from gearmbs.bearings.layout import scratch
-from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, DIAGNOSTICS
 from gearmbs.mechanism import Mechanism
 
 

@@ -17,7 +17,7 @@ from gearmbs.bearings import (
     UnevenSpacing,
     Waviness,
 )
-from gearmbs.bearings.profiles import spall_depth
+from gearmbs.bearings.layout import spall_depth
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism, linear_modes, static_equilibrium
 from gearmbs.signals import diagnose_bearing

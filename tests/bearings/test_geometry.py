@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError, equivalent_load, groove_contact, mean_load, rating_life
-from gearmbs.bearings.hertz import line_contact
+from gearmbs.bearings.laws_kernel import line_contact
 from gearmbs.bearings.ratings import dynamic_rating, load_factors
 
 MULTIPLES = {

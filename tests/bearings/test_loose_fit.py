@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError, BearingStatics, LooseFit, RollingBearing, Spall, add_bearing
-from gearmbs.bearings.loose import ring_inertia
+from gearmbs.bearings.element import ring_inertia
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import bearing_rig
 

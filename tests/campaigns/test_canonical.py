@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.campaigns import CampaignError, PairSubject, canonical, content_key
-from gearmbs.campaigns.canonical import rounded
+from gearmbs.campaigns.settings import rounded
 from gearmbs.campaigns.subjects.pair import canonical_case
 from gearmbs.studies import Case
 

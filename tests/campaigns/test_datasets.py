@@ -27,7 +27,7 @@ from gearmbs.campaigns.datasets import (
     withhold,
     write_data_set,
 )
-from gearmbs.campaigns.datasets.features import NAMES
+from gearmbs.campaigns.datasets.baseline import NAMES
 from gearmbs.signals import make_signal
 
 RATE = 12800.0

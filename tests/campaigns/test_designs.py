@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import CampaignError, designs
+from gearmbs.campaigns import CampaignError
+from gearmbs.campaigns import factors as designs
 
 
 @pytest.mark.parametrize("design", designs.SEQUENCES)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, load_plan, make_plan
-from gearmbs.campaigns.canonical import PHYSICS
+from gearmbs.campaigns.settings import PHYSICS
 from gearmbs.studies import Case, run_case
 
 BASE = Case(operation={"duration": 0.08, "run_up": 0.02, "settling": 0.02})
@@ -42,7 +42,7 @@ def test_physics_is_counted_up_when_results_change(campaign):
     assert PHYSICS in STORED, "store the numbers of the new physics"
     for name, value in STORED[PHYSICS].items():
         found = campaign.table[name][1]
-        assert found == pytest.approx(value, rel=0.01), f"{name}: count up gearmbs.campaigns.canonical.PHYSICS"
+        assert found == pytest.approx(value, rel=0.01), f"{name}: count up gearmbs.campaigns.settings.PHYSICS"
 
 
 STORED = {1: {"orders.line_of_centres.1": 64.972, "orders.line_of_action.1": 29.238, "orders.line_of_action.2": 33.594}}

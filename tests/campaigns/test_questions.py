@@ -23,7 +23,7 @@ from gearmbs.campaigns import (
     sobol_indices,
     total_bounds,
 )
-from gearmbs.campaigns.designs import factorial, morris, saltelli, sequence
+from gearmbs.campaigns.factors import factorial, morris, saltelli, sequence
 from gearmbs.cli import app
 from tests.campaigns.models import PI
 from tests.campaigns.support import function, ranges, small
@@ -280,7 +280,9 @@ def test_bounds_of_random_points_are_in_order_and_hold(function, truth, monkeypa
     from sklearn.gaussian_process.kernels import Matern, WhiteKernel
 
     # the bounds hold for any surrogate; the kernel's likeliest lengths are what takes the time
-    monkeypatch.setattr("gearmbs.campaigns.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01))
+    monkeypatch.setattr(
+        "gearmbs.campaigns.sensitivity.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01)
+    )
     held = []
     for seed in range(4):
         u = np.random.default_rng(seed).random((80, 3))
@@ -298,7 +300,9 @@ def test_bounds_of_noise_are_all_there_is(monkeypatch):
     pytest.importorskip("sklearn")
     from sklearn.gaussian_process.kernels import Matern, WhiteKernel
 
-    monkeypatch.setattr("gearmbs.campaigns.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01))
+    monkeypatch.setattr(
+        "gearmbs.campaigns.sensitivity.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01)
+    )
     u = np.random.default_rng(2).random((60, 3))
     with pytest.warns(UserWarning, match="explains nothing of 60 points.*anything from 0 to 1"):
         found = total_bounds(u, np.random.default_rng(5).standard_normal(60), NAMES)

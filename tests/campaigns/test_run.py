@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, make_plan
-from gearmbs.view.files import write_whole
+from gearmbs.files import write_whole
 from tests.campaigns.support import digest, function, ranges, small
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from gearmbs.contact.laws import LAW_HUNT_CROSSLEY, friction_law, normal_law
 from gearmbs.contact.layout import FRICTION_ADAMS
-from gearmbs.dae.equations.time_functions import smooth_step
+from gearmbs.dae.equations.loads.time_functions import smooth_step
 from gearmbs.mechanism import Mechanism, step
 
 IMPACT = 0

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.compiled.pointers import address
-from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, DIAGNOSTICS
 from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
 from gearmbs.gears import GearSpec
+from gearmbs.kernels.pointers import address
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.forces.function_kernel import vary
+from gearmbs.mechanism.forces.functions import vary
 
 
 def rotation(vector):

@@ -20,7 +20,7 @@ from gearmbs.drivetrain import (
     TorsionalShaft,
     gear_pump_ripple,
 )
-from gearmbs.drivetrain.attached import Attached
+from gearmbs.drivetrain.part import Attached
 from gearmbs.mechanism import static_equilibrium
 from tests.drivetrain.support import evaluate, frame, rotor
 

@@ -6,8 +6,8 @@ import pytest
 from gearmbs.bearings.clearance import ClearanceForce
 from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
 from gearmbs.mechanism import Diagnostic, Mechanism
-from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.functions import constant
+from gearmbs.mechanism.parts.elements import State
+from gearmbs.mechanism.parts.functions import constant
 from tests.drivetrain.support import differences, evaluate, frame, rotation
 
 TABLE = (1.0, 0.0, 3.0, -50.0, 10.0, 60.0, 5.0, 2.0, -4.0, 0.1, -0.05, -0.2)

@@ -27,7 +27,7 @@ DRIVE = f"{SPEED / TIME}*(TIME**2/2+{(TIME / (2 * np.pi)) ** 2}*(COS({2 * np.pi 
 
 @pytest.mark.parametrize("turn", [1.3, 0.05, 1e-6])
 def test_derivatives_of_the_element(turn):
-    from gearmbs.flexible.beam_kernel import WORK, large_beam
+    from gearmbs.flexible.large_beam import WORK, large_beam
 
     section = BeamSection(3e4, 20.0, (7.0, 11.0), (2e3, 3e3), 1.0, (1e-3, 1e-3, 2e-3))
     reals = np.array(LargeBeam("e", None, None, 0.4, section, 0.03).compiled().reals)

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipeinc, ellipkinc
 
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.flexible import BeamSection, ElasticMaterial, add_beam
 from gearmbs.mechanism import Mechanism, quasi_static, static_equilibrium
 

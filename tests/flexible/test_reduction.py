@@ -18,8 +18,8 @@ from gearmbs.flexible import (
     reduce_model,
     solid_model,
 )
-from gearmbs.flexible.integrals import of_lumps, of_mass_matrix
 from gearmbs.flexible.interfaces import resolve
+from gearmbs.flexible.reduction import of_lumps, of_mass_matrix
 from gearmbs.mechanism import Mechanism, ShapeIntegrals, static_equilibrium
 from tests.flexible.test_files import cube
 

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from gearmbs.dae.analyses.whirl import generator
+from gearmbs.dae.analyses.turning import generator
 from gearmbs.flexible import Disc, ElasticMaterial, Rotor, Shaft, ShaftSection, Support
 from gearmbs.mechanism import Mechanism, linear_modes
 

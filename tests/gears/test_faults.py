@@ -26,7 +26,7 @@ from gearmbs.gears.faults import (
     Wear,
     Wobble,
 )
-from gearmbs.gears.iso1328 import tolerances
+from gearmbs.gears.modifications import tolerances
 from gearmbs.gears.tables import tooth_deviations
 from gearmbs.gears.transmission import StaticMesh, kinematic_transmission_error
 

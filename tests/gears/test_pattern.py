@@ -7,8 +7,7 @@ import pytest
 
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import Crowning, RootCrack
-from gearmbs.gears.history import contact_history
-from gearmbs.gears.pattern import contact_pattern
+from gearmbs.gears.pattern import contact_history, contact_pattern
 
 
 def test_healthy_pattern_is_even_and_carries_the_load():

@@ -7,13 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from gearmbs.gears import (
-    GearPair,
-    GearSpec,
-    PairGeometry,
-    kinematic_transmission_error,
-    loaded_transmission_error,
-)
+from gearmbs.gears import GearPair, GearSpec, PairGeometry, kinematic_transmission_error, loaded_transmission_error
 from gearmbs.gears.reach import fillet_clearance
 
 RING = {"driver": GearSpec(23, "3 mm"), "driven": GearSpec.ring(70, "3 mm")}

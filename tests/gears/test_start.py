@@ -6,9 +6,9 @@ import re
 import numpy as np
 import pytest
 
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.gears import ContactLaw, GearPair, GearSpec, planetary
-from gearmbs.gears.planetary_rig import planetary_mechanism
+from gearmbs.gears.planetary.rig import planetary_mechanism
 from gearmbs.mechanism import Mechanism
 from tests.drivetrain.support import rotation, stage
 from tests.generators import cases, seed

@@ -8,15 +8,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error
-from gearmbs.gears.faults import (
-    BrokenTooth,
-    Crowning,
-    EndRelief,
-    FlankMap,
-    LeadCorrection,
-    PitchError,
-    Wear,
-)
+from gearmbs.gears.faults import BrokenTooth, Crowning, EndRelief, FlankMap, LeadCorrection, PitchError, Wear
 from gearmbs.gears.pattern import contact_pattern
 from gearmbs.gears.transmission import StaticMesh
 

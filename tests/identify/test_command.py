@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from gearmbs.cli import app
 from gearmbs.signals import write_signal
-from gearmbs.signals.simulated import record_signal
+from gearmbs.signals.files.simulated import record_signal
 from gearmbs.studies import Case, run_case
 
 FIT = """

@@ -27,7 +27,7 @@ from gearmbs.mechanism.contacts import (
 )
 from gearmbs.mechanism.contacts.kernel import SOLID
 from gearmbs.mechanism.contacts.shapes import volume
-from gearmbs.mechanism.forces.function_kernel import vary
+from gearmbs.mechanism.forces.functions import vary
 
 G = 9.81
 

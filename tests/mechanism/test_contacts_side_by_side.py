@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.contacts import (
+from gearmbs.mechanism.contacts import (  # fmt: skip
     Box,
     Coulomb,
     Cylinder,
@@ -22,7 +22,7 @@ from gearmbs.mechanism.contacts import (
     Mesh,
     Sphere,
     Torus,
-)  # fmt: skip
+)
 from tests.dae.model.test_side_by_side import records
 
 CUBE = Box((0.1, 0.1, 0.1)).facets()

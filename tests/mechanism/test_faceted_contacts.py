@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, DIAGNOSTICS
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.contacts import Box, Cylinder, HalfSpace, Impact, Mesh, Poisson, SolidContact, Sphere
-from gearmbs.mechanism.contacts.facet_tables import vertex_weights
+from gearmbs.mechanism.contacts.facets import vertex_weights
 
 LAWS = {"impact": Impact(1e8, 1.5, 0.0, 1e-4), "poisson": Poisson(1e6, 1.0)}
 

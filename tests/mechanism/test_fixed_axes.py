@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gearmbs.dae.model.member_tables import TURN_ROOT
+from gearmbs.dae.model.lane_members import TURN_ROOT
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.lumping import lumped
+from gearmbs.mechanism.building.lumping import lumped
 from gearmbs.studies import Case, simulate_case
 from tests.mechanism.test_lumping import TIGHT, agree, exact_reactions
 from tests.mechanism.test_own_forces import maxwell

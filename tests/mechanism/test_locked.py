@@ -4,7 +4,7 @@ import pytest
 
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.locked import locked_bodies
+from gearmbs.mechanism.checks import locked_bodies
 from gearmbs.studies import gear_rig
 
 

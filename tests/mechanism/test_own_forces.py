@@ -10,14 +10,7 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
 from gearmbs.adams import write_deck
-from gearmbs.mechanism import (
-    Diagnostic,
-    Mechanism,
-    ModelError,
-    linear_modes,
-    quasi_static,
-    static_equilibrium,
-)
+from gearmbs.mechanism import Diagnostic, Mechanism, ModelError, linear_modes, quasi_static, static_equilibrium
 
 UNIT = (0.1, 0.1, 0.1)
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.mechanism.expression_compiler import compile_expression
-from gearmbs.mechanism.expression_syntax import ExpressionError, Scope, parse, unparse
+from gearmbs.mechanism.language.library import compile_expression
+from gearmbs.mechanism.language.syntax import ExpressionError, Scope, parse, unparse
 from tests.dae.equations.expressions.support import MARKER_BODY, MARKERS, time_series
 
 

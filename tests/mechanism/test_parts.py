@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.mechanism import Mechanism, polynomial
-from gearmbs.mechanism.analyses import quasi_static
+from gearmbs.mechanism.solve.analyses import quasi_static
 
 
 @pytest.fixture(scope="module")

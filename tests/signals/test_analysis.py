@@ -21,7 +21,7 @@ from gearmbs.signals import (
     to_signal,
     write_signal,
 )
-from gearmbs.signals.shaft_finding import Known, mesh_shaft
+from gearmbs.signals.rotation.shaft import Known, mesh_shaft
 
 RATE = 12800.0
 TEETH = 32

@@ -21,9 +21,8 @@ from gearmbs.signals import (
     spectrum,
     with_metadata,
 )
-from gearmbs.signals.bearing_evidence import EnvelopeSpectrum, find_lines, log_tail, power_of
-from gearmbs.signals.bearing_judgement import judge
-from gearmbs.signals.bearing_report import PartFinding
+from gearmbs.signals.bearings.judgement import EnvelopeSpectrum, find_lines, judge, log_tail, power_of
+from gearmbs.signals.bearings.report import PartFinding
 from tests.view.looking import assert_readable
 
 RATE, SHAFT, SECONDS = 12000.0, 29.0, 5.0

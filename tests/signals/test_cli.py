@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from gearmbs.cli import app
 from gearmbs.signals import make_signal, write_signal
-from gearmbs.signals.command_parts import tooth_counts
+from gearmbs.signals.commands import tooth_counts
 
 RATE, SHAFT, TEETH = 12800.0, 30.0, 32
 
@@ -117,7 +117,7 @@ def test_a_report_that_cannot_be_written_is_printed(tmp_path, monkeypatch, optio
     def full(*_args):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("gearmbs.view.files.os.replace", full)
+    monkeypatch.setattr("gearmbs.files.os.replace", full)
     result = run("analyse", path, option, tmp_path / "here")
     assert result.exit_code == 1
     assert "# Vibration of x.csv" in result.output

@@ -23,7 +23,7 @@ from gearmbs.signals import (
     units_of,
     write_signal,
 )
-from gearmbs.signals.dimensions import unit_dimension
+from gearmbs.signals.signal.signal import unit_dimension
 
 RATE = 12800.0
 COUNT = 64

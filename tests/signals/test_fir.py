@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gearmbs.signals.decimation import products
-from gearmbs.signals.fir import convolve_valid
+from gearmbs.signals.filters import convolve_valid
+from gearmbs.signals.resampling import products
 
 
 @pytest.mark.parametrize(

@@ -7,16 +7,9 @@ import pytest
 import xarray as xr
 
 from gearmbs.gears import ContactLaw, FlankFriction, faults, planetary
-from gearmbs.signals import (
-    MissingMetadataError,
-    SignalError,
-    analyse,
-    diagnose_planetary,
-    make_signal,
-    planetary_lines,
-)
-from gearmbs.signals.planetary import path_weight
-from gearmbs.studies.planetary import PlanetaryRun, run_planetary
+from gearmbs.signals import MissingMetadataError, SignalError, analyse, diagnose_planetary, make_signal, planetary_lines
+from gearmbs.signals.planetary.averages import path_weight
+from gearmbs.studies.trains.planetary import PlanetaryRun, run_planetary
 
 TEETH = (17, 19, 55)
 BROKEN = faults.BrokenTooth(tooth=5, lost=0.6)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearmbs.signals import SignalError, analyse, make_signal, phase_from_tacho
-from gearmbs.signals.pulses import pulse_faults
+from gearmbs.signals.rotation.pulses import pulse_faults
 
 RATE = 5000.0
 

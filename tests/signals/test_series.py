@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from gearmbs.signals import SignalError, analyse, features, make_signal, series, to_signal, write_signal
-from gearmbs.signals.series import StoreWarning
+from gearmbs.signals.analysis.series import StoreWarning
 
 RATE = 8192.0
 TEETH = 20

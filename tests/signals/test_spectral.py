@@ -19,7 +19,7 @@ from gearmbs.signals import (
     units_of,
 )
 from gearmbs.signals.conversion import band_window
-from gearmbs.signals.dimensions import unit_dimension
+from gearmbs.signals.signal.signal import unit_dimension
 
 RATE = 12800.0
 POWER = {"displacement": 0, "velocity": 1, "acceleration": 2}

@@ -20,7 +20,7 @@ from gearmbs.signals import (
     phase_from_tacho,
     time_synchronous_average,
 )
-from gearmbs.signals.interpolation import interpolate
+from gearmbs.signals.rotation.angular import interpolate
 
 RATE = 12800.0
 

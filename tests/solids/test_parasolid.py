@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts import Box, Cylinder, Frustum, Mesh, Sphere, Torus, read_solid
 from gearmbs.mechanism.contacts.shapes import volume
 from gearmbs.solids import read_bodies
+from gearmbs.solids.bodies import primitive
 from gearmbs.solids.facets import faceted
-from gearmbs.solids.primitives import primitive
 from tests.solids.transmit_files import Solid, block, circle, cylinder, drilled, line, plane, transmit, turned
 
 Z, X = (0, 0, 1), (1, 0, 0)

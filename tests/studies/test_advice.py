@@ -6,9 +6,9 @@ import pytest
 from gearmbs.dae.integrators import messages
 from gearmbs.dae.result import Status
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.simulate import ADVICE as MODELLER
+from gearmbs.mechanism.solve.simulate import ADVICE as MODELLER
 from gearmbs.studies import Case, simulate_case
-from gearmbs.studies.simulation import ADVICE as CASE
+from gearmbs.studies.run.simulation import ADVICE as CASE
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.02}
 

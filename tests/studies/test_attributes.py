@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gearmbs.studies import Case, paper_cases, run_paper
-from gearmbs.studies.attributes import attributes_of
-from gearmbs.studies.report import paper_report
+from gearmbs.studies.paper.report import paper_report
+from gearmbs.studies.run.record import attributes_of
 
 
 def test_every_quantity_has_its_unit():

@@ -5,8 +5,8 @@ import pytest
 
 from gearmbs.drivetrain import RunSettings
 from gearmbs.studies import BenchSettings, bench_choices, bench_train
-from gearmbs.studies.bench_study import BenchStudy, levels, run_bench
-from gearmbs.studies.rig import gear_rig
+from gearmbs.studies.presets.bench import BenchStudy, levels, run_bench
+from gearmbs.studies.run.rig import gear_rig
 
 
 def test_loads_of_the_two_pressures():

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearmbs.studies import Case, CaseError, load_case, make_case, paper_cases
-from gearmbs.studies import case as case_module
-from gearmbs.studies.case import CaseWarning, Gears, Operation
+from gearmbs.studies.case import case as case_module
+from gearmbs.studies.case.case import CaseWarning, Gears, Operation
 from tests.generators import cases, seed
 
 FILE = """

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearmbs.studies import Case, CaseError, SimulationFailed, load_case, make_case, run_case, run_cases
-from gearmbs.studies.limits import check_record, edge, remarks, slip
+from gearmbs.studies.case.limits import check_record, edge, remarks, slip
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_a_slipping_run_fails_and_keeps_what_it_computed(monkeypatch):
         contact={"stiffness": "1e-3 N/mm^1.3", "damping": "1e-6 N s/mm"},
         operation={"run_up": "10 ms", "settling": "0 ms", "duration": "60 ms"},
     )
-    monkeypatch.setattr("gearmbs.studies.simulation.check_record", lambda case: None)
+    monkeypatch.setattr("gearmbs.studies.run.simulation.check_record", lambda case: None)
     with pytest.raises(SimulationFailed, match="slipped past each other") as caught:
         run_case(case)
     partial = caught.value.partial()
@@ -165,8 +165,8 @@ def test_wrong_settings_are_found_without_compiling():
     """In a fresh interpreter: a typing error, an impossible pair and a band too high, and numba is not imported."""
     code = (
         "import sys\n"
-        "from gearmbs.studies.case import CaseError, make_case\n"
-        "from gearmbs.studies.limits import check_record\n"
+        "from gearmbs.studies.case.case import CaseError, make_case\n"
+        "from gearmbs.studies.case.limits import check_record\n"
         "high = {'operation': {'speed': '9549 rpm'}, 'solver': {'signal_rate': '12.8 kHz'}}\n"
         "for data in ({'operation': {'spead': 1}}, {'fault': {'backlash': '-1 mm'}}, high):\n"
         "    try:\n"

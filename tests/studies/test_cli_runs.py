@@ -8,7 +8,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from gearmbs import cli
-from gearmbs.studies import run_commands
+from gearmbs.studies import commands
 
 CASE = "[operation]\nrun_up = '30 ms'\nsettling = '10 ms'\nduration = '200 ms'\n"
 
@@ -46,7 +46,7 @@ def signalled_after(fraction, number):
 def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypatch, keep_handlers, integrator, number):
     path = tmp_path / "long.toml"
     path.write_text(CASE + f"[solver]\nintegrator = '{integrator}'\n")
-    monkeypatch.setattr(run_commands, "case_bars", signalled_after(0.3, number))
+    monkeypatch.setattr(commands, "case_bars", signalled_after(0.3, number))
     result = CliRunner().invoke(cli.app, ["run", str(path)])
     assert result.exit_code == 130
     assert "interrupted at t = 0." in result.output
@@ -62,7 +62,7 @@ def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypat
 def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch, keep_handlers):
     path = tmp_path / "soft.toml"
     path.write_text(CASE)
-    monkeypatch.setattr("gearmbs.studies.simulation.slip", lambda *a: "the wheels slipped")
+    monkeypatch.setattr("gearmbs.studies.run.simulation.slip", lambda *a: "the wheels slipped")
     result = CliRunner().invoke(cli.app, ["run", str(path)])
     assert result.exit_code == 1
     assert "case 'soft': the wheels slipped\nWhat was computed until then is in" in result.output
@@ -72,7 +72,7 @@ def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch, keep_handle
 def test_a_failed_case_of_the_study_is_kept(tmp_path, monkeypatch, keep_handlers):
     """The case that failed and those finished before it are files, the study is not."""
     monkeypatch.setattr(
-        "gearmbs.studies.simulation.slip",
+        "gearmbs.studies.run.simulation.slip",
         lambda case, *a: "the wheels slipped" if case.name.startswith("mis") else None,
     )
     words = ["paper", "--out", str(tmp_path), "--duration", "80 ms", "--workers", "1"]

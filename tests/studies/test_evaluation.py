@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gearmbs.studies import Case, CaseError, run_case
-from gearmbs.studies.evaluation import VARIABLES
+from gearmbs.studies.run.record import VARIABLES
 
 SHORT = {"duration": 0.06, "run_up": 0.02, "settling": 0.02}
 

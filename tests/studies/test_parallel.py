@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
-from gearmbs.studies.processes import WorkerDied, run_jobs
-from gearmbs.studies.simulation import simulate_case
+from gearmbs.studies.run.processes import WorkerDied, run_jobs
+from gearmbs.studies.run.simulation import simulate_case
 from tests.studies.jobs import fail_or_wait, raise_what_cannot_travel, square
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
@@ -60,7 +60,7 @@ def test_ctrl_c_ends_all_processes(everyone):
     code = (
         "import signal\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from gearmbs.studies.processes import run_jobs\n"
+        "from gearmbs.studies.run.processes import run_jobs\n"
         "from tests.studies.jobs import fail_or_wait\n"
         "if __name__ == '__main__':\n"
         "    try:\n"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.drivetrain.backlash import BacklashOscillator
-from gearmbs.studies.rattle import MODELS, RattleSettings, rattle, rattle_map, rattle_table, rattle_train
+from gearmbs.studies.presets.rattle import MODELS, RattleSettings, rattle, rattle_map, rattle_table, rattle_train
 
 
 def test_one_description_for_all():

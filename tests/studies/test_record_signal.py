@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gearmbs.signals import SignalError, analyse, write_signal
-from gearmbs.signals.simulated import parse_models, read_any
+from gearmbs.signals.files.simulated import parse_models, read_any
 from gearmbs.studies import Case, record_signal, run_case
-from gearmbs.studies.store import write_dataset
+from gearmbs.studies.run.store import write_dataset
 from gearmbs.view import average_plot
 from tests.generators import cases, seed
 

@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from gearmbs.gears.transmission import loaded_transmission_error
-from gearmbs.studies.resonance import (
+from gearmbs.studies.presets.resonance import (
     DIRECTIONS,
     MODELS,
     ResonanceSettings,
+    ResonanceStudy,
     jump_frequency,
+    lowest_lag,
+    separation_load,
+    separation_loads,
     sweep_resonance,
 )
-from gearmbs.studies.resonance_study import ResonanceStudy, lowest_lag, separation_load, separation_loads
 
 WINDOW = 20
 

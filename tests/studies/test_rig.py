@@ -8,7 +8,7 @@ import pytest
 
 from gearmbs.gears import GearPair
 from gearmbs.studies import gear_rig
-from gearmbs.studies.rig import DRIVE, LOAD
+from gearmbs.studies.run.rig import DRIVE, LOAD
 
 PAIR = GearPair.paper(backlash="0.1 mm", torque="60 N m", rotation=-1)
 

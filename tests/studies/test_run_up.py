@@ -8,7 +8,7 @@ from gearmbs import cli
 from gearmbs.mechanism import polyline
 from gearmbs.signals import angular_resample, order_spectrum
 from gearmbs.studies import Case, CaseError, make_case, record_signal, run_case
-from gearmbs.studies.limits import check_record
+from gearmbs.studies.case.limits import check_record
 
 UP = [["0 s", "0 rpm"], ["0.6 s", "1800 rpm"]]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.studies import Case, paper_cases, run_case
-from gearmbs.studies.simulation import case_mechanism, simulate_case
+from gearmbs.studies.run.simulation import case_mechanism, simulate_case
 
 pytestmark = pytest.mark.slow
 

@@ -12,19 +12,18 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from gearmbs import _kept, cli
-from gearmbs.studies import (
-    Case,
-    CaseError,
-    SimulationFailed,
-    case_mechanism,
-    run_case,
-    run_cases,
-    simulate_case,
-    simulation,
+from gearmbs import cli, files
+from gearmbs.studies import Case, CaseError, SimulationFailed, case_mechanism, run_case, run_cases, simulate_case
+from gearmbs.studies.run import simulation
+from gearmbs.studies.run.parallel import StorageWarning
+from gearmbs.studies.run.store import (
+    KeptElsewhere,
+    check_place,
+    keep_dataset,
+    record_size,
+    stored_record,
+    write_dataset,
 )
-from gearmbs.studies.parallel import StorageWarning
-from gearmbs.studies.store import KeptElsewhere, check_place, keep_dataset, record_size, stored_record, write_dataset
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
 
@@ -66,7 +65,7 @@ def test_nothing_is_left_where_nothing_can_be_written(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "write_bytes", refuse)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(_kept.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(files.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     with pytest.raises(OSError, match="nor anywhere else; it is lost"):
         keep_dataset(tmp_path / "r.nc", small())
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
@@ -77,7 +76,7 @@ def test_a_file_that_cannot_grow_does_not_end_the_program(tmp_path):
     """The format's own library ends the process when a write fails; the system refuses files above 4 kB here."""
     code = (
         "import resource, signal, sys, numpy as np, xarray as xr\n"
-        "from gearmbs.studies.store import write_dataset\n"
+        "from gearmbs.studies.run.store import write_dataset\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
         "noise = np.random.default_rng(1).normal(size=20000)\n"
@@ -102,7 +101,7 @@ def test_places_are_looked_at_before_the_work(tmp_path, monkeypatch):
         check_place(tmp_path / "file" / "in it", 1e3)
     with pytest.raises(OSError, match=r"are free in .*, two records takes about 1000000000.0 GB; make room"):
         check_place(tmp_path, 1e18, "two records")
-    monkeypatch.setattr(_kept.tempfile, "TemporaryFile", lambda dir: open("/proc/version", "x"))
+    monkeypatch.setattr(files.tempfile, "TemporaryFile", lambda dir: open("/proc/version", "x"))
     with pytest.raises(OSError, match=r"cannot be written .*; write elsewhere"):
         check_place(tmp_path, 1e3)
 
@@ -124,7 +123,7 @@ def test_finished_cases_are_taken_up(tmp_path, monkeypatch):
         computed.append(case.name)
         return whole(case, progress)
 
-    monkeypatch.setattr("gearmbs.studies.parallel.run_case", watched)
+    monkeypatch.setattr("gearmbs.studies.run.parallel.run_case", watched)
     again = run_cases(cases, folder=tmp_path)
     assert computed == ["z = 31"]
     for one, other in zip(first, again, strict=False):
@@ -140,7 +139,7 @@ def test_finished_cases_are_taken_up(tmp_path, monkeypatch):
 def test_errors_can_be_kept(tmp_path, monkeypatch):
     """The case whose record is too short, the one that fails, and the sound one, each in its place."""
     monkeypatch.setattr(
-        "gearmbs.studies.simulation.slip", lambda case, *a: "the wheels slipped" if case.name == "slips" else None
+        "gearmbs.studies.run.simulation.slip", lambda case, *a: "the wheels slipped" if case.name == "slips" else None
     )
     cases = [
         Case(name="short", operation={**SHORT, "duration": 0.01}),
@@ -178,7 +177,7 @@ def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     assert len(list((tmp_path / "out" / "cases").glob("*load.nc"))) == 3
     with monkeypatch.context() as patch:
         patch.chdir(tmp_path)
-        patch.setattr("gearmbs.studies.paper.write_dataset", _refuse_in(tmp_path / "out"))
+        patch.setattr("gearmbs.studies.paper.paper.write_dataset", _refuse_in(tmp_path / "out"))
         result = CliRunner().invoke(cli.app, words)
     assert "taking up 3 finished of 6 cases" in result.output
     assert result.exit_code == 1
@@ -227,7 +226,7 @@ def test_a_record_on_bearings_is_told_from_one_on_joints(tmp_path):
 
 def test_a_record_without_an_ending_is_recognised(tmp_path):
     """By its first bytes; and what is no record is refused by its name."""
-    from gearmbs.signals.simulated import read_any
+    from gearmbs.signals.files.simulated import read_any
 
     record = run_case(Case(name="one", operation=SHORT), False)
     write_dataset(tmp_path / "one.nc", record)

@@ -9,15 +9,14 @@ from scipy.signal.windows import blackmanharris
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
-from gearmbs.signals.simulated import model_signals, parse_states
+from gearmbs.signals.files.simulated import model_signals, parse_states
 from gearmbs.studies import Case, SimulationFailed, run_case, run_paper, simulate_case
-from gearmbs.studies import rig as parts
-from gearmbs.studies.case import CaseError, make_case
-from gearmbs.studies.choices import choices
-from gearmbs.studies.claims import judge
-from gearmbs.studies.preset import paper_cases
-from gearmbs.studies.simulation import case_mechanism
-from gearmbs.studies.store import whole_file, write_dataset
+from gearmbs.studies.case.case import CaseError, make_case
+from gearmbs.studies.paper.preset import judge, paper_cases
+from gearmbs.studies.paper.report import choices
+from gearmbs.studies.run import rig as parts
+from gearmbs.studies.run.simulation import case_mechanism
+from gearmbs.studies.run.store import whole_file, write_dataset
 
 SHORT = {"run_up": 0.03, "settling": 0.01, "duration": 0.06}
 
@@ -213,7 +212,7 @@ def test_failure_keeps_what_was_computed(monkeypatch):
     assert not solution.success
     assert 0.005 < solution.t[-1] <= 0.0101
     assert "not finite" in solution.message or "NaN" in solution.message
-    monkeypatch.setattr("gearmbs.studies.simulation.simulate_case", lambda *a, **k: solution)
+    monkeypatch.setattr("gearmbs.studies.run.simulation.simulate_case", lambda *a, **k: solution)
     with pytest.raises(SimulationFailed) as caught:
         run_case(case)
     assert caught.value.solution is solution

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from gearmbs.studies import Case, CaseError, SimulationFailed, load_case, simulation, sweep
-from gearmbs.studies.case_file import case_toml
+from gearmbs.studies import Case, CaseError, SimulationFailed, load_case, sweep
+from gearmbs.studies.case.case import case_toml
+from gearmbs.studies.run import simulation
 from tests.view.looking import assert_readable
 
 SHORT = {"run_up": "20 ms", "settling": 0.0, "duration": "70 ms"}

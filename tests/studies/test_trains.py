@@ -26,12 +26,12 @@ from gearmbs.drivetrain import (
     TorqueSensor,
 )
 from gearmbs.signals import analyse
-from gearmbs.signals.orders import harmonic_amplitudes
-from gearmbs.signals.simulated import read_any
+from gearmbs.signals.files.simulated import read_any
+from gearmbs.signals.rotation.orders import harmonic_amplitudes
 from gearmbs.studies import run_train, train_report, train_scene, train_signal, train_spectrum
-from gearmbs.studies.train_recorder import counted_turns
-from gearmbs.studies.train_speed import HeldSpeed, by_angle
-from gearmbs.studies.trains import check_record, load_train
+from gearmbs.studies.trains.recorder import counted_turns
+from gearmbs.studies.trains.speed import HeldSpeed, by_angle
+from gearmbs.studies.trains.trains import check_record, load_train
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_description import TEXT
 

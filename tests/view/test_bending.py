@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from gearmbs.flexible import Disc, Shaft, ShaftSection, block_mesh, reduce_model, solid_model
-from gearmbs.flexible.surface import outward
+from gearmbs.flexible.interfaces import outward
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.view import Deflection, Mesh, mechanism_scene, solution_scene, stress_plot
-from gearmbs.view.mesh import box
+from gearmbs.view.geometry.mesh import box
 
 SHAFT = Shaft(
     [ShaftSection(0.3, 0.02), ShaftSection(0.2, 0.04, outer_end=0.03), ShaftSection(0.3, 0.02)],

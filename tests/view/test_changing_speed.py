@@ -7,7 +7,7 @@ import pytest
 
 from gearmbs.signals import campbell, order_map, order_track, speed_curve, to_signal, waterfall
 from gearmbs.view import campbell_plot, order_map_plot, order_track_plot, spectrogram_plot, waterfall_plot
-from gearmbs.view.figure_style import png_bytes
+from gearmbs.view.figures.style import png_bytes
 
 POINTS = [(0.0, 0.0), (2.0, 300.0)]
 

@@ -19,8 +19,8 @@ from gearmbs.view import (
     time_plot,
     transmission_error_plot,
 )
-from gearmbs.view.curves import path_ends
-from gearmbs.view.signals import thinned
+from gearmbs.view.figures.maps import path_ends
+from gearmbs.view.figures.records import thinned
 from tests.generators import cases, seed
 from tests.view.looking import assert_readable
 

@@ -7,11 +7,9 @@ from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import make_case, simulate_case
 from gearmbs.view import Scene, gear_scene, mechanism_scene, mesh_animation, solution_motion, solution_scene
-from gearmbs.view.body_mesh import body_mesh
-from gearmbs.view.mesh import box, cylinder
-from gearmbs.view.render import Camera, render
-from gearmbs.view.scene import Part
-from gearmbs.view.shading import corner_normals, feature_edges
+from gearmbs.view.geometry.mesh import body_mesh, box, corner_normals, cylinder, feature_edges
+from gearmbs.view.scenes.render import Camera, render
+from gearmbs.view.scenes.scene import Part
 from tests.browser import browsed, needs_browser
 from tests.view.looking import assert_readable
 

@@ -13,16 +13,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
-from gearmbs.adams.builders.control import state_system
+from gearmbs.adams.builders.control import diff_name, implicit_states, state_system
 from gearmbs.adams.builders.curve_data import curve_points
-from gearmbs.adams.builders.data_calls import Present, translated
-from gearmbs.adams.builders.element_pairs import KINDS, acts, joints_of, marker_pair, resting_joint
-from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
-from gearmbs.adams.builders.held_bodies import add_point_mass, hold
-from gearmbs.adams.builders.implicit import diff_name, implicit_states
-from gearmbs.adams.builders.model import AdamsModel, BodyState
-from gearmbs.adams.builders.scopes import sensor_state
+from gearmbs.adams.builders.frames import add_point_mass, hold, inertia_about_cm, marker_orientation, part_orientation
+from gearmbs.adams.builders.functions import FUNCTIONS, Accelerations, Present, translated
+from gearmbs.adams.builders.scopes import (
+    KINDS,
+    AdamsModel,
+    BodyState,
+    acts,
+    joints_of,
+    marker_pair,
+    resting_joint,
+    sensor_state,
+)
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import MARKER_FIELDS
@@ -30,23 +34,22 @@ from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.readers import read_variables
 from gearmbs.dae.equations.expressions import SplineData
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.curves import add_curve
-from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
-from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number
-from gearmbs.mechanism.joints import Joint
-from gearmbs.mechanism.parts import Body, Marker
+from gearmbs.mechanism.language.library import ELEMENT_FORCES
+from gearmbs.mechanism.language.syntax import Call, Name, Node, Number
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.curves import add_curve
+from gearmbs.mechanism.parts.elements import State
+from gearmbs.mechanism.parts.joints import Joint
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from gearmbs.adams.builders.fe_parts import Beam
+    from gearmbs.adams.builders.flexible import Beam
     from gearmbs.flexible import ModalModel
     from gearmbs.mechanism.contacts.shapes import Shape
     from gearmbs.solids.bodies import Body as SolidBody
-
 
 Maker = Callable[["Builder", Any], None]
 """What adds a statement of one kind to a builder's mechanism."""

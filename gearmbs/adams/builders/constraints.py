@@ -9,9 +9,9 @@ import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.parse import statements as st
-from gearmbs.mechanism.functions import expression
-from gearmbs.mechanism.joints import JOINTS, Joint, Prescribed
-from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.functions import expression
+from gearmbs.mechanism.parts.joints import JOINTS, Joint, Prescribed
 
 JOINT_KINDS = {k.adams[1]: kind for kind, k in JOINTS.items() if k.adams and k.adams[0] == "JOINT"}
 JPRIM_KINDS = {k.adams[1]: kind for kind, k in JOINTS.items() if k.adams and k.adams[0] == "JPRIM"}

@@ -13,9 +13,8 @@ from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
-from gearmbs.mechanism.contacts.mesh_files import READERS, read_mesh
 from gearmbs.mechanism.contacts.shapes import (
     Box,
     Cylinder,
@@ -29,8 +28,8 @@ from gearmbs.mechanism.contacts.shapes import (
     extruded,
     revolved,
 )
-from gearmbs.mechanism.contacts.solid_files import SUFFIXES, body_of, shape_of
-from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.contacts.solid_files import READERS, SUFFIXES, body_of, read_mesh, shape_of
+from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.solids import read_bodies
 
 ROUND = 1e-9
@@ -63,7 +62,7 @@ def add_contact(b: Builder, s: st.Contact) -> None:
 
 def _add_gears(b: Builder, s: st.Contact) -> None:
     """Build the contact of a gear pair again, with the laws that the statement has now."""
-    from gearmbs.adams.pairs import pair_of, with_laws
+    from gearmbs.adams.commands import pair_of, with_laws
 
     pair = pair_of(s.pair)
     law, friction = law_of(b, s), friction_of(b, s)

@@ -10,8 +10,8 @@ import numpy as np
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.parse import statements as st
-from gearmbs.mechanism.curves import Curve, curve_on_curve, point_on_curve
-from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.curves import Curve, curve_on_curve, point_on_curve
 
 
 def _parameter(b: Builder, curve: Curve, disp: Any, rm: Marker, icm: int | None) -> float | None:

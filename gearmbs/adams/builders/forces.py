@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.curve_data import LOADS, flexible_body
+from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.mechanism.building.methods import beam_stiffness
+from gearmbs.mechanism.forces.friction import INPUTS, KINDS
+from gearmbs.mechanism.forces.modal_force import add_modal_force
 from gearmbs.mechanism.forces.springs import Beam, Bushing, Field, MatrixForce
-from gearmbs.mechanism.friction import INPUTS, KINDS
-from gearmbs.mechanism.load_methods import beam_stiffness
-from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.modal import ModalBody
 
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
 
@@ -170,3 +176,82 @@ FORCES: dict[type, Callable[[Builder, Any], None]] = {
     st.Beam: add_beam,
     st.Friction: add_friction,
 }
+
+# Load cases of an MFORCE, and what its routine becomes.
+
+
+def load_cases(deck: Deck, s: st.Mforce) -> np.ndarray | None:
+    """Return the load cases that a statement scales, None if its routine gives the load itself."""
+    if s.force is not None or "force" in s.given:
+        return None
+    return flexible_body(deck, deck.of(st.FlexBody)[s.flex_body or 0]).loads
+
+
+def load_case(case: int, loads: np.ndarray) -> int:
+    """Return a load case's number, which is one of a column."""
+    if not 1 <= case <= loads.shape[1]:
+        raise ValueError(f"CASE_INDEX = {case}; {LOADS} has {loads.shape[1]} columns")
+    return case
+
+
+def no_cases(s: st.Mforce) -> str:
+    """Return what is missing where a body has no load cases."""
+    return (
+        f"FLEX_BODY/{s.flex_body} has no matrix {LOADS}; load cases inside a modal neutral file are not read, write "
+        "them as a MATRIX"
+    )
+
+
+def bind_mforce(deck: Deck, s: st.Mforce, parameters: tuple[float, ...], found: Mapping[str, Routine]) -> st.Mforce:
+    """MFORCE by MFOSUB: with FORCE the load itself, with FUNCTION the scale and the number of a load case."""
+    if s.flex_body not in deck.of(st.FlexBody):
+        raise ValueError(f"acts on FLEX_BODY/{s.flex_body}, which the deck does not have")
+    body = flexible_body(deck, deck.of(st.FlexBody)[s.flex_body])
+    direct = "force" in s.given
+    if not direct and body.loads is None:
+        raise ValueError(f"scales a load case, but {no_cases(s)}")
+    size = 6 + body.model.modes if direct else body.loads.shape[1]  # type: ignore[union-attr]
+
+    def routine(call: RoutineCall) -> np.ndarray:
+        call.loads = np.zeros((size, 0)) if body.loads is None else body.loads
+        values = found[""](call)
+        if direct:
+            return values
+        scale, case = np.asarray(values, dtype=float)
+        out = np.zeros(size)
+        out[load_case(int(case), body.loads) - 1] = scale  # type: ignore[arg-type]
+        return out
+
+    caller = Caller(deck, s, parameters, found[""] if hasattr(found[""], "py_func") and direct else routine, size)
+    shares = caller.texts(deck.functions, f"USER_MFORCE_{s.id}")
+    return replace(s, force=None, function=None, shares=tuple(shares))
+
+
+# MFORCE: distributions of forces on a FLEX_BODY, from its load cases or from a routine.
+
+
+def add_mforce(b: Builder, s: st.Mforce) -> None:
+    """MFORCE: a load case times SCALE, or shares by a routine."""
+    if s.flex_body not in b.flexible:
+        # its body could not be built, which is reported
+        return
+    body = b.mechanism.bodies[b.model.names["flex_body", s.flex_body]]
+    assert isinstance(body, ModalBody)
+    name = b.claim(s, "mforce")
+    reaction = b.markers[s.jfloat] if s.jfloat is not None else None
+    loads = load_cases(b.deck, s)
+    unit = np.concatenate(
+        [np.full(3, b.units.factor("force")), np.full(3 + body.modal.modes, b.units.factor("torque"))]
+    )
+    if s.shares:
+        # a routine gives a number for each component (FORCE) or for each load case (FUNCTION)
+        columns = np.eye(6 + body.modal.modes) if loads is None else loads
+        for k, (text, column) in enumerate(zip(s.shares, columns.T)):
+            add_modal_force(b.mechanism, f"{name}.{k + 1}", body, unit * column, b.text(text), reaction=reaction)
+        return
+    if s.case_index is None or s.scale is None:
+        raise ValueError("CASE_INDEX and SCALE, or FORCE = USER(...), are missing")
+    if loads is None:
+        raise ValueError(f"CASE_INDEX = {s.case_index}, but {no_cases(s)}")
+    column = loads[:, load_case(s.case_index, loads) - 1]
+    add_modal_force(b.mechanism, name, body, unit * column, b.text(s.scale), reaction=reaction)

@@ -19,7 +19,7 @@ import numpy as np
 
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.mechanism.user_functions import UserFunction, place_of
+from gearmbs.mechanism.language.user_functions import UserFunction, place_of
 
 SYSARY = {
     "DISP": ("DX", "DY", "DZ", "PSI", "THETA", "PHI"),

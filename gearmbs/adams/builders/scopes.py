@@ -2,20 +2,83 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
-from gearmbs.adams.builders.control import state_systems
+import numpy as np
+
+from gearmbs.adams.builders.control import implicit_states, state_systems
 from gearmbs.adams.builders.curve_data import curve_points
-from gearmbs.adams.builders.data_calls import Present, translated
-from gearmbs.adams.builders.element_pairs import KINDS, acts, marker_pair
-from gearmbs.adams.builders.implicit import implicit_states
+from gearmbs.adams.builders.functions import IN_DYNAMICS, Present, translated
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.check import measured_markers
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.equations.expressions import SplineData
-from gearmbs.mechanism.curves import AXES
-from gearmbs.mechanism.expression_syntax import Scope
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.language.syntax import Scope
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.curves import AXES
+from gearmbs.mechanism.parts.joints import Joint
+
+# Between which markers the elements of a deck act, and what they need to act.
+
+
+KINDS: dict[type, str] = {
+    st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
+    st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
+    st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
+    st.Beam: "beam", st.Friction: "friction", st.Contact: "contact",
+    st.Ptcv: "ptcv", st.Cvcv: "cvcv",
+}  # fmt: skip
+"""Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
+
+
+def joints_of(s: st.Statement) -> tuple[int, ...]:
+    """Return the joints without which an element cannot act."""
+    if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
+        return (s.joint,)
+    return s.joints if isinstance(s, (st.Coupler, st.Gear)) else ()
+
+
+def resting_joint(s: st.Statement, inactive: frozenset[tuple[str, int]]) -> int | None:
+    """Return an inactive joint without which an element cannot act, None when there is none."""
+    return next((ref for ref in joints_of(s) if ("JOINT", ref) in inactive), None)
+
+
+def acts(s: st.Statement, inactive: frozenset[tuple[str, int]]) -> bool:
+    """Whether an element is active, and the joints it needs are."""
+    return (st.KEYWORD_OF[type(s)], s.id) not in inactive and resting_joint(s, inactive) is None
+
+
+def marker_pair(deck: Deck, s: Any) -> tuple[int, int | None]:
+    """Return the ids of the markers I and J of what transmits a force, None for a J that there is not."""
+    if joints_of(s):
+        joint = deck.of(st.Joint)[joints_of(s)[0]]
+        return joint.i or 0, joint.j
+    if isinstance(s, st.Gcon):
+        return _gcon_pair(s)
+    if isinstance(s, st.Ptcv):
+        return s.i or 0, s.rm
+    if isinstance(s, st.Cvcv):
+        return s.irm or 0, s.jrm
+    if isinstance(s, st.Contact):
+        i, j = (deck.of(st.Graphics)[refs[0]].marker for refs in (s.igeom, s.jgeom))
+        return i or 0, j
+    if isinstance(s, (st.Vforce, st.Vtorque, st.Gforce)):
+        return s.i or 0, s.jfloat
+    if isinstance(s, st.Sforce) and s.action_only:
+        return s.i or 0, None
+    return s.i or 0, s.j
+
+
+def _gcon_pair(s: st.Gcon) -> tuple[int, int | None]:
+    """Return a general constraint's I marker and, when its expression names just one other, that one."""
+    used = measured_markers(s.function or "")
+    first = s.i if s.i is not None else (used[0] if used else 0)
+    others = [m for m in used if m != first]
+    return first, others[0] if len(others) == 1 else None
+
 
 FORCE_AND_TORQUE = (0, 3)
 """First components of both, see `Scope.absent`."""
@@ -103,3 +166,89 @@ def _curves(deck: Deck) -> dict[Any, SplineData]:
             alpha, *rows = zip(*curve.sampled)
             found |= {f"CURVE_{curve.id}.BY.{axis}": SplineData(alpha, (row,)) for axis, row in zip(AXES, rows)}
     return found
+
+
+# A mechanism built from a deck, with the way back from its names to the deck's ids.
+
+
+class BodyState(NamedTuple):
+    """Where a part's frame is and how it moves: SI, global components.
+
+    Attributes
+    ----------
+    position, velocity, angular_velocity : ndarray, shape (3,)
+    orientation : ndarray, shape (3, 3)
+    q_f, v_f : ndarray, shape (n,)
+        Modal coordinates and their rates; empty of a rigid part, and where they are zero.
+    """
+
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    q_f: np.ndarray = np.zeros(0)
+    v_f: np.ndarray = np.zeros(0)
+
+
+@dataclass
+class AdamsModel:
+    """A mechanism built from a deck, with the way back from names to ids.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    deck : Deck
+    names : dict
+        (kind, id) -> name in the mechanism; parts and markers have the kinds "part" and "marker".
+    pairs : dict
+        (kind, id) -> (I marker id, J marker id or None) of everything that transmits a force.
+    sources : dict
+        Name in the mechanism -> statement.
+    present : Present
+        What is constant during the analysis.
+    initial_motions : list
+        Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
+    runners : dict
+        Name of a runner on an open curve -> its statement and the curve's length, m.
+    beams : dict of int to dict
+        Id of an FE_PART that was built -> label of a node -> name of its body.
+    """
+
+    mechanism: Mechanism
+    deck: Deck
+    names: dict[tuple[str, int], str] = field(default_factory=dict)
+    pairs: dict[tuple[str, int], tuple[int, int | None]] = field(default_factory=dict)
+    sources: dict[str, st.Statement] = field(default_factory=dict)
+    present: Present = IN_DYNAMICS
+    initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
+    runners: dict[str, tuple[st.Statement, float]] = field(default_factory=dict)
+    beams: dict[int, dict[int, str]] = field(default_factory=dict)
+
+    def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
+        """Return what the deck's expressions may name, for requests."""
+        markers: dict[Any, int] = {}
+        for m in markers_of(self.mechanism):
+            markers[m.name.upper()] = marker_index[id(m)]
+            if m.number is not None:
+                markers[m.number] = marker_index[id(m)]
+        data = data_scope(self.deck, self.present)
+        return replace(
+            data,
+            markers=markers,
+            marker_body=marker_body,
+            splines={**data.splines, **_curves_of_model(self.mechanism)},
+            states=frozenset(str(k).upper() for k, state in self.mechanism.states.items() if state.algebraic),
+            # an element at a marker that is left out is left out, too
+            forces={key: pair for key, pair in self.pairs.items() if all(not m or m in markers for m in pair)},
+            absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in FORCE_AND_TORQUE),
+        )
+
+
+def _curves_of_model(mechanism: Mechanism) -> dict[Any, Any]:
+    """Return the splines that have names, those of curves."""
+    return {name.upper(): data for name, data in mechanism.splines.items() if isinstance(name, str)}
+
+
+def markers_of(mechanism: Mechanism) -> list[Marker]:
+    """Return all markers of a mechanism."""
+    return [m for body in (mechanism.ground, *mechanism.bodies.values()) for m in body.markers]

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic, labels_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
+from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, specs_of
 from gearmbs.adams.parse.remedies import refused_message
-from gearmbs.adams.parse.statements_data import REQUEST_TYPES
-from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
+from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
 REQUIRED: dict[type, tuple[str, ...]] = {
     st.Marker: ("part",),

@@ -11,12 +11,12 @@ from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.source import RawStatement
 from gearmbs.adams.parse.units import deck_units
-from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.language.syntax import Units
 
 if TYPE_CHECKING:
     from gearmbs.flexible import ModalNeutralFile
     from gearmbs.mechanism import Mechanism
-    from gearmbs.mechanism.user_functions import UserFunction
+    from gearmbs.mechanism.language.user_functions import UserFunction
 
 S = TypeVar("S", bound=st.Statement)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from gearmbs.adams.parse.source import CONTINUED, RawStatement
-from gearmbs.mechanism.expression_syntax import ExpressionError, parse
+from gearmbs.mechanism.language.syntax import ExpressionError, parse
 
 REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE, PATH = range(14)
 """Kinds of arguments; a PATH is a text in which a backslash is part of the name."""

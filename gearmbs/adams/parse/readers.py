@@ -12,8 +12,8 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import measured_markers
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
-from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
+from gearmbs.mechanism.language.library import ELEMENT_FORCES
+from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
 Key = tuple[str, int]
 """Name and id of a statement."""

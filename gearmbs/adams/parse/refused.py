@@ -10,8 +10,8 @@ from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
 from gearmbs.adams.parse.readers import read_variables, without_readers
 from gearmbs.adams.parse.remedies import instead_of_function
-from gearmbs.mechanism.expression_functions import UNSUPPORTED as REFUSED_FUNCTIONS
-from gearmbs.mechanism.expression_syntax import Call, parse, walk
+from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
+from gearmbs.mechanism.language.syntax import Call, parse, walk
 
 READ_IN_DECKS = {"SENVAL", "CURVE"}
 """Functions that a mechanism refuses and a deck has, where there is a statement with their id."""

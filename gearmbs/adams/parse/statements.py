@@ -6,51 +6,61 @@ radians).  ``given`` says which arguments stood in the deck.
 
 from __future__ import annotations
 
-from gearmbs.adams.parse.statement import Statement
-from gearmbs.adams.parse.statements_contact import Contact, Graphics
-from gearmbs.adams.parse.statements_control import Gse, Lse, Tfsiso
-from gearmbs.adams.parse.statements_curves import CurveStatement, Cvcv, Matrix, Ptcv
-from gearmbs.adams.parse.statements_data import (
+from gearmbs.adams.parse.data_statements import (
     Array,
     Diff,
     Equilibrium,
+    FeLoad,
+    FeNode,
+    FePart,
+    FlexBody,
+    Gse,
     InitialConditions,
     Integrator,
     Kinematics,
+    Lse,
+    Material,
+    Mforce,
     Output,
     Plant,
     PlantInput,
     PlantOutput,
     Request,
     Results,
+    Sensor,
     Spline,
+    String,
+    Tfsiso,
     Variable,
 )
-from gearmbs.adams.parse.statements_events import Sensor, String
-from gearmbs.adams.parse.statements_flexible import FeLoad, FeNode, FePart, FlexBody, Material, Mforce
-from gearmbs.adams.parse.statements_forces import (
+from gearmbs.adams.parse.model_statements import (
     Accgrav,
     Beam,
     Bushing,
+    Contact,
+    Coupler,
+    CurveStatement,
+    Cvcv,
     Field,
     Friction,
-    Gforce,
-    Sforce,
-    SpringDamper,
-    Vforce,
-    Vtorque,
-)
-from gearmbs.adams.parse.statements_model import (
-    Coupler,
     Gcon,
     Gear,
+    Gforce,
+    Graphics,
     Joint,
     Jprim,
     Marker,
+    Matrix,
     Motion,
     Part,
     PointMass,
+    Ptcv,
+    Sforce,
+    SpringDamper,
+    Statement,
     Units,
+    Vforce,
+    Vtorque,
 )
 
 STATEMENTS: dict[str, type[Statement]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearmbs.adams.parse import statements as st
-from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.language.syntax import Units
 
 INCH = 0.0254
 POUND = 0.45359237

@@ -8,24 +8,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.adams.builders.model import AdamsModel
+from gearmbs.adams.builders.scopes import AdamsModel
 from gearmbs.adams.errors import Diagnostic, folded
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Script, Simulate
+from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.statements_data import REQUEST_TYPES
 from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
-from gearmbs.adams.results.assembly import Assembly
-from gearmbs.adams.results.facets import FacetedTouch, facets_remark
+from gearmbs.adams.results.remarks import (
+    TRACK_COLUMNS,
+    TRACK_DIMENSIONS,
+    Assembly,
+    FacetedTouch,
+    facets_remark,
+    track_table,
+)
 from gearmbs.adams.results.requests import RequestSeries
-from gearmbs.adams.results.tracks import TRACK_COLUMNS, TRACK_DIMENSIONS, track_table
-from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.eigenvalues import Modes
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.contacts import ContactTracks
-from gearmbs.mechanism.modal import ModalBody
+from gearmbs.mechanism.parts.modal import ModalBody
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -421,7 +426,7 @@ def part_motion(segment: Segment, number: int, kind: str = "part") -> np.ndarray
 
 
 def _frame_motion(segment: Segment, name: str) -> np.ndarray:
-    from gearmbs.dae.equations.rotation import euler_from_matrix
+    from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
 
     s = segment.solution
     body = segment.model.mechanism.bodies[name]

@@ -7,25 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.adams.builders.data_calls import translated
-from gearmbs.adams.builders.model import AdamsModel, markers_of
+from gearmbs.adams.builders.functions import translated
+from gearmbs.adams.builders.scopes import AdamsModel, markers_of
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.statements_data import REQUEST_TYPES
-from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution
+from gearmbs.adams.parse.data_statements import REQUEST_TYPES
+from gearmbs.dae.analyses.statics import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
-from gearmbs.dae.equations.counted_angles import AXES as ANGLE_NAMES
 from gearmbs.dae.equations.expressions import eval_gradient
-from gearmbs.dae.equations.expressions.errors import ExpressionError
-from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
+from gearmbs.dae.equations.expressions.measures import KIN_A, KIN_R
+from gearmbs.dae.equations.expressions.opcodes import ExpressionError
 from gearmbs.dae.equations.expressions.tape import Tape
+from gearmbs.dae.equations.kinematics.update import AXES as ANGLE_NAMES
 from gearmbs.dae.results.frames import frame_motion
 from gearmbs.dae.results.solution import Solution
-from gearmbs.mechanism.compile import starting_angles
-from gearmbs.mechanism.expression_compiler import compile_expression
-from gearmbs.mechanism.expression_series import evaluate_series
-from gearmbs.mechanism.expression_syntax import Scope
-from gearmbs.mechanism.user_functions import raised_errors
+from gearmbs.kernels.jit import njit
+from gearmbs.mechanism.building.compile import starting_angles
+from gearmbs.mechanism.language.library import compile_expression
+from gearmbs.mechanism.language.syntax import Scope
+from gearmbs.mechanism.language.user_functions import evaluate_series, raised_errors
 
 NAMES = ("F1", "F2", "F3", "F4", "F5", "F6", "F7", "F8")
 

@@ -6,12 +6,11 @@ import re
 from pathlib import Path
 
 from gearmbs.adams.parse.commands import Linear
-from gearmbs.adams.results.msg import message_text
+from gearmbs.adams.results.msg import message_text, request_text
 from gearmbs.adams.results.record import RunRecord
-from gearmbs.adams.results.req import request_text
 from gearmbs.adams.results.res import results_text
 from gearmbs.dae.analyses.plant import FORMATS, LinearPlant
-from gearmbs.view.files import whole_file
+from gearmbs.files import whole_file
 
 
 class AdamsResult(RunRecord):

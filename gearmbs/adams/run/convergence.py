@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.builders.model import AdamsModel
-from gearmbs.dae.errors import ModelError
+from gearmbs.adams.builders.scopes import AdamsModel
+from gearmbs.dae.problem import ModelError
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.contacts.element import SolidContact

@@ -18,10 +18,10 @@ from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.run.session import Session
 from gearmbs.dae.analyses import plant as _plant
 from gearmbs.dae.analyses.plant import LinearPlant
-from gearmbs.dae.analyses.quasi_static import initial_conditions
+from gearmbs.dae.analyses.statics import initial_conditions
 
 if TYPE_CHECKING:
-    from gearmbs.adams.builders.model import AdamsModel
+    from gearmbs.adams.builders.scopes import AdamsModel
     from gearmbs.dae.model.system import System
 
 

@@ -10,41 +10,46 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.control import hold_states
-from gearmbs.adams.builders.data_calls import MODES, Present
-from gearmbs.adams.builders.initial import part_states, with_initial_motions
-from gearmbs.adams.builders.mechanism import build_model
-from gearmbs.adams.builders.model import AdamsModel
+from gearmbs.adams.builders.functions import MODES, Present
+from gearmbs.adams.builders.mechanism import build_model, part_states, with_initial_motions
 from gearmbs.adams.builders.routines import bound
+from gearmbs.adams.builders.scopes import AdamsModel
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import read_deck
-from gearmbs.adams.results.facets import faceted_touches
 from gearmbs.adams.results.record import NEWTON, Segment
+from gearmbs.adams.results.remarks import faceted_touches
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.run.convergence import Doubt, doubt
-from gearmbs.adams.run.equilibria import equilibria_to_passage
 from gearmbs.adams.run.plant import plant_of
-from gearmbs.adams.run.samples import parts, renew, take_samples
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
-from gearmbs.adams.run.segments import kept_until, segment_of
-from gearmbs.adams.run.sensors import Watch, act, after, in_unit, up_to
-from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch
-from gearmbs.dae.analyses.kinematic_analysis import kinematic
-from gearmbs.dae.analyses.modes import Modes
+from gearmbs.adams.run.sensors import (
+    Watch,
+    act,
+    after,
+    equilibria_to_passage,
+    in_unit,
+    parts,
+    renew,
+    take_samples,
+    up_to,
+)
+from gearmbs.adams.run.session import Session, active_sensors, change, kept_until, output_times, segment_of, switch
+from gearmbs.dae.analyses.eigenvalues import Modes
+from gearmbs.dae.analyses.kinematics import kinematic
 from gearmbs.dae.analyses.plant import LinearPlant
-from gearmbs.dae.analyses.quasi_static import initial_conditions, quasi_static
-from gearmbs.dae.analyses.statics import StaticResult, static_equilibrium
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.analyses.statics import StaticResult, initial_conditions, quasi_static, static_equilibrium
 from gearmbs.dae.model.system import System
+from gearmbs.dae.problem import ModelError
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.mechanism.analyses import frozen_friction, linear_modes
-from gearmbs.mechanism.modal import ModalBody
-from gearmbs.mechanism.passages import singular_passage
-from gearmbs.mechanism.stops import StopAt
+from gearmbs.mechanism.checks import singular_passage
+from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.solve.analyses import frozen_friction, linear_modes
+from gearmbs.mechanism.solve.simulate import StopAt
 
 DEFAULT_TOLERANCE = 1e-8
 """Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""

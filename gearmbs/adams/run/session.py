@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.builders.model import BodyState
+from gearmbs.adams.builders.scopes import AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, refused_arguments
 from gearmbs.adams.parse.commands import Change, Simulate, Switch, apply_change
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.refused import refused_functions
+from gearmbs.adams.results.record import Segment
+from gearmbs.adams.results.remarks import assembly_of, tracks_of
+from gearmbs.adams.results.requests import RequestEvaluator
+from gearmbs.dae.analyses.statics import StaticResult
+from gearmbs.dae.equations.expressions import ExpressionError
+from gearmbs.dae.problem import ModelError
+from gearmbs.dae.results.solution import Solution
 
 AT_START: dict[type, frozenset[str]] = {
     st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
@@ -49,7 +57,7 @@ class Session:
     pending : dict
         Of GSEs by id: number of the next sample and the discrete states from then on.
     redundancy : str
-        Which redundant rows are kept, see `gearmbs.mechanism.redundancy`.
+        Which redundant rows are kept, see `gearmbs.mechanism.checks`.
     check : bool or None
         Whether dynamic analyses are solved again with a smaller error; None: if that costs little.
     interrupted : bool
@@ -191,3 +199,74 @@ def output_times(session: Session, command: Simulate) -> np.ndarray:
     count = int(np.floor(span / command.dtout * (1.0 + 1e-12) + 1e-9))
     times = session.time + command.dtout * np.arange(count + 1)
     return times if end - times[-1] < 1e-9 * command.dtout else np.append(times, end)
+
+
+# Remarks on points of contact that leave an open curve.
+
+
+OFF = 1e-9
+"""Of a curve's length: beyond its end by less than it is at the end."""
+
+
+def off_the_end(model: AdamsModel, solution: Solution) -> list[str]:
+    """Return a remark on each point of contact that is beyond the end of its curve, with the first time of output."""
+    remarks = []
+    for runner, (statement, length) in model.runners.items():
+        travel = solution.com_position(runner)[:, 2]
+        beyond = np.flatnonzero((travel < -OFF * length) | (travel > (1.0 + OFF) * length))
+        if beyond.size:
+            time = solution.t[beyond[0]] / model.deck.units.time
+            remarks.append(
+                f"{statement.label()}: at TIME = {time:.9g} it is off the end of its curve, where the spline goes on "
+                "beyond the points; give points further out, or a SENSOR that ends the analysis before"
+            )
+    return remarks
+
+
+# From the solution of an analysis to what its results show: ``segment_of``, ``kept_until``.
+
+
+def segment_of(
+    session: Session,
+    command: Simulate,
+    kind: str,
+    model: AdamsModel,
+    solution: Solution,
+    options: dict[str, Any],
+    note: str | None,
+    equilibrium: StaticResult | None = None,
+) -> tuple[Segment, RequestEvaluator]:
+    """Return an analysis with its requests, forces, tracks and variables, and what evaluates more of it.
+
+    Raises
+    ------
+    DeckError
+        If a REQUEST cannot be evaluated.
+    """
+    evaluator = RequestEvaluator(model, solution)
+    segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
+    if kind != "STATICS":
+        segment.assembly = assembly_of(model, solution)
+    for request in session.deck.of(st.Request).values():
+        try:
+            segment.requests[request.id] = evaluator.request(request)
+        except ExpressionError as error:
+            raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
+    for kind_id in model.pairs:
+        segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
+    segment.tracks = tracks_of(model, solution)
+    segment.variables = evaluator.variables()
+    segment.note = "\n".join(filter(None, [note, *off_the_end(model, solution)])) or None
+    return segment, evaluator
+
+
+def kept_until(
+    session: Session, command: Simulate, kind: str, model: AdamsModel | None, error: Exception, options: dict[str, Any]
+) -> Segment | None:
+    """Return what an analysis computed before a routine of the user failed in it, None where there is nothing."""
+    solution = getattr(error, "solution", None)
+    if model is None or solution is None or solution.t.size == 0:
+        return None
+    with contextlib.suppress(ModelError, DeckError, ArithmeticError):
+        return segment_of(session, command, kind, model, solution, options, None)[0]
+    return None

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.write.context import WriterContext
-from gearmbs.adams.write.text import number
-from gearmbs.dae.errors import ModelError
+from gearmbs.adams.write.text import WriterContext, number
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts import (
     Box,
     Coulomb,
@@ -26,7 +25,7 @@ from gearmbs.mechanism.contacts import (
     Sphere,
     Torus,
 )
-from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.parts.bodies import Marker
 
 PLANE_SIZE = 1000.0
 """Edge of the part of a plane that is drawn, in the deck's unit of length; it touches everywhere."""

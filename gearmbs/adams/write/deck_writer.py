@@ -2,26 +2,208 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from gearmbs.adams.parse.units import TABLES
-from gearmbs.adams.write.context import COMPONENTS_OF
-from gearmbs.adams.write.data import data_statements
+from gearmbs.adams.write.elements import as_expressions, data_statements, hidden, kept, states_of
 from gearmbs.adams.write.flexible import flex_body_arguments, nearest_node
-from gearmbs.adams.write.joints import constraint_statements
-from gearmbs.adams.write.loads import element_statements
-from gearmbs.adams.write.names import DeckNames
-from gearmbs.adams.write.output import integrator_statement, request_statements
-from gearmbs.adams.write.text import listed, number, wrapped
-from gearmbs.dae.equations.rotation import euler_from_matrix
-from gearmbs.dae.errors import ModelError
+from gearmbs.adams.write.gears import is_gear_contact
+from gearmbs.adams.write.joints import constraint_statements, element_statements, joint_statement, load_statement
+from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
+from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.modal import ModalBody
-from gearmbs.mechanism.parts import Body, Marker
+from gearmbs.mechanism.contacts import SolidContact
+from gearmbs.mechanism.language.library import ELEMENT_FORCES
+from gearmbs.mechanism.language.syntax import Call, Name, Node, Number, parse, shown, unparse
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.modal import ModalBody
+
+# What a written deck asks for: REQUESTs, the files of results, the integrator.
+
+
+COLUMNS = ("F2", "F3", "F4", "F6", "F7", "F8")
+"""Columns of a request that the .req file contains."""
+LONGEST = 80
+"""Characters of a comment in the .req."""
+NOT_ASKED = ("coupler", "gear")
+"""Elements whose forces are those of their joints."""
+METHODS = ("GSTIFF", "WSTIFF")
+FORMULATIONS = ("I3", "SI2", "SI1")
+
+
+def request_statements(writer: WriterContext, requests: Mapping[str, str | Sequence[str]], all_of_them: bool) -> None:
+    """Write the requests a user asks for, then those of all bodies and elements.
+
+    Raises
+    ------
+    ModelError
+        For more than six expressions in a request.
+    """
+    texts: list[tuple[list[str], str]] = []
+    for name, given in requests.items():
+        expressions = [given] if isinstance(given, str) else list(given)
+        if not 1 <= len(expressions) <= len(COLUMNS):
+            raise ModelError(f"request '{name}': it holds 1 to {len(COLUMNS)} expressions, got {len(expressions)}")
+        texts.append(([writer.expression(e) for e in expressions], name))
+    for n, (expressions, name) in enumerate(texts, 1):
+        _functions(writer, n, expressions, name)
+    if all_of_them:
+        _bodies_and_elements(writer, len(texts) + 1)
+
+
+def _functions(writer: WriterContext, n: int, expressions: list[str], comment: str) -> None:
+    columns = [f"{c} = {text}\\" for c, text in zip(COLUMNS, expressions)]
+    writer.statement(f"REQUEST/{n}", [*columns, f"COMMENT = {_plain(comment)}"], comment)
+
+
+def _bodies_and_elements(writer: WriterContext, n: int) -> None:
+    for body in writer.mechanism.bodies.values():
+        for kind in ("DISPLACEMENT", "VELOCITY"):
+            comment = f"COMMENT = {_plain(f'{body.name} {kind.lower()}')}"
+            writer.statement(f"REQUEST/{n}", [kind, f"I = {writer.centers[id(body)]}", comment])
+            n += 1
+    functions = {kind: function for function, kind in ELEMENT_FORCES.items() if kind not in NOT_ASKED}
+    for (kind, name), number_ in writer.elements.items():
+        if kind in functions:
+            texts = [f"{functions[kind]}({number_}, 0, {c}, 0)" for c in (2, 3, 4, 6, 7, 8)]
+            _functions(writer, n, texts, f"{name} force")
+            n += 1
+
+
+def integrator_statement(
+    writer: WriterContext, integrator: str | None, formulation: str, tol: float | None, max_step: float | None
+) -> None:
+    """Write INTEGRATOR when any of its settings is given.
+
+    Raises
+    ------
+    ModelError
+        For a method or formulation that ADAMS does not have.
+    """
+    if integrator is None and tol is None and max_step is None:
+        return
+    method = (integrator or "GSTIFF").upper()
+    for word, value, known in (("integrator", method, METHODS), ("formulation", formulation, FORMULATIONS)):
+        if value not in known:
+            raise ModelError(f"{word} = {value!r}: choose one of {', '.join(known)} for a deck")
+    arguments = [method, formulation]
+    if tol is not None:
+        arguments.append(f"ERROR = {number(tol)}")
+    if max_step is not None:
+        arguments.append(f"HMAX = {number(max_step / writer.units.time)}")
+    writer.statement("INTEGRATOR/", arguments)
+
+
+def _plain(text: str) -> str:
+    """Return a text without characters that mean something in a deck."""
+    return re.sub(r"[^\w .:()+-]+", " ", text).strip()[:LONGEST] or "request"
+
+
+# Ids of what a mechanism holds, and expressions with ids in place of names.
+
+
+PLANTS = {"PINVAL": "pinput", "POUVAL": "poutput"}
+
+
+class DeckNames:
+    """Numbers the parts of a mechanism."""
+
+    def __init__(self, mechanism: Mechanism, gears: str) -> None:
+        self.mechanism = mechanism
+        self.gears = gears
+        self.units = mechanism.units
+        self.bodies: dict[int, int] = {}
+        self.markers: dict[int, int] = {}
+        self.marker_names: dict[str, int] = {}
+        self.elements: dict[tuple[str, str], int] = {}
+        self.kept = kept(mechanism)
+        self.hidden = hidden(mechanism)
+        self.variables = self._numbered(mechanism.variables)
+        self.all_states = states_of(mechanism)
+        self.states = self._numbered(self.all_states)
+        self.splines = {upper(k): n for n, k in enumerate(mechanism.splines, 1)}
+        self.arrays = {upper(k): n for n, k in enumerate(mechanism.arrays, 1)}
+        self.plants = {(kind, upper(k)): n for n, (kind, k) in enumerate(mechanism.plants, 1)}
+        self._number()
+
+    def _numbered(self, table: Iterable[Any]) -> dict[Any, int]:
+        """Number variables or states, without those that a statement stands for."""
+        return {upper(k): n for n, k in enumerate((k for k in table if upper(k) not in self.hidden), 1)}
+
+    def _number(self) -> None:
+        m = self.mechanism
+        for n, body in enumerate((m.ground, *m.bodies.values()), 1):
+            self.bodies[id(body)] = n
+        used = {mk.number for body in (m.ground, *m.bodies.values()) for mk in body.markers if mk.number}
+        fresh = (n for n in range(1, 10**9) if n not in used)
+        for body in (m.ground, *m.bodies.values()):
+            for marker in body.markers:
+                self.markers[id(marker)] = marker.number or next(fresh)
+                self.marker_names[marker.name.upper()] = self.markers[id(marker)]
+        counts: dict[str, int] = {}
+        for name, kind in self._kinds():
+            counts[kind] = counts.get(kind, 0) + 1
+            self.elements[kind, name] = counts[kind]
+
+    def _kinds(self) -> Iterable[tuple[str, str]]:
+        for name, joint in self.mechanism.joints.items():
+            yield name, joint_statement(joint).lower()
+        for name in self.mechanism.constraints:
+            yield name, "gcon"
+        for name, element in self.mechanism.elements.items():
+            solid = isinstance(element, SolidContact) or (self.gears == "solids" and is_gear_contact(element))
+            yield name, "contact" if solid else self.kept.get(name) or load_statement(as_expressions(element)).lower()
+
+    def expression(self, text: str) -> str:
+        """Return an expression with names replaced by ids."""
+
+        def rename(call: Call) -> Call:
+            if call.name == "INTEGRAL":
+                raise ModelError(
+                    f"{shown(text)}: ADAMS has no function INTEGRAL; give a motion by its velocity to a joint, "
+                    "or use a differential state"
+                )
+            if call.name in ("MODAL", "MODAL1"):
+                raise ModelError(f"{shown(text)}: ADAMS has no function {call.name}; use markers at nodes instead")
+            call = replace(call, args=tuple(self._argument(call, k, a) for k, a in enumerate(call.args)))
+            return self._element_call(call) if call.name in ELEMENT_FORCES else call
+
+        return unparse(parse(text), rename)
+
+    def _argument(self, call: Call, position: int, arg: Node) -> Node:
+        """Replace the name of a marker or data element by its id."""
+        key: Any = arg.text if isinstance(arg, Name) else arg.integer if isinstance(arg, Number) else None
+        table: dict[Any, int] = {}
+        if call.name == "VARVAL":
+            table = self.variables if key in self.variables else self.states
+        elif call.name in ("DIF", "DIF1"):
+            table = self.states
+        elif call.name in ("CUBSPL", "AKISPL") and position == 2:
+            table = self.splines
+        elif call.name == "ARYVAL" and position == 0:
+            table = self.arrays
+        elif call.name in PLANTS and position == 0:
+            table = {k: n for (kind, k), n in self.plants.items() if kind == PLANTS[call.name]}
+        elif isinstance(arg, Name) and (call.name not in ELEMENT_FORCES or position > 0):
+            table = self.marker_names
+        return Number(float(table[key]), arg.at, table[key]) if key in table else arg
+
+    def _element_call(self, call: Call) -> Call:
+        """Ask for an element's force under the statement it is written as."""
+        first = call.args[0] if call.args else None
+        if isinstance(first, Name):
+            for (kind, name), n in self.elements.items():
+                if name.upper() == first.text:
+                    keyword = next(k for k, v in ELEMENT_FORCES.items() if v == kind)
+                    return replace(call, name=keyword, args=(Number(float(n), first.at, n), *call.args[1:]))
+        return call
 
 
 def write_deck(

@@ -10,14 +10,52 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.write.context import WriterContext
-from gearmbs.adams.write.text import listed, number
+from gearmbs.adams.write.text import WriterContext, listed, number, upper
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.elements import Load, State
-from gearmbs.mechanism.forces.friction_force import FrictionForce
+from gearmbs.mechanism.forces.friction import INPUTS, FrictionForce, JointFriction
 from gearmbs.mechanism.forces.springs import LineSpring
-from gearmbs.mechanism.friction import INPUTS, JointFriction
-from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.parts.elements import Load, State
+from gearmbs.mechanism.parts.joints import Joint
+
+# Variables, states, arrays and splines of a mechanism as statements.
+
+
+def data_statements(w: WriterContext) -> None:
+    """Write variables, states, arrays, plant inputs and outputs, and splines."""
+    m = w.mechanism
+    for key, text in m.variables.items():
+        if upper(key) in w.hidden:
+            continue
+        n = w.variables[upper(key)]
+        w.statement(f"VARIABLE/{n}", [f"FUNCTION = {w.expression(text)}"], str(key))
+    for key, state in w.all_states.items():
+        if upper(key) in w.hidden:
+            continue
+        if state.algebraic:
+            raise ModelError(f"state '{key}': an algebraic state cannot be written; use a variable")
+        text = _times(w.expression(state.expression), w.units.time)
+        arguments = [f"IC = {number(state.start)}", f"FUNCTION = {text}"]
+        w.statement(f"DIFF/{w.states[upper(key)]}", arguments, str(key))
+    for key, values in m.arrays.items():
+        w.statement(f"ARRAY/{w.arrays[upper(key)]}", ["IC", f"NUMBERS = {listed(values)}"], str(key))
+    for (kind, key), members in m.plants.items():
+        ids = ", ".join(str(w.variables[upper(member)]) for member in members)
+        w.statement(f"{kind.upper()}/{w.plants[kind, upper(key)]}", [f"VARIABLES = {ids}"], str(key))
+    for key, data in m.splines.items():
+        arguments = [f"X = {listed(data.x)}"]
+        if data.z:
+            arguments += [f"Y = {number(z)}, {listed(row)}" for z, row in zip(data.z, data.y)]
+        else:
+            arguments.append(f"Y = {listed(data.y[0])}")
+        if data.linear_extrapolate:
+            arguments.append("LINEAR_EXTRAPOLATE")
+        w.statement(f"SPLINE/{w.splines[upper(key)]}", arguments, str(key))
+
+
+def _times(text: str, factor: float) -> str:
+    return text if factor == 1.0 else f"{number(factor)}*({text})"
+
 
 KEYWORDS = {
     "springdamper": "SPRINGDAMPER", "bushing": "BUSHING", "field": "FIELD", "beam": "BEAM", "friction": "FRICTION",

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.adams.write.text import listed
-from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism.modal import ModalBody, ShapedMarker
-from gearmbs.mechanism.parts import Marker
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.modal import ModalBody, ShapedMarker
 
 if TYPE_CHECKING:
-    from gearmbs.adams.write.context import WriterContext
+    from gearmbs.adams.write.text import WriterContext
     from gearmbs.flexible import ModalModel
 
 INVARIANTS = {"full": "TTTTTTTTT", "partial": "TTTTFTTTF", "constant": "TTTTFTTFF"}
@@ -50,9 +50,9 @@ def flex_body_arguments(
     ModelError
         If the body cannot be in such a file, or the deck is not written to one.
     """
-    from gearmbs.flexible.errors import FlexibleError
-    from gearmbs.flexible.mnf import mnf_of, with_seat_nodes, write_mnf
-    from gearmbs.flexible.seats import Seat
+    from gearmbs.flexible.files.mnf import mnf_of, with_seat_nodes, write_mnf
+    from gearmbs.flexible.material import FlexibleError
+    from gearmbs.flexible.modal_model import Seat
 
     label = f"body '{body.name}'"
     origin = body.origin

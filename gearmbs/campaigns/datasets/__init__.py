@@ -8,21 +8,22 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.datasets.baseline import (
         Score,
         classifier,
+        features,
         from_simulation_to_recordings,
         leak_and_no_leak,
         macro_auroc,
+        recording_features,
         score,
     )
-    from gearmbs.campaigns.datasets.features import features, recording_features
-    from gearmbs.campaigns.datasets.layers import SensorLayers
-    from gearmbs.campaigns.datasets.make import data_set_plan, feature_table, write_data_set
-    from gearmbs.campaigns.datasets.splits import (
+    from gearmbs.campaigns.datasets.layers import (
+        SensorLayers,
         one_state_a_group,
         random_split,
         shared_groups,
         split_by_group,
         withhold,
     )
+    from gearmbs.campaigns.datasets.make import data_set_plan, feature_table, write_data_set
 
 __all__ = [
     "Score",
@@ -52,17 +53,17 @@ late(
         "classifier": ".baseline",
         "data_set_plan": ".make",
         "feature_table": ".make",
-        "features": ".features:features",
+        "features": ".baseline:features",
         "from_simulation_to_recordings": ".baseline",
         "leak_and_no_leak": ".baseline",
         "macro_auroc": ".baseline",
-        "one_state_a_group": ".splits",
-        "random_split": ".splits",
-        "recording_features": ".features",
+        "one_state_a_group": ".layers",
+        "random_split": ".layers",
+        "recording_features": ".baseline",
         "score": ".baseline",
-        "shared_groups": ".splits",
-        "split_by_group": ".splits",
-        "withhold": ".splits",
+        "shared_groups": ".layers",
+        "split_by_group": ".layers",
+        "withhold": ".layers",
         "write_data_set": ".make",
     },
 )

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import gearmbs
-from gearmbs.campaigns.errors import CampaignError
-from gearmbs.campaigns.exports import front_matter
+from gearmbs.campaigns.results import front_matter
+from gearmbs.campaigns.settings import CampaignError
 
 TYPES = {
     "double": "sc:Float",
@@ -46,7 +46,7 @@ def write_card(
     folder: Path, title: str, files: Sequence[Path], facts: Mapping[str, Any], layers: Mapping[str, Any]
 ) -> Path:
     """Write README.md with the front matter that hubs read."""
-    from gearmbs.view.files import write_whole
+    from gearmbs.files import write_whole
 
     lines = ["---", "license: cc0-1.0", "task_categories:", "- time-series-classification", "tags:", "- vibration"]
     lines += ["- gears", "- simulation", *front_matter(files, int(facts["signals"]))]
@@ -102,7 +102,7 @@ def write_croissant(
 ) -> Path:
     """Write croissant.json: files with their digests, and the columns as fields of a record set; where and when (year,
     month and day, as 2026-01-31) it is published, if it is."""
-    from gearmbs.view.files import write_whole
+    from gearmbs.files import write_whole
 
     fields = []
     for name, kind in _columns(files).items():

@@ -10,9 +10,8 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.campaigns.runners.dask import DaskRunner
-    from gearmbs.campaigns.runners.processes import ProcessRunner
-    from gearmbs.campaigns.runners.serial import SerialRunner
+    from gearmbs.campaigns.runners.processes import ProcessRunner, SerialRunner
 
 __all__ = ["DaskRunner", "ProcessRunner", "SerialRunner"]
 
-late(__name__, {"DaskRunner": ".dask", "ProcessRunner": ".processes", "SerialRunner": ".serial"})
+late(__name__, {"DaskRunner": ".dask", "ProcessRunner": ".processes", "SerialRunner": ".processes"})

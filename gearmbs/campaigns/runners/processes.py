@@ -138,3 +138,17 @@ def _inherited_settings() -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+# Units one after the other in this process: for parts of job arrays, for notebooks, for looking into a case.
+
+
+class SerialRunner:
+    """Works on units here."""
+
+    workers = 1
+
+    def __call__(self, path: str, units: Iterator[int]) -> Iterator[UnitReport]:
+        """Yield the report of each unit in turn."""
+        for unit in units:
+            yield work_unit(path, unit)

@@ -8,10 +8,9 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.subjects.base import Kept, Outcome, Subject, make_subject, subject_kinds
     from gearmbs.campaigns.subjects.bearing import BearingSubject
     from gearmbs.campaigns.subjects.deck import DeckSubject
-    from gearmbs.campaigns.subjects.drivetrain import DrivetrainSubject
+    from gearmbs.campaigns.subjects.drivetrain import DrivetrainSubject, PlanetarySubject
     from gearmbs.campaigns.subjects.function import FunctionSubject
     from gearmbs.campaigns.subjects.pair import PairSubject
-    from gearmbs.campaigns.subjects.planetary import PlanetarySubject
 
 __all__ = [
     "BearingSubject",
@@ -37,7 +36,7 @@ late(
         "Kept": ".base",
         "Outcome": ".base",
         "PairSubject": ".pair",
-        "PlanetarySubject": ".planetary",
+        "PlanetarySubject": ".drivetrain",
         "Subject": ".base",
         "make_subject": ".base",
         "subject_kinds": ".base",

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.settings import CampaignError
 from gearmbs.units import DIMENSIONS
 
 KINDS = {
@@ -23,7 +23,7 @@ KINDS = {
     "function": "gearmbs.campaigns.subjects.function:FunctionSubject",
     "deck": "gearmbs.campaigns.subjects.deck:DeckSubject",
     "drivetrain": "gearmbs.campaigns.subjects.drivetrain:DrivetrainSubject",
-    "planetary": "gearmbs.campaigns.subjects.planetary:PlanetarySubject",
+    "planetary": "gearmbs.campaigns.subjects.drivetrain:PlanetarySubject",
     "bearing": "gearmbs.campaigns.subjects.bearing:BearingSubject",
     "paper claims": "gearmbs.campaigns.subjects.claims:ClaimsSubject",
 }
@@ -212,7 +212,7 @@ def check_keep(subject: Subject, keep: Sequence[str]) -> None:
 
 def tooth_fault_unit(table: Mapping[str, Any], key: str) -> str:
     """Return the SI unit of a parameter of a fault of a tooth, given as a table with its kind."""
-    from gearmbs.studies.tooth_faults import kinds, tooth_fault
+    from gearmbs.studies.case.parts import kinds, tooth_fault
 
     label = tooth_fault(str(table.get("kind"))).label
     dimension = kinds()[label].units.get(key, "dimensionless")

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gearmbs.campaigns.subjects.base import Kept, kept_by_functions
-from gearmbs.campaigns.subjects.tables import TablesSubject, in_si, told
+from gearmbs.campaigns.subjects.function import TablesSubject, in_si, told
 from gearmbs.units import DIMENSIONS, to_si
 
 RUN = {"settling": 0.05, "duration": 0.5, "rate": 12800.0, "tolerance": 1e-6}
@@ -59,7 +59,7 @@ class BearingSubject(TablesSubject):
     def made(self, tables: dict[str, Any]) -> BearingCase:
         """Return the bearing and all about it; the rig is built once, which checks it."""
         from gearmbs.bearings import Bearing
-        from gearmbs.bearings.defect_tables import as_defects
+        from gearmbs.bearings.defects import as_defects
 
         known = ("name", "bearing", "rig", "defects", "run")
         for key in tables:
@@ -84,7 +84,7 @@ class BearingSubject(TablesSubject):
         import inspect
 
         from gearmbs.studies import bearing_rig
-        from gearmbs.studies.trains import plain
+        from gearmbs.studies.trains.trains import plain
 
         defaults = {
             name: p.default for name, p in inspect.signature(bearing_rig).parameters.items() if p.default is not p.empty

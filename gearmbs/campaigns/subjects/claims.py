@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.base import Kept, Outcome, Subject
 from gearmbs.campaigns.subjects.pair import PairSubject, canonical_case
-from gearmbs.studies.case import Case, make_case
+from gearmbs.studies.case.case import Case, make_case
 
 SETTINGS = {
     "depth": ("m", 1e-4),
@@ -47,7 +47,7 @@ class ClaimsSubject(Subject):
     states and
     harmonics of high over low load, in one scale for all; ``load_each.C``, the same with each load in the scale of
     its own healthy
-    state; and ``all.C``, 1 where all three claims hold as `gearmbs.studies.claims.judge` judges them.
+    state; and ``all.C``, 1 where all three claims hold as `gearmbs.studies.paper.preset.judge` judges them.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ class ClaimsSubject(Subject):
 
     def check(self, data: dict[str, Any], name: str) -> list[Case]:
         """Return the six cases of a point."""
-        from gearmbs.studies.limits import check_record
-        from gearmbs.studies.preset import paper_cases
+        from gearmbs.studies.case.limits import check_record
+        from gearmbs.studies.paper.preset import paper_cases
 
         s = data
         friction = (
@@ -127,7 +127,7 @@ class ClaimsSubject(Subject):
         """Return the harmonics of the six cases: dims (load, state, harmonic), by component."""
         import xarray as xr
 
-        from gearmbs.studies.preset import LOAD_NAMES, STATES
+        from gearmbs.studies.paper.preset import LOAD_NAMES, STATES
 
         levels = []
         for k, case in enumerate(thing):
@@ -160,7 +160,7 @@ class ClaimsSubject(Subject):
 
 def ratios(levels: Any) -> dict[str, float]:
     """Return the ratios that decide the claims from harmonics of dims (load, state, component, harmonic)."""
-    from gearmbs.studies.claims import judge
+    from gearmbs.studies.paper.preset import judge
 
     found: dict[str, float] = {}
     for component in levels.component.values:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.base import Kept, Subject, kept_by_functions
 
 PLACE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}")

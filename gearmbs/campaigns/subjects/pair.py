@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.base import (
     FAILED,
     Kept,
@@ -19,7 +19,7 @@ from gearmbs.campaigns.subjects.base import (
     tooth_fault_unit,
 )
 from gearmbs.signals import COMPONENTS
-from gearmbs.studies.case import Case, make_case, units_of_fields
+from gearmbs.studies.case.case import Case, make_case, units_of_fields
 from gearmbs.units import to_si
 
 FIRST_ORDERS = 3
@@ -83,7 +83,7 @@ class PairSubject(Subject):
 
     def check(self, data: dict[str, Any], name: str) -> Case:
         """Return the validated case, whose record can be evaluated."""
-        from gearmbs.studies.limits import check_record
+        from gearmbs.studies.case.limits import check_record
 
         case = make_case({**data, "name": name}, name)
         check_record(case, name)
@@ -95,7 +95,7 @@ class PairSubject(Subject):
 
     def run(self, thing: Case, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Return the record of a case."""
-        from gearmbs.studies.simulation import run_case
+        from gearmbs.studies.run.simulation import run_case
 
         operation = thing.operation
         span = operation.run_up + operation.settling + operation.duration
@@ -139,7 +139,7 @@ class PairSubject(Subject):
 
     def explain(self, error: Exception) -> Outcome:
         """Return the integrator's status, its message and what the settings of a case offer against it."""
-        from gearmbs.studies.simulation import ADVICE, SimulationFailed
+        from gearmbs.studies.run.simulation import ADVICE, SimulationFailed
 
         if isinstance(error, SimulationFailed):
             slipped = "Raise contact.stiffness or make operation.run_up longer."
@@ -149,7 +149,7 @@ class PairSubject(Subject):
 
     def partial(self, error: Exception) -> Any:
         """Return the record up to where the integrator stopped."""
-        from gearmbs.studies.simulation import SimulationFailed
+        from gearmbs.studies.run.simulation import SimulationFailed
 
         return error.partial() if isinstance(error, SimulationFailed) else None
 
@@ -248,7 +248,7 @@ def indicators(record: Any) -> dict[str, float]:
     """Return the condition indicators of the driver's synchronous average: ``NAME.COMPONENT``; NaN if shorter than a
     turn."""
     from gearmbs.signals import INDICATORS, condition_indicators, phase_from_speed, time_synchronous_average
-    from gearmbs.signals.simulated import record_signal
+    from gearmbs.signals.files.simulated import record_signal
 
     signal = record_signal(record)
     try:

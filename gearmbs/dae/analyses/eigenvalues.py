@@ -14,14 +14,185 @@ it can be inverted.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cholesky, eig, qr, solve_triangular
 
-from gearmbs.dae.analyses.instant import ROUNDING
-from gearmbs.dae.analyses.linearised import Reduced
-from gearmbs.dae.errors import SingularModelError
+from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
+from gearmbs.dae.analyses.turning import DIFFERENCED, angular_velocities, spinning_modes, turning
+from gearmbs.dae.problem import ModelError, SingularModelError
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.system import System
+
+# The DAE linearised at one instant, in the motions its constraints leave free.
+
+
+if TYPE_CHECKING:
+    pass
+
+DEPENDENT = 1e-10
+"""Pivot, of the largest, below which constraints count as dependent."""
+
+
+def allowed_motions(constraint: np.ndarray) -> np.ndarray:
+    """Return a basis of the null space of the constraints: some coordinates move by one each, the others follow.
+
+    Unlike an orthonormal one it keeps parts that have nothing to do with each other apart, exactly.
+    """
+    rows, n = constraint.shape
+    if rows == 0:
+        return np.eye(n)
+    upper, order = qr(constraint, mode="r", pivoting=True)
+    pivots = np.abs(np.diag(upper))
+    rank = int(np.sum(pivots > DEPENDENT * pivots[0]))
+    basis = np.zeros((n, n - rank))
+    basis[order[rank:]] = np.eye(n - rank)
+    basis[order[:rank]] = -solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
+    return basis
+
+
+@dataclass
+class Reduced:
+    """M x'' + C x' + K x + H z = 0 and z' = P x + Q x' + S z in the motions the constraints allow.
+
+    ``basis`` has a column of changes of (R, theta, q_f) for each entry of x; ``stiffness_terms`` and ``damping_terms``
+    are the sums of the absolute values of the terms each coefficient is made of, against which rounding is to be held.
+    """
+
+    basis: np.ndarray
+    stiffness_terms: np.ndarray
+    damping_terms: np.ndarray
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    state_force: np.ndarray
+    state_position: np.ndarray
+    state_velocity: np.ndarray
+    state_state: np.ndarray
+
+
+def reduce(instant: Instant) -> Reduced:
+    """Linearise an I3 problem about an instant and project it on the motions allowed by its constraints.
+
+    Raises
+    ------
+    ModelError
+        If the applied loads depend on each other in a singular way, or have no derivatives here.
+    """
+    y = instant.y
+    matrix = instant.matrix(y)
+    mass = instant.mass_matrix(matrix).toarray()
+    full = matrix.toarray()
+    if not np.all(np.isfinite(matrix.data)):
+        row = int(np.argmin(np.isfinite(full).all(axis=1)))
+        raise ModelError(
+            f"{instant.problem.names[row]}: its derivatives are not finite in this position; look for a division by "
+            "zero, coinciding markers, or angles about axes at right angles to each other"
+        )
+    q, v = instant.block("R", "lambda"), np.concatenate([instant.block("u", "p"), instant.block("eps", "R")])
+    force = instant.block("u", "eps")
+    half = instant.at["p"] - instant.at["u"]
+    rows, eps = instant.block("lambda", "F"), instant.block("eps", "R")
+    inner = instant.block("F", "mu")
+    kept = np.zeros(inner.size, dtype=bool)
+    kept[inner.size - instant.differential.size :] = instant.differential
+    loads, z = inner[~kept], inner[kept]
+
+    def eliminate(target: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivative of the target rows with the loads following their definitions, and the size of its terms."""
+        direct = full[np.ix_(target, columns)]
+        if not loads.size:
+            return direct, np.abs(direct)
+        on = full[np.ix_(target, loads)]
+        followed = np.linalg.solve(full[np.ix_(loads, loads)], full[np.ix_(loads, columns)])
+        return direct - on @ followed, np.abs(direct) + np.abs(on) @ np.abs(followed)
+
+    try:
+        (stiffness, stiffness_terms), (damping, damping_terms) = eliminate(force, q), eliminate(force, v)
+        state_force = eliminate(force, z)[0]
+        state_q, state_v, state_z = (-eliminate(z, columns)[0] for columns in (q, v, z))
+        force_reaction, state_reaction = eliminate(force, rows)[0], -eliminate(z, rows)[0]
+    except np.linalg.LinAlgError as error:
+        raise ModelError("the applied loads and variables depend on each other in a singular way") from error
+    # delta p' = d/dt of -(dG_eps/d theta) delta theta - ...: its velocity part is a damping
+    moved = full[np.ix_(eps, instant.block("theta", "lambda"))]
+    constraint = full[np.ix_(rows, q)]
+    turn = turning(instant)
+    if turn is None:
+        damping[half:, half:] -= moved
+        damping_terms[half:, half:] += np.abs(moved)
+    else:
+        # see `turning`: T delta phi for delta theta, and what the coefficients' own change adds
+        to, rate = turn.transform, turn.transform_rate
+        mass = to.T @ turn.momentum_rate
+        terms = np.abs(turn.momentum_place) + np.abs(turn.momentum_rate_change)
+        damping_terms = np.abs(to.T) @ (damping_terms @ np.abs(to) + terms)
+        stiffness_terms = np.abs(to.T) @ (
+            stiffness_terms @ np.abs(to) + DIFFERENCED * np.abs(turn.momentum_place_change)
+        )
+        stiffness = to.T @ (turn.momentum_place_change + damping @ rate + stiffness @ to)
+        damping = to.T @ (turn.momentum_rate_change + turn.momentum_place + damping @ to)
+        state_force = to.T @ state_force
+        state_q, state_v = state_q @ to + state_v @ rate, state_v @ to
+        constraint = constraint @ to
+        force_reaction = to.T @ force_reaction
+    basis = _free(instant, constraint)
+    absolute = np.abs(basis)
+    projected = [basis.T @ force for force in (stiffness, damping, state_force)]
+    # what constraints exert themselves does no work along the basis; loads that follow the reactions do
+    felt = basis.T @ force_reaction
+    felt[np.abs(felt) <= DEPENDENT * (absolute.T @ np.abs(force_reaction))] = 0.0
+    if felt.any() or state_reaction.any():
+        changes = _reactions(mass, constraint, force_reaction, (stiffness, damping, state_force))
+        projected = [force + felt @ change for force, change in zip(projected, changes)]
+        rates = zip((state_q, state_v, state_z), changes)
+        state_q, state_v, state_z = (rate + state_reaction @ change for rate, change in rates)
+    return Reduced(
+        basis if turn is None else turn.transform @ basis,
+        absolute.T @ stiffness_terms @ absolute,
+        absolute.T @ damping_terms @ absolute,
+        basis.T @ mass @ basis,
+        projected[1] @ basis,
+        projected[0] @ basis,
+        projected[2],
+        state_q @ basis,
+        state_v @ basis,
+        state_z,
+    )
+
+
+def _free(instant: Instant, constraint: np.ndarray) -> np.ndarray:
+    """Return a basis of the motions that constraints allow, lengths and angles weighed against each other."""
+    arm = max(min(instant.system.length, 1.0), 1e-3)
+    sizes = instant.system.model.modal_sizes()[:, 0]
+    half = (constraint.shape[1] - sizes.size) // 2
+    weight = np.concatenate([np.ones(half), np.full(half, arm), arm / sizes])
+    return allowed_motions(constraint / weight) / weight[:, None]
+
+
+def _reactions(
+    mass: np.ndarray, constraint: np.ndarray, force_reaction: np.ndarray, forces: tuple[np.ndarray, ...]
+) -> list[np.ndarray]:
+    """Return how the multipliers change with positions, velocities and states.
+
+    Of M q'' + f + L lambda = 0 and Phi_q q'' = 0 they are what q'' leaves of f, at a position of equilibrium; f are
+    the forces' derivatives and L those by the multipliers, Phi_q^T and what loads make of reactions.
+    """
+    m, n = constraint.shape
+    if m == 0:
+        return [np.zeros((0, force.shape[1])) for force in forces]
+    whole = np.block([[mass, force_reaction], [constraint, np.zeros((m, m))]])
+    size = np.sqrt(np.maximum(np.abs(whole).max(axis=1), np.finfo(float).tiny))
+    scaled = whole / size[:, None] / size
+    given = np.zeros((n + m, sum(force.shape[1] for force in forces)))
+    given[:n] = -np.hstack(forces)
+    solved = np.linalg.lstsq(scaled, given / size[:, None], rcond=None)[0] / size[:, None]
+    return np.split(solved[n:], np.cumsum([force.shape[1] for force in forces])[:-1], axis=1)
+
 
 SLOWEST = 1e-6
 """Angular frequency, rad/s, below which a motion counts as free of stiffness."""
@@ -329,3 +500,198 @@ def _direct(balanced: Balanced, root: np.ndarray) -> tuple[np.ndarray, np.ndarra
     first[2 * n :, 2 * n :] = -balanced.static[n:, n:] / own / rate
     values, vectors = eig(first)
     return values * rate, solve_triangular(root, vectors[:n].real) + 1j * solve_triangular(root, vectors[:n].imag)
+
+
+# Linear modes: eigenvalues and shapes of the DAE linearised about an operating point.
+#
+# The exact Jacobians of the I3 residual are projected on the motions the constraints allow, which leaves
+#
+#     M x'' + C x' + K x + H z = 0,    z' = P x + Q x' + S z
+#
+# with as many x as degrees of freedom; its eigenvalues are the finite ones of the pencil (dG/dy, dG/dy').
+
+
+RIGID, OSCILLATING, REAL, SLIDING = "rigid", "oscillating", "real", "damped rigid"
+REAL_TOLERANCE = 1e-9
+CRITICAL = 1e-6
+"""Imaginary part by magnitude up to which a pair does not oscillate.
+
+A double eigenvalue, that of critical damping, is known to the square root of rounding, 1.5e-8; the ratio 1e-6 stands
+for a damping ratio of 1 - 5e-13.
+"""
+UNRESISTED = 1e-6
+"""Elastic by kinetic energy of a decaying motion below which it is rigid."""
+GROWTH_TOLERANCE = 1e-8
+"""Rounding of a real part, of the eigenvalue's own magnitude, that does not count as growth."""
+
+
+@dataclass(repr=False)
+class Modes:
+    """Eigenvalues and their shapes; one entry for each conjugate pair, real eigenvalue or rigid motion.
+
+    Only conjugate pairs are modes with a natural frequency, those of `oscillating`. A real eigenvalue decays or grows
+    without oscillation, as a motion that is damped beyond the critical does, or a state of a controller.
+
+    Attributes
+    ----------
+    eigenvalues : ndarray of complex, shape (k,)
+        rad/s, imaginary part not negative, sorted by magnitude.
+    frequencies : ndarray, shape (k,)
+        Undamped natural frequencies |s| / 2 pi of what oscillates, Hz; zero for rigid motions, NaN where the
+        eigenvalue is real: there is none.
+    damping_ratios : ndarray, shape (k,)
+        -Re s / |s|; zero for rigid motions, 1 or -1 where the eigenvalue is real.
+    kinds : list of str
+        ``rigid`` (no stiffness: eigenvalue zero), ``oscillating`` (a conjugate pair), ``damped rigid`` (the decay of a
+        motion that dampers resist and no stiffness) or ``real``.
+    shapes : ndarray of complex, shape (k, bodies, 6)
+        Displacement of the centre of mass and rotation of each body, global components; the largest entry is 1.
+    body_names : list of str
+    """
+
+    eigenvalues: np.ndarray
+    frequencies: np.ndarray
+    damping_ratios: np.ndarray
+    kinds: list[str]
+    shapes: np.ndarray
+    body_names: list[str]
+
+    @property
+    def stable(self) -> bool:
+        """True when no mode grows; rigid motions count as stable."""
+        return bool(np.all(self.eigenvalues.real <= GROWTH_TOLERANCE * np.abs(self.eigenvalues)))
+
+    @property
+    def oscillating(self) -> np.ndarray:
+        """Places of the modes that have a natural frequency, shape (n,)."""
+        return np.flatnonzero([kind == OSCILLATING for kind in self.kinds])
+
+    def table(self) -> str:
+        """Return the modes as text: number, kind, frequency, damping ratio, eigenvalue, body that moves most.
+
+        Rigid motions come first; what does not oscillate is listed apart, below, and has no frequency.
+        """
+        if not len(self):
+            return "no modes: there are no degrees of freedom and no states"
+        lines = [f"{'mode':>4}  {'kind':<12} {'frequency/Hz':>14} {'damping':>11}  {'eigenvalue/(rad/s)':<30} largest"]
+        apart = [k for k, kind in enumerate(self.kinds) if kind in (REAL, SLIDING)]
+        for k in [*(k for k in range(len(self)) if k not in apart), *apart]:
+            if apart and k == apart[0]:
+                lines.append("without oscillation, no modes: real eigenvalues, of over-damped motions and of states")
+            s = self.eigenvalues[k]
+            body = self.body_names[int(np.argmax(np.abs(self.shapes[k]).max(axis=1)))]
+            value = f"{s.real:.6g} {'+-' if s.imag else '+'} {s.imag:.6g}i"
+            frequency = "-" if k in apart else f"{self.frequencies[k]:.8g}"
+            lines.append(
+                f"{k + 1:>4}  {self.kinds[k]:<12} {frequency:>14} {self.damping_ratios[k]:>11.4g}  {value:<30} {body}"
+            )
+        return "\n".join(lines)
+
+    def __len__(self) -> int:
+        return self.eigenvalues.size
+
+    def __str__(self) -> str:
+        return self.table()
+
+    def __repr__(self) -> str:
+        named = {RIGID: "rigid", OSCILLATING: "oscillating", SLIDING: "damped rigid", REAL: "without oscillation"}
+        counts = {name: self.kinds.count(kind) for kind, name in named.items()}
+        parts = ", ".join(f"{n} {name}" for name, n in counts.items() if n) or "none"
+        moving = self.frequencies[self.frequencies > 0.0]
+        span = f", {moving.min():.6g} to {moving.max():.6g} Hz" if moving.size else ""
+        return f"Modes({parts}{span}, {'stable' if self.stable else 'unstable'})"
+
+
+def linear_modes(system: System) -> Modes:
+    """Return the linear modes of a system at its present pose and velocity, time functions frozen at ``system.t0``.
+
+    At a position of equilibrium they are the small vibrations. Elsewhere they are the instantaneous eigenvalues
+    with the loads' own changes. What spins is described in axes that do not turn with it (see
+    `gearmbs.dae.analyses.turning`): of rotors alike about their axis the modes are those of the whirl, with gyroscopic
+    couples; of other moving points the coefficients are frozen. Without degrees of freedom and states there are none.
+
+    Raises
+    ------
+    SingularModelError
+        If a motion left free by the constraints has no inertia.
+    ModelError
+        If the model cannot be made consistent.
+
+    Warns
+    -----
+    UserWarning
+        If a body with modal coordinates spins that is not alike about this axis: they turn with it, so that its own
+        modes are not those of its whirl.
+    """
+    instant = Instant(system, "I3")
+    instant.y = instant.settle(instant.y)
+    _warn_of_turning_modes(instant)
+    reduced = reduce(instant)
+    found = spectrum(reduced)
+    values, vectors = found.values, found.vectors
+    real = np.abs(values.imag) <= CRITICAL * np.abs(values)
+    kept = real | (values.imag >= -REAL_TOLERANCE * np.abs(values))
+    values, vectors, real = values[kept], vectors[:, kept], real[kept]
+    values = np.where(real, values.real + 0j, values)
+    sliding = real & _unresisted(reduced, values, vectors)
+    rigid, held = found.rigid.shape[1], found.held.shape[1]
+    eigenvalues = np.concatenate([np.zeros(rigid + held, dtype=complex), values])
+    motions = np.hstack([found.rigid.astype(complex), found.held.astype(complex), vectors])
+    size = np.abs(eigenvalues)
+    ratios = np.divide(-eigenvalues.real, size, out=np.zeros(size.size), where=size > 0.0) + 0.0
+    kinds = [RIGID] * rigid + [REAL] * held
+    kinds += [SLIDING if free else REAL if r else OSCILLATING for r, free in zip(real, sliding)]
+    none = np.array([kind in (REAL, SLIDING) for kind in kinds], dtype=bool)
+    return Modes(
+        eigenvalues,
+        np.where(none, np.nan, size / (2.0 * np.pi)),
+        ratios,
+        kinds,
+        _unit(instant.spatial(reduced.basis @ motions)),
+        system.body_names,
+    )
+
+
+def _unresisted(reduced: Reduced, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Mark motions x of real eigenvalues that no elastic force K x + H z resists: |x.f| and |f| beside x.M x s^2."""
+    out = np.zeros(values.size, dtype=bool)
+    for k in np.flatnonzero(values.imag == 0.0):
+        s, x = values[k].real, vectors[:, k].real if np.abs(vectors[:, k].real).any() else vectors[:, k].imag
+        force, inertia = reduced.stiffness @ x, s * s * (reduced.mass @ x)
+        if reduced.state_state.size:
+            driven = (reduced.state_position + s * reduced.state_velocity) @ x
+            rates = s * np.eye(driven.size) - reduced.state_state
+            force = force + reduced.state_force @ np.linalg.lstsq(rates, driven, rcond=None)[0]
+        kinetic = float(x @ inertia)
+        # forces at right angles to the motion have no energy; rounding of stiff parts is larger in them
+        beside = float(np.abs(force).max()) <= np.sqrt(UNRESISTED) * float(np.abs(inertia).max())
+        out[k] = kinetic > 0.0 and abs(float(x @ force)) <= UNRESISTED * kinetic and beside
+    return out
+
+
+def _warn_of_turning_modes(instant: Instant) -> None:
+    names = instant.system.body_names
+    for k, _, found in spinning_modes(instant, angular_velocities(instant)):
+        if found is None:
+            reason = "is not alike about the axis it spins about"
+        elif not found.gyroscopic:
+            reason = "has a coupling without gyroscopic terms (take coupling='full')"
+        elif not found.known:
+            reason = "has modes of several waves round about"
+        else:
+            continue
+        warnings.warn(
+            f"{names[k]} spins and {reason}: modal coordinates that turn with it have their frequencies as seen from "
+            "the body; whirl and critical speeds of a shaft by its sections are found by gearmbs.flexible.Rotor",
+            stacklevel=3,
+        )
+
+
+def _unit(shapes: np.ndarray) -> np.ndarray:
+    """Scale each shape so that its largest entry is 1."""
+    if not shapes.size:
+        return shapes
+    flat = shapes.reshape(shapes.shape[0], -1)
+    largest = flat[np.arange(flat.shape[0]), np.argmax(np.abs(flat), axis=1)]
+    largest = np.where(largest == 0.0, 1.0, largest)
+    return shapes / largest[:, None, None]

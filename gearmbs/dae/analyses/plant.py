@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, expm
 
-from gearmbs.dae.analyses.instant import Instant
-from gearmbs.dae.analyses.linearised import Reduced, reduce
-from gearmbs.dae.errors import ModelError, SingularModelError
+from gearmbs.dae.analyses.eigenvalues import Reduced, reduce
+from gearmbs.dae.analyses.kinematics import Instant
+from gearmbs.dae.problem import ModelError, SingularModelError
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System

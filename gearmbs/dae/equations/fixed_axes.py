@@ -19,17 +19,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
-from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.constraint_terms import cross3, dot3
-from gearmbs.dae.equations.euler_switch import counts_angles, track
-from gearmbs.dae.equations.forces import evaluate_element
+from gearmbs.dae.equations.constraints.terms import cross3, dot3
+from gearmbs.dae.equations.kinematics.rotation import KIN_A, KIN_FORCE, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.kinematics.update import (
+    counts_angles,
+    predict_angles,
+    track,
+    update_functions,
+    update_ground,
+    update_marker,
+)
+from gearmbs.dae.equations.loads import expressions
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, evaluate_element
 from gearmbs.dae.equations.residual import S_VECTOR, S_WRENCH, add_own_states
-from gearmbs.dae.equations.rotation import KIN_A, KIN_FORCE, KIN_R, KIN_V, KIN_W
-from gearmbs.dae.equations.update import predict_angles, update_functions, update_ground, update_marker
-from gearmbs.dae.problem import HOOK_SIG, KEPT, RESIDUAL_SIG
+from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed, put
+from gearmbs.dae.problem import HOOK_SIG, JACOBIAN_SIG, KEPT, RESIDUAL_SIG
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 AXIS_OMEGA = 0
 """Index in y of the angular velocity, -1 where a motion prescribes the turn."""
@@ -165,7 +172,7 @@ def axes_residual(t, y, yp, out, idata, rdata, work):
         else:
             wrench = vector_at(tab.scratch, S_WRENCH, 6)
             jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, row[T.FORCE_WIDTH])
-            expression_loads.load(row, t, y, tab, wrench, jac, np.int64(0))
+            expressions.load(row, t, y, tab, wrench, jac, np.int64(0))
         add_moments(row, wrench, axes, turns, tab)
     s = vector_at(tab.scratch, S_VECTOR, 9)
     for k in range(axes.shape[0]):
@@ -179,7 +186,7 @@ def axes_residual(t, y, yp, out, idata, rdata, work):
         if tab.state[k, T.STATE_TAPE] < 0:
             continue
         left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]
-        out[z] = left - expression_loads.value(tab.state[k, T.STATE_TAPE], t, y, tab)
+        out[z] = left - expressions.value(tab.state[k, T.STATE_TAPE], t, y, tab)
 
 
 @njit(HOOK_SIG, cache=True, error_model="numpy")
@@ -191,3 +198,256 @@ def axes_hook(t, hist, npast, idata, rdata, work):
         update_axes(t, hist[0], axes, markers, turns, tab)
         track(t, hist[0], tab, True)
     return KEPT
+
+
+# The exact sparse Jacobian of bodies that turn about fixed axes, see `gearmbs.dae.equations.fixed_axes`.
+#
+# The kernels' derivatives are by the spatial variations [dR, dpi, dv, dw] of each body. Its angle and angular velocity
+# move all of them:
+#
+#     d/d phi:   dR = n x rho,  dpi = n,  dv = omega n x (n x rho),  dw = 0
+#     d/d omega:                          dv = n x rho,              dw = n
+
+
+S_LEVER = S_VECTOR
+"""Scratch of `lever` and `weight_moment`: nine places, of which n x (P - C) stays; see there."""
+S_CHAIN = S_LEVER + 9
+"""rho, n x rho and n x (n x rho) of the body whose columns are formed."""
+S_FORCE = S_CHAIN + 9
+"""The way of a force's point and the force's moment by it."""
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def prepare_chain(k, turns, tab, s):
+    """Write rho, n x rho and n x (n x rho) of body k + 1 to ``s``."""
+    for c in range(3):
+        s[c] = tab.kin[k + 1, KIN_R + c] - turns[k, TURN_POINT + c]
+    cross3(turns[k], TURN_AXIS, s, 0, s, 3)
+    cross3(turns[k], TURN_AXIS, s, 3, s, 6)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def chain(k, omega, d, at, turns, s):
+    """Return the derivatives by phi and omega of body k + 1 from the spatial ones in ``d[at:]``."""
+    n = turns[k]
+    by_phi = dot3(d, at, s, 3) + dot3(d, at + 3, n, TURN_AXIS) + omega * dot3(d, at + 6, s, 6)
+    return by_phi, dot3(d, at + 6, s, 3) + dot3(d, at + 9, n, TURN_AXIS)
+
+
+@njit(cache=True, error_model="numpy")
+def weighted_entries(mode, base, rows, weights, bodies, first, unknowns, after, y, axes, turns, tab, slot, vals, k):
+    """Entries of one equation from minus a weighted sum of rows of spatial derivatives.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
+    base : int
+        Row of the entries.
+    rows : ndarray, shape (m, width)
+        Derivatives by the variations of bodies, 12 each, then by unknowns.
+    weights : ndarray, shape (m,)
+    bodies, first : int
+        Number of bodies, and where among the extra integers they are.
+    unknowns, after : int
+        Number of unknowns, and where they are.
+    y : ndarray
+    axes, turns : ndarray
+        Of `gearmbs.dae.equations.fixed_axes`.
+    tab : Tables
+        Up to date with y.
+    """
+    s = vector_at(tab.scratch, S_CHAIN, 9)
+    for q in range(bodies):
+        a = tab.extra_i[first + q] - 1
+        if a < 0 or axes[a, AXIS_OMEGA] < 0:
+            continue
+        prepare_chain(a, turns, tab, s)
+        by_phi = by_omega = 0.0
+        for r in range(weights.size):
+            phi, omega = chain(a, y[axes[a, AXIS_OMEGA]], rows[r], 12 * q, turns, s)
+            by_phi += weights[r] * phi
+            by_omega += weights[r] * omega
+        k = put(mode, slot, vals, k, base, axes[a, AXIS_PHI], -by_phi)
+        k = put(mode, slot, vals, k, base, axes[a, AXIS_OMEGA], -by_omega)
+    for q in range(unknowns):
+        total = 0.0
+        for r in range(weights.size):
+            total += weights[r] * rows[r, 12 * bodies + q]
+        k = put(mode, slot, vals, k, base, tab.extra_i[after + q], -total)
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
+    """Entries of the moments of one force element about the axes of its bodies.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
+    row : ndarray of int
+        Row of the force element.
+    wrench, rows : ndarray, shapes (6,) and (6, width)
+        F and N, and their spatial derivatives.
+    y : ndarray
+    axes, turns : ndarray
+        Of `gearmbs.dae.equations.fixed_axes`.
+    tab : Tables
+        Up to date with y.
+    """
+    s, way = vector_at(tab.scratch, S_LEVER, 9), vector_at(tab.scratch, S_FORCE, 6)
+    weights, point = vector_at(tab.scratch, S_FORCE + 6, 6), row[T.FORCE_I]
+    depends = row[T.FORCE_DEPENDS]
+    bodies = tab.extra_i[depends]
+    after = depends + 2 + bodies
+    has_force, has_torque = row[T.FORCE_F] >= 0, row[T.FORCE_N] >= 0
+    for side in range(2):
+        b = tab.marker_body[row[T.FORCE_I + side]] - 1
+        if b < 0 or axes[b, AXIS_OMEGA] < 0:
+            continue
+        sign = 1.0 - 2.0 * side
+        lever(b, point, turns, tab, s)
+        for c in range(3):
+            weights[c] = sign * s[3 + c] if has_force else 0.0
+            weights[3 + c] = sign * turns[b, TURN_AXIS + c] if has_torque else 0.0
+        k = weighted_entries(
+            mode, axes[b, AXIS_OMEGA], rows, weights, bodies, depends + 1, tab.extra_i[after - 1], after, y, axes,
+            turns, tab, slot, vals, k,
+        )  # fmt: skip
+        owner = tab.marker_body[point] - 1
+        if has_force and owner >= 0 and axes[owner, AXIS_OMEGA] >= 0:
+            # the point moves with the body that it is on
+            lever(owner, point, turns, tab, s)
+            cross3(s, 3, wrench, 0, way, 0)
+            moved = sign * dot3(turns[b], TURN_AXIS, way, 0)
+            k = put(mode, slot, vals, k, axes[b, AXIS_OMEGA], axes[owner, AXIS_PHI], -moved)
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def element_axis_entries(mode, t, row, y, cj, idata, axes, turns, tab, slot, vals, k):
+    """Entries of one force element: of its own states, and of its moments about the axes.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
+    t : float
+        S.
+    row : ndarray of int
+        Row of the force element.
+    y : ndarray
+    cj : float
+        Factor of dG/dy'.
+    idata : ndarray of int
+    axes, turns : ndarray
+        Of `gearmbs.dae.equations.fixed_axes`.
+    tab : Tables
+        Up to date with y.
+    """
+    width, depends = row[T.FORCE_WIDTH], row[T.FORCE_DEPENDS]
+    bodies = tab.extra_i[depends]
+    after = depends + 2 + bodies
+    if row[T.FORCE_KIND] != T.COMPILED:
+        wrench = vector_at(tab.scratch, S_WRENCH, 6)
+        rows = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
+        expressions.load(row, t, y, tab, wrench, rows, np.int64(1))
+        return moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k)
+    if row[T.FORCE_PART] == 0:
+        evaluate_element(row, t, y, tab, np.int64(DERIVATIVES))
+        one = vector_at(tab.scratch, S_FORCE, 1)
+        one[0] = 1.0
+        for q in range(row[T.FORCE_STATES]):
+            z = row[T.FORCE_Z] + q
+            kind = tab.state[z - idata[T.H_Z], T.STATE_KIND]
+            own = matrix_at(tab.scratch, T.SCRATCH_FIXED + (6 * row[T.FORCE_WRENCHES] + q) * width, 1, width)
+            k = put(mode, slot, vals, k, z, z, cj if kind == T.STATE_DIFFERENTIAL else 1.0)
+            k = weighted_entries(
+                mode, z, own, one, bodies, depends + 1, tab.extra_i[after - 1], after, y, axes, turns, tab, slot,
+                vals, k,
+            )  # fmt: skip
+    wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
+    rows = matrix_at(tab.scratch, T.SCRATCH_FIXED + 6 * row[T.FORCE_PART] * width, 6, width)
+    return moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k)
+
+
+@njit(cache=True, error_model="numpy")
+def axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, vals, k):
+    """Entries of the equation of one user-defined state that an expression gives.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
+    t : float
+        S.
+    state : int
+        Number of the state.
+    y : ndarray
+    cj : float
+        Factor of dG/dy'.
+    idata : ndarray of int
+    axes, turns : ndarray
+        Of `gearmbs.dae.equations.fixed_axes`.
+    tab : Tables
+        Up to date with y.
+    """
+    z, tape = idata[T.H_Z] + state, tab.state[state, T.STATE_TAPE]
+    row = tab.tape[tape]
+    size = expressions.gradient_size(row)
+    grad = expressions.tail(tab, size)
+    expressions.gradient(tape, t, y, tab, grad)
+    one = vector_at(tab.scratch, S_FORCE, 1)
+    one[0] = 1.0
+    bodies, first = row[T.TAPE_N_BODIES], row[T.TAPE_BODIES]
+    k = put(mode, slot, vals, k, z, z, cj if tab.state[state, T.STATE_KIND] == T.STATE_DIFFERENTIAL else 1.0)
+    return weighted_entries(
+        mode, z, matrix_at(grad, 0, 1, size), one, bodies, first, row[T.TAPE_N_UNKNOWNS], first + bodies, y, axes,
+        turns, tab, slot, vals, k,
+    )  # fmt: skip
+
+
+@njit(JACOBIAN_SIG, cache=True, error_model="numpy")
+def axes_jacobian(t, y, yp, cj, vals, idata, rdata, work):
+    """Evaluate dG/dy + cj dG/dy' into ``vals``, or count the entries or note their places; see `entries.put`."""
+    y, vals, idata, rdata = uncounted(y), uncounted(vals), uncounted(idata), uncounted(rdata)
+    tab = T.unpack(idata, rdata, work)
+    axes, markers, slot, turns = axes_in(idata, rdata)
+    mode = idata[T.H_MODE]
+    update_axes(t, y, axes, markers, turns, tab)
+    if mode == NUMBERS:
+        for p in range(vals.size):
+            vals[p] = 0.0
+    # a literal 0 would make numba compile every callee once more
+    k = np.int64(0)
+    s = vector_at(tab.scratch, S_LEVER, 9)
+    for a in range(axes.shape[0]):
+        omega, phi = axes[a, AXIS_OMEGA], axes[a, AXIS_PHI]
+        if omega < 0:
+            continue
+        _, turned = weight_moment(a, turns, tab, s)
+        k = put(mode, slot, vals, k, omega, omega, cj * turns[a, TURN_INERTIA])
+        k = put(mode, slot, vals, k, omega, phi, -turned)
+        k = put(mode, slot, vals, k, phi, omega, 1.0)
+        k = put(mode, slot, vals, k, phi, phi, -cj)
+    for f in range(idata[T.H_FORCES]):
+        k = element_axis_entries(mode, t, tab.force[f], y, cj, idata, axes, turns, tab, slot, vals, k)
+    for state in range(idata[T.H_STATES]):
+        if tab.state[state, T.STATE_TAPE] >= 0:
+            k = axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, vals, k)
+    if mode == COUNT:
+        vals[0] = k
+
+
+def axes_pattern(
+    idata: np.ndarray, rdata: np.ndarray, work_size: int, t: float, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots); see `gearmbs.dae.equations.jacobian.pattern`."""
+    n = y.size
+    ask, yp, places = idata.copy(), np.zeros(n), np.zeros(1)
+    for mode in (COUNT, PLACES):
+        ask[T.H_MODE] = mode
+        places = np.zeros(1 if mode == COUNT else 2 * int(places[0]))
+        axes_jacobian(t, y, yp, 1.0, places, ask, rdata.copy(), np.zeros(work_size))
+    return compressed(places.reshape(-1, 2).astype(np.int64), n)

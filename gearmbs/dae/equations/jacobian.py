@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import uncounted, vector_at
-from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.entries import COUNT, NUMBERS, PLACES, compressed, put
-from gearmbs.dae.equations.jacobian_constraints import row_entries, tape_row_entries
-from gearmbs.dae.equations.jacobian_loads import element_entries, load_entries, state_entries
-from gearmbs.dae.equations.modal_entries import modal_body_entries
+from gearmbs.dae.equations.bodies.inertia import modal_body_entries
+from gearmbs.dae.equations.constraints import terms
+from gearmbs.dae.equations.constraints.jacobian import row_entries, tape_row_entries
+from gearmbs.dae.equations.kinematics.rotation import KIN_ADOT, KIN_AXES, KIN_H
+from gearmbs.dae.equations.kinematics.update import inertia_times, update_tables
+from gearmbs.dae.equations.loads.jacobian import element_entries, load_entries, state_entries
 from gearmbs.dae.equations.residual import S_PRODUCT, S_TERM
-from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H
-from gearmbs.dae.equations.update import inertia_times, update_tables
+from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed, put
 from gearmbs.dae.problem import JACOBIAN_SIG
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import uncounted, vector_at
 
 J_AXES, J_AXIS_RATES, TURNED_MOMENTUM, CROSS = 0, 9, 18, 30
 """Places in the scratch of `body_entries`: J a_m, J adot_m, and dh/dtheta_m = a_m x h + J adot_m, three vectors each;

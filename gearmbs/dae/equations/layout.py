@@ -11,10 +11,10 @@ from collections import namedtuple
 import numpy as np
 from numba import types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.pointers import IMAT, IVEC, MAT, VEC
-from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations.rotation import KIN_COLUMNS
+from gearmbs.dae.equations.kinematics.rotation import KIN_COLUMNS
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import IMAT, IVEC, MAT, VEC
+from gearmbs.kernels.structs import matrix_at, vector_at
 
 H_BODIES = 0
 """Bodies including the ground, which is body 0."""
@@ -86,7 +86,7 @@ H_R_MODAL = 58
 """Integrals of modal bodies and shapes of elastic frames."""
 H_N_MODAL = 59
 H_W_PARTIAL = 60
-"""Partial derivatives of elastic frames, see `gearmbs.dae.equations.elastic_frames`."""
+"""Partial derivatives of elastic frames, see `gearmbs.dae.equations.bodies.frames`."""
 H_N_PARTIAL = 61
 H_SIZE = 62
 
@@ -181,11 +181,11 @@ FORCE_DIAGNOSTICS = 17
 FORCE_COLUMNS = 18
 
 COMPILED = 0
-"""Kind of a force element with a kernel of its own, see `gearmbs.dae.equations.force_elements`."""
+"""Kind of a force element with a kernel of its own, see `gearmbs.dae.equations.loads.forces`."""
 EXPRESSION = 1
-"""Components given by expressions, see `gearmbs.dae.equations.expression_loads`."""
+"""Components given by expressions, see `gearmbs.dae.equations.loads.expressions`."""
 REACTION = 2
-"""What constraint rows exert, see `gearmbs.dae.equations.reactions`."""
+"""What constraint rows exert, see `gearmbs.dae.equations.loads.reactions`."""
 
 ANGLE_AXIS = 0
 ANGLE_I = 1
@@ -215,7 +215,7 @@ TAPE_BODIES = 6
 TAPE_N_BODIES = 7
 TAPE_N_UNKNOWNS = 8
 TAPE_ADDRESS = 9
-"""Addresses of the kernels that evaluate it, in the order of `gearmbs.dae.equations.expression_loads.KERNELS`."""
+"""Addresses of the kernels that evaluate it, in the order of `gearmbs.dae.equations.loads.expressions.KERNELS`."""
 TAPE_KERNELS = 6
 TAPE_COLUMNS = TAPE_ADDRESS + TAPE_KERNELS
 

@@ -24,18 +24,12 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.pointers import F8, I8, VEC
-from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
-from gearmbs.dae.equations import constraint_terms as terms
-from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic_frames import is_elastic, own_rate
-from gearmbs.dae.equations.elastic_loads import bring_to_body
-from gearmbs.dae.equations.forces import evaluate_element
-from gearmbs.dae.equations.modal_inertia import modal_residual
-from gearmbs.dae.equations.reactions import reaction_wrench
-from gearmbs.dae.equations.rotation import (
+from gearmbs.dae.equations.bodies.frames import is_elastic, own_rate
+from gearmbs.dae.equations.bodies.inertia import modal_residual
+from gearmbs.dae.equations.constraints import terms
+from gearmbs.dae.equations.constraints.terms import add_dot_term, add_point_term
+from gearmbs.dae.equations.kinematics.rotation import (
     KIN_ADOT,
     KIN_AXES,
     KIN_COLUMNS,
@@ -48,10 +42,16 @@ from gearmbs.dae.equations.rotation import (
     KIN_V,
     KIN_W,
 )
-from gearmbs.dae.equations.simple_terms import add_dot_term, add_point_term
+from gearmbs.dae.equations.kinematics.update import update_tables
+from gearmbs.dae.equations.loads import expressions
+from gearmbs.dae.equations.loads.elastic import bring_to_body
+from gearmbs.dae.equations.loads.forces import evaluate_element
+from gearmbs.dae.equations.loads.reactions import reaction_wrench
 from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multipliers_of_row
-from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import F8, I8, VEC
+from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 S_GRADIENT = 0
 S_GRADIENT_T = 12
@@ -140,9 +140,9 @@ def add_tape_row(k, t, lam, mu, y, tab, out):
     """Add the constraint forces of a row given by tape k; return its value and rate."""
     row = tab.tape[k]
     n = 6 * row[T.TAPE_N_BODIES] + 1
-    room = expression_loads.tail(tab, n * (n + 1))
+    room = expressions.tail(tab, n * (n + 1))
     grad, hess = room[0:n], room[n:]
-    value = expression_loads.second(k, t, y, tab, grad, hess)
+    value = expressions.second(k, t, y, tab, grad, hess)
     rate = grad[n - 1]
     for p in range(row[T.TAPE_N_BODIES]):
         b = tab.extra_i[row[T.TAPE_BODIES] + p]
@@ -270,7 +270,7 @@ def residual(t, y, yp, out, idata, rdata, work):
             if row[T.FORCE_KIND] == T.REACTION:
                 reaction_wrench(row, multipliers, lam0, tab, room, wrench, jac, np.int64(0))
             else:
-                expression_loads.load(row, t, y, tab, wrench, jac, np.int64(0))
+                expressions.load(row, t, y, tab, wrench, jac, np.int64(0))
         for c in range(3):
             if row[T.FORCE_F] >= 0:
                 out[row[T.FORCE_F] + c] = y[row[T.FORCE_F] + c] - wrench[c]
@@ -286,4 +286,4 @@ def residual(t, y, yp, out, idata, rdata, work):
         if tab.state[k, T.STATE_TAPE] < 0:
             continue
         left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]
-        out[z] = left - expression_loads.value(tab.state[k, T.STATE_TAPE], t, y, tab)
+        out[z] = left - expressions.value(tab.state[k, T.STATE_TAPE], t, y, tab)

@@ -30,12 +30,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.bound_functions import FUNCTIONS_TYPE, bind, no_events, no_hook
-from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
-from gearmbs.dae.dense_output import combine, lagrange_weights
 from gearmbs.dae.integrators.messages import list_names
 from gearmbs.dae.problem import RESIDUAL_SIG, DAEProblem
+from gearmbs.dae.result import combine, lagrange_weights
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, no_events, no_hook
+from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 
 EPS = 2.220446049250313e-16
 SETTLED = 1e-6
@@ -463,7 +463,7 @@ def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, id
     functions, part
         As of `settle`.
     times, ends, orders, nodes, rows, y, yp
-        As of `gearmbs.dae.dense_output.evaluate_many`.
+        As of `gearmbs.dae.result.evaluate_many`.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
     """

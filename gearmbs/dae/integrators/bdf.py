@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from numba import float64, int64, types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
-from gearmbs.dae.dense_output import lagrange_weights
+from gearmbs.dae.result import lagrange_weights
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import bits_of, double_of
 
 MAX_ORDER = 6
 HISTORY = MAX_ORDER + 2

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.integrators.history import copy, rows_from
 from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
+from gearmbs.dae.integrators.run_state import copy, rows_from
 from gearmbs.dae.linalg.sparse_lu import solve
+from gearmbs.kernels.jit import njit
 
 UNFORESEEN = 100.0
 """Tolerances by which an algebraic unknown has to miss its prediction to be looked at."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from gearmbs._jit import njit
 from gearmbs.dae.integrators.bdf import HISTORY, divided_difference_norm, local_error, step_for_error
-from gearmbs.dae.integrators.history import rows_from, times_from
-from gearmbs.dae.integrators.run_state import KINK_MEMORY
+from gearmbs.dae.integrators.run_state import KINK_MEMORY, rows_from, times_from
+from gearmbs.kernels.jit import njit
 
 TARGET = 0.2
 """Local error, in tolerances, that steps aim at where derivatives jump, which leaves room for the next jump, and with

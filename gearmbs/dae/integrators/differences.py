@@ -24,9 +24,9 @@ from functools import cache
 import numpy as np
 from numba import int64, types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.python_callback import call_address
 from gearmbs.dae.problem import EVENTS_SIG, JACOBIAN_SIG, RESIDUAL_SIG
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import call_address
 
 # header of idata
 N = 0

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
 from gearmbs.dae.integrators.algebraic import settle, settle_between
-from gearmbs.dae.integrators.history import copy, rows_from, times_from
+from gearmbs.dae.integrators.run_state import copy, rows_from, times_from
+from gearmbs.kernels.jit import njit
 
 SECANTS = 20
 """Tries by secants; the root of a smooth function takes some ten."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.corrector import set_weights
 from gearmbs.dae.integrators.events import SAMPLES
-from gearmbs.dae.integrators.history import newest_point
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE
 from gearmbs.dae.integrators.options import Options, event_rules
-from gearmbs.dae.integrators.run_state import KINK_MEMORY, RunState, Sizes, state_layout
-from gearmbs.dae.integrators.weights import set_weights
+from gearmbs.dae.integrators.run_state import KINK_MEMORY, RunState, Sizes, newest_point, state_layout
 from gearmbs.dae.problem import DAEProblem
 
 NEWTON_TOLERANCE = 1.0

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from gearmbs._jit import njit
 from gearmbs.dae.integrators.controller import meets_kinks
-from gearmbs.dae.integrators.history import copy
-from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING
+from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING, copy
 from gearmbs.dae.linalg.sparse_lu import fits, refactor
+from gearmbs.kernels.jit import njit
 
 GAMMA_DRIFT = 0.2
 GAMMA_DRIFT_AT_KINKS = 0.3

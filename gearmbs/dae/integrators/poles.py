@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
 from gearmbs.dae.integrators.corrector import EPS, HELD, ROUNDED_TERMS
-from gearmbs.dae.integrators.history import rows_from
+from gearmbs.dae.integrators.run_state import rows_from
+from gearmbs.kernels.jit import njit
 
 NEAR = 0.49
 FAR = 0.51

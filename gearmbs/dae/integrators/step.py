@@ -11,25 +11,44 @@ from __future__ import annotations
 import numpy as np
 from numba import int64
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.bound_functions import FUNCTIONS_TYPE
-from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.algebraic import PART_TYPE
 from gearmbs.dae.integrators.branches import keeps_its_index, kept_its_index, stays_on_branch
 from gearmbs.dae.integrators.controller import after_error_failure, after_start, after_success
-from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, correct, equations_hold, first_not_finite
+from gearmbs.dae.integrators.corrector import (
+    CONVERGED,
+    NOT_FINITE,
+    SLOW,
+    accept_noise,
+    correct,
+    count_noise,
+    equations_hold,
+    first_not_finite,
+    forget_noise,
+    remember_noise,
+    renew_weights,
+    weighted_argmax,
+)
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
-from gearmbs.dae.integrators.history import copy, forget, open_row, record_history, respace, rows_from, times_from
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, renew_matrix
 from gearmbs.dae.integrators.poles import passes_pole
-from gearmbs.dae.integrators.rounding import accept_noise, count_noise, forget_noise, remember_noise
-from gearmbs.dae.integrators.run_state import STATE_TYPE
-from gearmbs.dae.integrators.weights import renew_weights, weighted_argmax
+from gearmbs.dae.integrators.run_state import (
+    STATE_TYPE,
+    copy,
+    forget,
+    open_row,
+    record_history,
+    respace,
+    rows_from,
+    times_from,
+)
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.dae.problem import HISTORY_CHANGED
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import bits_of, double_of
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE
 
 EPS = 2.220446049250313e-16
 ROUNDED_STEP = 16.0 * EPS

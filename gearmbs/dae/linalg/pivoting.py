@@ -19,8 +19,8 @@ from functools import lru_cache
 import numpy as np
 from numba import float64, int64, types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.structs import KEPT_LAYOUTS, BlockLayout, IntVector, Struct, Vector
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, IntVector, Struct, Vector
 
 THRESHOLDS = (0.01, 0.1, 0.5)
 """Fraction of its column's largest entry a pivot must reach; the next is taken where entries grow too much."""

@@ -1,7 +1,7 @@
 """Sparse LU for a fixed pattern: numeric factorisations replayed along a plan without search.
 
 `factor` replays the plan of `gearmbs.dae.linalg.lu_plan` level by level, see `gearmbs.dae.linalg.schedule`, or, where
-columns are taken together as nodes, column by column, see `gearmbs.dae.linalg.by_columns`; `solve` applies it. Pivots
+columns are taken together as nodes, column by column, see `gearmbs.dae.linalg.sparse_lu`; `solve` applies it. Pivots
 stay frozen until a multiplier grows beyond `GROWTH_LIMIT`, a pivot vanishes, or an entry that was left out of the plan
 counts; then the caller analyses again with the current values.
 """
@@ -13,23 +13,147 @@ from functools import lru_cache
 import numpy as np
 from numba import float64, int64, types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES, all_lanes
-from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
-from gearmbs.dae.compiled.structs import KEPT_LAYOUTS, BlockLayout, Struct, Vector
-from gearmbs.dae.compiled.views import vector_at
-from gearmbs.dae.linalg.by_columns import backward_by_columns, factor_by_columns, forward_by_nodes
-from gearmbs.dae.linalg.dense_tail import padded, solve_tail
-from gearmbs.dae.linalg.front_blocks import (
+from gearmbs.dae.linalg.dense_tail import (
     act_on_blocks,
     divide_blocks,
     factor_behind,
     fill_blocks,
     open_tail,
+    padded,
+    solve_tail,
     tail_in,
 )
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
-from gearmbs.dae.linalg.nodes import has_nodes
+from gearmbs.dae.linalg.schedule import has_nodes, through_node
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import LANES, all_lanes, bits_of, double_of, lanes_at, larger, magnitude, put_lanes
+from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, Struct, Vector, vector_at
+
+# Factors and substitutions column by column (left-looking), where columns are taken together as nodes.
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _act_by_nodes(plan, factors, k):
+    """Eliminate from column k, spread out in ``factors.x``, what the earlier pivots act on it, and store U's part.
+
+    The columns of a node act together.
+    """
+    x, w, lu = factors.x, factors.w, factors.lu
+    l_ptr, l_pos, u_pos, node_end = plan.l_ptr, plan.l_pos, plan.u_pos, plan.node_end
+    upper = np.uint64(l_pos.shape[0])
+    p, last = np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])
+    while p < last:
+        j = np.uint64(u_pos[p])
+        end = node_end[j]
+        if end - np.int64(j) == 1:
+            u = x[j]
+            x[j] = 0.0
+            lu[upper + p] = u
+            p += np.uint64(1)
+            if u != 0.0:
+                for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
+                    x[l_pos[q]] -= lu[q] * u
+            continue
+        # the column has all rows of the node from this one on
+        stop, rows = np.uint64(min(end, k)), np.uint64(end) - j
+        below = np.uint64(l_ptr[end - 1])
+        size = rows + np.uint64(l_ptr[end]) - below
+        for i in range(rows):
+            w[i] = x[j + i]
+            x[j + i] = 0.0
+        for i in range(rows, size):
+            w[i] = 0.0
+        through_node(np.int64(j), np.int64(stop), np.int64(size), l_ptr, lu, w)
+        for i in range(stop - j):
+            lu[upper + p + i] = w[i]
+        for i in range(stop - j, rows):
+            x[j + i] = w[i]
+        for i in range(size - rows):
+            x[l_pos[below + i]] += w[rows + i]
+        p += stop - j
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def factor_by_columns(plan, factors, vals):
+    """Factor a matrix column by column; return what `gearmbs.dae.linalg.sparse_lu.factor` does."""
+    x, lu, pivot_inv, blocks = factors.x, factors.lu, factors.pivot_inv, factors.blocks
+    a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
+    top, grown = int64(0), (all_lanes(0.0), all_lanes(0.0))
+    n, tail = pivot_inv.shape[0], plan.tail
+    if tail < n:
+        fill_blocks(plan, blocks, vals)
+    for k in range(n):
+        for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
+            x[a_pos[p]] = vals[a_src[p]] * a_scale[p]
+        _act_by_nodes(plan, factors, k)
+        if k >= tail:
+            continue
+        pivot = x[k]
+        x[k] = 0.0
+        if plan.kept[k] == 0.0:
+            pivot_inv[k] = 0.0
+            x[:] = 0.0
+            continue
+        if pivot == 0.0:
+            x[:] = 0.0
+            return np.inf
+        inv = 1.0 / pivot
+        pivot_inv[k] = inv
+        for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
+            i = l_pos[q]
+            l = x[i] * inv
+            x[i] = 0.0
+            lu[q] = l
+            top = max(top, bits_of(abs(l)))
+        if tail < n:
+            act_on_blocks(plan, blocks, lu, k)
+            grown = divide_blocks(plan, blocks, pivot_inv, k, grown)
+    if tail < n:
+        top = max(top, bits_of(factor_behind(plan, factors, tail, grown)))
+    return double_of(top)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def forward_by_nodes(plan, factors):
+    """Solve L x = x in ``factors.x``, the columns of a node together."""
+    x, w, lu = factors.x, factors.w, factors.lu
+    l_pos, l_ptr, node_end = plan.l_pos, plan.l_ptr, plan.node_end
+    n = factors.pivot_inv.shape[0]
+    k = 0
+    while k < n:
+        end = node_end[k]
+        if end - k == 1:
+            v = x[k]
+            if v != 0.0:
+                for q in range(np.uint64(l_ptr[k]), np.uint64(l_ptr[k + 1])):
+                    x[l_pos[q]] -= lu[q] * v
+        else:
+            first, rows, below = np.uint64(k), np.uint64(end - k), np.uint64(l_ptr[end - 1])
+            size = rows + np.uint64(l_ptr[end]) - below
+            for i in range(rows):
+                w[i] = x[first + i]
+            for i in range(rows, size):
+                w[i] = 0.0
+            through_node(k, end, np.int64(size), l_ptr, lu, w)
+            for i in range(rows):
+                x[first + i] = w[i]
+            for i in range(size - rows):
+                x[l_pos[below + i]] += w[rows + i]
+        k = end
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def backward_by_columns(plan, factors):
+    """Take from ``factors.x`` what the unknowns above the diagonal of U give, column by column."""
+    x, lu, pivot_inv, u_pos, u_ptr = factors.x, factors.lu, factors.pivot_inv, plan.u_pos, plan.u_ptr
+    upper = np.uint64(plan.l_pos.shape[0])
+    n = pivot_inv.shape[0]
+    for m in range(n):
+        k = np.uint64(n - 1 - m)
+        v = x[k] * pivot_inv[k]
+        for p in range(np.uint64(u_ptr[k]), np.uint64(u_ptr[k + np.uint64(1)])):
+            x[u_pos[p]] -= lu[upper + p] * v
+
 
 GROWTH_LIMIT = 1e5
 
@@ -257,3 +381,99 @@ def solve_pair(plan, factors, pair):
         size, to = plan.col_scale[k], plan.col_to[k]
         pair[0, to] = pair[2, k] * pivot_inv[k] * size
         pair[1, to] = pair[3, k] * pivot_inv[k] * size
+
+
+# Sparse LU of eight matrices of one plan side by side; see `gearmbs.dae.linalg.sparse_lu` for one at a time.
+
+
+class LaneFactors(Struct):
+    """Numbers of eight factorisations, as of `gearmbs.dae.linalg.sparse_lu.LUFactors`, in lanes."""
+
+    l_vals: Vector
+    u_vals: Vector
+    pivot_inv: Vector
+    x: Vector
+
+
+def new_lane_factors(plan: LUPlan) -> LaneFactors:
+    """Return empty factors for a plan without a dense tail."""
+    n = len(plan.row_from)
+    if plan.tail < n:
+        raise ValueError("the plan has a dense tail; make it without")
+    return LaneFactors(
+        l_vals=np.zeros(LANES * len(plan.l_pos)),
+        u_vals=np.zeros(LANES * len(plan.u_pos)),
+        pivot_inv=np.zeros(LANES * n),
+        x=np.zeros(LANES * n),
+    )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def factor_lanes(plan, factors, vals, growth):
+    """Factor eight matrices along a plan from which no unknown was dropped.
+
+    Parameters
+    ----------
+    plan : LUPlan
+    factors : LaneFactors
+        Overwritten.
+    vals : ndarray, shape (LANES nnz,)
+        Their values in CSC order, in lanes.
+    growth : ndarray, shape (LANES,)
+        Written: what `gearmbs.dae.linalg.sparse_lu.factor` returns of each.
+    """
+    x, l_vals, u_vals, pivot_inv = factors.x, factors.l_vals, factors.u_vals, factors.pivot_inv
+    l_ptr, l_pos, u_ptr, u_pos = plan.l_ptr, plan.l_pos, plan.u_ptr, plan.u_pos
+    a_ptr, a_pos, a_src, a_scale = plan.a_ptr, plan.a_pos, plan.a_src, plan.a_scale
+    grown, zero = all_lanes(0.0), all_lanes(0.0)
+    for k in range(pivot_inv.size // LANES):
+        for p in range(a_ptr[k], a_ptr[k + 1]):
+            put_lanes(x, a_pos[p], lanes_at(vals, a_src[p]) * a_scale[p])
+        for p in range(u_ptr[k], u_ptr[k + 1]):
+            j = u_pos[p]
+            u = lanes_at(x, j)
+            put_lanes(x, j, zero)
+            put_lanes(u_vals, p, u)
+            for q in range(l_ptr[j], l_ptr[j + 1]):
+                put_lanes(x, l_pos[q], lanes_at(x, l_pos[q]) - lanes_at(l_vals, q) * u)
+        inverse = 1.0 / lanes_at(x, k)
+        put_lanes(x, k, zero)
+        put_lanes(pivot_inv, k, inverse)
+        # a pivot of zero must tell even if nothing is below it
+        grown = larger(grown, 0.0 * inverse)
+        for q in range(l_ptr[k], l_ptr[k + 1]):
+            l = lanes_at(x, l_pos[q]) * inverse
+            put_lanes(x, l_pos[q], zero)
+            put_lanes(l_vals, q, l)
+            grown = larger(grown, magnitude(l))
+    left_src, left_limit = plan.left_src, plan.left_limit
+    over = all_lanes(-np.inf)
+    for p in range(left_src.size):
+        over = larger(over, magnitude(lanes_at(vals, left_src[p])) - left_limit[p])
+    put_lanes(growth, 0, over)
+    for lane in range(LANES):
+        # what is not a number counts, too
+        fits = growth[lane] <= 0.0
+        growth[lane] = 0.0 if fits else np.inf
+    put_lanes(growth, 0, lanes_at(growth, 0) + grown)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def solve_lanes(plan, factors, b, out):
+    """Write the solutions of eight systems, in lanes; ``out`` may be ``b`` itself."""
+    x, l_vals, u_vals, pivot_inv = factors.x, factors.l_vals, factors.u_vals, factors.pivot_inv
+    l_pos, l_col, u_pos, u_col = plan.l_pos, plan.l_col, plan.u_pos, plan.u_col
+    n = pivot_inv.size // LANES
+    for k in range(n):
+        put_lanes(x, k, lanes_at(b, plan.row_from[k]) * plan.row_scale[k])
+    for q in range(l_pos.size):
+        put_lanes(x, l_pos[q], lanes_at(x, l_pos[q]) - lanes_at(l_vals, q) * lanes_at(x, l_col[q]))
+    last = u_pos.size - 1
+    for m in range(u_pos.size):
+        p = last - m
+        k = u_col[p]
+        scaled = lanes_at(x, k) * lanes_at(pivot_inv, k)
+        put_lanes(x, u_pos[p], lanes_at(x, u_pos[p]) - lanes_at(u_vals, p) * scaled)
+    for k in range(n):
+        put_lanes(out, plan.col_to[k], lanes_at(x, k) * lanes_at(pivot_inv, k) * plan.col_scale[k])
+        put_lanes(x, k, all_lanes(0.0))

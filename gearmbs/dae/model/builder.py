@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic_shapes import shape_table
+from gearmbs.dae.equations.bodies.frames import shape_table
+from gearmbs.dae.equations.bodies.inertia import ModalInertia
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
-from gearmbs.dae.equations.force_elements import FRAME_COLUMNS, Diagnostic
-from gearmbs.dae.equations.modal_integrals import ModalInertia
+from gearmbs.dae.equations.loads.forces import FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.equations.unknowns import Counts
 from gearmbs.dae.model.model import Model, Names, frozen
 
@@ -189,7 +189,7 @@ class TableBuilder:
         scratch: int = 0,
         diagnostics: Sequence[Diagnostic] = (),
     ) -> int:
-        """Add a compiled force element, see `gearmbs.dae.equations.force_elements`; return its (first) row.
+        """Add a compiled force element, see `gearmbs.dae.equations.loads.forces`; return its (first) row.
 
         Parameters
         ----------

@@ -2,11 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
-from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies.inertia import add_momentum, set_modal_momenta, update_inertia
+from gearmbs.dae.equations.constraints.terms import dot3
+from gearmbs.dae.equations.kinematics.rotation import (
+    KIN_A,
+    KIN_AXES,
+    KIN_H,
+    KIN_W,
+    POSE_A,
+    POSE_COLUMNS,
+    POSE_R,
+    POSE_V,
+    POSE_W,
+    axes_and_velocity,
+    best_reference,
+    euler_angles,
+    euler_rates,
+)
+from gearmbs.dae.equations.kinematics.update import inertia_times
+from gearmbs.dae.equations.unknowns import I3
+from gearmbs.dae.model import evaluator
+from gearmbs.dae.model.model import Model
+from gearmbs.kernels.jit import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,3 +101,240 @@ class Configuration:
     def velocities(self) -> np.ndarray:
         """v and omega of each body, then v_f, shape (coordinates,)."""
         return np.concatenate([self.pose[:, POSE_V:POSE_COLUMNS].ravel(), self.v_f])
+
+
+# The acceleration system of a model at a configuration: masses, constraints, loads, and the unknowns y behind them.
+
+
+POSE_PLACES = 6
+"""Spatial displacements of a body, after which the modal coordinates come."""
+
+
+class Assembled(NamedTuple):
+    """The acceleration system of a model at a configuration, with the unknowns and tables it was made from."""
+
+    matrix: scipy.sparse.csc_array
+    rhs: np.ndarray
+    phi: np.ndarray
+    loads: np.ndarray
+    y: np.ndarray
+    idata: np.ndarray
+    rdata: np.ndarray
+    work: np.ndarray
+
+
+@njit(
+    "void(float64[:, ::1], float64[::1], float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])",
+    cache=True,
+    error_model="numpy",
+)
+def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
+    """Fill positions, velocities and momenta of y from a configuration."""
+    tab = T.unpack(idata, rdata, work)
+    kin = tab.kin
+    s = tab.scratch
+    for b in range(1, idata[T.H_BODIES]):
+        row, at = pose[b - 1], tab.at[b]
+        first = at[T.AT_V_MODES] - POSE_PLACES * pose.shape[0]
+        for m in range(at[T.AT_MODES]):
+            y[at[T.AT_QF] + m] = q_f[first + m]
+            y[at[T.AT_VF] + m] = v_f[first + m]
+        if at[T.AT_MODES] > 0:
+            update_inertia(y, at, tab.modal, tab.partial, tab.body[b])
+        th, e, p = at[T.AT_THETA], at[T.AT_EPS], at[T.AT_P]
+        for c in range(3):
+            y[at[T.AT_R] + c] = row[POSE_R + c]
+            y[at[T.AT_U] + c] = row[POSE_V + c]
+        for c in range(9):
+            kin[b, KIN_A + c] = row[POSE_A + c]
+        euler_angles(row, POSE_A, tab.code[b], y, th)
+        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
+        euler_rates(kin, b, row, POSE_W, y, e)
+        inertia_times(kin[b], tab.body[b], row, POSE_W, kin[b], KIN_H, s)
+        if at[T.AT_MODES] > 0:
+            for c in range(3):
+                kin[b, KIN_W + c] = row[POSE_W + c]
+            add_momentum(y, at, tab.partial, kin[b])
+            set_modal_momenta(y, at, tab.modal, tab.partial, kin[b])
+        for m in range(3):
+            y[p + m] = dot3(kin[b], KIN_AXES + 3 * m, kin[b], KIN_H)
+
+
+def euler_references(pose: np.ndarray) -> np.ndarray:
+    """Return, for the ground and each body, the Euler reference that is farther from its singularity."""
+    chosen = [best_reference(np.ascontiguousarray(row[POSE_A:POSE_V]), 0) for row in pose]
+    return np.array([0, *chosen], dtype=np.int64)
+
+
+class AccelerationSystem:
+    """Assembles the acceleration system of one model; its pattern is found once."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._pattern: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    def at(self, place: Configuration, t: float, inner: np.ndarray | None, states: np.ndarray) -> Assembled:
+        """Assemble at a configuration; ``inner`` holds loads and states, F to z of y; default: no loads, ``states``."""
+        idata, rdata, size = self.model.pack(I3, codes=euler_references(place.pose))
+        work = np.zeros(size)
+        y = np.zeros(int(idata[T.H_UNKNOWNS]))
+        y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + states.size] = states
+        if inner is not None:
+            y[int(idata[T.H_F]) :] = inner
+        unknowns_from_pose(np.ascontiguousarray(place.pose), place.q_f, place.v_f, idata, rdata, work, y)
+        if self._pattern is None:
+            self._pattern = evaluator.pattern(idata, rdata, size, t, y)
+        indptr, indices, slots = self._pattern
+        n = indptr.size - 1
+        vals = np.zeros(indices.size)
+        records = evaluator.assemble(np.array([t]), y[None, :], slots, idata, rdata, size, vals)
+        matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(n, n))
+        return Assembled(matrix, records.solution[0], records.phi[0], records.loads[0], y, idata, rdata, work)
+
+    def constraints(
+        self, place: Configuration, t: float, states: np.ndarray
+    ) -> tuple[scipy.sparse.csc_array, np.ndarray, np.ndarray]:
+        """Return Phi_q in spatial displacements and modal coordinates, Phi, and Phi_q v + Phi_t."""
+        found = self.at(place, t, None, states)
+        base = place.coordinates
+        return scipy.sparse.csc_array(found.matrix[base:, :base]), found.phi[0::3].copy(), found.phi[1::3].copy()
+
+
+# A model in a configuration at a time: what its assembly, its diagnosis and its start are computed from.
+
+
+STIFFENED = 1e4
+"""Weight of modal coordinates over that of displacements."""
+SHORTEST = 1e-3
+"""Least length of a mechanism, m."""
+
+
+class PosedModel:
+    """A model with the configuration, states and time that it starts from.
+
+    Parameters
+    ----------
+    model : Model
+        Tables and names.
+    configuration : Configuration
+        Positions and velocities.
+    states : array_like
+        Start of the user-defined states.
+    t0 : float
+        s.
+    mechanism : Mechanism, optional
+        What the model was made from, for names in messages and measurements.
+    marker_index : dict, optional
+        Row of the marker table by ``id`` of a marker.
+
+    Attributes
+    ----------
+    start : Configuration
+    state_start : ndarray
+    whole : Model
+        The model with the rows that have been dropped as redundant.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        configuration: Configuration,
+        states: Sequence[float] = (),
+        t0: float = 0.0,
+        mechanism: Any = None,
+        marker_index: dict[int, int] | None = None,
+    ) -> None:
+        self.model = model
+        self.whole = model
+        self.start = configuration
+        self.state_start = np.array(states, dtype=float)
+        self.t0 = t0
+        self.mechanism = mechanism
+        self.marker_index = marker_index or {}
+        self.assembler = AccelerationSystem(model)
+        self._of_whole = self.assembler
+        self._dropped = np.zeros(0, dtype=np.int64)
+        self.row_order: np.ndarray | None = None
+        """All rows from the one that is to be kept first to the one to be dropped first, if not as they stand."""
+        self.typical_length: float | None = None
+        """A length that replaces the one found, for tolerances of another model of the same mechanism."""
+
+    # --- names --------------------------------------------------------------------------------------
+
+    @property
+    def body_names(self) -> list[str]:
+        """Names of the moving bodies."""
+        return list(self.model.names.bodies)
+
+    @property
+    def row_names(self) -> list[str]:
+        """Names of the constraint rows, ``joint: what it enforces``."""
+        return list(self.model.names.rows)
+
+    @property
+    def force_names(self) -> list[str]:
+        """Names of the force elements."""
+        return list(self.model.names.forces)
+
+    @property
+    def state_names(self) -> list[str]:
+        """Names of the user-defined states."""
+        return list(self.model.names.states)
+
+    # --- positions and constraints ------------------------------------------------------------------
+
+    @property
+    def pose(self) -> np.ndarray:
+        """R, A (row-major), v and omega of each moving body at the start, shape (bodies, 18)."""
+        return self.start.pose
+
+    @property
+    def length(self) -> float:
+        """A typical length in m: the largest marker arm or distance between bodies, at least 1 mm."""
+        if self.typical_length is not None:
+            return self.typical_length
+        arms = np.abs(self.model.marker_places())
+        spread = np.ptp(self.pose[:, POSE_R:POSE_A], axis=0).max(initial=0.0)
+        return float(max(arms.max(initial=0.0), spread, SHORTEST))
+
+    def coordinate_weights(self) -> np.ndarray:
+        """Weights of the coordinates: 1 for metres, L^2 for radians, more for bending by the same way."""
+        length = min(self.length, 1.0)
+        one = np.concatenate([np.ones(3), np.full(3, length**2)])
+        sizes = self.model.modal_sizes()[:, 0]
+        # assembly moves bodies rather than bending them
+        return np.concatenate([np.tile(one, self.pose.shape[0]), STIFFENED * (length / sizes) ** 2])
+
+    def constraint_jacobian(self, place: Configuration | np.ndarray, t: float):
+        """Return Phi_q in spatial displacements, Phi, and Phi_q v + Phi_t at a configuration."""
+        return self.assembler.constraints(self._configuration(place), t, self.state_start)
+
+    def _configuration(self, place: Configuration | np.ndarray) -> Configuration:
+        """Return a configuration; of a pose alone, with the modal coordinates of the start."""
+        if isinstance(place, Configuration):
+            return place
+        return Configuration(np.asarray(place, dtype=float).reshape(-1, POSE_COLUMNS), self.start.q_f, self.start.v_f)
+
+    # --- redundant rows -----------------------------------------------------------------------------
+
+    def keep_rows(self, kept: np.ndarray) -> None:
+        """Go on with a model of the constraint rows ``kept`` alone."""
+        if kept.size == len(self.model.rows):
+            return
+        self._dropped = np.setdiff1d(np.arange(len(self.model.rows)), kept)
+        self.model = self.model.with_rows(kept)
+        self.assembler = AccelerationSystem(self.model)
+
+    @property
+    def has_dropped_rows(self) -> bool:
+        """Whether constraint rows were dropped as redundant."""
+        return self._dropped.size > 0
+
+    def dropped_rates(self, place: Configuration, t: float) -> tuple[scipy.sparse.csc_array, np.ndarray, list[str]]:
+        """Return Phi_q, Phi_q v + Phi_t and the names of the rows dropped as redundant, at a configuration."""
+        phi_q, _, rate = self._of_whole.constraints(place, t, self.state_start)
+        return (
+            scipy.sparse.csc_array(phi_q[self._dropped]),
+            rate[self._dropped],
+            [self.whole.names.rows[i] for i in self._dropped],
+        )

@@ -9,26 +9,31 @@ import numpy as np
 import scipy
 from numba import float64, int64
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES
-from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
-from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD
-from gearmbs.dae.equations.entries import COUNT, NUMBERS, PLACES, compressed
-from gearmbs.dae.equations.euler_switch import track, turns_are_counted
-from gearmbs.dae.equations.output_records import joint_loads, loads_of_rows, pose_record, poses
-from gearmbs.dae.equations.projection import are_satisfied, displace, largest_violation, violations
-from gearmbs.dae.equations.reactions import renew_reactions
+from gearmbs.dae.equations.constraints.projection import are_satisfied, displace, largest_violation, violations
+from gearmbs.dae.equations.kinematics.update import track, turns_are_counted, update_tables
+from gearmbs.dae.equations.loads.reactions import renew_reactions
+from gearmbs.dae.equations.outputs import accelerations as index1
+from gearmbs.dae.equations.outputs.accelerations import (
+    ROW_PHI,
+    ROW_RATE,
+    ROW_RECORD,
+    joint_loads,
+    loads_of_rows,
+    pose_record,
+    poses,
+)
 from gearmbs.dae.equations.residual import update
-from gearmbs.dae.equations.update import update_tables
-from gearmbs.dae.errors import ModelError
-from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
-from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
-from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
+from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed
+from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
-from gearmbs.dae.model.member_tables import Members
+from gearmbs.dae.model.lane_members import Members
 from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding, new_records
+from gearmbs.dae.problem import ModelError
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import LANES
+from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.side_by_side import SideBySide

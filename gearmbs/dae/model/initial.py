@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
-from gearmbs.dae.errors import AssemblyError, SingularModelError
+from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.model import turning
+from gearmbs.dae.problem import AssemblyError, SingularModelError
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration
-    from gearmbs.dae.model.posed import PosedModel
+    from gearmbs.dae.model.configuration import Configuration, PosedModel
 
 POSITION_TOLERANCE = 1e-12
 RANK_TOLERANCE = 1e-9

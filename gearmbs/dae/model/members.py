@@ -12,16 +12,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import float64, int64, void
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
-from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.accelerations import ROW_RECORD
+from gearmbs.dae.equations.constraints import terms
+from gearmbs.dae.equations.kinematics.rotation import (
+    KIN_A,
+    KIN_R,
+    KIN_V,
+    KIN_W,
+    POSE_A,
+    POSE_COLUMNS,
+    POSE_R,
+    POSE_V,
+    POSE_W,
+)
+from gearmbs.dae.equations.kinematics.update import update_functions, update_markers
+from gearmbs.dae.equations.outputs.accelerations import ROW_RECORD
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
-from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
-from gearmbs.dae.equations.update import update_functions, update_markers
 from gearmbs.dae.model.evaluator import Evaluator
-from gearmbs.dae.model.member_tables import (
+from gearmbs.dae.model.lane_members import (
     EDGE_AXES,
     EDGE_CHILD,
     EDGE_CHILD_HAS_I,
@@ -37,13 +45,16 @@ from gearmbs.dae.model.member_tables import (
     Members,
 )
 from gearmbs.dae.model.records import RECORDS_TYPE, Records, new_records
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
+
+if TYPE_CHECKING:
+    from gearmbs.dae.problem import DAEProblem
 
 PART = 512
 """Output times evaluated at a time, whose records fit the processor's cache."""
 
 _IVEC = int64[::1]
-if TYPE_CHECKING:
-    from gearmbs.dae.problem import DAEProblem
 
 _VEC = float64[::1]
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae.compiled.pointers import address
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic_frames import partials_size
+from gearmbs.dae.equations.bodies.frames import partials_size
+from gearmbs.dae.equations.bodies.inertia import ModalInertia, present_size
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
-from gearmbs.dae.equations.force_elements import FORCE_SIG, Diagnostic
-from gearmbs.dae.equations.modal_integrals import ModalInertia, present_size
-from gearmbs.dae.equations.rotation import KIN_COLUMNS
+from gearmbs.dae.equations.kinematics.rotation import KIN_COLUMNS
+from gearmbs.dae.equations.loads.forces import FORCE_SIG, Diagnostic
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
+from gearmbs.kernels.pointers import address
 
 STATE_IMPLICIT = 2
 """Kind of a state z = f(..., z): to the equations algebraic, to integrators an unknown whose error counts."""
@@ -335,7 +335,7 @@ class Model:
         """Return the rows of the expressions with the addresses of their evaluators, loaded only if there are any."""
         rows = self.tape_rows.copy()
         if self.tapes:
-            from gearmbs.dae.equations.expression_loads import addresses
+            from gearmbs.dae.equations.loads.expressions import addresses
 
             rows[:, T.TAPE_ADDRESS :] = addresses()
         return rows

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, types
 
-from gearmbs._jit import njit
-from gearmbs.dae.equations import accelerations as index1
-from gearmbs.dae.equations.rotation import POSE_COLUMNS
+from gearmbs.dae.equations.kinematics.rotation import POSE_COLUMNS
+from gearmbs.dae.equations.outputs import accelerations as index1
+from gearmbs.kernels.jit import njit
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]

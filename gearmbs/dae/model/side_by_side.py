@@ -10,14 +10,18 @@ from __future__ import annotations
 import numpy as np
 from numba import float64, int64
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES, all_lanes, deal_eight, lanes_at, larger, magnitude, put_lanes
-from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
-from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD, apply_loads
-from gearmbs.dae.equations.euler_switch import track, turns_are_counted
-from gearmbs.dae.equations.lane_system import (
+from gearmbs.dae.equations.constraints.projection import EPS, ROUNDED_POSITION, ROUNDED_RATE, displace
+from gearmbs.dae.equations.kinematics.rotation import POSE_COLUMNS
+from gearmbs.dae.equations.kinematics.update import (
+    track,
+    turns_are_counted,
+    update_bodies,
+    update_functions,
+    update_marker,
+)
+from gearmbs.dae.equations.outputs.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD, apply_loads, poses
+from gearmbs.dae.equations.outputs.lanes import (
     LaneTables,
     lane_reactions,
     lane_saddle,
@@ -25,15 +29,20 @@ from gearmbs.dae.equations.lane_system import (
     take_bodies,
     take_terms,
 )
-from gearmbs.dae.equations.output_records import poses
-from gearmbs.dae.equations.projection import EPS, ROUNDED_POSITION, ROUNDED_RATE, displace
-from gearmbs.dae.equations.rotation import POSE_COLUMNS
-from gearmbs.dae.equations.update import update_bodies, update_functions, update_marker
-from gearmbs.dae.linalg.lanes_lu import LaneFactors, factor_lanes, new_lane_factors, solve_lanes
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
-from gearmbs.dae.model.lane_members import MemberLanes, expand_lanes, new_member_lanes
-from gearmbs.dae.model.member_tables import MEMBERS_TYPE, Members, no_members
+from gearmbs.dae.linalg.sparse_lu import LaneFactors, factor_lanes, new_lane_factors, solve_lanes
+from gearmbs.dae.model.lane_members import (
+    MEMBERS_TYPE,
+    MemberLanes,
+    Members,
+    expand_lanes,
+    new_member_lanes,
+    no_members,
+)
 from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, allow_rounding
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import LANES, all_lanes, deal_eight, lanes_at, larger, magnitude, put_lanes
+from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector, matrix_at, uncounted, vector_at
 
 LOOKED_AT = 32
 """Entries of a matrix that are compared before the result is looked at."""

@@ -9,20 +9,18 @@ import scipy
 
 from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.constraint_terms import ANGLE
-from gearmbs.dae.equations.euler_switch import hook
-from gearmbs.dae.equations.reactions import reactions_from
-from gearmbs.dae.equations.rotation import KIN_ADOT, euler_rates
+from gearmbs.dae.equations.constraints.terms import ANGLE
+from gearmbs.dae.equations.kinematics.rotation import KIN_ADOT, euler_rates
+from gearmbs.dae.equations.kinematics.update import hook
+from gearmbs.dae.equations.loads.reactions import reactions_from
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, SI1
-from gearmbs.dae.errors import ModelError, SingularModelError
 from gearmbs.dae.model import diagnosis
-from gearmbs.dae.model.acceleration_system import Assembled, euler_references
-from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.model.configuration import Assembled, euler_references
+from gearmbs.dae.problem import DAEProblem, ModelError, SingularModelError
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration
+    from gearmbs.dae.model.configuration import Configuration, PosedModel
     from gearmbs.dae.model.model import Model
-    from gearmbs.dae.model.posed import PosedModel
 
 MAX_LOAD_ITERATIONS = 200
 """Passes in which loads that depend on each other may come to agree at the start; friction converges like a power of

@@ -5,19 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.equations.unknowns import FORMULATIONS, Unknown
-from gearmbs.dae.errors import AssemblyError, ModelError
 from gearmbs.dae.model import diagnosis, initial, start
-from gearmbs.dae.model.configuration import Configuration
-from gearmbs.dae.model.conflicts import conflict
-from gearmbs.dae.model.posed import PosedModel
-from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.model.configuration import Configuration, PosedModel
+from gearmbs.dae.model.diagnosis import conflict
+from gearmbs.dae.problem import AssemblyError, DAEProblem, ModelError
 
 
 class System(PosedModel):
     """A mechanism as a DAE.
 
     Built by :meth:`gearmbs.mechanism.Mechanism.compile`; users rarely make one themselves. For its parameters see
-    `gearmbs.dae.model.posed.PosedModel`; the configuration is a guess that :meth:`initialise` makes consistent.
+    `gearmbs.dae.model.configuration.PosedModel`; the configuration is a guess that :meth:`initialise` makes consistent.
 
     Attributes
     ----------

@@ -14,15 +14,14 @@ import numpy as np
 import scipy
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.constraint_terms import ROTATION
-from gearmbs.dae.equations.rotation import POSE_A, POSE_V
-from gearmbs.dae.equations.time_functions import CONSTANT
-from gearmbs.dae.model.acceleration_system import POSE_PLACES, AccelerationSystem
+from gearmbs.dae.equations.constraints.terms import ROTATION
+from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_V
+from gearmbs.dae.equations.loads.time_functions import CONSTANT
+from gearmbs.dae.model.configuration import POSE_PLACES, AccelerationSystem
 from gearmbs.dae.model.model import Model, frozen
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration
-    from gearmbs.dae.model.posed import PosedModel
+    from gearmbs.dae.model.configuration import Configuration, PosedModel
 
 LONGEST_STEP = 0.5
 """rad, far from the quarter turn at which the nearest solution is another one."""

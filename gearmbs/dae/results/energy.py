@@ -15,14 +15,12 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.force_elements import DISSIPATED, STORED
-from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_V, POSE_W
-from gearmbs.dae.results.evaluated import Evaluated
-from gearmbs.dae.results.frames import frame_motion
+from gearmbs.dae.equations.kinematics.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_V, POSE_W
+from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED
+from gearmbs.dae.results.frames import Evaluated, frame_motion
 
 if TYPE_CHECKING:
-    from gearmbs.dae.equations.modal_integrals import ModalInertia
-
+    from gearmbs.dae.equations.bodies.inertia import ModalInertia
 
 JOINT_FRICTION = "dissipated_joint_friction"
 COARSE = 0.01

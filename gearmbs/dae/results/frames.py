@@ -2,16 +2,49 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.equations.expressions.marker_motion import ACC_A, ACC_ALPHA
-from gearmbs.dae.equations.rotation import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.equations.expressions.measures import ACC_A, ACC_ALPHA
+from gearmbs.dae.equations.kinematics.rotation import (
+    KIN_A,
+    KIN_AXES,
+    KIN_R,
+    KIN_V,
+    KIN_W,
+    POSE_A,
+    POSE_R,
+    POSE_V,
+    POSE_W,
+)
+from gearmbs.dae.model.evaluator import Records
+from gearmbs.dae.model.model import Model
 
-if TYPE_CHECKING:
-    from gearmbs.dae.model.model import Model
-    from gearmbs.dae.results.evaluated import Evaluated
+# Output times with all that was evaluated at them, which energies and motions of frames are computed from.
+
+
+class Evaluated(NamedTuple):
+    """A model over time.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Output times, s.
+    model : Model
+    records : Records
+        Poses, accelerations, multipliers, loads.
+    """
+
+    t: np.ndarray
+    model: Model
+    records: Records
+
+    def modal(self, body: int) -> np.ndarray:
+        """Return q_f, v_f and their accelerations of a modal body, shape (3, m, modes); the ground is body 0."""
+        first = sum(self.model.modes[:body])
+        return self.records.modal[:, :, first : first + self.model.modes[body]]
+
 
 KIN_PLACES = KIN_AXES + 9
 ACC_PLACES = 6
@@ -61,7 +94,7 @@ def elastic_motion(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return motion (m, 27) and accelerations (m, 6) of an elastic frame from those of its body.
 
-    The equations are those of `gearmbs.dae.equations.elastic_frames`.
+    The equations are those of `gearmbs.dae.equations.bodies.frames`.
 
     Parameters
     ----------

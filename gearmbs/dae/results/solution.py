@@ -7,7 +7,7 @@ of the integrator's noise.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -15,20 +15,44 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from gearmbs._deprecation import former_name
-from gearmbs._shown import Shown
-from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
+from gearmbs._shown import Shown, html_table
+from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.model.configuration import Configuration
+from gearmbs.dae.model.system import System
+from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, Status
-from gearmbs.dae.results.evaluated import Evaluated
+from gearmbs.dae.results.frames import Evaluated
 from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.dae.model.member_tables import Members
-    from gearmbs.dae.model.system import System
-    from gearmbs.dae.problem import DAEProblem
+    from gearmbs.dae.model.lane_members import Members
+
+# A solution as a table for notebooks.
+
+
+def solution_html(solution: Solution) -> str:
+    """Return how a run ended, what it cost and what it is about."""
+    system, stats = solution.system, solution.stats
+    mechanism = getattr(system, "mechanism", None)
+    name = mechanism.name if mechanism is not None else "mechanism"
+    span = (
+        f"{solution.t[0]:.6g} to {solution.t[-1]:.6g} s, {solution.t.size} outputs" if solution.t.size else "no outputs"
+    )
+    joints = list(dict.fromkeys(row.rsplit(": ", 1)[0] for row in system.row_names))
+    rows = [
+        ("status", solution.status.name.replace("_", " ").lower()),
+        ("time", span),
+        ("steps", f"{stats.steps}, {stats.residuals} residuals, {stats.jacobians} Jacobians"),
+        ("solver time", f"{stats.wall_time:.3g} s"),
+        ("bodies", ", ".join(system.body_names)),
+        ("joints", ", ".join(joints) or "none"),
+        ("forces", ", ".join(system.force_names) or "none"),
+    ]
+    return html_table(f"Solution of {name}", ("", ""), rows, solution.message)
+
 
 PART_SIZE = 2048
 """Output times whose records stay in the processor's cache, and outweigh what Python does for each part."""
@@ -162,7 +186,7 @@ class Solution(Shown):
     def _evaluator(self) -> Fills:
         problem = self.problem
         if self.members is not None and len(self.members.turn):
-            from gearmbs.dae.model.axis_outputs import AxisEvaluator
+            from gearmbs.dae.model.fixed_axes import AxisEvaluator
 
             return AxisEvaluator(problem, self.members)
         if self.members is not None:
@@ -530,3 +554,65 @@ class Solution(Shown):
         out.attrs["message"] = self.message
         out.attrs.update({f"solver_{k}": v for k, v in self.stats.as_dict().items()})
         return out
+
+
+# A solution handed on piece by piece while the integration goes, so that a long run needs no memory for its steps.
+
+
+class Stream:
+    """Consumer of an integrator's steps that hands them on as solutions.
+
+    Parameters
+    ----------
+    system : System
+    problem : DAEProblem
+    t_end : float
+        End of the run, s.
+    consumer : callable
+        Called as ``consumer(part)`` with a `Solution` of some accepted steps, in the order of time. It is valid until
+        the next call: parts share their memory. Forces and accelerations are evaluated when first asked for.
+
+    members : Members, optional
+        Of bodies that are integrated as one.
+
+    Attributes
+    ----------
+    part_size : int
+        About how many steps a part has.
+    conflict : str or None
+        The first violation found of a constraint row removed as redundant.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        problem: DAEProblem,
+        t_end: float,
+        consumer: Callable[[Solution], None],
+        members: Members | None = None,
+    ) -> None:
+        nothing = np.empty((0, problem.n))
+        result = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "")
+        self.whole = Solution(system, problem, result, members)
+        self.part_size = PART_SIZE if members is None or not len(members.turn) else AXIS_PART_SIZE
+        self.whole.share(2 * self.part_size)
+        self.consumer = consumer
+        self.conflict: str | None = None
+        self.interval = (t_end - problem.t0) / CONFLICT_SAMPLES
+        self.next_look = problem.t0
+
+    def __call__(self, t: np.ndarray, y: np.ndarray, idata: np.ndarray) -> None:
+        """Hand on accepted steps and the integer table that is valid for them."""
+        # in equal parts: a small rest would cost as much beside its evaluation as a full part
+        size = -(-t.size // max(1, round(t.size / self.part_size)))
+        for k in range(0, t.size, size):
+            part = self.whole.over(t[k : k + size], y[k : k + size], [(0, idata)])
+            if self.conflict is None and part.t[-1] >= self.next_look:
+                self.next_look = float(part.t[-1]) + self.interval
+                self.conflict = part.find_conflict(np.array([part.t.size - 1]))
+            self.consumer(part)
+
+    def close(self, solution: Solution) -> Solution:
+        """Give what was found on the way to the solution that the run ended with, and return it."""
+        solution.note_conflict(self.conflict)
+        return solution

@@ -1,1 +1,1 @@
-"""Compiled laws of torques about a shaft's axis; see `gearmbs.drivetrain.torque_kernel` for their arguments."""
+"""Compiled laws of torques about a shaft's axis; see `gearmbs.drivetrain.torque_element` for their arguments."""

@@ -11,9 +11,9 @@ spring; with one a side that has let go never pulls.
 
 from __future__ import annotations
 
-from gearmbs._jit import njit
-from gearmbs.dae.equations.impact import impact
-from gearmbs.drivetrain.torque_kernel import BY_ANGLE, BY_SPEED, LAW_SIG, LOST, STORED, TOLD, TORQUE
+from gearmbs.dae.equations.loads.forces import impact
+from gearmbs.drivetrain.torque_element import BY_ANGLE, BY_SPEED, LAW_SIG, LOST, STORED_TORQUE, TOLD, TORQUE
+from gearmbs.kernels.jit import njit
 
 FREE, LINEAR, CUBIC, DAMPING, BAND, DEPTH, MORE, SECOND, WIDTH = range(9)
 """Parameters: a_0, k_1, k_3, c, b/2, depth of the damping, k_2 - k_1, d_2, width of the transition."""
@@ -41,7 +41,7 @@ def clutch(p, t, angle, speed, times, states, out):
         elastic += p[MORE] * part
         tangent += p[MORE] * slope
         energy += p[MORE] * area
-    out[STORED] = energy
+    out[STORED_TORQUE] = energy
     if p[BAND] == 0.0:
         out[TORQUE] = -side * elastic - p[DAMPING] * speed
         out[BY_ANGLE] = -tangent

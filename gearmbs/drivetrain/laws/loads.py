@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.drivetrain.torque_kernel import (
+from gearmbs.drivetrain.torque_element import (
     BY_ANGLE,
     BY_SPEED,
     BY_STATE,
@@ -25,6 +24,7 @@ from gearmbs.drivetrain.torque_kernel import (
     TOLD,
     TORQUE,
 )
+from gearmbs.kernels.jit import njit
 
 PUMP_SENSE, PER_PRESSURE, IDLE, VISCOUS, PUMP_SMOOTH, PUMP_TEETH, PUMP_START, PUMP_LAG, EFFICIENCY = range(9)
 """Parameters of a pump: sense, V_g/2pi (m^3/rad), T_0, c, w_0, Z, a_0, lag, eta; then a_1, a_2, ..."""

@@ -20,8 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.drivetrain.torque_kernel import (
+from gearmbs.drivetrain.torque_element import (
     BY_SPEED,
     BY_STATE,
     LAW_SIG,
@@ -31,6 +30,7 @@ from gearmbs.drivetrain.torque_kernel import (
     TOLD,
     TORQUE,
 )
+from gearmbs.kernels.jit import njit
 
 LINEAR_SHARE = 0.8
 """Part of the largest torque up to which a controller's torque is what it asks for."""

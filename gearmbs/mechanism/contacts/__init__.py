@@ -6,7 +6,6 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson, SolidContact
-    from gearmbs.mechanism.contacts.mesh_files import read_mesh
     from gearmbs.mechanism.contacts.shapes import (
         Box,
         Cylinder,
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
         extruded,
         revolved,
     )
-    from gearmbs.mechanism.contacts.solid_files import read_solid
+    from gearmbs.mechanism.contacts.solid_files import read_mesh, read_solid
     from gearmbs.mechanism.contacts.tracks import ContactTracks, contact_tracks
 
 __all__ = [
@@ -49,7 +48,7 @@ late(
     __name__,
     {
         **dict.fromkeys(("Coulomb", "Impact", "Poisson", "SolidContact"), ".element"),
-        "read_mesh": ".mesh_files",
+        "read_mesh": ".solid_files",
         "read_solid": ".solid_files",
         **dict.fromkeys(
             ("Box", "Cylinder", "Ellipsoid", "Frustum", "HalfSpace", "Mesh", "Shape", "Sphere", "Torus"), ".shapes"

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at
-from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.points import dot, moved, relative, turned
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import matrix_at
+from gearmbs.mechanism.contacts import meshes as pt
+from gearmbs.mechanism.contacts.meshes import dot, moved, relative, turned
 
 MOST = 8
 """Points of contact of two boxes."""

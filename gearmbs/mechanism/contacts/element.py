@@ -9,28 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.equations.force_elements import Diagnostic
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.equations.loads.forces import Diagnostic
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts import fields, kernel
 from gearmbs.mechanism.contacts.boxes import MOST
 from gearmbs.mechanism.contacts.edges import NODES, ROOM
-from gearmbs.mechanism.contacts.facet_tables import Facets, sagitta
+from gearmbs.mechanism.contacts.facets import Facets, sagitta
 from gearmbs.mechanism.contacts.loads import IMPACT, LAW_REALS, POISSON
-from gearmbs.mechanism.contacts.points import COLUMNS
-from gearmbs.mechanism.contacts.shapes import (
-    Box,
-    Cylinder,
-    Ellipsoid,
-    Frustum,
-    HalfSpace,
-    Mesh,
-    Shape,
-    Sphere,
-    Torus,
-)
-from gearmbs.mechanism.contacts.supports import reduced
-from gearmbs.mechanism.elements import Compiled, ForceElement
-from gearmbs.mechanism.quantities import quantity
+from gearmbs.mechanism.contacts.meshes import COLUMNS
+from gearmbs.mechanism.contacts.overlaps import reduced
+from gearmbs.mechanism.contacts.shapes import Box, Cylinder, Ellipsoid, Frustum, HalfSpace, Mesh, Shape, Sphere, Torus
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement
+from gearmbs.mechanism.parts.quantities import quantity
 
 REVERSAL = 1e-3
 """Speed, m/s, about which the penalty goes over from compression to restitution."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.mechanism.contacts.points import dot
+from gearmbs.kernels.jit import njit
+from gearmbs.mechanism.contacts.meshes import dot
 
 BALL, BOX, FRUSTUM, TORUS, ELLIPSOID, HALF_SPACE, MESH = 0, 1, 2, 3, 4, 5, 6
 """Kinds of shapes. A cylinder is a frustum with equal radii."""

@@ -8,21 +8,24 @@ number of triangles, their place in the integers, number of edges, their place t
 
 from __future__ import annotations
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS, FORCE_SIG, FRAME_A, FRAME_P
-from gearmbs.mechanism.contacts import points as pt
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, DIAGNOSTICS, FORCE_SIG, FRAME_A, FRAME_P
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import matrix_at, vector_at
+from gearmbs.mechanism.contacts import meshes as pt
 from gearmbs.mechanism.contacts.boxes import SCRATCH, box_on_plane, two_boxes
-from gearmbs.mechanism.contacts.convex_pairs import convex_pair
-from gearmbs.mechanism.contacts.edges import EDGE, edges_below, label_edges
-from gearmbs.mechanism.contacts.facet_moves import moved_with
-from gearmbs.mechanism.contacts.facets import BEARING, vertices_below, without_idle
+from gearmbs.mechanism.contacts.edges import EDGE, edges_below, label_edges, moved_with
+from gearmbs.mechanism.contacts.facets import (
+    BEARING,
+    join_patches,
+    label_patches,
+    patches_in,
+    vertices_below,
+    without_idle,
+)
 from gearmbs.mechanism.contacts.fields import BOX, HALF_SPACE, MESH, distance
 from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
-from gearmbs.mechanism.contacts.meshes import BLOCK
-from gearmbs.mechanism.contacts.patches import join_patches, label_patches, patches_in
-from gearmbs.mechanism.contacts.points import local_point
-from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_plane
+from gearmbs.mechanism.contacts.meshes import BLOCK, local_point
+from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_plane, convex_pair
 
 BALL_SOLID, CONVEX_PLANE, BOXES, FACETS, CONVEX = 0, 1, 2, 3, 4
 """Families of pairs."""
@@ -158,7 +161,7 @@ def faceted(ints, reals, at, sizes, pose):
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def contact_of_solids(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Write the wrench of all pairs on I's body; see `gearmbs.dae.equations.force_elements`.
+    """Write the wrench of all pairs on I's body; see `gearmbs.dae.equations.loads.forces`.
 
     Diagnostics: energy stored, powers lost by damping and friction, patches, largest depth, sum of normal forces.
     """

@@ -15,12 +15,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.equations.force_elements import FRAME_P, FRAME_V, FRAME_W
-from gearmbs.dae.equations.impact import friction_over_speed, impact, stored_energy
-from gearmbs.dae.equations.time_functions import smooth_step
-from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.points import dot, turned
+from gearmbs.dae.equations.loads.forces import FRAME_P, FRAME_V, FRAME_W, friction_over_speed, impact, stored_energy
+from gearmbs.dae.equations.loads.time_functions import smooth_step
+from gearmbs.kernels.jit import njit
+from gearmbs.mechanism.contacts import meshes as pt
+from gearmbs.mechanism.contacts.meshes import dot, turned
 
 IMPACT, POISSON = 0, 1
 LAW, STIFFNESS, EXPONENT, DAMPING, FULL_DEPTH, PENALTY, RESTITUTION, REVERSAL = 0, 1, 2, 3, 4, 5, 6, 7

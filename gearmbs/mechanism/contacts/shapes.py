@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism.quantities import quantities, quantity
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.parts.quantities import quantities, quantity
 
 SEGMENTS = 48
 """Around a solid of revolution that is cut into triangles."""

@@ -2,15 +2,109 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gearmbs.dae.errors import ModelError
+import numpy as np
+
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.shapes import Box, Cylinder, Frustum, Mesh, Shape, Sphere, Torus
-from gearmbs.mechanism.quantities import quantity
-from gearmbs.solids.bodies import PART_NUMBER, Body, read_bodies
+from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.solids.bodies import PART_NUMBER, Body, primitive, read_bodies
 from gearmbs.solids.facets import faceted
-from gearmbs.solids.primitives import primitive
+
+# Meshes from files: STL (text and binary), OBJ and the SHELL files of ADAMS.
+
+
+STL_HEADER = 84
+STL_FACET = 50
+"""Bytes of a binary STL before the facets and of each."""
+
+
+def read_mesh(path: str | Path, scale: float = 1.0) -> Mesh:
+    """Read a closed surface.
+
+    Parameters
+    ----------
+    path : path
+        A .stl, .obj, .shl or .slp file.
+    scale : float
+        SI value of the file's unit of length, m.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read, holds no triangles, or its surface is not closed.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise ModelError(f"{path}: a mesh is read from {', '.join(READERS)} files; save it as one")
+    try:
+        vertices, triangles = reader(path.read_bytes())
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, IndexError, struct.error) as error:
+        raise ModelError(f"{path}: it is not a whole {path.suffix} file: {error}") from None
+    if len(triangles) == 0:
+        raise ModelError(f"{path}: it holds no triangles")
+    try:
+        return Mesh(scale * vertices, triangles)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def _stl(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    binary = len(data) >= STL_HEADER
+    if binary:
+        count = struct.unpack("<I", data[80:84])[0]
+        binary = len(data) == STL_HEADER + STL_FACET * count
+    if binary:
+        facets = np.frombuffer(data, np.uint8, offset=STL_HEADER).reshape(count, STL_FACET)
+        points = facets[:, 12:48].copy().view("<f4").astype(float).reshape(-1, 3)
+    else:
+        words = data.decode("latin-1").split()
+        at = [k for k, word in enumerate(words) if word.lower() == "vertex"]
+        points = np.array([[float(w) for w in words[k + 1 : k + 4]] for k in at], dtype=float).reshape(-1, 3)
+    return points, np.arange(3 * (len(points) // 3)).reshape(-1, 3)
+
+
+def _obj(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    points: list[list[float]] = []
+    triangles: list[tuple[int, int, int]] = []
+    for line in data.decode("latin-1").splitlines():
+        words = line.split()
+        if words[:1] == ["v"]:
+            points.append([float(w) for w in words[1:4]])
+        elif words[:1] == ["f"]:
+            numbers = [int(w.split("/")[0]) for w in words[1:]]
+            _fan([n - 1 if n > 0 else len(points) + n for n in numbers], triangles)
+    return np.array(points, dtype=float).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def _shell(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of vertices, faces, edges and a scale; then the vertices, then each face: its size and its vertices."""
+    lines = [line.split() for line in data.decode("latin-1").splitlines()]
+    rows = [words for words in lines if words and words[0][0] in "+-.0123456789"]
+    n_vertices, n_faces = int(rows[0][0]), int(rows[0][1])
+    scale = float(rows[0][3]) if len(rows[0]) > 3 else 1.0
+    points = scale * np.array([[float(w) for w in row[:3]] for row in rows[1 : 1 + n_vertices]])
+    triangles: list[tuple[int, int, int]] = []
+    for row in rows[1 + n_vertices : 1 + n_vertices + n_faces]:
+        numbers = [int(w) for w in row]
+        _fan([n - 1 for n in numbers[1 : 1 + numbers[0]]], triangles)
+    return points, np.array(triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def _fan(corners: list[int], out: list[tuple[int, int, int]]) -> None:
+    out.extend((corners[0], corners[k], corners[k + 1]) for k in range(1, len(corners) - 1))
+
+
+READERS: dict[str, Callable[[bytes], tuple[np.ndarray, np.ndarray]]] = {
+    ".stl": _stl, ".obj": _obj, ".shl": _shell, ".slp": _stl,
+}  # fmt: skip
 
 SUFFIXES = (".x_t", ".xmt_txt")
 CONTRADICTIONS = (ArithmeticError, AssertionError, IndexError, RecursionError, TypeError, ValueError)

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numba import types
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.pointers import IVEC, MAT, VEC
-from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations.force_elements import FRAME_A, FRAME_COLUMNS, FRAME_P, FRAME_V, FRAME_W
-from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.kinematics.rotation import KIN_A, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.loads.forces import FRAME_A, FRAME_COLUMNS, FRAME_P, FRAME_V, FRAME_W
 from gearmbs.dae.results.frames import frame_motion
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import IVEC, MAT, VEC
+from gearmbs.kernels.structs import matrix_at, vector_at
 from gearmbs.mechanism.contacts import kernel
-from gearmbs.mechanism.contacts import points as pt
+from gearmbs.mechanism.contacts import meshes as pt
 from gearmbs.mechanism.contacts.loads import LAW_REALS, friction_factor, normal_force, share_out, slip
-from gearmbs.mechanism.contacts.points import dot
+from gearmbs.mechanism.contacts.meshes import dot
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.contacts.element import SolidContact
-    from gearmbs.mechanism.parts import Marker
+    from gearmbs.mechanism.parts.bodies import Marker
 
 PAIR, PLACE, NORMAL, PRESSED, RUBBED, SLIP, DEPTH = 0, 1, 4, 7, 10, 13, 16
 """Columns of an incident: number of the pair, place, unit normal from J to I, forces on I, slip of I, depth."""

@@ -1,4 +1,4 @@
-"""Kernel of joint friction, whose law is given in `gearmbs.mechanism.friction`.
+"""Kernel of joint friction, whose law is given in `gearmbs.mechanism.forces.friction`.
 
 Every quantity is carried with its derivatives by all that the element depends on: 12 variations of the frames of I and
 J each, the deformations, the six components of the joint's reaction. Quantities are rows of the scratch, the value
@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at
-from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
-from gearmbs.dae.equations.time_functions import smooth_step
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.dae.equations.loads.time_functions import smooth_step
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.structs import matrix_at
 
 PIN, SLIDE, CYLINDER, BALL = 0, 1, 2, 3
 """Kinds: about the z axis of a frame, along z of J, along and about z of J, about all axes of J."""
@@ -124,7 +124,7 @@ def component(rows, out, frames, f, axis, x, y, z):
     out : int
         Row to write.
     frames : ndarray, shape (2, 18)
-        Frames of I and J, as in `gearmbs.dae.equations.force_elements`.
+        Frames of I and J, as in `gearmbs.dae.equations.loads.forces`.
     f, axis : int
         Frame and its axis: 0, 1, 2 for x, y, z.
     x, y, z : float
@@ -302,7 +302,7 @@ def resisting(ints, reals, slips, rows):
 def joint_friction(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Write the friction of a joint.
 
-    Arguments as in `gearmbs.dae.equations.force_elements`; the inputs are the reaction F and N on I's body at
+    Arguments as in `gearmbs.dae.equations.loads.forces`; the inputs are the reaction F and N on I's body at
     marker I if the friction depends on it, else none.
     """
     kind, f = ints[KIND], ints[FRAME]

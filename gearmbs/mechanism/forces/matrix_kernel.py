@@ -9,9 +9,9 @@ the angles counted; rotations are meant to be small, so q' is not the derivative
 
 from __future__ import annotations
 
-from gearmbs._jit import njit
-from gearmbs.dae.equations.counted_angles import angle_gradient, counted_angle
-from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.dae.equations.kinematics.update import angle_gradient, counted_angle
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.kernels.jit import njit
 
 STIFFNESS = 0
 """K, row-major, in the reals; then C, free and preload."""
@@ -92,7 +92,7 @@ def measure_slopes(ints, frames, work):
 def matrix_force(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Write F and N of a bushing, field or beam.
 
-    Arguments as in `gearmbs.dae.equations.force_elements`; ``ints`` holds the places of the references
+    Arguments as in `gearmbs.dae.equations.loads.forces`; ``ints`` holds the places of the references
     of AX, AY and AZ among the inputs, or -1.
     """
     measure(ints, frames, inputs, reals, work)

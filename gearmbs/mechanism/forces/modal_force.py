@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism.modal import ModalBody, ShapedMarker
-from gearmbs.mechanism.parts import Marker
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.modal import ModalBody, ShapedMarker
 
 if TYPE_CHECKING:
-    from gearmbs.mechanism.elements import Load
     from gearmbs.mechanism.mechanism import Mechanism
+    from gearmbs.mechanism.parts.elements import Load
 
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
 
@@ -86,7 +86,8 @@ def add_modal_force(
     made = []
     if parts:
         other = reaction or mechanism.ground.marker(name=f"{name}.reaction")
-        made.append(mechanism.load(f"{name}.frame", frame, other, rm=frame, kind=kind, **parts))  # type: ignore[arg-type]
+        held = f"{name}.frame"
+        made.append(mechanism.load(held, frame, other, rm=frame, kind=kind, **parts))  # type: ignore[arg-type]
     largest = float(np.abs(given[6:]).max(initial=0.0))
     if largest > 0.0:
         turned = np.zeros((n, 3))

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.equations.counted_angles import angle_gradient, counted_angle
-from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.dae.equations.kinematics.update import angle_gradient, counted_angle
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.kernels.jit import njit
 
 STIFFNESS = 0
 DAMPING = 1
@@ -29,7 +29,7 @@ PRELOAD = 3
 def line_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Write the force along the line from J to I; nothing where the markers coincide.
 
-    Arguments as in `gearmbs.dae.equations.force_elements`; there are no inputs.
+    Arguments as in `gearmbs.dae.equations.loads.forces`; there are no inputs.
     """
     k, c, preload = reals[STIFFNESS], reals[DAMPING], reals[PRELOAD]
     dx, dy, dz = (
@@ -66,7 +66,7 @@ def line_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rate
 def axis_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Write the torque about the z axis of J.
 
-    Arguments as in `gearmbs.dae.equations.force_elements`; the only input is
+    Arguments as in `gearmbs.dae.equations.loads.forces`; the only input is
     the reference of the counted angle AZ.
     """
     k, c, preload = reals[STIFFNESS], reals[DAMPING], reals[PRELOAD]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.mechanism.elements import Compiled, ForceElement
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement
 from gearmbs.units import shown
 
 

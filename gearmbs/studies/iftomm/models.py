@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.mechanism import Mechanism, polynomial
-from gearmbs.mechanism.geometry import frame_along
+from gearmbs.mechanism.parts.bodies import frame_along
 
 GRAVITY = 9.81
 

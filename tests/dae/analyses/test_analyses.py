@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from gearmbs.mechanism import Mechanism, ModelError, SingularModelError, polynomial
-from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
+from gearmbs.mechanism.solve.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
 
 G = 9.81
 

@@ -3,17 +3,8 @@
 import numpy as np
 import pytest
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import (
-    LANES,
-    all_lanes,
-    deal_eight,
-    lanes_at,
-    larger,
-    larger_number,
-    magnitude,
-    put_lanes,
-)
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import LANES, all_lanes, deal_eight, lanes_at, larger, larger_number, magnitude, put_lanes
 
 
 @njit(error_model="numpy")

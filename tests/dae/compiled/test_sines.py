@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES
-from gearmbs.dae.compiled.sines import FARTHEST_ANGLE, put_turns
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import FARTHEST_ANGLE, LANES, put_turns
 
 
 @njit(error_model="numpy")

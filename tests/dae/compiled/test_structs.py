@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numba import float64, int64, njit
 
-from gearmbs._jit import njit as kernel
-from gearmbs.dae.compiled.direct_calls import direct
-from gearmbs.dae.compiled.structs import LINE, BlockLayout, IntVector, Matrix, Struct, Vector
+from gearmbs.kernels.jit import njit as kernel
+from gearmbs.kernels.pointers import direct
+from gearmbs.kernels.structs import LINE, BlockLayout, IntVector, Matrix, Struct, Vector
 
 
 class Sample(Struct):

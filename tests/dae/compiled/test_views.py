@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.kernels.structs import matrix_at, vector_at
 
 
 @njit

@@ -6,7 +6,7 @@ from scipy.sparse import csc_array
 
 from gearmbs.dae.model.system import FORMULATIONS
 from gearmbs.mechanism import Mechanism, harmonic, ramp
-from gearmbs.mechanism.joints import JOINTS
+from gearmbs.mechanism.parts.joints import JOINTS
 
 RNG = 20240
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearmbs.dae.integrators import driver
 from gearmbs.dae.integrators import run_state as s
-from gearmbs.dae.integrators import start
+from gearmbs.dae.integrators.corrector import rounding_level
 from gearmbs.dae.integrators.driver import Run
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.rounding import rounding_level
 from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.problem import DAEProblem
 
@@ -16,7 +16,7 @@ from gearmbs.dae.problem import DAEProblem
 def started(problem: DAEProblem, t_eval: np.ndarray | None = None, t_end: float | None = None, **settings) -> Run:
     """Return a run that stands at its start, with pivots chosen."""
     run = Run(problem, t_eval, t_end, Options(**settings))
-    failure = start.begin(run)
+    failure = driver.begin(run)
     assert failure is None, failure
     return run
 

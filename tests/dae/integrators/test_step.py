@@ -13,12 +13,24 @@ from gearmbs.dae.integrators.corrector import (
     SLOW,
     amount_left,
     apply_correction,
+    count_noise,
+    renew_weights,
+    set_weights,
+    weighted_argmax,
+    weighted_max,
 )
-from gearmbs.dae.integrators.history import forget, newest_point, open_row, rows_from, times_from
 from gearmbs.dae.integrators.newton_matrix import GAMMA_DRIFT, form_matrix
-from gearmbs.dae.integrators.rounding import count_noise
-from gearmbs.dae.integrators.run_state import KINK_MEMORY, REPIVOT, RUNNING, WINDOW
-from gearmbs.dae.integrators.weights import renew_weights, set_weights, weighted_argmax, weighted_max
+from gearmbs.dae.integrators.run_state import (
+    KINK_MEMORY,
+    REPIVOT,
+    RUNNING,
+    WINDOW,
+    forget,
+    newest_point,
+    open_row,
+    rows_from,
+    times_from,
+)
 from tests.dae.integrators.problems import pendulum
 from tests.dae.integrators.stepping import started, take_step
 

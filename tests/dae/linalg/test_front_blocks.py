@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gearmbs.dae.compiled.lanes import LANES
-from gearmbs.dae.linalg.analyse import analyse
-from gearmbs.dae.linalg.front_blocks import front_blocks
-from gearmbs.dae.linalg.nodes import has_nodes
+from gearmbs.dae.linalg.dense_tail import front_blocks
+from gearmbs.dae.linalg.lu_plan import analyse
+from gearmbs.dae.linalg.schedule import has_nodes
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors, solve
+from gearmbs.kernels.lanes import LANES
 
 
 @pytest.mark.parametrize("tail", [0, 5, 11, 40])

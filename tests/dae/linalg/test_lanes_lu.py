@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES
-from gearmbs.dae.linalg.analyse import analyse
-from gearmbs.dae.linalg.lanes_lu import factor_lanes, new_lane_factors, solve_lanes
-from gearmbs.dae.linalg.sparse_lu import factor, new_factors, solve
+from gearmbs.dae.linalg.lu_plan import analyse
+from gearmbs.dae.linalg.sparse_lu import factor, factor_lanes, new_factors, new_lane_factors, solve, solve_lanes
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import LANES
 
 
 @njit(error_model="numpy")

@@ -6,8 +6,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.dae.linalg.analyse import analyse
-from gearmbs.dae.linalg.lu_plan import LUPlan
+from gearmbs.dae.linalg.lu_plan import LUPlan, analyse
 from gearmbs.dae.linalg.sparse_lu import factor, new_factors, solve, solve_pair
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gearmbs.dae.compiled.lanes import LANES
 from gearmbs.dae.model.evaluator import NEVER
 from gearmbs.dae.model.side_by_side import is_possible
+from gearmbs.kernels.lanes import LANES
 from gearmbs.mechanism import Mechanism, Mode
 from tests.mechanism.test_lumping import tree
 

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.dae.equations.expressions.errors import ExpressionError
     from gearmbs.dae.equations.expressions.evaluate import (
         angle_rates,
         eval_gradient,
@@ -13,9 +12,9 @@ if TYPE_CHECKING:
         eval_value,
         update_angles,
     )
-    from gearmbs.dae.equations.expressions.evaluate_second import eval_second
-    from gearmbs.dae.equations.expressions.evaluate_time import eval_time
-    from gearmbs.dae.equations.expressions.spline_data import SplineData
+    from gearmbs.dae.equations.expressions.opcodes import ExpressionError
+    from gearmbs.dae.equations.expressions.second import eval_second, eval_time
+    from gearmbs.dae.equations.expressions.splines import SplineData
     from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 
 __all__ = [
@@ -35,15 +34,15 @@ __all__ = [
 late(
     __name__,
     {
-        "ExpressionError": ".errors",
-        "SplineData": ".spline_data",
+        "ExpressionError": ".opcodes",
+        "SplineData": ".splines",
         "Tape": ".tape",
         "TapeBuilder": ".tape",
         "angle_rates": ".evaluate",
         "eval_gradient": ".evaluate",
         "eval_request": ".evaluate",
-        "eval_second": ".evaluate_second",
-        "eval_time": ".evaluate_time",
+        "eval_second": ".second",
+        "eval_time": ".second",
         "eval_value": ".evaluate",
         "update_angles": ".evaluate",
     },

@@ -5,6 +5,8 @@ expression depends on, and the instructions; ``floats`` holds constants and spli
 Instruction ``k`` writes register ``k`` (static single assignment), so operands are register numbers.
 """
 
+from __future__ import annotations
+
 HEAD_COUNT = 0
 """Number of instructions."""
 HEAD_RESULT = 1
@@ -119,3 +121,14 @@ LEVEL_ACCELERATION = 5
 def external_results(count: int) -> int:
     """Return how many numbers a function of the user may write: its value and derivatives, two at least."""
     return 1 + max(count + (count**2 if count <= MOST_SECOND else 0), 2)
+
+
+# What is raised about expressions.
+
+
+class ExpressionError(ValueError):
+    """A function expression that cannot be read or evaluated; says where and what to do."""
+
+
+class NotEvaluatedError(ExpressionError):
+    """A function of the language that is well written but not evaluated here, or not in this place."""

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.time_functions import cubic, smooth_step
+from gearmbs.dae.equations.loads.time_functions import cubic, smooth_step
+from gearmbs.kernels.jit import njit
 
 
 @njit("UniTuple(float64, 3)(int64, float64, float64)", cache=True, error_model="numpy", nogil=True)

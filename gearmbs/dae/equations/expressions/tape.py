@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.errors import ExpressionError
-from gearmbs.dae.equations.expressions.evaluate_second import JACOBIAN_AT
-from gearmbs.dae.equations.expressions.integrals import integral_table, time_value
+from gearmbs.dae.equations.expressions.evaluate import integral_table, time_value
 from gearmbs.dae.equations.expressions.measures import LEAF_WORK
+from gearmbs.dae.equations.expressions.opcodes import ExpressionError
 from gearmbs.dae.equations.expressions.scalar import binary_python, unary_python
-from gearmbs.dae.equations.expressions.spline_data import SplineData, spline_table
+from gearmbs.dae.equations.expressions.second import JACOBIAN_AT
+from gearmbs.dae.equations.expressions.splines import SplineData, spline_table
 
 _LEAF_LEVEL = {
     op.CONST: op.LEVEL_CONSTANT,
@@ -262,7 +262,7 @@ class TapeBuilder:
         Parameters
         ----------
         address : int
-            Of a C function as of `gearmbs.dae.compiled.python_callback`, called as f(t, a, a, order, out) with the
+            Of a C function as of `gearmbs.kernels.pointers`, called as f(t, a, a, order, out) with the
             arguments in a; out receives the value, and for order 1 the partials behind it, for order 2 the first and
             second derivative by the first argument, for order 3 the partials and the matrix of second ones.
         arguments : sequence of int

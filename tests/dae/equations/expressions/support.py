@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gearmbs.dae.equations.expressions import eval_gradient, eval_request, eval_second, eval_time, eval_value
-from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
-from gearmbs.mechanism.expression_compiler import compile_expression
-from gearmbs.mechanism.expression_syntax import Scope
+from gearmbs.dae.equations.expressions.measures import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.mechanism.language.library import compile_expression
+from gearmbs.mechanism.language.syntax import Scope
 
 MARKERS = {1: 0, 2: 1, 3: 2, 4: 3, 10: 4, "CM": 1}
 MARKER_BODY = np.array([1, 2, 3, 2, 0], dtype=np.int64)

@@ -1,0 +1,475 @@
+"""Statements of a deck as typed records: data, requests, settings and output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from gearmbs.adams.parse.grammar import (
+    CHOICE,
+    EXPRESSION,
+    FLAG,
+    ID,
+    IDS,
+    INT,
+    PATH,
+    REAL,
+    REALS,
+    STRINGS,
+    TABLE,
+    TEXT,
+    WORD,
+    WORDS,
+    arg,
+)
+from gearmbs.adams.parse.model_statements import Statement, Vector
+
+# `arg` returns a dataclass field; the linter takes it for a default value
+# ruff: noqa: RUF009
+
+
+@dataclass(frozen=True)
+class Variable(Statement):
+    """VARIABLE: an algebraic variable given by an expression."""
+
+    ic: float | None = arg("IC", REAL)
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+
+
+@dataclass(frozen=True)
+class Diff(Statement):
+    """DIFF: a first-order differential equation."""
+
+    ic: Vector = arg("IC", REALS, (0.0,), count=(1, 2))
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    implicit: bool = arg("IMPLICIT", FLAG, False)
+    static_hold: bool = arg("STATIC_HOLD", FLAG, False)
+    routine: str | None = arg("ROUTINE", TEXT)
+
+
+@dataclass(frozen=True)
+class Spline(Statement):
+    """SPLINE: points of a curve or a family of curves."""
+
+    x: Vector | None = arg("X", REALS, count=(4, 100000))
+    y: tuple[Vector, ...] = arg("Y", TABLE, (), count=(4, 100000))
+    linear_extrapolate: bool = arg("LINEAR_EXTRAPOLATE", FLAG, False)
+    data_file: str | None = arg("FILE", TEXT)
+    block: str | None = arg("BLOCK", TEXT)
+
+
+@dataclass(frozen=True)
+class Array(Statement):
+    """ARRAY of numbers."""
+
+    type: str | None = arg("type", CHOICE, choices="IC X Y U")
+    size: int | None = arg("SIZE", INT)
+    numbers: Vector = arg("NUMBERS", REALS, (), count=(1, 100000))
+    variables: tuple[int, ...] = arg("VARIABLES", IDS, (), count=(1, 100000))
+
+
+@dataclass(frozen=True)
+class Plant(Statement):
+    """PINPUT or POUTPUT: a list of variables."""
+
+    variables: tuple[int, ...] = arg("VARIABLES", IDS, (), count=(1, 100000))
+
+
+@dataclass(frozen=True)
+class PlantInput(Plant, keyword="PINPUT"):
+    """PINPUT."""
+
+
+@dataclass(frozen=True)
+class PlantOutput(Plant, keyword="POUTPUT"):
+    """POUTPUT."""
+
+
+@dataclass(frozen=True)
+class RequestType:
+    """A standard type of REQUEST.
+
+    Attributes
+    ----------
+    number : int
+        In request files.
+    functions : tuple of str
+        Functions behind the eight columns.
+    dimensions : tuple of str
+        Of the first four columns and of the others.
+    """
+
+    number: int
+    functions: tuple[str, str, str, str, str, str, str, str]
+    dimensions: tuple[str, str]
+
+
+REQUEST_TYPES = {
+    "DISPLACEMENT": RequestType(1, ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"), ("length", "angle")),
+    "VELOCITY": RequestType(2, ("VM", "VX", "VY", "VZ", "WM", "WX", "WY", "WZ"), ("velocity", "angular_velocity")),
+    "ACCELERATION": RequestType(
+        3, ("ACCM", "ACCX", "ACCY", "ACCZ", "WDTM", "WDTX", "WDTY", "WDTZ"), ("acceleration", "angular_acceleration")
+    ),
+    "FORCE": RequestType(4, ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ"), ("force", "torque")),
+}
+"""All that reads, checks, evaluates or writes a REQUEST takes its type from here."""
+
+
+@dataclass(frozen=True)
+class Request(Statement):
+    """REQUEST: what the request file holds."""
+
+    type: str | None = arg(
+        "type",
+        CHOICE,
+        choices=" ".join(REQUEST_TYPES),
+        aliases="D:DISPLACEMENT V:VELOCITY A:ACCELERATION F:FORCE",
+    )
+    i: int | None = arg("I", ID)
+    j: int | None = arg("J", ID)
+    rm: int | None = arg("RM", ID)
+    comment: str | None = arg("COMMENT", TEXT, aliases="C")
+    f1: str | None = arg("F1", EXPRESSION)
+    f2: str | None = arg("F2", EXPRESSION)
+    f3: str | None = arg("F3", EXPRESSION)
+    f4: str | None = arg("F4", EXPRESSION)
+    f5: str | None = arg("F5", EXPRESSION)
+    f6: str | None = arg("F6", EXPRESSION)
+    f7: str | None = arg("F7", EXPRESSION)
+    f8: str | None = arg("F8", EXPRESSION)
+    function: str | None = arg("FUNCTION", TEXT)
+    routine: str | None = arg("ROUTINE", TEXT)
+    title: tuple[str, ...] = arg("TITLE", STRINGS, ())
+    cnames: tuple[str, ...] = arg("CNAMES", STRINGS, ())
+    cunits: tuple[str, ...] = arg("CUNITS", STRINGS, ())
+    clabels: tuple[str, ...] = arg("CLABELS", STRINGS, ())
+    results_name: str | None = arg("RESULTS_NAME", TEXT)
+
+    def functions(self) -> tuple[str | None, ...]:
+        """Return F1 to F8."""
+        return (self.f1, self.f2, self.f3, self.f4, self.f5, self.f6, self.f7, self.f8)
+
+
+@dataclass(frozen=True)
+class Integrator(Statement):
+    """INTEGRATOR: method, formulation and its settings."""
+
+    method: str | None = arg(
+        "method",
+        CHOICE,
+        choices="GSTIFF WSTIFF CONSTANT_BDF HHT NEWMARK HASTIFF ABAM RKF45 SI2_GSTIFF DSTIFF",
+    )
+    formulation: str | None = arg("formulation", CHOICE, choices="I3 SI2 SI1")
+    error: float | None = arg("ERROR", REAL)
+    hinit: float | None = arg("HINIT", REAL, dimension="time")
+    hmax: float | None = arg("HMAX", REAL, dimension="time")
+    hmin: float | None = arg("HMIN", REAL, dimension="time")
+    hratio: int | None = arg("HRATIO", INT)
+    kmax: int | None = arg("KMAX", INT)
+    maxit: int | None = arg("MAXIT", INT)
+    pattern: tuple[str, ...] = arg("PATTERN", WORDS, ())
+    interpolate: str | None = arg("INTERPOLATE", WORD)
+    corrector: str | None = arg("CORRECTOR", WORD)
+    fixit: int | None = arg("FIXIT", INT)
+    adaptivity: float | None = arg("ADAPTIVITY", REAL)
+    beta: float | None = arg("BETA", REAL)
+    gamma: float | None = arg("GAMMA", REAL)
+    alpha: float | None = arg("ALPHA", REAL)
+    scale: Vector | None = arg("SCALE", REALS, count=(1, 3))
+
+
+@dataclass(frozen=True)
+class InitialConditions(Statement, keyword="IC"):
+    """IC: control of the initial conditions analysis."""
+
+    error: float | None = arg("ERROR", REAL)
+    aerror: float | None = arg("AERROR", REAL)
+    verror: float | None = arg("VERROR", REAL)
+    maxit: int | None = arg("MAXIT", INT)
+    amaxit: int | None = arg("AMAXIT", INT)
+    tlimit: float | None = arg("TLIMIT", REAL)
+    alimit: float | None = arg("ALIMIT", REAL)
+    pattern: tuple[str, ...] = arg("PATTERN", WORDS, ())
+    apattern: tuple[str, ...] = arg("APATTERN", WORDS, ())
+
+
+@dataclass(frozen=True)
+class Kinematics(InitialConditions):
+    """KINEMATICS: control of kinematic analyses."""
+
+    hmax: float | None = arg("HMAX", REAL, dimension="time")
+
+
+@dataclass(frozen=True)
+class Equilibrium(InitialConditions):
+    """EQUILIBRIUM: control of static analyses."""
+
+    stability: float | None = arg("STABILITY", REAL)
+    imbalance: float | None = arg("IMBALANCE", REAL)
+    static_method: str | None = arg("METHOD", WORD)
+
+
+@dataclass(frozen=True)
+class Output(Statement):
+    """OUTPUT: which files are written and how."""
+
+    reqsave: bool = arg("REQSAVE", FLAG, False)
+    grsave: bool = arg("GRSAVE", FLAG, False)
+    gr521sav: bool = arg("GR521SAV", FLAG, False)
+    separator: str | None = arg("separator", CHOICE, choices="SEPARATOR NOSEPARATOR")
+    teletype: bool = arg("TELETYPE", FLAG, False)
+    osformat: bool = arg("OSFORMAT", FLAG, False)
+    fixed: bool = arg("FIXED", FLAG, False)
+    ypr: bool = arg("YPR", FLAG, False)
+    chart: str | None = arg("CHART", TEXT)
+    noprint: bool = arg("NOPRINT", FLAG, False)
+    dscale: Vector | None = arg("DSCALE", REALS, count=(1, 2))
+    vscale: Vector | None = arg("VSCALE", REALS, count=(1, 2))
+    ascale: Vector | None = arg("ASCALE", REALS, count=(1, 2))
+    fscale: Vector | None = arg("FSCALE", REALS, count=(1, 2))
+    dzero: float | None = arg("DZERO", REAL)
+    vzero: float | None = arg("VZERO", REAL)
+    azero: float | None = arg("AZERO", REAL)
+    fzero: float | None = arg("FZERO", REAL)
+
+
+@dataclass(frozen=True)
+class Results(Statement):
+    """RESULTS: whether and what the results file holds."""
+
+    formatted: bool = arg("FORMATTED", FLAG, False)
+    unformatted: bool = arg("UNFORMATTED", FLAG, False)
+    xrf: bool = arg("XRF", FLAG, False)
+    nodisplacements: bool = arg("NODISPLACEMENTS", FLAG, False)
+    novelocities: bool = arg("NOVELOCITIES", FLAG, False)
+    noaccelerations: bool = arg("NOACCELERATIONS", FLAG, False)
+    noreactionforces: bool = arg("NOREACTIONFORCES", FLAG, False)
+    noappliedforces: bool = arg("NOAPPLIEDFORCES", FLAG, False)
+    nodatastructures: bool = arg("NODATASTRUCTURES", FLAG, False)
+    nosystemelements: bool = arg("NOSYSTEMELEMENTS", FLAG, False)
+    nolinear: bool = arg("NOLINEAR", FLAG, False)
+    nofloatingmarkers: bool = arg("NOFLOATINGMARKERS", FLAG, False)
+    nocontacts: bool = arg("NOCONTACTS", FLAG, False)
+    notires: bool = arg("NOTIRES", FLAG, False)
+    norequests: bool = arg("NOREQUESTS", FLAG, False)
+    comment: str | None = arg("COMMENT", TEXT)
+
+
+# Statements of a deck as typed records: linear systems of a control loop.
+
+
+# `arg` returns a dataclass field; the linter takes it for a default value
+# ruff: noqa: RUF009
+
+
+@dataclass(frozen=True)
+class _System(Statement):
+    """States, inputs and outputs, each an ARRAY."""
+
+    x: int | None = arg("X", ID)
+    u: int | None = arg("U", ID)
+    y: int | None = arg("Y", ID)
+    static_hold: bool = arg("STATIC_HOLD", FLAG, False)
+
+
+@dataclass(frozen=True)
+class Lse(_System):
+    """LSE: x' = A x + B u, y = C x + D u."""
+
+    a: int | None = arg("A", ID)
+    b: int | None = arg("B", ID)
+    c: int | None = arg("C", ID)
+    d: int | None = arg("D", ID)
+    ic: int | None = arg("IC", ID)
+
+
+@dataclass(frozen=True)
+class Tfsiso(_System):
+    """TFSISO: y(s)/u(s) = (b0 + b1 s + ...)/(a0 + a1 s + ...)."""
+
+    numerator: Vector = arg("NUMERATOR", REALS, (), count=(1, 30))
+    denominator: Vector = arg("DENOMINATOR", REALS, (), count=(1, 30))
+
+
+@dataclass(frozen=True)
+class Gse(_System):
+    """GSE: x' = f(t, x, xd, u), y = g(t, x, xd, u) and at samples xd_next = h(t, x, xd, u), by routines of the user.
+
+    With IMPLICIT the first is 0 = f(t, x, xd, u, x').
+
+    Attributes
+    ----------
+    callers : mapping
+        Of the parts "deriv", "output" and "update", once they are bound.
+    held : tuple of float
+        Discrete states as they are.
+    rated : tuple of bool
+        Of each continuous state of implicit equations, whether they depend on its rate.
+    """
+
+    ns: int = arg("NS", INT, 0)
+    nd: int = arg("ND", INT, 0)
+    no: int = arg("NO", INT, 0)
+    xd: int | None = arg("XD", ID)
+    ic: int | None = arg("IC", ID)
+    icd: int | None = arg("ICD", ID)
+    sample_period: str | None = arg("SAMPLE_PERIOD", EXPRESSION)
+    sample_offset: float = arg("SAMPLE_OFFSET", REAL, 0.0, dimension="time")
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+    interface: str | None = arg("INTERFACE", TEXT)
+    implicit: bool = arg("IMPLICIT", FLAG, False)
+    xxflag: str | None = arg("XXFLAG", WORD)
+    xuflag: str | None = arg("XUFLAG", WORD)
+    yxflag: str | None = arg("YXFLAG", WORD)
+    yuflag: str | None = arg("YUFLAG", WORD)
+    callers: Any = field(default=None, kw_only=True, compare=False)
+    held: Vector = field(default=(), kw_only=True)
+    rated: tuple[bool, ...] = field(default=(), kw_only=True)
+
+
+# Statements of a deck as typed records: sensors, texts.
+
+
+# `arg` returns a dataclass field; the linter takes it for a default value
+
+
+@dataclass(frozen=True)
+class Sensor(Statement):
+    """SENSOR: what happens when an expression passes a value."""
+
+    relation: str = arg("relation", CHOICE, "EQ", choices="EQ GE LE")
+    value: float = arg("VALUE", REAL, 0.0)
+    error: float = arg("ERROR", REAL, 1e-3)
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+    evaluate: str | None = arg("EVALUATE", EXPRESSION, aliases="EVAL")
+    evaluate_routine: str | None = arg("EVALUATE_ROUTINE", TEXT)
+    angular: bool = arg("ANGULAR", FLAG, False)
+    bisection: bool = arg("BISECTION", FLAG, False)
+    codgen: bool = arg("CODGEN", FLAG, False)
+    dt: float | None = arg("DT", REAL, dimension="time")
+    halt: bool = arg("HALT", FLAG, False)
+    print_: bool = arg("PRINT", FLAG, False)
+    restart: bool = arg("RESTART", FLAG, False)
+    back: bool = arg("RETURN", FLAG, False)
+    stepsize: float | None = arg("STEPSIZE", REAL, dimension="time")
+    yydump: bool = arg("YYDUMP", FLAG, False)
+
+
+@dataclass(frozen=True)
+class String(Statement):
+    """STRING: a text, which routines of a user may ask for."""
+
+    text: str | None = arg("STRING", TEXT)
+
+
+# Statements of a deck as typed records: flexible bodies.
+
+
+# `arg` returns a dataclass field; the linter takes it for a default value
+# ruff: noqa: RUF009
+
+
+NODES = 100_000
+"""More than an FE_PART has nodes: the number of a node is that of its part times this, and its own."""
+
+
+@dataclass(frozen=True)
+class FlexBody(Statement, keyword="FLEX_BODY"):
+    """FLEX_BODY: a body with modes, from a modal neutral file."""
+
+    mnf_file: str | None = arg("MNF_FILE", PATH)
+    db_file: str | None = arg("DB_FILE", PATH)
+    bdf_file: str | None = arg("BDF_FILE", PATH)
+    index_in_database: int | None = arg("INDEX_IN_DATABASE", INT)
+    matrices: tuple[int, ...] = arg("MATRICES", IDS, (), count=(1, 100))
+    qg: Vector = arg("QG", REALS, (0.0, 0.0, 0.0), count=3, dimension="length")
+    reuler: Vector | None = arg("REULER", REALS, count=3, dimension="angle")
+    zg: Vector | None = arg("ZG", REALS, count=3, dimension="length")
+    xg: Vector | None = arg("XG", REALS, count=3, dimension="length")
+    vx: float = arg("VX", REAL, 0.0, dimension="velocity")
+    vy: float = arg("VY", REAL, 0.0, dimension="velocity")
+    vz: float = arg("VZ", REAL, 0.0, dimension="velocity")
+    wx: float = arg("WX", REAL, 0.0, dimension="angular_velocity")
+    wy: float = arg("WY", REAL, 0.0, dimension="angular_velocity")
+    wz: float = arg("WZ", REAL, 0.0, dimension="angular_velocity")
+    vm: int | None = arg("VM", ID)
+    wm: int | None = arg("WM", ID)
+    exact: tuple[str, ...] = arg("EXACT", WORDS, (), choices="X Y Z PSI THETA PHI")
+    invariants: tuple[str, ...] = arg("INVARIANTS", WORDS, (), choices="TRUE FALSE")
+    dmode: Vector = arg("DMODE", REALS, (), count=(1, 10000))
+    vmode: Vector = arg("VMODE", REALS, (), count=(1, 10000))
+    char_len: float | None = arg("CHAR_LEN", REAL, dimension="length")
+    cratio: str | None = arg("CRATIO", EXPRESSION)
+
+
+@dataclass(frozen=True)
+class Material(Statement):
+    """MATERIAL of an FE_PART."""
+
+    label_name: str | None = arg("NAME", TEXT)
+    density: float | None = arg("DENSITY", REAL)
+    youngs_modulus: float | None = arg("YOUNGS_MODULUS", REAL)
+    poissons_ratio: float | None = arg("POISSONS_RATIO", REAL)
+
+
+@dataclass(frozen=True)
+class FePart(Statement, keyword="FE_PART"):
+    """FE_PART: a beam of large motion through nodes."""
+
+    type: str | None = arg("TYPE", TEXT)
+    qg: Vector = arg("QG", REALS, (0.0, 0.0, 0.0), count=3, dimension="length")
+    reuler: Vector | None = arg("REULER", REALS, count=3, dimension="angle")
+    node_labels: tuple[int, ...] = arg("NODE_LABELS", IDS, (), count=(1, 1000))
+    coordinates: Vector = arg("COORDINATES", REALS, (), count=(1, 7000), dimension="angle")
+    section: Vector = arg("SECTION", REALS, (), count=(1, 6000))
+    material: int | None = arg("MATERIAL", ID)
+    cratiok: float = arg("CRATIOK", REAL, 0.0, dimension="time")
+    cratiom: float = arg("CRATIOM", REAL, 0.0)
+    preload: str | None = arg("PRELOAD", TEXT)
+
+    zg: ClassVar[None] = None
+    xg: ClassVar[None] = None
+
+
+@dataclass(frozen=True)
+class FeNode(Statement, keyword="FE_NODE"):
+    """A node of an FE_PART that has been built; the FE_NODE statements of a deck repeat what its FE_PART says."""
+
+    part: str = ""
+
+    def label(self) -> str:
+        """Return the part and the number of the node."""
+        return f"{self.part}, node {self.id % NODES}"
+
+
+@dataclass(frozen=True)
+class FeLoad(Statement, keyword="FE_LOAD"):
+    """FE_LOAD: force and torque a length on an FE_PART."""
+
+    fe_part: int | None = arg("FE_PART", ID)
+    rm: int | None = arg("RM", ID)
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+    fx: str | None = arg("FX", EXPRESSION)
+    fy: str | None = arg("FY", EXPRESSION)
+    fz: str | None = arg("FZ", EXPRESSION)
+    tx: str | None = arg("TX", EXPRESSION)
+    ty: str | None = arg("TY", EXPRESSION)
+    tz: str | None = arg("TZ", EXPRESSION)
+
+
+@dataclass(frozen=True)
+class Mforce(Statement):
+    """MFORCE: a distribution of forces on a FLEX_BODY."""
+
+    flex_body: int | None = arg("FLEX_BODY", ID)
+    jfloat: int | None = arg("JFLOAT", ID)
+    case_index: int | None = arg("CASE_INDEX", INT)
+    scale: str | None = arg("SCALE", EXPRESSION)
+    force: str | None = arg("FORCE", EXPRESSION)
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+    shares: tuple[str, ...] = field(default=(), kw_only=True)

@@ -1,0 +1,249 @@
+"""How far an analysis had to move the parts before it could start."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearmbs.adams.builders.scopes import AdamsModel, markers_of
+from gearmbs.adams.parse import statements as st
+from gearmbs.dae.results.solution import Solution
+from gearmbs.mechanism.contacts import ContactTracks, SolidContact, contact_tracks
+from gearmbs.mechanism.language.syntax import Units
+
+FAR = 1e-3
+"""Displacement worth a warning, in sizes of the model."""
+TURNED = np.deg2rad(0.1)
+"""Rotation worth a warning, rad."""
+
+LEAST_ANGLE = 1e-9
+"""Rotation that is none but rounding, rad."""
+ROUNDED = 1e-9
+"""Change of a velocity, of it, that is none."""
+GIVEN = frozenset("vx vy vz wx wy wz".split())
+"""Arguments by which a statement gives velocities."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """The largest corrections of the initial conditions.
+
+    Attributes
+    ----------
+    distance : float
+        Of a part's centre of mass, in the deck's unit of length.
+    angle : float
+        Rad.
+    farthest, most_turned : str
+        Which parts they are, "" without any.
+    far : bool
+        Whether that is more than the rounded numbers of a deck explain.
+    speed, spin : float
+        Largest changes of velocities that the deck gives, in its units.
+    fastest, most_spun : str
+        Which parts they are, "" if none was changed.
+    """
+
+    distance: float = 0.0
+    angle: float = 0.0
+    farthest: str = ""
+    most_turned: str = ""
+    far: bool = False
+    speed: float = 0.0
+    spin: float = 0.0
+    fastest: str = ""
+    most_spun: str = ""
+
+    def remark(self, time: float, unit: str) -> str:
+        """Return a sentence on parts that were moved far, "" when none was."""
+        if not self.far:
+            return ""
+        moved = [f"{self.farthest} by {self.distance:.4g} {unit}"] if self.distance > 0.0 else []
+        if self.angle > LEAST_ANGLE or not moved:
+            moved.append(f"{self.most_turned} by {np.rad2deg(self.angle):.4g} degrees")
+        return f"at TIME = {time:g} the parts did not fit their joints and motions and were moved: {', '.join(moved)}"
+
+
+def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
+    """Compare where the parts were put with where a solution starts."""
+    bodies = model.mechanism.bodies
+    distances, angles, speeds, spins = {}, {}, {"": 0.0}, {"": 0.0}
+    for name, body in bodies.items():
+        if name not in model.sources:
+            # a runner on a curve, which is no part
+            continue
+        label = model.sources[name].label()
+        distances[label] = float(np.linalg.norm(solution.com_position(name)[0] - body.centre_of_mass()[0]))
+        # |A - B| = 2 sqrt(2) sin(angle/2)
+        apart = float(np.linalg.norm(solution.orientation(name)[0] - body.orientation))
+        angles[label] = 2.0 * float(np.arcsin(min(1.0, apart / np.sqrt(8.0))))
+        if GIVEN & set(model.sources[name].given):
+            speeds[label] = _change(body.centre_of_mass()[1], solution.com_velocity(name)[0])
+            spins[label] = _change(body.angular_velocity, solution.angular_velocity(name)[0])
+    if not bodies:
+        return Assembly()
+    places = np.array([m.global_position() for m in markers_of(model.mechanism)])
+    size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    farthest, most_turned = max(distances, key=distances.__getitem__), max(angles, key=angles.__getitem__)
+    distance, angle = distances[farthest], angles[most_turned]
+    far = distance > FAR * size or angle > TURNED
+    fastest, most_spun = max(speeds, key=speeds.__getitem__), max(spins, key=spins.__getitem__)
+    units = model.deck.units
+    return Assembly(
+        distance / units.length, angle, farthest, most_turned, far, speeds[fastest] / units.factor("velocity"),
+        spins[most_spun] / units.factor("angular_velocity"), fastest, most_spun,
+    )  # fmt: skip
+
+
+def _change(given: np.ndarray, found: np.ndarray) -> float:
+    """Return by how much a velocity differs from that given, 0 where only by rounding."""
+    change = float(np.linalg.norm(found - given))
+    return change if change > ROUNDED * float(np.linalg.norm(given)) else 0.0
+
+
+# Constraint rows in the words of ADAMS's message files.
+
+
+TYPES = {st.Joint: "Joint", st.Jprim: "Primitive Joint", st.Motion: "Motion"}
+PATTERNS = (
+    (re.compile(r"coincident (\w)"), "Translation of I Marker Along {0}g"),
+    (re.compile(r"no offset along (\w)_J"), "Translation of I Marker Along {0}j"),
+    (re.compile(r"(\w)_I normal to (\w)_J"), "Rotation Between {0}i & {1}j"),
+    (re.compile(r"angle"), "Rotation About Zj"),
+    (re.compile(r"displacement"), "Translation Along Zj"),
+)
+
+
+def row_text(model: AdamsModel, name: str) -> str:
+    """Return a row, named ``joint: what it enforces``, as ADAMS names it: element, its type, its motion."""
+    element, _, label = name.rpartition(": ")
+    statement = model.sources.get(element)
+    where = element
+    if statement is not None:
+        kind = getattr(statement, "type", None) or ""
+        words = f"{str(kind).title()} {TYPES.get(type(statement), '')}".strip()
+        where = f"{statement.label()} {element}" + (f" ({words})" if words else "")
+    for pattern, text in PATTERNS:
+        found = pattern.fullmatch(label)
+        if found is not None:
+            return f"{where}    {text.format(*(axis.upper() for axis in found.groups()))}"
+    return f"{where}    {label}"
+
+
+# What is to be said of contacts whose solids are cut into facets: what rolls on these loses speed.
+
+
+@dataclass(frozen=True)
+class FacetedTouch:
+    """Two solids that touched, one of them round and cut into facets.
+
+    Attributes
+    ----------
+    contact, first, second : str
+        The CONTACT and both GRAPHICS.
+    triangles : int
+        Of both solids.
+    sagitta, depth : float
+        Between the facets and the round surface, and the median penetration while they touched, m.
+    """
+
+    contact: str
+    first: str
+    second: str
+    triangles: int
+    sagitta: float
+    depth: float
+
+
+def faceted_touches(model: AdamsModel, tracks: dict[int, ContactTracks]) -> list[FacetedTouch]:
+    """Return pairs of round solids in facets that touched, those first whose facets are coarsest against the depth."""
+    found = []
+    for number, track in tracks.items():
+        name = model.names["contact", number]
+        statement, element = model.sources[name], model.mechanism.elements[name]
+        assert isinstance(statement, st.Contact)
+        assert isinstance(element, SolidContact)
+        depths: dict[tuple[int, int], list[np.ndarray]] = {}
+        for k, pair in enumerate(track.pairs):
+            depths.setdefault(pair, []).append(track.penetration[track.touching[:, k], k])
+        for (i, j), triangles, sagitta in element.round_facets():
+            sunk = np.concatenate(depths.get((i, j), [np.zeros(0)]))
+            if sunk.size:
+                first, second = f"GRAPHICS/{statement.igeom[i]}", f"GRAPHICS/{statement.jgeom[j]}"
+                label = statement.label()
+                found.append(FacetedTouch(label, first, second, triangles, sagitta, float(np.median(sunk))))
+    return sorted(found, key=lambda touch: -touch.sagitta / touch.depth)
+
+
+def facets_remark(touches: list[FacetedTouch], length: float, unit: str) -> str:
+    """Return one sentence on all of them, lengths in the deck's unit, which is ``length`` m and called ``unit``."""
+    worst, others = touches[0], touches[1:]
+    also = ""
+    if others:
+        named = list(dict.fromkeys(f"{t.first} and {t.second} of {t.contact}" for t in others))
+        shown = ", ".join(named[:3]) + (f" and {len(named) - 3} more" if len(named) > 3 else "")
+        also = f"; so are {shown}"
+    return (
+        f"{worst.contact}: {worst.first} and {worst.second} are cut into {worst.triangles} triangles, which leave the "
+        f"round surface by up to {worst.sagitta / length:.3g} {unit}, while they sink in by {worst.depth / length:.3g}"
+        f"{also}. What rolls on facets is lifted over each edge and loses speed to DAMPING, which nothing else tells; "
+        "let it roll on solids whose contact is exact (PLANE, BOX, CYLINDER, FRUSTUM, ELLIPSOID for what is round), "
+        "give a finer mesh, or less DAMPING, and compare"
+    )
+
+
+# What happened at the points of contact of a CONTACT, under the names that ADAMS's postprocessor has for it.
+
+
+VECTORS: dict[str, tuple[str, Callable[[ContactTracks], np.ndarray]]] = {
+    "I_Point": ("length", lambda t: t.i_point),
+    "J_Point": ("length", lambda t: t.j_point),
+    "I_Normal_Unit_Vector": ("number", lambda t: t.i_normal),
+    "J_Normal_Unit_Vector": ("number", lambda t: -t.i_normal),
+    "I_Normal_Force": ("force", lambda t: t.i_normal_force),
+    "J_Normal_Force": ("force", lambda t: -t.i_normal_force),
+    "I_Friction_Force": ("force", lambda t: t.i_friction_force),
+    "J_Friction_Force": ("force", lambda t: -t.i_friction_force),
+    "Slip_Velocity": ("velocity", lambda t: t.slip_velocity),
+}
+"""Sets of components X, Y and Z: their dimension, their values in SI."""
+DEPTH = "Penetration"
+TRACK_COLUMNS = tuple(f"{name}.{axis}" for name in VECTORS for axis in "XYZ") + (f"{DEPTH}.Depth",)
+
+
+def tracks_of(model: AdamsModel, solution: Solution) -> dict[int, ContactTracks]:
+    """Return the tracks of all active contacts between solids, by id, SI."""
+    found = {}
+    for kind, number in model.pairs:
+        name = model.names.get((kind, number))
+        element = model.mechanism.elements.get(name) if kind == "contact" and name is not None else None
+        if isinstance(element, SolidContact):
+            found[number] = contact_tracks(solution, element)
+    return found
+
+
+TRACK_DIMENSIONS = tuple(d for d, _ in VECTORS.values() for _ in "XYZ") + ("length",)
+
+
+def track_table(parts: Sequence[tuple[int, ContactTracks | None]], units: Units) -> np.ndarray:
+    """Return the tracks of a contact over analyses, shape (m, tracks, columns), in the deck's units.
+
+    Parameters
+    ----------
+    parts : sequence of (int, ContactTracks or None)
+        Of each analysis the number of output times, and the tracks, which are counted from the first on in each.
+    units : Units
+    """
+    most = max((len(tracks) for _, tracks in parts if tracks is not None), default=0)
+    tables = []
+    for times, tracks in parts:
+        table = np.zeros((times, most, len(TRACK_COLUMNS)))
+        if tracks is not None:
+            # the sum makes minus nothing nothing
+            vectors = [0.0 + values(tracks) / units.factor(dimension) for dimension, values in VECTORS.values()]
+            table[:, : len(tracks)] = np.concatenate([*vectors, tracks.penetration[:, :, None] / units.length], axis=2)
+        tables.append(table)
+    return np.concatenate(tables or [np.zeros((0, 0, len(TRACK_COLUMNS)))])

@@ -1,0 +1,1 @@
+"""Which factors move a result: Sobol' indices, their bounds, and surrogates."""

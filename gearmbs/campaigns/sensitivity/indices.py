@@ -1,0 +1,375 @@
+"""What decides a result: effects, elementary effects, Sobol' indices.
+
+References
+----------
+.. [1] A. Saltelli et al., Variance based sensitivity analysis of model output, Comput. Phys. Commun. 181 (2010) 259.
+.. [2] M. J. W. Jansen, Analysis of variance designs for model output, Comput. Phys. Commun. 117 (1999) 35.
+.. [3] F. Campolongo, J. Cariboni, A. Saltelli, An effective screening design for sensitivity analysis of large models,
+   Environ. Model. Softw. 22 (2007) 1509.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.campaigns.factors import SEQUENCES
+from gearmbs.campaigns.settings import CampaignError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gearmbs.campaigns.campaign import Campaign
+    from gearmbs.campaigns.plan import Plan
+    from gearmbs.campaigns.sensitivity.surrogates import PolynomialChaos
+
+RESAMPLES = 200
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class SobolIndices:
+    """Sobol' indices of a result.
+
+    Attributes
+    ----------
+    names : list of str
+    first, total : ndarray, shape (d,)
+        Parts of the variance: of each factor alone, and of each with all its interactions.
+    first_confidence, total_confidence : ndarray, shape (d,)
+        Half widths of their 95 % intervals, by resampling of the base points.
+    base_points, left_out : int
+        Base points used, and those left out since one of their cases has no result.
+    mean, variance : float
+        Of the result.
+    explained : float
+        Part of the variance that the polynomials explain at points left out, whose indices are known and not sampled;
+        0 without.
+    """
+
+    names: list[str]
+    first: np.ndarray
+    total: np.ndarray
+    first_confidence: np.ndarray
+    total_confidence: np.ndarray
+    base_points: int
+    left_out: int
+    mean: float
+    variance: float
+    explained: float = 0.0
+
+    def table(self) -> pd.DataFrame:
+        """Return the indices by factor, the most important first."""
+        import pandas as pd
+
+        table = pd.DataFrame(
+            {
+                "first": self.first,
+                "first_confidence": self.first_confidence,
+                "total": self.total,
+                "total_confidence": self.total_confidence,
+            },
+            index=pd.Index(self.names, name="factor"),
+        )
+        return table.sort_values("total", ascending=False)
+
+
+def sobol_indices(
+    values: np.ndarray,
+    names: list[str],
+    *,
+    points: np.ndarray | None = None,
+    levels: Sequence[int] | None = None,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+) -> SobolIndices:
+    """Return first and total Sobol' indices of results on a Saltelli design.
+
+    With A, B and AB_i, A with coordinate i of B, standardised together: first index the mean of f_B (f_AB - f_A)
+    (Saltelli 2010), total index half the mean of (f_A - f_AB)^2 (Jansen 1999), over the variance of f_A and f_B. With
+    the points, polynomials serve as control variates, which narrows the intervals and leaves the expectation; see
+    `gearmbs.campaigns.sensitivity.surrogates`.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n (d + 2),)
+        In the order of `gearmbs.campaigns.factors.saltelli`; NaN where there is none.
+    names : list of str
+        The d factors' coordinates.
+    points : ndarray, shape (n (d + 2), d), optional
+        The design.
+    levels : sequence of int, optional
+        Number of values of each coordinate that has but a few, 0 for a range.
+
+    Returns
+    -------
+    SobolIndices
+    """
+    d = len(names)
+    blocks = np.asarray(values, dtype=float).reshape(-1, d + 2)
+    good = np.isfinite(blocks).all(axis=1)
+    left_out = int((~good).sum())
+    blocks = blocks[good]
+    if len(blocks) < 4:
+        raise CampaignError(f"sobol: {len(blocks)} base points have all their results; at least four are needed")
+    mean, variance = float(blocks[:, [0, -1]].mean()), float(blocks[:, [0, -1]].var())
+    if variance == 0.0:
+        raise CampaignError("sobol: the result is the same everywhere; it depends on none of the factors")
+    blocks = (blocks - blocks.mean()) / blocks.std()
+    controlled = None
+    if points is not None:
+        from gearmbs.campaigns.sensitivity.surrogates import control_variates
+
+        controlled = control_variates(blocks, np.reshape(points, (-1, d + 2, d))[good], levels or [0] * d, seed=seed)
+    estimate = (lambda rows: _indices(blocks[rows])) if controlled is None else controlled.indices
+    first, total = estimate(np.arange(len(blocks)))
+    generator = np.random.default_rng(seed)
+    drawn = [estimate(generator.integers(len(blocks), size=len(blocks))) for _ in range(resamples)]
+    spread = np.std(np.array(drawn), axis=0, ddof=1)
+    from scipy.stats import norm
+
+    q = norm.ppf(0.5 + 0.5 * CONFIDENCE)
+    return SobolIndices(
+        names,
+        first,
+        total,
+        q * spread[0],
+        q * spread[1],
+        len(blocks),
+        left_out,
+        mean,
+        variance,
+        0.0 if controlled is None else controlled.explained,
+    )
+
+
+def _indices(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    a, b, mixed = blocks[:, :1], blocks[:, -1:], blocks[:, 1:-1]
+    variance = np.var(np.r_[a, b])
+    return (b * (mixed - a)).mean(axis=0) / variance, 0.5 * ((a - mixed) ** 2).mean(axis=0) / variance
+
+
+def morris_effects(values: np.ndarray, points: np.ndarray, names: list[str], *, seed: int = 0) -> pd.DataFrame:
+    """Return the elementary effects on a Morris design: mean, mean of the absolute value, spread, and its confidence.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n (d + 1),)
+        In the order of `gearmbs.campaigns.factors.morris`; trajectories with a NaN are left out.
+    points : ndarray, shape (n (d + 1), d)
+        The design.
+
+    Returns
+    -------
+    DataFrame
+        ``mu``, ``mu_star`` (Campolongo 2007), ``sigma`` and ``confidence`` (half width of the 95 % interval of mu_star)
+        by factor. An effect is the change of the result over the whole range of the factor.
+    """
+    import pandas as pd
+    from scipy.stats import norm
+
+    d = len(names)
+    y, x = np.asarray(values, dtype=float).reshape(-1, d + 1), np.asarray(points).reshape(-1, d + 1, d)
+    good = np.isfinite(y).all(axis=1)
+    y, x = y[good], x[good]
+    if not len(y):
+        raise CampaignError("morris: no trajectory has all its results")
+    moves = np.diff(x, axis=1)
+    axis = np.abs(moves).argmax(axis=2)
+    effect = np.empty((len(y), d))
+    rows = np.arange(len(y))[:, None]
+    effect[rows, axis] = np.diff(y, axis=1) / np.take_along_axis(moves, axis[..., None], axis=2)[..., 0]
+    size = np.abs(effect)
+    drawn = np.random.default_rng(seed).integers(len(y), size=(RESAMPLES, len(y)))
+    spread = size[drawn].mean(axis=1).std(axis=0, ddof=1)
+    table = pd.DataFrame(
+        {
+            "mu": effect.mean(axis=0),
+            "mu_star": size.mean(axis=0),
+            "sigma": effect.std(axis=0, ddof=1) if len(y) > 1 else np.full(d, np.nan),
+            "confidence": norm.ppf(0.5 + 0.5 * CONFIDENCE) * spread,
+        },
+        index=pd.Index(names, name="factor"),
+    )
+    return table.sort_values("mu_star", ascending=False)
+
+
+def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, interactions: bool = True) -> pd.DataFrame:
+    """Return main effects and two-factor interactions of a two-level design: mean at high less mean at low.
+
+    Parameters
+    ----------
+    coded : ndarray, shape (n, d)
+        -1 and 1.
+    values : ndarray, shape (n,)
+    """
+    import pandas as pd
+
+    good = np.isfinite(values)
+    coded, values = coded[good], np.asarray(values, dtype=float)[good]
+    terms = {name: coded[:, k] for k, name in enumerate(names)}
+    if interactions:
+        for i, j in itertools.combinations(range(len(names)), 2):
+            terms[f"{names[i]} x {names[j]}"] = coded[:, i] * coded[:, j]
+    rows = {}
+    for name, column in terms.items():
+        up, down = column > 0, column < 0
+        if up.any() and down.any():
+            rows[name] = float(values[up].mean() - values[down].mean())
+    table = pd.DataFrame({"effect": rows})
+    table.index.name = "term"
+    return table.reindex(table.effect.abs().sort_values(ascending=False).index)
+
+
+def one_factor_studies(campaign: Campaign, result: str) -> pd.DataFrame:
+    """Return a result over the values of each factor alone, the others at the base, of a one-at-a-time design.
+
+    Returns
+    -------
+    DataFrame
+        By factor and value: ``result``; ``change``, its difference from the base; and ``sensitivity``, the mean of the
+        slopes to the neighbouring values, in the result's unit over the factor's in SI, NaN for factors without order.
+    """
+    import pandas as pd
+
+    plan = campaign.plan
+    points = plan.points()
+    y, columns = results_in_order(campaign, result), plan.columns(points)
+    rows, first = [], 1
+    for factor in plan.factors:
+        stop = first + plan.count(factor)
+        values, found = columns[factor.name][first:stop], y[first:stop]
+        slope = np.full(found.size, np.nan)
+        if values.dtype.kind in "fiu" and found.size > 1:
+            slopes = np.diff(found) / np.diff(values.astype(float))
+            slope = 0.5 * (np.r_[slopes[:1], slopes] + np.r_[slopes, slopes[-1:]])
+        rows += [(factor.name, v, r, r - y[0], k) for v, r, k in zip(values, found, slope)]
+        # further coordinates of a factor have one value each, which is not a study
+        first = stop + factor.width - 1
+    table = pd.DataFrame(rows, columns=["factor", "value", "result", "change", "sensitivity"])
+    return table.set_index(["factor", "value"])
+
+
+def grid_indices(values: np.ndarray, counts: Sequence[int], names: list[str]) -> SobolIndices:
+    """Return first and total Sobol' indices of results on a full grid, each value of a factor as likely as the others.
+
+    These are the parts of the grid's own variance (analysis of variance of a complete layout), free of any sampling
+    error: the mean over all factors but one varies by its first index, the mean over that one leaves what is not in its
+    total.
+
+    Parameters
+    ----------
+    values : ndarray, shape (product of counts,)
+        The last factor running fastest, as `gearmbs.campaigns.factors.grid` does.
+    counts : sequence of int
+        Values of each factor.
+
+    Raises
+    ------
+    CampaignError
+        If a result is missing, or all are equal.
+    """
+    y = np.asarray(values, dtype=float).reshape(tuple(counts))
+    missing = int((~np.isfinite(y)).sum())
+    if missing:
+        raise CampaignError(f"grid: {missing} of {y.size} cases have no result; the parts of a grid need them all")
+    variance = float(y.var())
+    if variance == 0.0:
+        raise CampaignError("grid: the result is the same everywhere; it depends on none of the factors")
+    d = len(names)
+    others = [tuple(a for a in range(d) if a != k) for k in range(d)]
+    first = np.array([y.mean(axis=axes).var() for axes in others]) / variance
+    total = np.array([y.var(axis=k).mean() for k in range(d)]) / variance
+    zero = np.zeros(d)
+    return SobolIndices(names, first, total, zero, zero, y.size, 0, float(y.mean()), variance)
+
+
+def coordinates(campaign: Campaign) -> tuple[list[str], np.ndarray]:
+    """Return the names of the coordinates of a campaign's plan and its points in the unit cube."""
+    plan = campaign.plan
+    names = []
+    for factor in plan.factors:
+        names += [factor.name] + [f"{factor.name}[{k}]" for k in range(1, factor.width)]
+    return names, plan.points()
+
+
+def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
+    """Return a result by case, NaN for cases that failed or are not done."""
+    table = campaign.table
+    if result not in table.columns:
+        from gearmbs.campaigns.results import result_names
+
+        known = ", ".join(result_names(campaign.folder, table)[:12])
+        raise CampaignError(f"result {result!r} is unknown; known are {known or 'none, since no case has results'}")
+    if table[result].dtype.kind not in "biuf":
+        raise CampaignError(f"result {result!r} is a column of texts, not of numbers")
+    values = np.full(campaign.folder.case_count, np.nan)
+    values[table["index"].to_numpy()] = table[result].to_numpy(dtype=float)
+    return values
+
+
+def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -> PolynomialChaos:
+    """Return the polynomial chaos of a campaign's result over the coordinates of its plan."""
+    from gearmbs.campaigns.sensitivity.surrogates import fit_chaos
+
+    plan = campaign.plan
+    if plan.variants > 1 or plan.constraints:
+        raise CampaignError(
+            "polynomial chaos: not of crossed choices or constraints; fit the table's columns by fit_chaos"
+        )
+    names, points = coordinates(campaign)
+    return fit_chaos(points, results_in_order(campaign, result), names, levels=_levels(plan), degree=degree)
+
+
+def _levels(plan: Plan) -> list[int]:
+    """Return the number of values of each coordinate that has but a few, 0 for a range."""
+    from gearmbs.campaigns.factors import Choice, Factor
+
+    levels: list[int] = []
+    for factor in plan.factors:
+        few = len(factor.values) if isinstance(factor, Factor) else factor.count if isinstance(factor, Choice) else 0
+        levels += [few] + [0] * (factor.width - 1)
+    return levels
+
+
+def sensitivity(campaign: Campaign, result: str) -> Any:
+    """Return what decides a result, by the campaign's design.
+
+    `SobolIndices` of a Saltelli design or a full grid, a table of effects of a Morris or factorial one, and a
+    `PolynomialChaos`, whose coefficients are Sobol' indices, of points that fill the space; `one_factor_studies` of a
+    one-at-a-time design.
+
+    Raises
+    ------
+    CampaignError
+        For a design that is made for something else.
+    """
+    plan = campaign.plan
+    names, points = coordinates(campaign)
+    values = results_in_order(campaign, result)
+    if plan.variants > 1:
+        raise CampaignError(
+            "sensitivity: not of crossed choices; make the choice a factor, or ask for one option's cases"
+        )
+    if plan.design == "saltelli":
+        return sobol_indices(values, names, points=points, levels=_levels(plan))
+    if plan.design == "morris":
+        return morris_effects(values, points, names)
+    if plan.design in ("factorial", "plackett burman"):
+        return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
+    if plan.design == "grid" and not plan.constraints:
+        # crossed choices, which take no coordinate, were refused above
+        varied = [k for k, count in enumerate(plan.counts()) if count > 1]
+        return grid_indices(values, [plan.counts()[k] for k in varied], [names[k] for k in varied])
+    if plan.design == "one at a time":
+        return one_factor_studies(campaign, result)
+    if plan.design in (*SEQUENCES, "latin hypercube"):
+        return campaign_chaos(campaign, result)
+    raise CampaignError(
+        f"sensitivity: a {plan.design} design has none of its own; take saltelli, morris, sobol or factorial, or "
+        f"response_surface"
+    )

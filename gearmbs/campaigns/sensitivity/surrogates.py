@@ -1,0 +1,536 @@
+"""A result as a sum of orthonormal polynomials of the factors, from any sample: a surrogate whose coefficients are the
+Sobol' indices.
+
+References
+----------
+.. [1] B. Sudret, Global sensitivity analysis using polynomial chaos expansions, Reliab. Eng. Syst. Saf. 93 (2008) 964.
+.. [2] G. Blatman, B. Sudret, Adaptive sparse polynomial chaos expansion based on least angle regression, J. Comput.
+   Phys. 230 (2011) 2345.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.campaigns.results import factor_names
+from gearmbs.campaigns.sensitivity.indices import coordinates, results_in_order
+from gearmbs.campaigns.settings import CampaignError, whole
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from gearmbs.campaigns.campaign import Campaign
+
+HIGHEST = 6
+POINTS_A_TERM = 2.0
+"""Points for each coefficient at least: with fewer the errors at points left out say little."""
+
+RESAMPLES = 100
+
+
+@dataclass(frozen=True)
+class PolynomialChaos:
+    """A sum of products of orthonormal polynomials, at most some factors in each.
+
+    Attributes
+    ----------
+    names : list of str
+        The d factors' coordinates.
+    levels : tuple of int
+        Number of values of each that has but a few, 0 for a range.
+    degrees : ndarray of int, shape (t, d)
+        Degree of each factor in each term; the first term is the constant.
+    coefficients : ndarray, shape (t,)
+    r_squared, q_squared : float
+        Part of the variance it explains, of its points and of each point by the sum fitted to all others.
+    confidence : ndarray, shape (2, d)
+        Half widths of the 95 % intervals of first and total indices, by resampling of the points.
+    count : int
+        Points.
+    """
+
+    names: list[str]
+    levels: tuple[int, ...]
+    degrees: np.ndarray
+    coefficients: np.ndarray
+    r_squared: float
+    q_squared: float
+    confidence: np.ndarray
+    count: int
+
+    def predict(self, u: np.ndarray) -> np.ndarray:
+        """Return the sum at points of the unit cube, shape (n, d)."""
+        return chaos_columns(np.atleast_2d(u), self.degrees, self.levels) @ self.coefficients
+
+    @property
+    def indices(self) -> np.ndarray:
+        """First and total Sobol' indices, shape (2, d)."""
+        return chaos_indices(self.degrees, self.coefficients)
+
+    def interaction(self, one: str, other: str) -> float:
+        """Return the part of the variance that two factors explain together beyond each alone."""
+        pair = [self.names.index(one), self.names.index(other)]
+        active = self.degrees > 0
+        both = active[:, pair].all(axis=1) & (active.sum(axis=1) == 2)
+        return float((self.coefficients[both] ** 2).sum() / (self.coefficients[1:] ** 2).sum())
+
+    def table(self) -> pd.DataFrame:
+        """Return first and total indices with their confidence by factor, the most important first."""
+        import pandas as pd
+
+        first, total = self.indices
+        data = {"first": first, "first_confidence": self.confidence[0]}
+        data |= {"total": total, "total_confidence": self.confidence[1]}
+        return pd.DataFrame(data, index=pd.Index(self.names, name="factor")).sort_values("total", ascending=False)
+
+
+def fit_chaos(
+    u: np.ndarray,
+    values: Sequence[float] | np.ndarray,
+    names: list[str],
+    *,
+    levels: Sequence[int] | None = None,
+    degree: int | None = None,
+    together: int = 2,
+    seed: int = 0,
+) -> PolynomialChaos:
+    """Fit a polynomial chaos by least squares.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, d)
+        Points in the unit cube, evenly spread.
+    values : array_like, shape (n,)
+        NaN are left out.
+    names : list of str
+    levels : sequence of int, optional
+        Number of values of each coordinate that has but a few, 0 for a range.
+    degree : int, optional
+        Highest sum of degrees in a term; default the one of the least errors at points left out.
+    together : int
+        Most factors in a term.
+    seed : int
+        Of the resampling.
+
+    Raises
+    ------
+    CampaignError
+        If there are too few points, or the result is the same everywhere.
+
+    Examples
+    --------
+    >>> u = np.random.default_rng(0).random((200, 2))
+    >>> found = fit_chaos(u, u[:, 0] + 0.5 * u[:, 1], ["a", "b"])
+    >>> found.indices.round(3).tolist()
+    [[0.8, 0.2], [0.8, 0.2]]
+    """
+    y = np.asarray(values, dtype=float)
+    good = np.isfinite(y)
+    u, y = np.asarray(u, dtype=float)[good], y[good]
+    few = tuple(levels or [0] * len(names))
+    if y.size < 2 or np.ptp(y) == 0.0:
+        raise CampaignError("polynomial chaos: the result is the same everywhere; it depends on none of the factors")
+    best = best_chaos(u, y, few, degree=degree, together=together)
+    x = chaos_columns(u, best.degrees, few)
+    generator, drawn = np.random.default_rng(seed), []
+    for _ in range(RESAMPLES):
+        # weights of a Bayesian bootstrap, under which no coefficient is left undetermined
+        weight = np.sqrt(generator.exponential(size=y.size))
+        drawn.append(chaos_indices(best.degrees, np.linalg.lstsq(x * weight[:, None], y * weight, rcond=None)[0]))
+    confidence = 1.96 * np.std(drawn, axis=0, ddof=1)
+    return PolynomialChaos(
+        list(names), few, best.degrees, best.coefficients, best.r_squared, best.q_squared, confidence, y.size
+    )
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Terms and coefficients of a sum, and what it explains; see `PolynomialChaos`."""
+
+    degrees: np.ndarray
+    coefficients: np.ndarray
+    r_squared: float
+    q_squared: float
+
+
+def best_chaos(
+    u: np.ndarray,
+    y: np.ndarray,
+    levels: Sequence[int],
+    *,
+    degree: int | None = None,
+    together: int = 2,
+    most: float = np.inf,
+) -> Fitted:
+    """Return the sum of the least errors at points left out; see `fit_chaos`, without confidence.
+
+    Of degrees that are not given only those with at most ``most`` terms are tried, the lowest in any case.
+    """
+    best: Fitted | None = None
+    for highest in range(1, HIGHEST + 1) if degree is None else (degree,):
+        degrees = _terms(levels, highest, together)
+        if best is not None and (POINTS_A_TERM * len(degrees) > y.size or len(degrees) > most):
+            break
+        if len(degrees) >= y.size:
+            raise CampaignError(f"polynomial chaos: {y.size} points for {len(degrees)} coefficients; draw more points")
+        found = Fitted(degrees, *_least_squares(chaos_columns(u, degrees, levels), y))
+        if best is None or found.q_squared > best.q_squared:
+            best = found
+    assert best is not None
+    return best
+
+
+def _least_squares(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Return coefficients, R^2 and the same of points left out."""
+    q, r = np.linalg.qr(x)
+    coefficients = np.linalg.solve(r, q.T @ y)
+    rest = y - x @ coefficients
+    leverage = np.minimum((q**2).sum(axis=1), 1.0 - 1e-12)
+    spread = float(((y - y.mean()) ** 2).sum())
+    out = rest / (1.0 - leverage)
+    return coefficients, 1.0 - float(rest @ rest) / spread, 1.0 - float(out @ out) / spread
+
+
+def chaos_indices(degrees: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Return first and total indices of a sum, shape (2, d)."""
+    active = degrees > 0
+    part = coefficients**2
+    whole = part[1:].sum()
+    alone = active & (active.sum(axis=1) == 1)[:, None]
+    return np.array([part @ alone, part @ active]) / whole
+
+
+def _terms(levels: Sequence[int], degree: int, together: int) -> np.ndarray:
+    """Return the degrees of all terms, shape (t, d), the constant first."""
+    d = len(levels)
+    most = [min(degree, count - 1) if count else degree for count in levels]
+    rows = [np.zeros(d, dtype=int)]
+    for size in range(1, together + 1):
+        for chosen in itertools.combinations(range(d), size):
+            for powers in itertools.product(*(range(1, most[k] + 1) for k in chosen)):
+                if sum(powers) <= degree:
+                    row = np.zeros(d, dtype=int)
+                    row[list(chosen)] = powers
+                    rows.append(row)
+    return np.array(rows)
+
+
+def chaos_columns(u: np.ndarray, degrees: np.ndarray, levels: Sequence[int]) -> np.ndarray:
+    """Return the products of the polynomials at points, shape (n, t)."""
+    found = np.ones((len(u), len(degrees)))
+    for k, count in enumerate(levels):
+        basis = _discrete(u[:, k], count) if count else _legendre(u[:, k], int(degrees[:, k].max()))
+        found *= basis[:, degrees[:, k]]
+    return found
+
+
+def _legendre(u: np.ndarray, degree: int) -> np.ndarray:
+    """Return Legendre's polynomials on [0, 1], orthonormal, shape (n, degree + 1)."""
+    basis = np.polynomial.legendre.legvander(2.0 * u - 1.0, degree)
+    return basis * np.sqrt(2.0 * np.arange(degree + 1) + 1.0)
+
+
+def _discrete(u: np.ndarray, count: int) -> np.ndarray:
+    """Return polynomials over so many equally likely values, orthonormal, shape (n, count)."""
+    places = np.arange(count) - 0.5 * (count - 1)
+    q, r = np.linalg.qr(np.vander(places, count, increasing=True))
+    basis = q * np.sign(np.diag(r)) * np.sqrt(count)
+    return basis[np.minimum((u * count).astype(int), count - 1)]
+
+
+# Sobol' indices of a Saltelli design, their noise lowered by a surrogate that is exact where it need not be right.
+#
+# The result is f = g + r, g a polynomial chaos. The indices of g are known from its coefficients; only how f's
+# estimator differs from g's on the same points is left to chance. Each base point is judged by a polynomial fitted to
+# the others, so that the estimate stays unbiased however bad the polynomial is: a bad one saves nothing.
+#
+# References
+# ----------
+# .. [1] E. Qian et al., Multifidelity Monte Carlo estimation of variance and sensitivity indices, SIAM/ASA J.
+# Uncertain.    Quantif. 6 (2018) 683.
+# .. [2] B. L. Nelson, Control variate remedies, Oper. Res. 38 (1990) 974.
+
+
+CONTROL_FOLDS = 5
+TOGETHER = 3
+"""Most factors in a term of the polynomial."""
+
+MOST_TERMS, MOST_POINTS = 500, 20_000
+"""Of a fit, so that it stays below some hundred megabytes however large the design is."""
+
+
+@dataclass(frozen=True)
+class ControlledBlocks:
+    """What each base point says of the indices, and what its control variates say, whose mean is zero.
+
+    Attributes
+    ----------
+    plain, control : ndarray, shape (n, 2 d + 1)
+        Of the d first indices' numerators, of the d total ones' and of the variance.
+    explained : float
+        Part of the variance that the polynomials explain at base points they were not fitted to.
+    """
+
+    plain: np.ndarray
+    control: np.ndarray
+    explained: float
+
+    def indices(self, rows: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Return first and total indices, shape (d,) each, from these base points."""
+        plain, control = self.plain[rows], self.control[rows]
+        away = control - control.mean(axis=0)
+        spread = (away**2).mean(axis=0)
+        slope = np.divide((away * plain).mean(axis=0), spread, out=np.zeros_like(spread), where=spread > 0.0)
+        found = plain.mean(axis=0) - slope * control.mean(axis=0)
+        d = (found.size - 1) // 2
+        return found[:d] / found[-1], found[d:-1] / found[-1]
+
+
+def control_variates(
+    blocks: np.ndarray, points: np.ndarray, levels: Sequence[int], *, seed: int = 0
+) -> ControlledBlocks | None:
+    """Return the base points' parts of the indices with their control variates.
+
+    Parameters
+    ----------
+    blocks : ndarray, shape (n, d + 2)
+        Results at A, AB_1 ... AB_d, B of each base point, standardised.
+    points : ndarray, shape (n, d + 2, d)
+        Where in the unit cube.
+    levels : sequence of int, shape (d,)
+        Number of values of each coordinate that has but a few, 0 for a range.
+    seed : int
+        Of the folds.
+
+    Returns
+    -------
+    ControlledBlocks or None
+        None if there are too few base points to fit a polynomial to a part of them.
+    """
+    n, d = points.shape[0], points.shape[2]
+    fold = np.random.default_rng(seed).permutation(n) % CONTROL_FOLDS
+    surrogate = np.empty_like(blocks)
+    known = np.empty((n, 2 * d + 1))
+    centre = np.empty(n)
+    for k in range(CONTROL_FOLDS):
+        mine, others = fold == k, fold != k
+        if not mine.any() or (d + 2) * int(others.sum()) < 4 * (d + 1):
+            return None
+        some = np.flatnonzero(others)[: max(1, MOST_POINTS // (d + 2))]
+        u, y = points[some].reshape(-1, d), blocks[some].ravel()
+        fitted = best_chaos(u, y, levels, together=min(d, TOGETHER), most=MOST_TERMS)
+        degrees, weights = fitted.degrees, fitted.coefficients
+        values = chaos_columns(points[mine].reshape(-1, d), degrees, levels) @ weights
+        surrogate[mine] = values.reshape(-1, d + 2)
+        variance = float((weights[1:] ** 2).sum())
+        known[mine] = np.r_[(chaos_indices(degrees, weights) * variance).ravel(), variance] if variance else 0.0
+        centre[mine] = weights[0]
+    ends = [0, -1]
+    rest = blocks[:, ends] - surrogate[:, ends]
+    explained = 1.0 - float((rest**2).mean() / blocks[:, ends].var())
+    plain = _parts(blocks, np.full(n, blocks[:, ends].mean()))
+    return ControlledBlocks(plain, _parts(surrogate, centre) - known, explained)
+
+
+def _parts(blocks: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return of each base point its numerators of the indices and its variance, shape (n, 2 d + 1)."""
+    away = blocks - centre[:, None]
+    a, b, mixed = away[:, :1], away[:, -1:], away[:, 1:-1]
+    return np.hstack([b * (mixed - a), 0.5 * (a - mixed) ** 2, 0.5 * (a**2 + b**2)])
+
+
+# Response surfaces: a quadratic of the factors, with its error where it was not fitted.
+
+
+@dataclass(frozen=True)
+class ResponseSurface:
+    """A polynomial of degree one or two in the coded factors x = 2 u - 1, from -1 to 1.
+
+    Attributes
+    ----------
+    names : list of str
+    degree : int
+    coefficients : ndarray
+    standard_errors : ndarray
+    r_squared : float
+        Part of the variance it explains of the points it was fitted to.
+    q_squared : float
+        The same for each point by the surface fitted to all others: what it is worth elsewhere.
+    error : float
+        RMS of those left-out errors, in the unit of the result.
+    count : int
+        Points.
+    """
+
+    names: list[str]
+    degree: int
+    coefficients: np.ndarray
+    standard_errors: np.ndarray
+    r_squared: float
+    q_squared: float
+    error: float
+    count: int
+
+    def terms(self) -> list[str]:
+        """Return the names of the terms."""
+        pairs = np.triu_indices(len(self.names)) if self.degree == 2 else ((), ())
+        squares = [
+            f"{self.names[i]}^2" if i == j else f"{self.names[i]} x {self.names[j]}" for i, j in zip(pairs[0], pairs[1])
+        ]
+        return ["1", *self.names, *squares]
+
+    def table(self) -> pd.DataFrame:
+        """Return coefficients and standard errors by term."""
+        import pandas as pd
+
+        data = {"coefficient": self.coefficients, "standard_error": self.standard_errors}
+        return pd.DataFrame(data, index=pd.Index(self.terms(), name="term"))
+
+    def predict(self, u: np.ndarray) -> np.ndarray:
+        """Return the surface at points of the unit cube, shape (n, d)."""
+        return design_matrix(2.0 * np.atleast_2d(u) - 1.0, self.degree) @ self.coefficients
+
+
+def design_matrix(x: np.ndarray, degree: int) -> np.ndarray:
+    """Return the columns of the terms 1, x_i and, of degree two, x_i x_j."""
+    columns = [np.ones(len(x)), *x.T]
+    if degree == 2:
+        rows, others = np.triu_indices(x.shape[1])
+        columns += list((x[:, rows] * x[:, others]).T)
+    return np.array(columns).T
+
+
+def fit_surface(
+    u: np.ndarray, values: Sequence[float] | np.ndarray, names: list[str], degree: int = 2
+) -> ResponseSurface:
+    """Fit a response surface by least squares.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, d)
+        Points in the unit cube.
+    values : array_like, shape (n,)
+        NaN are left out.
+    names : list of str
+    degree : {1, 2}
+
+    Raises
+    ------
+    CampaignError
+        If the points do not determine the coefficients.
+    """
+    if degree not in (1, 2):
+        raise CampaignError(f"response surface: degree = {degree!r}; give 1 or 2, or fit_chaos for more")
+    y = np.asarray(values, dtype=float)
+    good = np.isfinite(y)
+    x, y = design_matrix(2.0 * u[good] - 1.0, degree), y[good]
+    n, t = x.shape
+    if n < t or np.linalg.matrix_rank(x) < t:
+        raise CampaignError(
+            f"response surface: {n} points do not determine {t} coefficients; take a central composite, "
+            f"more points of a "
+            "sequence, or degree=1"
+        )
+    inverse = np.linalg.inv(x.T @ x)
+    coefficients = inverse @ (x.T @ y)
+    rest = y - x @ coefficients
+    leverage = np.einsum("ij,jk,ik->i", x, inverse, x)
+    with np.errstate(all="ignore"):
+        out = np.where(leverage < 1.0 - 1e-9, rest / (1.0 - leverage), np.nan)
+    spread = float(np.sum((y - y.mean()) ** 2))
+    noise = float(rest @ rest) / (n - t) if n > t else np.nan
+    return ResponseSurface(
+        names,
+        degree,
+        coefficients,
+        np.sqrt(np.diag(inverse) * noise),
+        1.0 - float(rest @ rest) / spread if spread else 1.0,
+        1.0 - float(np.sum(out**2)) / spread if spread else 1.0,
+        float(np.sqrt(np.mean(out**2))),
+        n,
+    )
+
+
+def response_surface(campaign: Campaign, result: str, degree: int = 2) -> ResponseSurface:
+    """Return the response surface of a campaign's result over the coordinates of its plan."""
+    if campaign.plan.variants > 1:
+        raise CampaignError("response surface: not of crossed choices; fit each option's cases by fit_surface")
+    names, points = coordinates(campaign)
+    values = results_in_order(campaign, result)
+    if len(values) != len(points):
+        raise CampaignError(
+            "response surface: constraints have left points out; fit the table's columns by fit_surface"
+        )
+    return fit_surface(points, values, names, degree)
+
+
+def condition_map(
+    campaign: Campaign, condition: str, across: str, along: str, bins: int = 8
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return over two factors in which part of the cases a condition holds.
+
+    Parameters
+    ----------
+    condition : str
+        A comparison of columns of the table, as a constraint is written; a column's name may hold what no name in an
+        expression does, then write it with underscores: ``orders_line_of_action_2 > 10``.
+    across, along : str
+        Columns of the horizontal and the vertical axis.
+    bins : int
+        Of equal numbers of cases along each.
+
+    Returns
+    -------
+    share, counts : ndarray, shape (bins, bins)
+        Part of the cases and how many there are, rows along the vertical axis.
+    edges_across, edges_along : ndarray, shape (bins + 1,)
+    """
+    from gearmbs.campaigns.settings import satisfied
+
+    table = campaign.table
+    table = table[table["status"] == "done"]
+    columns = {str(name): table[name].to_numpy() for name in table.columns}
+    columns |= {str(name).replace(".", "_").replace(" ", "_"): table[name].to_numpy() for name in table.columns}
+    held = satisfied(condition, columns)
+    bins = whole(bins, "bins", 1)
+    for name in (across, along):
+        if name not in table.columns or table[name].dtype.kind not in "biuf":
+            known = ", ".join(str(n) for n in factor_names(campaign.folder) if table[n].dtype.kind in "biuf")
+            raise CampaignError(f"map: {name!r} is no column of numbers; factors that are one: {known}")
+    x, y = (table[name].to_numpy(dtype=float) for name in (across, along))
+    edges_x, edges_y = (np.quantile(v, np.linspace(0.0, 1.0, bins + 1)) for v in (x, y))
+    i = np.clip(np.searchsorted(edges_y, y, side="right") - 1, 0, bins - 1)
+    j = np.clip(np.searchsorted(edges_x, x, side="right") - 1, 0, bins - 1)
+    counts, hits = np.zeros((bins, bins)), np.zeros((bins, bins))
+    np.add.at(counts, (i, j), 1.0)
+    np.add.at(hits, (i, j), held.astype(float))
+    with np.errstate(all="ignore"):
+        return hits / counts, counts, edges_x, edges_y
+
+
+def condition_figure(campaign: Campaign, condition: str, across: str, along: str, bins: int = 8) -> Figure:
+    """Draw a `condition_map`: in which part of the cases a condition holds, over two factors."""
+    from gearmbs.view.figures.style import new_figure
+
+    share, counts, edges_x, edges_y = condition_map(campaign, condition, across, along, bins)
+    figure = new_figure(5.6, 4.2)
+    ax = figure.subplots()
+    mesh = ax.pcolormesh(edges_x, edges_y, share, vmin=0.0, vmax=1.0)
+    figure.colorbar(mesh, ax=ax, label="part of the cases")
+    ax.set_xlabel(across)
+    ax.set_ylabel(along)
+    ax.set_title(
+        f"{condition}: {np.nansum(share * counts) / counts.sum():.0%} of {counts.sum():.0f} cases", fontsize=10
+    )
+    logarithmic = {f.name for f in campaign.plan.factors if getattr(f, "scale", "") == "log"}
+    if across in logarithmic:
+        ax.set_xscale("log")
+    if along in logarithmic:
+        ax.set_yscale("log")
+    return figure

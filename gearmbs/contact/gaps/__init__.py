@@ -1,0 +1,1 @@
+"""Gaps between two flanks in their sections, with derivatives by the pose."""

@@ -1,0 +1,289 @@
+"""Where the contacts of a strip stand: half-way between the two surfaces, with derivatives by the pose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.contact import layout as L
+from gearmbs.contact.gaps.face import level, level_point
+from gearmbs.contact.gaps.support import (
+    corner_curvatures,
+    corner_slopes,
+    edge_curvatures,
+    edge_of,
+    edge_slopes,
+    helical_turn,
+    helicoid_curvatures,
+    helicoid_slopes,
+    involute_curvatures,
+    involute_slopes,
+    screw_of,
+    tilt_of,
+)
+from gearmbs.kernels.records import inlined, kernel
+
+
+@kernel
+def contact_points(side, corner, strip, loads, n, f, corners, want):
+    """Fill where the contacts stand in the sections, half-way between the surfaces, and their derivatives.
+
+    Coordinates are along the normal and the tangent ``(cos alpha, -sin alpha)``, from the centre of wheel 1.
+
+    Parameters
+    ----------
+    side : record
+    corner : record
+        Tip corner of wheel 1, for sections in which it bears.
+    strip, loads : record
+        Sections with gaps; out: places in ``loads``.
+    n : int
+        Sections.
+    f : float
+        Angle of wheel 1's tooth from the line of centres, and its half angle at the base circle.
+    corners : bool
+        Whether the corner bears in any of the sections.
+    want : int
+        Nonzero to fill derivatives.
+    """
+    if level(side, strip, n, want):
+        level_point(side, corner, strip, loads, f)
+        return
+    tilt = tilt_of(side)
+    p, q, i_w = tilt.p, tilt.q, tilt.i_w
+    rb, half_h = side.base_1, 0.5 * side.x[1]
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        A = p * sa + q * ca
+        B = p * ca - q * sa
+        kap = np.sqrt(1.0 - B * B)
+        zp = strip.zeta[j] + half_h
+        s = rb * (f + strip.alpha[j] + strip.turn[j])
+        h = involute_slopes(A, B, kap, s, rb, tilt)
+        c = h
+        if corners:
+            sn = sa * corner.cos[j] + ca * corner.sin[j]
+            cs = ca * corner.cos[j] - sa * corner.sin[j]
+            c = corner_slopes(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
+        bears = strip.kind[j] == 1.0
+        loads.normal[j] = (c.h if bears else h.h) + A * i_w * zp + 0.5 * strip.gap[j]
+        loads.tangent[j] = (c.alpha if bears else h.alpha) + B * i_w * zp
+        loads.slope_A[j] = c.A if bears else h.A
+        loads.slope_B[j] = c.B if bears else h.B
+        loads.slope_F[j] = c.F if bears else h.F
+    if want != 0:
+        point_slopes(side, corner, strip, loads, n, f, corners)
+
+
+@kernel
+def point_slopes(side, corner, strip, loads, n, f, corners):
+    """Fill derivatives of the contact points by the pose; arguments as in `contact_points`, which runs before."""
+    tilt = tilt_of(side)
+    p, q, i_w, i_w3 = tilt.p, tilt.q, tilt.i_w, tilt.i_w3
+    rb, half_h = side.base_1, 0.5 * side.x[1]
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        A = p * sa + q * ca
+        B = p * ca - q * sa
+        kap = np.sqrt(1.0 - B * B)
+        zp = strip.zeta[j] + half_h
+        s = rb * (f + strip.alpha[j] + strip.turn[j])
+        h = involute_curvatures(A, B, kap, s, rb, tilt)
+        c = h
+        if corners:
+            sn = sa * corner.cos[j] + ca * corner.sin[j]
+            cs = ca * corner.cos[j] - sa * corner.sin[j]
+            c = corner_curvatures(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
+        bears = strip.kind[j] == 1.0
+        cross = A * B * i_w3 * zp
+        normal_A = loads.slope_A[j] + kap * kap * i_w3 * zp
+        normal_B = loads.slope_B[j] + cross
+        tangent_A = (c.alpha_A if bears else h.alpha_A) + cross
+        tangent_B = (c.alpha_B if bears else h.alpha_B) + (i_w + B * B * i_w3) * zp
+        by_n = loads.tangent[j]
+        by_t = (c.alpha_alpha if bears else h.alpha_alpha) - A * i_w * zp
+        x = strip.alpha_x
+        grad, normal, tangent = strip.grad, loads.normal_x, loads.tangent_x
+        normal[0, j] = 0.5 * grad[0, j] + by_n * x[0, j]
+        normal[1, j] = 0.5 * grad[1, j] + by_n * x[1, j] + 0.5 * A * i_w
+        normal[2, j] = 0.5 * grad[2, j] + by_n * x[2, j] + normal_A * sa + normal_B * ca
+        normal[3, j] = 0.5 * grad[3, j] + by_n * x[3, j] + normal_A * ca - normal_B * sa
+        normal[4, j] = 0.5 * grad[4, j] + by_n * x[4, j] + loads.slope_F[j]
+        normal[5, j] = 0.5 * grad[5, j] + by_n * x[5, j]
+        tangent[0, j] = by_t * x[0, j]
+        tangent[1, j] = by_t * x[1, j] + 0.5 * B * i_w
+        tangent[2, j] = by_t * x[2, j] + tangent_A * sa + tangent_B * ca
+        tangent[3, j] = by_t * x[3, j] + tangent_A * ca - tangent_B * sa
+        tangent[4, j] = by_t * x[4, j] + (c.alpha_F if bears else h.alpha_F)
+        tangent[5, j] = by_t * x[5, j]
+
+
+# Where the contacts of helical wheels stand, and friction in their tangent plane; loops as in `sections`.
+
+
+@kernel
+def helical_points(side, corner, strip, loads, n, f, corners, want):
+    """Fill where the contacts of helical wheels stand, and their derivatives; as `points.contact_points`.
+
+    Parameters
+    ----------
+    side, corner, strip, loads : record
+    n : int
+        Sections.
+    f : float
+        Angle of wheel 1's tooth from the line of centres, and its half angle at the base circle.
+    corners : bool
+        Whether wheel 1's edge bears in any of the sections.
+    want : int
+        Nonzero to fill derivatives.
+    """
+    flank_points(side, strip, loads, n, f, want)
+    if corners:
+        edge_points(side, corner, strip, loads, n, want)
+
+
+@kernel
+def flank_points(side, strip, loads, n, f, want):
+    """Fill the points of sections in which wheel 1's flank bears; arguments as in `helical_points`."""
+    tilt = tilt_of(side)
+    half, rb, t = 0.5 * side.x[L.H], side.base_1, side.twist_1
+    for j in range(n):
+        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
+        screw = screw_of(sa, ca, t, tilt)
+        s = rb * (f + strip.alpha[j] + helical_turn(screw.A, screw.B, screw.kap2, t, tilt))
+        slopes = helicoid_slopes(screw, s, Z, rb, t, sa, ca, tilt)
+        loads.normal[j] = slopes.h + 0.5 * strip.gap[j]
+        loads.tangent[j] = slopes.alpha
+    if want == 0:
+        return
+    for j in range(n):
+        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
+        screw = screw_of(sa, ca, t, tilt)
+        s = rb * (f + strip.alpha[j] + helical_turn(screw.A, screw.B, screw.kap2, t, tilt))
+        slopes = helicoid_slopes(screw, s, Z, rb, t, sa, ca, tilt)
+        put_point_slopes(strip, loads, j, slopes, helicoid_curvatures(screw, s, Z, rb, t, sa, ca, tilt))
+
+
+@kernel
+def edge_points(side, corner, strip, loads, n, want):
+    """Fill the points of sections in which wheel 1's edge bears; arguments as in `helical_points`."""
+    tilt = tilt_of(side)
+    half, t = 0.5 * side.x[L.H], side.twist_1
+    k = t / side.base_1
+    for j in range(n):
+        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
+        ce, se, r, rt = corner.cos[j], corner.sin[j], corner.radius[j], corner.rounding[j]
+        screw = screw_of(sa, ca, t, tilt)
+        sn, cs = sa * ce + ca * se, ca * ce - sa * se
+        slopes = edge_slopes(screw, edge_of(ce, se, r, k, Z, tilt), sn, cs, r, rt, Z, sa, ca, tilt)
+        bears = strip.kind[j] == 1.0
+        loads.normal[j] = slopes.h + 0.5 * strip.gap[j] if bears else loads.normal[j]
+        loads.tangent[j] = slopes.alpha if bears else loads.tangent[j]
+    if want == 0:
+        return
+    for j in range(n):
+        if strip.kind[j] != 1.0:
+            continue
+        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
+        ce, se, r, rt = corner.cos[j], corner.sin[j], corner.radius[j], corner.rounding[j]
+        screw = screw_of(sa, ca, t, tilt)
+        sn, cs = sa * ce + ca * se, ca * ce - sa * se
+        edge = edge_of(ce, se, r, k, Z, tilt)
+        slopes = edge_slopes(screw, edge, sn, cs, r, rt, Z, sa, ca, tilt)
+        curvatures = edge_curvatures(screw, edge, sn, cs, ce, se, r, rt, k, Z, sa, ca, tilt)
+        put_point_slopes(strip, loads, j, slopes, curvatures)
+
+
+@inlined
+def put_point_slopes(strip, loads, j, s, c):
+    """Fill the derivatives of a contact point from slopes and curvatures of wheel 1's support."""
+    x, grad, normal, tangent = strip.alpha_x, strip.grad, loads.normal_x, loads.tangent_x
+    normal[0, j] = 0.5 * grad[0, j] + s.alpha * x[0, j]
+    normal[1, j] = 0.5 * grad[1, j] + s.alpha * x[1, j] + 0.5 * s.Z
+    normal[2, j] = 0.5 * grad[2, j] + s.alpha * x[2, j] + s.p
+    normal[3, j] = 0.5 * grad[3, j] + s.alpha * x[3, j] + s.q
+    normal[4, j] = 0.5 * grad[4, j] + s.alpha * x[4, j] + s.F
+    normal[5, j] = 0.5 * grad[5, j] + s.alpha * x[5, j]
+    tangent[0, j] = c.alpha_alpha * x[0, j]
+    tangent[1, j] = c.alpha_alpha * x[1, j] + 0.5 * c.alpha_Z
+    tangent[2, j] = c.alpha_alpha * x[2, j] + c.alpha_p
+    tangent[3, j] = c.alpha_alpha * x[3, j] + c.alpha_q
+    tangent[4, j] = c.alpha_alpha * x[4, j] + c.alpha_F
+    tangent[5, j] = c.alpha_alpha * x[5, j]
+
+
+@kernel
+def lay_directions(side, strip, loads, n):
+    """Turn the friction directions along the face into the tangent plane of helical flanks.
+
+    The contact line leans against the normal of the section by the base helix angle. Runs after
+    `sums.friction_directions`, whose directions along the axis it replaces.
+    """
+    lean = 1.0 / np.sqrt(1.0 + side.twist_1 * side.twist_1)
+    across = lean * side.twist_1
+    half, axial, twist = 0.5 * side.x[L.H], loads.axial, side.twist
+    v0, v1, v2, v3, v4, v5 = twist[0], twist[1], twist[2], twist[3], twist[4], twist[5]
+    for j in range(n):
+        sa, ca, pt, zp = strip.sin[j], strip.cos[j], loads.tangent[j], strip.zeta[j] + half
+        axial[0, j] = -across * sa
+        axial[1, j] = -across * ca
+        axial[2, j] = lean
+        axial[3, j] = lean * axial[3, j] + across * zp * ca
+        axial[4, j] = lean * axial[4, j] - across * zp * sa
+        axial[5, j] = -across * pt
+        loads.v_axial[j] = (
+            axial[0, j] * v0 + axial[1, j] * v1 + lean * v2 + axial[3, j] * v3 + axial[4, j] * v4 + axial[5, j] * v5
+        )
+
+
+@inlined
+def lay_slope(loads, j, k, dz, x, leaning, spin):
+    """Complete the derivatives of friction in section ``j`` by pose number ``k``.
+
+    Parameters
+    ----------
+    loads : record
+    j, k : int
+    dz : float
+        Derivative of the contact point's place along the axis.
+    x : tuple of float
+        Sine and cosine of the normal, its turn, the place along the axis.
+    leaning : tuple of float
+        Cosine less one, and sine, of the base helix angle.
+    spin : tuple of float
+        Twist, without the velocity along the axis.
+    """
+    sa, ca, da, zp = x
+    less, across = leaning
+    v0, v1, v3, v4, v5 = spin
+    pn, pt, fz = loads.normal[j], loads.tangent[j], loads.f_axial[j]
+    dn, dt = loads.normal_x[k, j], loads.tangent_x[k, j]
+    un, ut = dn - pt * da, dt + pn * da
+    d0, d1 = -across * ca * da, across * sa * da
+    d3 = less * (un * ca - ut * sa) + across * (dz * ca - zp * sa * da)
+    d4 = -less * (un * sa + ut * ca) - across * (dz * sa + zp * ca * da)
+    d5 = -across * dt
+    moved = d0 * v0 + d1 * v1 + d3 * v3 + d4 * v4 + d5 * v5
+    loads.profile_x[k, j] += loads.pa[j] * moved
+    loads.axial_x[k, j] += loads.aa[j] * moved
+    loads.turned[0, k, j] += fz * d0
+    loads.turned[1, k, j] += fz * d1
+    loads.turned[3, k, j] += fz * d3
+    loads.turned[4, k, j] += fz * d4
+    loads.turned[5, k, j] += fz * d5
+
+
+@kernel
+def lay_slopes(side, strip, loads, n):
+    """Complete the derivatives of friction for the directions of `lay_directions`; runs after `friction_slopes`."""
+    lean = 1.0 / np.sqrt(1.0 + side.twist_1 * side.twist_1)
+    leaning = (lean - 1.0, lean * side.twist_1)
+    half = 0.5 * side.x[L.H]
+    spin = (side.twist[0], side.twist[1], side.twist[3], side.twist[4], side.twist[5])
+    for j in range(n):
+        sa, ca, zp, turn = strip.sin[j], strip.cos[j], strip.zeta[j] + half, strip.alpha_x
+        lay_slope(loads, j, 0, 0.0, (sa, ca, turn[0, j], zp), leaning, spin)
+        lay_slope(loads, j, 1, 0.5, (sa, ca, turn[1, j], zp), leaning, spin)
+        lay_slope(loads, j, 2, 0.0, (sa, ca, turn[2, j], zp), leaning, spin)
+        lay_slope(loads, j, 3, 0.0, (sa, ca, turn[3, j], zp), leaning, spin)
+        lay_slope(loads, j, 4, 0.0, (sa, ca, turn[4, j], zp), leaning, spin)
+        lay_slope(loads, j, 5, 0.0, (sa, ca, turn[5, j], zp), leaning, spin)

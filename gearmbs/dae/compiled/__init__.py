@@ -1,1 +1,0 @@
-"""What compiled code is made with: views into flat tables, and calls through typed function pointers."""

@@ -1,0 +1,1 @@
+"""Elastic bodies: frames of their points, inertia, and the integrals that make it."""

@@ -1,0 +1,1 @@
+"""Generalized forces (eq. 5) and their derivatives."""

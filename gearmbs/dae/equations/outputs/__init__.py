@@ -1,0 +1,1 @@
+"""What is evaluated at output times: accelerations, multipliers and reactions."""

@@ -1,0 +1,135 @@
+"""Files that appear under their final name only when they are whole."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TypeVar
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path in the same folder; rename it to ``path`` on success, remove it on failure.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written, with the name of the file to come.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
+    try:
+        yield part
+        os.replace(part, path)
+    except OSError as error:
+        # a full disk is told without a file, anything else with one that nobody has asked for
+        if error.errno is None or error.filename not in (None, str(part)):
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def write_whole(path: str | Path, text: str) -> Path:
+    """Write a text file as a whole and return its path."""
+    with whole_file(path) as part:
+        part.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+# Places of results: looked at before the work; what cannot be written there after all is kept somewhere else.
+
+
+T = TypeVar("T")
+
+
+class KeptElsewhere(OSError):
+    """A file could not be written where it was wanted; its content is in another place.
+
+    Attributes
+    ----------
+    path : Path
+        Where it is.
+    """
+
+    def __init__(self, message: str, path: Path) -> None:
+        super().__init__(message)
+        self.path = path
+
+
+def keep(save: Callable[[Path], T], path: str | Path) -> T:
+    """Return ``save(path)``; if that is impossible save somewhere else where it is possible.
+
+    Raises
+    ------
+    KeptElsewhere
+        If it had to be saved elsewhere: in the working folder or the one for temporary files.
+    OSError
+        If it cannot be saved anywhere.
+    """
+    path = Path(path)
+    try:
+        return save(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        for folder in (Path("."), Path(tempfile.gettempdir())):
+            other = folder.absolute() / f"gearmbs-kept-{os.getpid()}" / path.name
+            try:
+                save(other)
+            except OSError:
+                shutil.rmtree(other.parent, ignore_errors=True)
+                continue
+            raise KeptElsewhere(f"{path}: cannot be written ({reason}); it is in {other} instead", other) from error
+        raise OSError(error.errno, f"{path}: cannot be written ({reason}), nor anywhere else; it is lost") from error
+
+
+def check_place(target: str | Path, needed: float, what: str = "the result", option: str = "--out") -> None:
+    """Refuse a folder or file that cannot be written, or whose disk has not the room, before anything is computed.
+
+    Parameters
+    ----------
+    target : path
+        Folder or file to come; folders are not made yet.
+    needed : float
+        Bytes that will be written at least.
+    what : str
+        Named in the message.
+    option : str
+        Of the command line, by which another place is given.
+
+    Raises
+    ------
+    OSError
+        Naming the folder, why it will not do, and what would.
+    """
+    folder = Path(target).absolute()
+    if folder.is_file():
+        folder = folder.parent
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError(f"{target}: {folder} is a file; write elsewhere ({option})")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(
+            f"{target}: {folder} cannot be written ({error.strerror or error}); write elsewhere ({option})"
+        ) from None
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise OSError(
+            f"{target}: {_size(free)} are free in {folder}, {what} takes about {_size(needed)}; make room or write "
+            f"elsewhere ({option})"
+        )
+
+
+def _size(count: float) -> str:
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"

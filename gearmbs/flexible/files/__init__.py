@@ -1,0 +1,1 @@
+"""Files of flexible bodies: neutral files, Nastran, Ansys, and matrices."""

@@ -1,0 +1,1 @@
+"""Planetary sets: wheels, rims, and the mechanism they make."""

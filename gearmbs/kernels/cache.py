@@ -1,0 +1,351 @@
+"""Compiled kernels on disk, under a digest of all that they are made of.
+
+A digest covers the byte code of the function and of every function it calls, the values of the globals they name, the
+declared types and options, the versions of Python, numba and LLVM, the processor, and the source of the modules that
+compile and keep kernels. So an edit never finds stale code, a comment or docstring of a kernel costs nothing, and
+nothing on disk is ever changed or deleted but a file that cannot be read: processes, checkouts and users may share a
+folder. Looking costs no file work before the first kernel is called.
+
+The folder is ``$NUMBA_CACHE_DIR`` if that is set; else ``__pycache__/kernels`` of the package that the kernel belongs
+to; or, where that cannot be written, ``gearmbs`` in the user's cache folder. Where nothing can be written, kernels
+are compiled for the process alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import pickle
+import platform
+import sys
+import threading
+import types as python
+import uuid
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+import llvmlite
+import numba
+import numpy as np
+from numba.core import config, dispatcher, serialize
+
+FORMAT = "3"
+"""To be raised when the files or what they hold change."""
+
+MAKERS = ("jit", "library", "cache", "late")
+"""Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
+
+OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
+"""Settings of numba's that change its machine code."""
+
+_parts: dict[str, Any] = {}
+
+
+# what a kernel is made of
+
+
+@functools.cache
+def setting() -> str:
+    """Return what all kernels of a process depend on."""
+    magic = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+    options = [(name, getattr(config, name, None)) for name in OPTIONS]
+    made_by = [hashlib.sha256(Path(__file__).with_name(f"{name}.py").read_bytes()).hexdigest() for name in MAKERS]
+    versions = (numba.__version__, llvmlite.__version__, platform.python_version())
+    return repr((FORMAT, versions, magic, options, made_by))
+
+
+_identities: dict[Any, str] = {}
+
+
+class _UnderWay(threading.local):
+    """Functions whose description is under way, and how deep among them those stand that others call in turn."""
+
+    def __init__(self) -> None:
+        self.functions: list[Any] = []
+        self.called_back: list[int] = []
+
+
+_under_way = _UnderWay()
+
+
+def identity(function: Any) -> str:
+    """Return a digest of a function, or kernel, and of all below it; of those that call each other as of any others."""
+    known = _identities.get(function)
+    if known is not None:
+        return known
+    outer, called_back = _under_way.functions, _under_way.called_back
+    depth = len(outer)
+    if function in outer:
+        called_back.append(outer.index(function))
+        return f"the caller {called_back[-1] - depth} above"
+    outer.append(function)
+    try:
+        digest = hashlib.sha256(_described(function).encode()).hexdigest()
+        if not called_back:
+            # digests inside a circle of calls hold for the place from which it was entered
+            _identities[function] = digest
+    finally:
+        del outer[depth:]
+        called_back[:] = [place for place in called_back if place < depth]
+    return digest
+
+
+def _described(function: Any) -> str:
+    plain = function.py_func if isinstance(function, dispatcher.Dispatcher) else function
+    names: list[str] = []
+    code = _code(plain.__code__, plain.__doc__, names)
+    found = []
+    for name in dict.fromkeys(names):
+        if name in plain.__globals__:
+            found.append((name, _token(plain.__globals__[name], names)))
+    cells = [_token(cell.cell_contents, names) for cell in plain.__closure__ or ()]
+    options: tuple = ()
+    if isinstance(function, dispatcher.Dispatcher):
+        options = (
+            sorted((k, repr(v)) for k, v in function.targetoptions.items()),
+            _declared(function),
+        )
+    return repr((plain.__module__, plain.__qualname__, code, found, cells, _token(plain.__defaults__, names), options))
+
+
+def _declared(function: Any) -> str:
+    if getattr(function, "declared", None) is None:
+        return ""
+    args, result = function.declared_types()
+    return repr(([_type(t) for t in args], _type(result)))
+
+
+def _type(kind: Any) -> str:
+    """Return a text for a type; unlike its name it has the fields of named tuples."""
+    if isinstance(kind, numba.types.Dispatcher):
+        return identity(kind.dispatcher)
+    fields = getattr(kind, "fields", "") if isinstance(kind, numba.types.BaseNamedTuple) else ""
+    inner = [_type(t) for t in kind.types] if isinstance(kind, numba.types.BaseTuple) else ""
+    # types of one's own come with code that reads and writes their members
+    return f"{kind} {fields} {inner} {_source(type(kind).__module__)}"
+
+
+def _code(code: python.CodeType, doc: str | None, names: list[str]) -> str:
+    """Return what a code object does, without its lines and its docstring; collect the names it uses."""
+    names.extend(code.co_names)
+    constants = [
+        _code(c, None, names) if isinstance(c, python.CodeType) else _token(c, names)
+        for c in code.co_consts
+        if c is None or c != doc
+    ]
+    variables = (code.co_varnames, code.co_freevars, code.co_cellvars, code.co_argcount, code.co_flags)
+    return repr((code.co_code.hex(), constants, code.co_names, variables))
+
+
+def _token(value: Any, names: list[str]) -> str:
+    """Return a text that differs when what compiled code takes from a value differs."""
+    if value is None or isinstance(value, (bool, int, float, complex, str, bytes, np.generic)):
+        return f"{type(value).__name__} {value!r}"
+    if isinstance(value, (tuple, list)):
+        return f"{type(value).__qualname__} [{', '.join(_token(v, names) for v in value)}]"
+    if isinstance(value, frozenset):
+        return f"frozenset {sorted(_token(v, names) for v in value)}"
+    if isinstance(value, (dispatcher.Dispatcher, python.FunctionType)):
+        plain = value.py_func if isinstance(value, dispatcher.Dispatcher) else value
+        if not _inside(plain.__module__):
+            return f"{plain.__module__}.{plain.__qualname__}"
+        if getattr(value, "late", False):
+            # its callers hold its address only
+            return f"late {plain.__module__}:{plain.__name__} {_declared(value)}"
+        # what a plain function stands for in compiled code is told elsewhere in its module
+        return identity(value) + ("" if plain is not value else _source(plain.__module__))
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape} {hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()}"
+    if isinstance(value, numba.types.Type):
+        return _type(value)
+    if isinstance(value, np.dtype):
+        return repr(value)
+    if isinstance(value, python.ModuleType):
+        if not _inside(value.__name__):
+            return value.__name__
+        used = [name for name in dict.fromkeys(names) if name in value.__dict__]
+        return repr([(name, _token(value.__dict__[name], names)) for name in used])
+    home = getattr(value, "__module__", None) or type(value).__module__
+    if isinstance(getattr(value, "_defn", None), python.FunctionType) and _inside(home):
+        # an intrinsic
+        return f"{identity(value._defn)} {_source(home)}"
+    name = getattr(value, "__qualname__", type(value).__qualname__)
+    return f"{home}.{name} {_source(home)}"
+
+
+def _inside(module: str | None) -> bool:
+    """Return whether a module is code of one's own, and not of an installed library's."""
+    top = (module or "").partition(".")[0]
+    return top not in ("numba", "numpy", "math", "builtins", "scipy", "llvmlite", "operator", "cmath", "")
+
+
+@functools.cache
+def _source(module: str) -> str:
+    """Return a digest of a module's source, for objects that have no code of their own."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if not _inside(module) or file is None:
+        return ""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+# where it is kept
+
+
+def file_name(kernel: Any, kind: str, args: tuple) -> str:
+    """Return the name of the file of an entry or part."""
+    told = [_type(t) for t in args]
+    text = repr((setting(), identity(kernel), kind, told))
+    digest = hashlib.sha256(text.encode()).hexdigest()[:24]
+    return f"{kernel.__module__.partition('.')[2] or kernel.__module__}.{kernel.__name__}-{digest}.{kind}"
+
+
+@functools.cache
+def folders(package: str) -> tuple[Path, ...]:
+    """Return where kernels of a package may be found; the last one is where new ones go, if it can be written."""
+    if config.CACHE_DIR:
+        return (Path(config.CACHE_DIR) / package,)
+    home = getattr(sys.modules.get(package), "__file__", None)
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearmbs" / package
+    if home is None:
+        return (user,)
+    beside = Path(home).parent / "__pycache__" / "kernels"
+    return (beside,) if _writable(beside) else (beside, user)
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
+def writable(package: str) -> bool:
+    """Return whether kernels of a package can be kept."""
+    return _writable(folders(package)[-1])
+
+
+def _read(file: str, package: str) -> Any:
+    for folder in folders(package):
+        try:
+            data = (folder / file).read_bytes()
+        except OSError:
+            continue
+        if len(data) > 4 and zlib.crc32(data[4:]).to_bytes(4, "little") == data[:4]:
+            return pickle.loads(data[4:])
+    return None
+
+
+def _write(file: str, package: str, payload: Any) -> None:
+    data = serialize.dumps(payload)
+    data = zlib.crc32(data).to_bytes(4, "little") + data
+    folder = folders(package)[-1]
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        temporary = folder / f"{file}.{uuid.uuid4().hex[:12]}.tmp"
+        try:
+            temporary.write_bytes(data)
+            temporary.replace(folder / file)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+def _package(kernel: Any) -> str:
+    return kernel.__module__.partition(".")[0]
+
+
+def stored(kernel: Any, kind: str, args: tuple) -> bool:
+    """Return whether an entry or part is on disk."""
+    return any((folder / file_name(kernel, kind, args)).exists() for folder in folders(_package(kernel)))
+
+
+def load(kernel: Any, kind: str, args: tuple, rebuild: Callable) -> Any:
+    """Return an entry or part from disk, or None."""
+    return _load(file_name(kernel, kind, args), _package(kernel), kind, rebuild)
+
+
+def _load(file: str, package: str, kind: str, rebuild: Callable) -> Any:
+    if kind == "part" and file in _parts:
+        return _parts[file]
+    try:
+        payload = _read(file, package)
+        target = numba.core.registry.cpu_target.target_context
+        made = None if payload is None else rebuild(target, package, file, payload)
+    except Exception:
+        # what cannot be rebuilt, for whatever reason, is compiled again and its file replaced
+        made = None
+    if kind == "part" and made is not None:
+        _parts[file] = made
+    return made
+
+
+def loaded_part(file: str, package: str, rebuild: Callable) -> Any:
+    """Return a part by the name of its file, or None."""
+    return _load(file, package, "part", rebuild)
+
+
+class Slot:
+    """The place of an entry or part that is being compiled, held against other processes."""
+
+    def __init__(self, kernel: Any, kind: str, args: tuple) -> None:
+        self.package, self.kind = _package(kernel), kind
+        self.file = file_name(kernel, kind, args)
+        self.name = self.file.rpartition("-")[2].partition(".")[0]
+
+    def load(self, rebuild: Callable) -> Any:
+        """Return what another process has put there meanwhile, or None."""
+        return _load(self.file, self.package, self.kind, rebuild)
+
+    def save(self, payload: tuple | None) -> None:
+        """Keep what was compiled."""
+        if payload is not None:
+            _write(self.file, self.package, payload)
+
+    def keep(self, part: Any) -> None:
+        """Remember a part for this process."""
+        _parts[self.file] = part
+
+
+@contextlib.contextmanager
+def compiling(kernel: Any, kind: str, args: tuple) -> Iterator[Slot]:
+    """Yield the slot of an entry or part, while no other process compiles the same."""
+    slot = Slot(kernel, kind, args)
+    with _lock(folders(slot.package)[-1] / f"{slot.file}.lock"):
+        yield slot
+
+
+@contextlib.contextmanager
+def _lock(path: Path) -> Iterator[None]:
+    try:
+        stream = _locked(path)
+    except (ImportError, OSError):
+        # two processes may then compile the same; both results are right
+        stream = None
+    try:
+        yield
+    finally:
+        if stream is not None:
+            # removed while it is held: who waits for it will see that it is gone
+            with contextlib.suppress(OSError):
+                path.unlink()
+            stream.close()
+
+
+def _locked(path: Path) -> IO:
+    """Return a file, held by this process alone, that stands at a path."""
+    import fcntl
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    while True:
+        with contextlib.ExitStack() as unless_held:
+            stream = unless_held.enter_context(open(path, "w"))
+            fcntl.flock(stream, fcntl.LOCK_EX)
+            # its last holder may have removed it meanwhile; what is locked then is a file that nobody else finds
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(stream.fileno()), path.stat()):
+                    unless_held.pop_all()
+                    return stream

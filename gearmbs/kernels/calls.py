@@ -1,0 +1,155 @@
+"""Which kernels there are, what each calls, and which of them Python calls: read from the code itself.
+
+A kernel is an entry if code that is not compiled names it, or if it has a declared signature and no kernel calls it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dis
+import gc
+import importlib.util
+import pkgutil
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
+
+from gearmbs.kernels.jit import Kernel
+
+MAKES_KERNELS = re.compile(r"^(?:from [\w.]*jit import|import numba|from numba import .*\bnjit\b)", re.M)
+MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "late")}
+"""Modules that make kernels and hold none."""
+
+NAMED = {"LOAD_NAME", "LOAD_GLOBAL", "LOAD_ATTR", "LOAD_METHOD", "LOAD_DEREF"}
+
+
+def kernel_modules(package: str = "gearmbs") -> list[str]:
+    """Return the modules of a package that compile, by what they import."""
+    root = Path(importlib.import_module(package).__file__ or "").parent
+    found = []
+    for path in sorted(root.rglob("*.py")):
+        if path.relative_to(root).as_posix() not in MAKERS and MAKES_KERNELS.search(path.read_text("utf-8")):
+            found.append(".".join((package, *path.relative_to(root).with_suffix("").parts)))
+    return found
+
+
+def import_all(package: str = "gearmbs") -> None:
+    """Import all modules of a package, but those that need what is not installed."""
+    root = importlib.import_module(package)
+    for info in pkgutil.walk_packages(root.__path__, f"{package}."):
+        if not info.name.endswith("__main__"):
+            with contextlib.suppress(ImportError):
+                importlib.import_module(info.name)
+
+
+def kernels(modules: Iterable[str]) -> list[Kernel]:
+    """Return the kernels defined in some modules, which are imported."""
+    names = set(modules)
+    for name in names:
+        importlib.import_module(name)
+    # by the type, for what a weak proxy stands for may be gone
+    found: list[Kernel] = [k for k in gc.get_objects() if issubclass(type(k), Kernel)]
+    return sorted((k for k in found if k.__module__ in names and k == find(k.__module__, k.__name__)), key=address)
+
+
+def find(module: str, name: str) -> Kernel | None:
+    """Return a kernel by its module and name; None if the module holds it under no such name."""
+    found = getattr(importlib.import_module(module), name, None)
+    return found if isinstance(found, Kernel) else None
+
+
+def address(kernel: Kernel) -> str:
+    """Return the module and name of a kernel as text."""
+    return f"{kernel.__module__}:{kernel.__name__}"
+
+
+@cache
+def callees(kernel: Kernel) -> tuple[Kernel, ...]:
+    """Return the kernels that a kernel names and is compiled with."""
+    plain = kernel.py_func
+    return tuple(k for k in _kernels_of(set(_names(plain.__code__)), plain.__globals__) if not k.late)
+
+
+def below(kernel: Kernel) -> set[Kernel]:
+    """Return all kernels that a kernel calls, directly or through others."""
+    found: set[Kernel] = set()
+    waiting = [kernel]
+    while waiting:
+        for callee in callees(waiting.pop()):
+            if callee not in found:
+                found.add(callee)
+                waiting.append(callee)
+    return found
+
+
+def size(kernel: Kernel) -> int:
+    """Return the length of a kernel's byte code, to compare the time it takes to compile."""
+    return len(kernel.py_func.__code__.co_code)
+
+
+def entries(found: list[Kernel], modules: Iterable[str] | None = None) -> list[Kernel]:
+    """Return those of some kernels with a declared signature that Python calls, or that nothing else calls.
+
+    Parameters
+    ----------
+    found : list of Kernel
+    modules : iterable of str, optional
+        Where to look for calls; by default, all imported modules of the kernels' package.
+    """
+    packages = {kernel.__module__.partition(".")[0] for kernel in found}
+    if modules is None:
+        modules = [name for name in list(sys.modules) if name.partition(".")[0] in packages]
+    own = {(k.__code__.co_filename, k.__code__.co_firstlineno) for k in found}
+    called = {callee for kernel in found for callee in callees(kernel)}
+    used: set[Kernel] = set()
+    for name in modules:
+        used |= _named_by_python(sys.modules[name], own)
+    return [k for k in found if k.declared is not None and (k in used or k not in called)]
+
+
+def _named_by_python(module: ModuleType, own: set) -> set[Kernel]:
+    path = getattr(module, "__file__", None)
+    if path is None or not path.endswith(".py"):
+        return set()
+    used: set[Kernel] = set()
+    names = set(_names(compile(Path(path).read_bytes(), path, "exec"), own, used))
+    return used | set(_kernels_of(names, vars(module)))
+
+
+def _names(code: CodeType, own: Iterable = (), imported: set | None = None) -> Iterator[str]:
+    """Yield the names that code loads, also in what is defined inside it, but for the functions of ``own``."""
+    source = ""
+    for step in dis.get_instructions(code):
+        if step.opname in NAMED:
+            yield step.argval
+        elif step.opname == "IMPORT_NAME":
+            source = step.argval
+        elif step.opname == "IMPORT_FROM" and imported is not None and code.co_name != "<module>":
+            value = _if_loaded(source, step.argval)
+            if isinstance(value, Kernel):
+                imported.add(value)
+    for inner in code.co_consts:
+        if isinstance(inner, CodeType) and (inner.co_filename, inner.co_firstlineno) not in own:
+            yield from _names(inner, own, imported)
+
+
+def _if_loaded(module: str, name: str) -> Any:
+    """Return what a module calls by a name, None if it is still to be imported; see `gearmbs._lazy.late`."""
+    space = vars(sys.modules.get(module, object))
+    home, _, other = space.get("_homes", {}).get(name, "").partition(":")
+    if home and name not in space:
+        space = vars(sys.modules.get(importlib.util.resolve_name(home, module), object))
+    return space.get(other or name)
+
+
+def _kernels_of(names: set[str], space: dict) -> Iterator[Kernel]:
+    for name in sorted(names):
+        value = space.get(name)
+        if isinstance(value, Kernel):
+            yield value
+        elif isinstance(value, ModuleType) and value.__name__.partition(".")[0] not in ("numpy", "numba"):
+            yield from (vars(value)[n] for n in sorted(names) if isinstance(vars(value).get(n), Kernel))

@@ -1,0 +1,308 @@
+"""``njit`` as this package uses it: declared signatures, compiled or loaded when first called, cached by content.
+
+numba's own ``njit`` with a signature compiles or loads at decoration, so that importing a module costs as much as using
+all of it; it compiles every helper as if Python called it; and its cache sees only the file a function stands in. A
+`Kernel` is a dispatcher that differs in these five points:
+
+* A declared signature is looked at when the kernel is first called or first compiled into a caller.
+* A kernel that Python calls is an *entry*: machine code with a wrapper for Python. A kernel that kernels call is a
+  *part*: LLVM code without wrappers that is optimised inside its callers only. One function may be both.
+* Entries and parts are kept in `gearmbs.kernels.cache` under a digest of all they are made of: their own code, the code
+  of the kernels they call, and the constants they name. What has not changed is never compiled again, and nothing
+  that has changed is ever found.
+* A kernel may be *late*: its callers find it when they first call it; see `gearmbs.kernels.late`.
+* An index that is computed counts from the start of an array; see `gearmbs.kernels.jit`.
+
+The decorator is used like numba's. Literal integers among the arguments count as plain integers, so that a helper
+without a signature is compiled once and not once a literal.
+"""
+
+from __future__ import annotations
+
+import collections
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from numba import types
+from numba.core import bytecode, compiler, config, errors, ir, sigutils, typing
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.ir_utils import get_definition, guard
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NopythonTypeInference
+from numba.core.untyped_passes import ExtractByteCode
+
+from gearmbs.kernels import cache
+from gearmbs.kernels.ahead import compile_missing
+from gearmbs.kernels.late import late_part
+from gearmbs.kernels.library import EntryLibrary, PartLibrary
+
+CompilationError = errors.NumbaError
+"""What numba raises where a function cannot be compiled."""
+
+# Indices of arrays that count from the start: compiled code without the wrap-around of negative ones.
+#
+# numba takes every signed index for one that may be negative and adds the length of the axis if it is. In kernels whose
+# indices come out of tables that is a comparison, a selection and an addition for each number that is read: as many
+# instructions as the arithmetic takes. Here an index is unsigned as soon as types are known, so that it is used as it
+# is. A negative literal still counts from the end; an index that is computed must not be negative.
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class CountedIndices(FunctionPass):
+    """Compiler pass that makes the integer indices of arrays unsigned."""
+
+    _name = "gearmbs_counted_indices"
+
+    def __init__(self) -> None:
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        """Change the signatures of the reads and writes of array elements."""
+        for block in state.func_ir.blocks.values():
+            for statement in block.body:
+                access = statement.value if isinstance(statement, ir.Assign) else statement
+                if isinstance(access, ir.SetItem) or (isinstance(access, ir.Expr) and access.op == "getitem"):
+                    signature = state.calltypes.get(access)
+                    if signature is None or not isinstance(signature.args[0], types.Array):
+                        continue
+                    array, index, *value = signature.args
+                    counted = _counted(index, access.index, state.func_ir)
+                    del state.calltypes[access]
+                    state.calltypes[access] = signature.replace(args=(array, counted, *value))
+        return True
+
+
+def _counted(index: Any, variable: ir.Var, func_ir: Any) -> Any:
+    """Return the type of an index with its integers unsigned, but for negative literals."""
+    if isinstance(index, types.Integer):
+        return index if _is_negative(variable, func_ir) else _unsigned(index)
+    if isinstance(index, types.BaseTuple):
+        made = guard(get_definition, func_ir, variable)
+        items = made.items if isinstance(made, ir.Expr) and made.op == "build_tuple" else None
+        if items is None:
+            return index
+        parts = [part if _is_negative(item, func_ir) else _unsigned(part) for part, item in zip(index, items)]
+        return types.Tuple(parts)
+    return index
+
+
+def _unsigned(index: Any) -> Any:
+    return types.uintp if isinstance(index, types.Integer) and index.signed else index
+
+
+def _is_negative(variable: ir.Var, func_ir: Any) -> bool:
+    made = guard(get_definition, func_ir, variable)
+    return isinstance(made, (ir.Const, ir.Global, ir.FreeVar)) and isinstance(made.value, int) and made.value < 0
+
+
+def njit(signature_or_function: Any = None, *, cache: bool = False, late: bool = False, **options: Any) -> Any:
+    """Compile a function for use from Python and from other kernels.
+
+    Parameters
+    ----------
+    signature_or_function : function, signature or str, optional
+        As of `numba.njit`: the function, or one signature, by type or as text.
+    cache : bool
+        Without it this is numba's own decorator: compiled at once and for this process only.
+    late : bool
+        Whether compiled callers look for the kernel when they first call it; see `gearmbs.kernels.late`. It needs a
+        signature.
+    **options
+        Further options of `numba.njit`: ``nogil``, ``error_model``, ``fastmath``, ``forceinline``.
+
+    Returns
+    -------
+    Kernel, or a decorator that returns one
+    """
+    if not cache or config.DISABLE_JIT:
+        arguments = () if signature_or_function is None else (signature_or_function,)
+        return numba.njit(*arguments, **options)
+    if callable(signature_or_function) and not sigutils.is_signature(signature_or_function):
+        return Kernel(signature_or_function, None, options)
+    return lambda function: Kernel(function, signature_or_function, options, late)
+
+
+class _Overloads(collections.OrderedDict):
+    """Compiled overloads by argument types; the declared one is compiled when it is asked for."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        super().__init__()
+        self.kernel = kernel
+
+    def __missing__(self, args: tuple) -> Any:
+        if self.kernel.declared is None or self.kernel.declared_types()[0] != tuple(args) or len(self):
+            raise KeyError(args)
+        self.kernel.ready()
+        return self[args]
+
+
+class Kernel(CPUDispatcher):
+    """A dispatcher that compiles or loads what is called, when it is called.
+
+    Parameters
+    ----------
+    function : function
+    declared : signature or str, optional
+        The only signature; without it the types of the arguments decide.
+    options : dict
+        Options of `numba.njit`.
+    late : bool
+        See `njit`.
+    """
+
+    def __init__(self, function: Callable, declared: Any, options: dict[str, Any], late: bool = False) -> None:
+        self.declared = declared
+        self.late = late
+        self.options = options
+        self._normalised: tuple | None = None
+        self._parts: dict[tuple, Any] = {}
+        super().__init__(py_func=function, targetoptions={"boundscheck": None, **options, "nopython": True})
+        self.overloads = _Overloads(self)
+
+    def declared_types(self) -> tuple[tuple, Any]:
+        """Return the types of the declared signature: arguments and result."""
+        if self._normalised is None:
+            args, result = sigutils.normalize_signature(self.declared)
+            self._normalised = tuple(args), result
+        return self._normalised
+
+    def ready(self) -> Kernel:
+        """Compile or load the entry of the declared signature, unless it is there."""
+        if self._can_compile and self.declared is not None:
+            with global_compiler_lock:
+                if not len(self.overloads):
+                    self.compile(self.declared)
+                self.disable_compile()
+        return self
+
+    # from Python
+
+    def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
+        if self.declared is None:
+            return super()._compile_for_args(*args, **kws)
+        return self.ready()  # to be called anew, now that the signature is known
+
+    def get_compile_result(self, sig: Any) -> Any:
+        """Return the entry of a signature; compile it if needed."""
+        return super(Kernel, self.ready()).get_compile_result(sig)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile or load the entry of a signature; return the function for Python."""
+        with global_compiler_lock, self._compiling_counter:
+            args, result = sigutils.normalize_signature(sig)
+            args = tuple(args)
+            if args in self.overloads:
+                return collections.OrderedDict.__getitem__(self.overloads, args).entry_point
+            if self.declared is not None:
+                args, result = self.declared_types()
+            entry = cache.load(self, "entry", args, EntryLibrary.rebuild)
+            if entry is None and self.declared is not None and compile_missing(self):
+                entry = cache.load(self, "entry", args, EntryLibrary.rebuild)
+            if entry is None:
+                with cache.compiling(self, "entry", args) as slot:
+                    entry = slot.load(EntryLibrary.rebuild)
+                    if entry is None:
+                        entry = self._compile(EntryLibrary, args, result, slot.name)
+                        slot.save(EntryLibrary.reduce(entry))
+            self.add_overload(entry)
+            return entry.entry_point
+
+    # from other kernels
+
+    def get_call_template(self, args: tuple, kws: dict) -> Any:
+        """Return what types a call in compiled code, after making sure that the part is there."""
+        pysig, args = self._compiler.fold_argument_types(args, kws)
+        args = tuple(numba.types.unliteral(a) for a in args)
+        self.part(self.declared_types()[0] if self.declared is not None else args)
+        name = self.py_func.__name__
+        signatures = [part.signature for part in self._parts.values()]
+        template = typing.make_concrete_template(f"CallTemplate({name})", key=name, signatures=signatures)
+        return template, pysig, args, {}
+
+    def get_overload(self, sig: Any) -> Any:
+        """Return the key under which the part of a signature is known to the compiler."""
+        args, _ = sigutils.normalize_signature(sig)
+        return self.part(tuple(args)).key
+
+    @property
+    def nopython_signatures(self) -> list:
+        """Signatures that there is an entry or a part for."""
+        return list(dict.fromkeys(found.signature for found in (*self.overloads.values(), *self._parts.values())))
+
+    def part(self, args: tuple) -> Any:
+        """Return the part for some types of arguments; compile or load it if needed."""
+        with global_compiler_lock:
+            found = self._parts.get(args)
+            if found is None:
+                with self._compiling_counter:
+                    found = self._parts[args] = late_part(self) if self.late else self._part(args)
+                self.targetctx.insert_user_function(found.key, found.fndesc, [found.library])
+            return found
+
+    def _part(self, args: tuple) -> Any:
+        result = self.declared_types()[1] if self.declared is not None else None
+        part = cache.load(self, "part", args, PartLibrary.rebuild)
+        if part is None:
+            with cache.compiling(self, "part", args) as slot:
+                part = slot.load(PartLibrary.rebuild)
+                if part is None:
+                    compiled = self._compile(PartLibrary, args, result, slot.name)
+                    part = PartLibrary.made(compiled, slot.file)
+                    slot.keep(part)
+                    slot.save(PartLibrary.reduce(part))
+        return part
+
+    def _compile(self, library: Any, args: tuple, result: Any, name: str) -> Any:
+        flags = _Flags()
+        self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
+        library.customise(flags)
+        code = library(self.targetctx.codegen(), self.py_func.__qualname__)
+        code.enable_object_caching()
+        pipeline = type("Pipeline", (_Pipeline,), {"name": name})
+        compiled = compiler.compile_extra(
+            self.typingctx, self.targetctx, self.py_func, args, result, flags, {}, code, pipeline
+        )
+        if compiled.typing_error is not None:
+            raise compiled.typing_error
+        return compiled
+
+
+class _Flags(compiler.Flags):
+    """Numba's flags, compared in less time: it looks up each call of its own functions by all of them."""
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return _HASH_OF_FLAGS
+
+    def __eq__(self, other: object) -> bool:
+        return (isinstance(other, _Flags) and self._values == other._values) or super().__eq__(other)
+
+
+_HASH_OF_FLAGS = hash(compiler.Flags())
+
+
+class _Pipeline(compiler.Compiler):
+    """Numba's pipeline with indices counted from the start, and symbols named after the content, in every process."""
+
+    name = ""
+
+    def define_pipelines(self) -> list:
+        """Return numba's passes with `CountedIndices` before the lowering."""
+        (pipeline,) = super().define_pipelines()
+        pipeline.add_pass_after(CountedIndices, NopythonTypeInference)
+        pipeline.finalize()
+        return [pipeline]
+
+    def compile_extra(self, func: Callable) -> Any:
+        """Compile a function; as of numba, but for the name of its symbol."""
+        identity = bytecode.FunctionIdentity.from_function(func)
+        identity.unique_id = self.name
+        identity.unique_name = f"{identity.func_qualname}${self.name}"
+        self.state.func_id = identity
+        ExtractByteCode().run_pass(self.state)
+        self.state.lifted = ()
+        self.state.lifted_from = None
+        return self._compile_bytecode()

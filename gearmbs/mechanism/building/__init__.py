@@ -1,0 +1,1 @@
+"""From a mechanism to the arrays that the equations are evaluated from."""

@@ -1,0 +1,620 @@
+"""Joints and motions of a Mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.dae.equations.constraints import terms
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.forces.springs import AxisSpring, Beam, Bushing, Field, LineSpring, MatrixForce, in_si
+from gearmbs.mechanism.parts import elements as el
+from gearmbs.mechanism.parts import joints as jt
+from gearmbs.mechanism.parts.bodies import Body, Marker, Vector, frame_along, vector
+from gearmbs.mechanism.parts.elements import Load
+from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, integrated
+from gearmbs.mechanism.parts.quantities import expression_text, keeps_given, quantity
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson, SolidContact
+    from gearmbs.mechanism.contacts.shapes import Shape
+    from gearmbs.mechanism.language.syntax import Units
+
+
+class JointMethods:
+    """The part of :class:`gearmbs.mechanism.Mechanism` that adds joints and motions."""
+
+    name: str
+    joints: dict[str, jt.Joint]
+    _check_name: Callable[[str], None]
+    _check_body: Callable[[str, Body], None]
+
+    @keeps_given
+    def joint(
+        self,
+        kind: str,
+        name: str,
+        i: Body | Marker,
+        j: Body | Marker,
+        *,
+        at: Vector | None = None,
+        axis: Vector | None = None,
+        axis_j: Vector | None = None,
+    ) -> jt.Joint:
+        """Add a joint of one of the kinds in :data:`gearmbs.mechanism.parts.joints.JOINTS`.
+
+        Parameters
+        ----------
+        i, j : Body or Marker
+            What the joint connects. With bodies, ``at`` (default: the origin of ``i``) and ``axis`` (default: z)
+            place a marker on each, in global components at the initial position. If one is a marker and the other a
+            body, a marker that coincides with the given one is placed on the body.
+        axis_j : array_like, optional
+            Axis on ``j`` at the initial position, at a right angle to ``axis``: for universal joints and the
+            perpendicular primitive between bodies, which need two.
+
+        Raises
+        ------
+        ModelError
+            For an unknown kind, a name in use, foreign bodies, a joint of a body with itself, or axes that should be at
+            right angles and are nearly parallel.
+        """
+        if kind not in jt.JOINTS:
+            raise ModelError(f"joint '{name}': kind {kind!r} is unknown; choose one of {', '.join(jt.JOINTS)}")
+        label = f"{kind.replace('_', ' ')} joint '{name}'"
+        crossed = jt.JOINTS[kind].crossed
+        if crossed and axis_j is None and not (isinstance(i, Marker) and isinstance(j, Marker)):
+            raise ModelError(
+                f"{label}: it needs two axes at right angles, one on each body; give axis=... (on I) and axis_j=... "
+                "(on J), or two markers with such z axes"
+            )
+        if axis_j is not None and not crossed:
+            kinds = " and ".join(k for k, v in jt.JOINTS.items() if v.crossed)
+            raise ModelError(f"{label}: axis_j is for {kinds} joints; others have one axis")
+        mi, mj = self._markers(label, name, i, j, at, axis, axis_j)
+        if crossed:
+            try:
+                jt.check_crossed(label, mi, mj)
+            except ModelError:
+                # markers made for it would be in the way of the next attempt
+                for marker in (mi, mj):
+                    if marker is not i and marker is not j:
+                        marker.body.markers.remove(marker)
+                raise
+        return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj)))
+
+    @keeps_given
+    def fixed(self, name, i, j, **where) -> jt.Joint:
+        """Add a fixed joint: no relative motion. See :meth:`joint`."""
+        return self.joint("fixed", name, i, j, **where)
+
+    @keeps_given
+    def revolute(self, name, i, j, **where) -> jt.Joint:
+        """Add a revolute joint: rotation about the common z axis. See :meth:`joint`."""
+        return self.joint("revolute", name, i, j, **where)
+
+    @keeps_given
+    def spherical(self, name, i, j, **where) -> jt.Joint:
+        """Add a spherical joint: a common point. See :meth:`joint`."""
+        return self.joint("spherical", name, i, j, **where)
+
+    @keeps_given
+    def cylindrical(self, name, i, j, **where) -> jt.Joint:
+        """Add a cylindrical joint: rotation about and translation along z_J. See :meth:`joint`."""
+        return self.joint("cylindrical", name, i, j, **where)
+
+    @keeps_given
+    def translational(self, name, i, j, **where) -> jt.Joint:
+        """Add a translational joint along z_J. See :meth:`joint`."""
+        return self.joint("translational", name, i, j, **where)
+
+    @keeps_given
+    def universal(self, name, i, j, **where) -> jt.Joint:
+        """Add a universal joint whose cross arms are z_I and z_J: ``axis`` and ``axis_j``. See :meth:`joint`."""
+        return self.joint("universal", name, i, j, **where)
+
+    @keeps_given
+    def planar(self, name, i, j, **where) -> jt.Joint:
+        """Add a planar joint: motion in the xy plane of J. See :meth:`joint`."""
+        return self.joint("planar", name, i, j, **where)
+
+    @keeps_given
+    def screw(self, name, i, j, *, pitch: float, at: Vector | None = None, axis: Vector | None = None) -> jt.Joint:
+        """Add a screw joint: I advances ``pitch`` metres along z_J a turn."""
+        pitch = quantity(pitch, "length", f"joint '{name}': pitch")
+        mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
+        return self._add_joint(jt.Joint(name, "screw", mi, mj, jt.screw_rows(mi, mj, pitch)))
+
+    @keeps_given
+    def distance(self, name: str, i: Marker, j: Marker, length: float | None = None) -> jt.Joint:
+        """Keep the origins of two markers ``length`` metres apart (default: as they are)."""
+        self._check_name(name)
+        if length is None:
+            length = float(np.linalg.norm(i.global_position() - j.global_position()))
+        length = quantity(length, "length", f"joint '{name}': length")
+        if not length > 0.0:
+            raise ModelError(f"joint '{name}': length = {length} m; a distance joint needs a positive length")
+        row = jt.Row(f"distance {length:g} m", (jt.Term(terms.DISTANCE, i, j),), constant(length))
+        return self._add_joint(jt.Joint(name, "distance", i, j, [row]))
+
+    def coupler(self, name: str, parts: list[tuple[jt.Joint, float]], offset: float | None = None) -> jt.Joint:
+        """Couple joint coordinates linearly: sum of coefficient x coordinate stays at its initial value.
+
+        A coordinate is the angle (rad) of a revolute or cylindrical joint or the displacement (m) of a
+        translational one. Gears are couplers of two angles; a rack and pinion couples an angle (coefficient: pitch
+        radius) and a displacement.
+
+        Parameters
+        ----------
+        parts : list of (Joint, float)
+            Two or more joints with their coefficients.
+        offset : float, optional
+            Value of the sum; default: the one at the initial position.
+        """
+        if len(parts) < 2:
+            raise ModelError(f"coupler '{name}': it needs at least two joints")
+        row_terms = tuple(jt.coordinate_term(joint, coefficient) for joint, coefficient in parts)
+        if offset is None:
+            offset = sum(t.coefficient * jt.initial_coordinate(t) for t in row_terms)
+        row = jt.Row("coupled coordinates", row_terms, constant(offset))
+        return self._add_joint(jt.Joint(name, "coupler", parts[0][0].i, parts[0][0].j, [row]))
+
+    def gear(self, name: str, first: jt.Joint, second: jt.Joint, ratio: float) -> jt.Joint:
+        """Let the second joint turn ``ratio`` times as fast as the first, both about their own z_J (see coupler).
+
+        Two outside gears on parallel axes of one direction have ratio = -z1/z2.
+        """
+        return self.coupler(name, [(first, quantity(ratio, "dimensionless", f"gear '{name}': ratio")), (second, -1.0)])
+
+    @keeps_given
+    def rack_pinion(self, name: str, pinion: jt.Joint, rack: jt.Joint, radius: float) -> jt.Joint:
+        """Let the rack's joint move ``radius`` metres along its z_J for each radian of the pinion's.
+
+        The radius is negative where a positive turn drives the rack against its z axis.
+        """
+        if rack.kind != "translational":
+            raise ModelError(f"rack and pinion '{name}': joint '{rack.name}' is {rack.kind}; it must be translational")
+        size = quantity(radius, "length", f"rack and pinion '{name}': radius")
+        return self.coupler(name, [(pinion, size), (rack, -1.0)])
+
+    @keeps_given
+    def rotation(
+        self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
+        start: float | None = None, rate: float = 0.0,
+    ) -> jt.Joint:  # fmt: skip
+        """Prescribe the rotation of I about z_J of a joint as a function of time.
+
+        Parameters
+        ----------
+        function : float, str or TimeFunction
+            rad, or rad/s, rad/s^2 for the other levels.
+        level : {"displacement", "velocity", "acceleration"}
+            What the function gives.
+        start : float, optional
+            Angle at time 0 for velocities and accelerations, rad; default: as the bodies are.
+        rate : float
+            Angular velocity at time 0 for accelerations, rad/s.
+        """
+        self._check_joint(name, joint, ("revolute", "cylindrical", "self_aligning"))
+        given = self._prescribed(name, function, level, start, rate, jt.coordinate_term(joint, 1.0), "rad")
+        moved = _displacement(name, function, given, "rad")
+        row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, moved)
+        return self._add_joint(jt.Joint(name, "rotation", joint.i, joint.j, [row], given))
+
+    @keeps_given
+    def translation(
+        self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
+        start: float | None = None, rate: float = 0.0,
+    ) -> jt.Joint:  # fmt: skip
+        """Prescribe the displacement of I along z_J of a joint; as :meth:`rotation`, in m, m/s or m/s^2."""
+        self._check_joint(name, joint, ("translational", "cylindrical"))
+        along = jt.Term(terms.DOT2, joint.i, joint.j, jt.Z)
+        given = self._prescribed(name, function, level, start, rate, along, "m")
+        row = jt.Row("displacement", (along,), _displacement(name, function, given, "m"))
+        return self._add_joint(jt.Joint(name, "translation", joint.i, joint.j, [row], given))
+
+    # --- checks -----------------------------------------------------------------------------------
+
+    def _markers(self, label, name, i, j, at, axis, axis_j=None) -> tuple[Marker, Marker]:
+        self._check_name(name)
+        for part in (i, j):
+            self._check_body(label, part.body if isinstance(part, Marker) else part)
+        given = [part for part in (i, j) if isinstance(part, Marker)]
+        if given and not (at is None and axis is None and axis_j is None):
+            raise ModelError(f"{label}: give either markers or bodies with `at` and `axis`, not both")
+        if given:
+            # a body gets a marker that lies on the other's
+            where = given[0].global_position(), given[0].global_orientation()
+            mi = i if isinstance(i, Marker) else i.marker_at(*where, name=f"{name}.I")
+            mj = j if isinstance(j, Marker) else j.marker_at(*where, name=f"{name}.J")
+        else:
+            at = (j if i.is_ground else i).position if at is None else vector(at, f"{label}: at", "length")
+            frame = frame_along((0.0, 0.0, 1.0) if axis is None else axis, f"{label}: axis")
+            mi = i.marker_at(at, frame, name=f"{name}.I")
+            mj = j.marker_at(at, frame if axis_j is None else frame_along(axis_j, f"{label}: axis_j"), name=f"{name}.J")
+        if mi.body is mj.body:
+            raise ModelError(f"{label}: both markers are on body '{mi.body.name}'; a joint connects two bodies")
+        return mi, mj
+
+    def _prescribed(
+        self, name: str, function: float | str | TimeFunction, level: str, start: float | None, rate: float,
+        term: jt.Term, unit: str,
+    ) -> jt.Prescribed | None:  # fmt: skip
+        """Return what a motion is given by, None for its displacement."""
+        if level == "displacement":
+            return None
+        if level not in ("velocity", "acceleration"):
+            raise ModelError(f"motion '{name}': level {level!r}; choose displacement, velocity or acceleration")
+        label = f"motion '{name}'"
+        first = jt.initial_coordinate(term) if start is None else quantity(start, unit, f"{label}: start")
+        given = as_function(function, f"{unit}/s" if level == "velocity" else f"{unit}/s^2", label)
+        return jt.Prescribed(level, given, first, quantity(rate, f"{unit}/s", f"{label}: rate"))
+
+    def _check_joint(self, name: str, joint: jt.Joint, kinds: tuple[str, ...]) -> None:
+        self._check_name(name)
+        if self.joints.get(getattr(joint, "name", "")) is not joint:
+            raise ModelError(f"motion '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
+        if joint.kind not in kinds:
+            raise ModelError(f"motion '{name}': joint '{joint.name}' is {joint.kind}; it must be {' or '.join(kinds)}")
+
+    def _add_joint(self, joint: jt.Joint) -> jt.Joint:
+        self._check_name(joint.name)
+        for marker in (joint.i, joint.j):
+            self._check_body(f"joint '{joint.name}'", marker.body)
+        self.joints[joint.name] = joint
+        return joint
+
+
+def _displacement(
+    name: str, function: float | str | TimeFunction, given: jt.Prescribed | None, unit: str
+) -> TimeFunction:
+    """Return the displacement of a motion, whatever its function gives."""
+    if given is None:
+        return as_function(function, unit, f"motion '{name}'")
+    return integrated(given.function, given.start, None if given.level == "velocity" else given.rate)
+
+
+# Loads of a Mechanism: forces and torques by expressions, springs, bushings, fields, beams.
+
+
+Expression = str | float | None
+M = TypeVar("M", bound=MatrixForce)
+
+SI_UNITS = {
+    "force": "N", "torque": "N*m", "length": "m", "angle": "rad", "time": "s", "stiffness": "N/m", "damping": "N*s/m",
+    "rotational_stiffness": "N*m/rad", "rotational_damping": "N*m*s/rad",
+}  # fmt: skip
+"""SI unit of each dimension of the function language that loads have."""
+
+FIELDS = {"damping_ratio": "time"}
+"""Dimensions of fields that are not called like them."""
+
+
+class LoadMethods:
+    """The part of :class:`gearmbs.mechanism.Mechanism` that adds loads."""
+
+    units: Units
+    reads_units: bool
+    given: dict[str, dict[str, Any]]
+    add: Callable[[Any], Any]
+    _add_load: Callable[[Load], Load]
+
+    def _text(self, label: str, value: Expression, dimension: str) -> str:
+        """Return an expression, or the number a text with a unit stands for."""
+        if not self.reads_units:
+            return str(value)
+        return expression_text(value, SI_UNITS[dimension], label, self.units.factor(dimension))
+
+    def _number(self, label: str, field: str, value: float, dimension: str | None = None) -> float:
+        """Return a number in the mechanism's units; ``dimension`` is that of the field's name by default."""
+        dimension = dimension or FIELDS.get(field, field)
+        return quantity(value, SI_UNITS[dimension], f"{label}: {field}", self.units.factor(dimension))
+
+    def _in_si(self, *values: tuple[float, str]) -> list[float]:
+        """Return numbers in the mechanism's units, each with its dimension, in SI."""
+        factors = [self.units.factor(dimension) for _, dimension in values]
+        return [value if factor == 1.0 else value * factor for (value, _), factor in zip(values, factors)]
+
+    @keeps_given
+    def load(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        fx: Expression = None,
+        fy: Expression = None,
+        fz: Expression = None,
+        tx: Expression = None,
+        ty: Expression = None,
+        tz: Expression = None,
+        rm: Marker | None = None,
+        kind: str = "gforce",
+    ) -> Load:
+        """Apply forces and torques given by expressions, in the frame of marker ``rm`` (default: J).
+
+        They act on I's body at I; the reaction acts on J's body at the same point. Expressions are in the ADAMS
+        function language and SI units, for instance ``"-100*DX(tip, anchor, anchor) - STEP(TIME, 0, 0, 1, 5)"``;
+        markers go by their names (in quotes when they hold other characters than letters, digits, dot and underscore).
+        """
+        given = zip(("fx", "fy", "fz", "tx", "ty", "tz"), (fx, fy, fz, tx, ty, tz))
+        expressions = tuple(
+            None if e is None else self._text(f"{kind} '{name}': {c}", e, "force" if c[0] == "f" else "torque")
+            for c, e in given
+        )
+        if not any(expressions):
+            raise ModelError(f"load '{name}': give at least one of fx, fy, fz, tx, ty, tz")
+        return self._add_load(Load(name, kind, i, j, rm or j, el.COMPONENTS, expressions))
+
+    @keeps_given
+    def line_force(self, name: str, i: Marker, j: Marker, expression: Expression, kind: str = "sforce") -> Load:
+        """Apply a force along the line between two markers; positive values push I and J apart."""
+        text = self._text(f"{kind} '{name}'", expression, "force")
+        return self._add_load(Load(name, kind, i, j, j, el.LINE, (text,)))
+
+    @keeps_given
+    def axis_force(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
+        """Apply a force on I along z of ``rm`` (default: J), the reaction on J's body at the same point."""
+        text = self._text(f"sforce '{name}'", expression, "force")
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_FORCE, (text,)))
+
+    @keeps_given
+    def axis_torque(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
+        """Apply a torque on I about z of ``rm`` (default: J), the reaction on J's body."""
+        text = self._text(f"sforce '{name}'", expression, "torque")
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_TORQUE, (text,)))
+
+    @keeps_given
+    def spring_damper(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        length: float | None = None,
+        preload: float = 0.0,
+    ) -> LineSpring:
+        """Connect two markers by a spring (N/m) and damper (N s/m) along the line between them.
+
+        ``length`` is the length at which the force is ``preload`` (default: the initial distance).
+        """
+        if length is None:
+            length = float(np.linalg.norm(i.global_position() - j.global_position())) / self.units.length
+        label = f"spring-damper '{name}'"
+        k, c = self._number(label, "stiffness", stiffness), self._number(label, "damping", damping)
+        free, start = self._number(label, "length", length), self._number(label, "preload", preload, "force")
+        made = {"stiffness": k, "damping": c, "length": free, "preload": start}
+        k, c, free, start = self._in_si((k, "stiffness"), (c, "damping"), (free, "length"), (start, "force"))
+        return self.add(LineSpring(name, i, j, k, c, free, start, made))
+
+    @keeps_given
+    def torsion_spring(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        angle: float = 0.0,
+        preload: float = 0.0,
+    ) -> AxisSpring:
+        """Connect two markers by a rotational spring (N m/rad) and damper (N m s/rad) about z of J."""
+        label = f"torsion spring '{name}'"
+        k = self._number(label, "stiffness", stiffness, "rotational_stiffness")
+        c = self._number(label, "damping", damping, "rotational_damping")
+        free, start = self._number(label, "angle", angle), self._number(label, "preload", preload, "torque")
+        made = {"stiffness": k, "damping": c, "angle": free, "preload": start}
+        dimensions = ("rotational_stiffness", "rotational_damping", "angle", "torque")
+        k, c, free, start = self._in_si(*zip((k, c, free, start), dimensions))
+        return self.add(AxisSpring(name, i, j, k, c, free, start, made))
+
+    @keeps_given
+    def bushing(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: Vector = (0.0, 0.0, 0.0),
+        damping: Vector = (0.0, 0.0, 0.0),
+        torsional_stiffness: Vector = (0.0, 0.0, 0.0),
+        torsional_damping: Vector = (0.0, 0.0, 0.0),
+    ) -> Bushing:
+        """Connect two markers by springs and dampers along and about the three axes of J (small rotations)."""
+        label = f"bushing '{name}'"
+        k, c, kt, ct = (
+            vector(value, f"{label}: {field}", SI_UNITS[dimension], self.units.factor(dimension)).tolist()
+            for field, value, dimension in (
+                ("stiffness", stiffness, "stiffness"),
+                ("damping", damping, "damping"),
+                ("torsional_stiffness", torsional_stiffness, "rotational_stiffness"),
+                ("torsional_damping", torsional_damping, "rotational_damping"),
+            )
+        )
+        if not any((*k, *c, *kt, *ct)):
+            raise ModelError(f"bushing '{name}': all stiffnesses and dampings are zero")
+        made = {"stiffness": k, "damping": c, "torsional_stiffness": kt, "torsional_damping": ct}
+        return self.matrix_force(Bushing, name, i, j, np.diag([*k, *kt]), np.diag([*c, *ct]), made)
+
+    def matrix_force(
+        self,
+        kind: type[M],
+        name: str,
+        i: Marker,
+        j: Marker,
+        stiffness: np.ndarray,
+        damping: np.ndarray,
+        parameters: Mapping[str, Any],
+        free: npt.ArrayLike = (0.0,) * 6,
+        preload: npt.ArrayLike = (0.0,) * 6,
+    ) -> M:
+        """Add an element of a class derived from MatrixForce, its numbers in the mechanism's units."""
+        k, c = in_si(stiffness, self.units, False), in_si(damping, self.units, True)
+        rest = np.asarray(free, dtype=float) * np.repeat([self.units.factor("length"), 1.0], 3)
+        factors = np.repeat([self.units.factor("force"), self.units.factor("torque")], 3)
+        start = factors * np.asarray(preload, dtype=float)
+        return self.add(kind(name, i, j, k, c, rest, start, parameters))
+
+    def field(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: npt.ArrayLike | None = None,
+        damping: npt.ArrayLike | None = None,
+        free: npt.ArrayLike = (0.0,) * 6,
+        preload: npt.ArrayLike = (0.0,) * 6,
+    ) -> Field:
+        """Connect two markers by full matrices: F = preload - K (q - free) - C q'.
+
+        Parameters
+        ----------
+        stiffness, damping : array_like, shape (6, 6)
+            N/m, N/rad, N m/m, N m/rad and with s; zero when left out.
+        free, preload : array_like, shape (6,)
+            Displacements and rotations of I in J's frame (small rotations about its axes) without load, and the load
+            there.
+        """
+        label = f"field '{name}'"
+        k, c = (
+            np.zeros((6, 6)) if m is None else _numbers(m, f"{label}: {field}")
+            for field, m in (("stiffness", stiffness), ("damping", damping))
+        )
+        rest, start = _numbers(free, f"{label}: free"), _numbers(preload, f"{label}: preload")
+        if k.shape != (6, 6) or c.shape != (6, 6) or rest.shape != (6,) or start.shape != (6,):
+            raise ModelError(f"{label}: stiffness and damping are 6x6, free and preload have 6 entries")
+        if not any(np.any(part) for part in (k, c, start)):
+            raise ModelError(f"{label}: all stiffnesses, dampings and preloads are zero")
+        made = {"stiffness": k, "damping": c, "free": rest, "preload": start}
+        return self.matrix_force(Field, name, i, j, k, c, made, rest, start)
+
+    @keeps_given
+    def beam(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        length: float,
+        area: float,
+        second_moments: Vector,
+        modulus: float,
+        shear_modulus: float,
+        shear_ratios: tuple[float, float] = (0.0, 0.0),
+        damping_ratio: float = 0.0,
+    ) -> Beam:
+        """Connect two markers by a massless Timoshenko beam from J to I along x of J.
+
+        Parameters
+        ----------
+        length, area : float
+            m, m^2.
+        second_moments : array_like
+            Torsion constant and second moments about y and z, m^4.
+        modulus, shear_modulus : float
+            N/m^2.
+        shear_ratios : tuple of float
+            Shear area ratios in y and z; 0: without shear.
+        damping_ratio : float
+            Damping over stiffness, s.
+        """
+        label = f"beam '{name}'"
+        units = self.units
+        ixx, iyy, izz = vector(second_moments, f"{label}: second_moments", "m^4", units.length**4)
+        length, damping_ratio = (
+            self._number(label, "length", length),
+            self._number(label, "damping_ratio", damping_ratio),
+        )
+        area = quantity(area, "area", f"{label}: area", units.length**2)
+        modulus, shear_modulus = (
+            quantity(value, "pressure", f"{label}: {field}", units.force / units.length**2)
+            for field, value in (("modulus", modulus), ("shear_modulus", shear_modulus))
+        )
+        for field, value in (
+            ("length", length),
+            ("area", area),
+            ("modulus", modulus),
+            ("shear_modulus", shear_modulus),
+        ):
+            if not value > 0.0:
+                raise ModelError(f"beam '{name}': {field} = {value}; it must be positive")
+        k = beam_stiffness(length, area, ixx, iyy, izz, modulus, shear_modulus, shear_ratios)
+        free = (length, 0.0, 0.0, 0.0, 0.0, 0.0)
+        made = {
+            "length": length,
+            "area": area,
+            "second_moments": (ixx, iyy, izz),
+            "modulus": modulus,
+            "shear_modulus": shear_modulus,
+            "shear_ratios": shear_ratios,
+            "damping_ratio": damping_ratio,
+        }
+        return self.matrix_force(Beam, name, i, j, k, damping_ratio * k, made, free)
+
+    def contact(
+        self, name: str, i: Marker, solids_i: Shape | Sequence[Shape], j: Marker, solids_j: Shape | Sequence[Shape],
+        law: Impact | Poisson, friction: Coulomb | None = None,
+    ) -> SolidContact:  # fmt: skip
+        """Let solids of two bodies touch; ADAMS's CONTACT.
+
+        Parameters
+        ----------
+        i, j : Marker
+            In whose frames the solids are given.
+        solids_i, solids_j : Shape or sequence of Shape
+            From :mod:`gearmbs.mechanism.contacts`; each of the first may touch each of the second.
+        law : Impact or Poisson
+            From :mod:`gearmbs.mechanism.contacts`, SI.
+        friction : Coulomb, optional
+
+        Raises
+        ------
+        ModelError
+            If a size or a constant makes no sense, or both sides are on one body.
+
+        Examples
+        --------
+        >>> from gearmbs.mechanism import Mechanism
+        >>> from gearmbs.mechanism.contacts import HalfSpace, Impact, Sphere
+        >>> m = Mechanism("drop", gravity=(0, 0, -9.81))
+        >>> ball = m.body("ball", 1.0, (4e-4, 4e-4, 4e-4), position=(0, 0, 0.5))
+        >>> m.contact("floor", ball.marker(), Sphere("20 mm"), m.ground.marker(), HalfSpace(), Impact(1e7, 1.5, 500.0))
+        SolidContact('floor', sphere and plane, I='ball.marker1', J='ground.marker1')
+        """
+        from gearmbs.mechanism.contacts.element import SolidContact
+
+        first, second = (tuple(s) if isinstance(s, Sequence) else (s,) for s in (solids_i, solids_j))
+        return self.add(SolidContact(name, i, j, first, second, law, friction))
+
+
+def beam_stiffness(
+    length: float, area: float, ixx: float, iyy: float, izz: float, modulus: float, shear_modulus: float,
+    shear_ratios: tuple[float, float],
+) -> np.ndarray:  # fmt: skip
+    """Return the 6x6 stiffness of a beam's free end along x, the other end held; Timoshenko's with shear ratios."""
+    k = np.zeros((6, 6))
+    k[0, 0], k[3, 3] = modulus * area / length, shear_modulus * ixx / length
+    for shift, turn, inertia, ratio, sign in ((1, 5, izz, shear_ratios[0], -1.0), (2, 4, iyy, shear_ratios[1], 1.0)):
+        shear = 12.0 * modulus * inertia * ratio / (shear_modulus * area * length**2)
+        bending = modulus * inertia / (1.0 + shear)
+        k[shift, shift] = 12.0 * bending / length**3
+        k[shift, turn] = k[turn, shift] = sign * 6.0 * bending / length**2
+        k[turn, turn] = (4.0 + shear) * bending / length
+    return k
+
+
+def _numbers(value: npt.ArrayLike, field: str) -> np.ndarray:
+    """Return an array without texts: its entries have different units."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"{field}: {value!r} is not made of numbers; give them in SI, texts have no place here"
+        ) from None

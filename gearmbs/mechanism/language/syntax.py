@@ -1,0 +1,382 @@
+"""ADAMS's function language: from text to a syntax tree, and the names and units its meaning depends on.
+
+``parse`` reads the text (and finds every syntax error without a model); a ``Scope`` holds what names stand for;
+``gearmbs.mechanism.language.library`` makes a tape of both.  Case does not matter; angles are radians, ``90D`` is
+ninety degrees.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from gearmbs.dae.equations.expressions.opcodes import ExpressionError
+from gearmbs.dae.equations.expressions.splines import SplineData
+
+MAX_DEPTH = 100
+"""Deepest nesting of brackets, functions and signs."""
+
+Ref = int | str
+"""An ADAMS id or a name."""
+
+
+DIMENSIONS = {
+    "number": (0, 0, 0, 0),
+    "angle": (0, 0, 0, 0),
+    "time": (0, 0, 1, 0),
+    "rate": (0, 0, -1, 0),
+    "mass": (1, 0, 0, 0),
+    "inertia": (1, 2, 0, 0),
+    "length": (0, 1, 0, 0),
+    "velocity": (0, 1, -1, 0),
+    "acceleration": (0, 1, -2, 0),
+    "angular_velocity": (0, 0, -1, 0),
+    "angular_acceleration": (0, 0, -2, 0),
+    "force": (0, 0, 0, 1),
+    "torque": (0, 1, 0, 1),
+    "stiffness": (0, -1, 0, 1),
+    "damping": (0, -1, 1, 1),
+    "rotational_stiffness": (0, 1, 0, 1),
+    "rotational_damping": (0, 1, 1, 1),
+}
+"""Exponents of mass, length, time and force (angles are numbers)."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A literal; ``integer`` when it can stand for an id."""
+
+    value: float
+    at: int
+    integer: int | None = None
+
+
+@dataclass(frozen=True)
+class Name:
+    """A constant or the name of a model element."""
+
+    text: str
+    at: int
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function with its arguments."""
+
+    name: str
+    args: tuple[Node, ...]
+    at: int
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Terms joined by operators of one precedence, from left to right."""
+
+    first: Node
+    rest: tuple[tuple[str, Node], ...]
+    at: int
+
+
+@dataclass(frozen=True)
+class Negative:
+    """A sign change."""
+
+    operand: Node
+    at: int
+
+
+@dataclass(frozen=True)
+class Power:
+    """A power; it binds to the right."""
+
+    base: Node
+    exponent: Node
+    at: int
+
+
+Node = Number | Name | Call | Chain | Negative | Power
+
+
+@dataclass(frozen=True)
+class Units:
+    """SI values of the units an expression is written in."""
+
+    length: float = 1.0
+    time: float = 1.0
+    force: float = 1.0
+    mass: float = 1.0
+
+    def factor(self, dimension: str) -> float:
+        """Return the SI value of one unit of ``dimension``, a key of ``DIMENSIONS``."""
+        if dimension not in DIMENSIONS:
+            raise ValueError(f"dimension {dimension!r} is not one of {', '.join(DIMENSIONS)}")
+        mass, length, time, force = DIMENSIONS[dimension]
+        return self.mass**mass * self.length**length * self.time**time * self.force**force
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the names and ids in an expression stand for.
+
+    Parameters
+    ----------
+    markers : mapping of int or str to int
+        Marker table index of every id and (upper-case) name.
+    marker_body : sequence of int
+        Row of the kinematics table of every marker.
+    variables : mapping
+        Expression of every VARIABLE; VARVAL writes it in place.
+    states : set
+        VARIABLEs that are unknowns of their own: VARVAL becomes ``("variable", ref)``.
+    diffs : mapping
+        Expression of every DIFF; None for an implicit one.  DIF becomes ``("diff", ref)``.
+    modes : mapping of str to int
+        Number of modes of each body that has some, by upper-case name.  MODAL becomes ``("mode", name, place)``.
+    splines : mapping to SplineData
+    arrays : mapping to sequences of float
+    functions : mapping
+        Functions of the user by name, see `gearmbs.mechanism.language.user_functions.UserFunction`.
+    plants : mapping of ("pinput" | "poutput", ref) to VARIABLE refs
+    forces : mapping of (kind, ref) to (I marker ref, J marker ref or None)
+        Elements whose forces JOINT, SFORCE, FX ... can ask for.
+    absent : set of (kind, ref, 0 or 3)
+        Elements without a force (0) or without a torque (3): it is zero.
+    aliases : set of (kind, ref)
+        Further names of forces that have another one: FX ... TM, sums between two markers, take each force once.
+    units : Units
+    one_sided : bool
+        Only what elements exert at their I markers are unknowns; the J side follows from action and reaction at one
+        point.
+    """
+
+    markers: Mapping[Ref, int] = field(default_factory=dict)
+    marker_body: Sequence[int] = ()
+    variables: Mapping[Ref, str] = field(default_factory=dict)
+    states: frozenset[Ref] = frozenset()
+    diffs: Mapping[Ref, str | None] = field(default_factory=dict)
+    modes: Mapping[Ref, int] = field(default_factory=dict)
+    splines: Mapping[Ref, SplineData] = field(default_factory=dict)
+    arrays: Mapping[Ref, Sequence[float]] = field(default_factory=dict)
+    functions: Mapping[str, Any] = field(default_factory=dict)
+    plants: Mapping[tuple[str, Ref], Sequence[Ref]] = field(default_factory=dict)
+    forces: Mapping[tuple[str, Ref], tuple[Ref, Ref | None]] = field(default_factory=dict)
+    absent: frozenset[tuple[str, Ref, int]] = frozenset()
+    aliases: frozenset[tuple[str, Ref]] = frozenset()
+    units: Units = Units()
+    one_sided: bool = False
+
+
+_TOKEN = re.compile(
+    r"""\s*(?:
+      (?P<number>(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d+|[Dd]\d+)?)(?P<degree>[Dd](?![A-Za-z0-9_]))?
+    | (?P<name>[A-Za-z_.$][A-Za-z0-9_.$]*|"[^"]*"|'[^']*')
+    | (?P<op>\*\*|[-+*/(),:])
+    )""",
+    re.VERBOSE,
+)
+
+
+_EXPONENT = re.compile(r"[+-]\d+(?![\d.A-Za-z_])")
+"""What may be an exponent behind a D: a signed integer that does not go on as a number or name."""
+
+
+class _Parser:
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.tokens: list[tuple[str, str, int, bool]] = []
+        at = 0
+        while at < len(text):
+            match = _TOKEN.match(text, at)
+            if match is None:
+                if not text[at:].strip():
+                    break
+                at += len(text[at:]) - len(text[at:].lstrip())
+                raise self.error(f"unexpected character {text[at]!r}", at)
+            exponent = _EXPONENT.match(text, match.end()) if match["degree"] else None
+            if exponent is not None:
+                number, sign, digits = match["number"], exponent[0][0], exponent[0][1:]
+                raise self.error(
+                    f"{number}D{sign}{digits} may be {number} degrees {sign} {digits} or a number with an exponent; "
+                    f"write {number}D {sign} {digits} or {number}E{sign}{digits}",
+                    match.start("number"),
+                )
+            kind = match.lastgroup if match.lastgroup != "degree" else "number"
+            self.tokens.append((str(kind), match.group(str(kind)), match.start(str(kind)), bool(match.group("degree"))))
+            at = match.end()
+        self.tokens.append(("end", "", len(text), False))
+        self.next = 0
+        self.depth = 0
+
+    def error(self, message: str, at: int) -> ExpressionError:
+        return ExpressionError(f"{message} at column {at + 1} of {shown(self.text)}")
+
+    def accept(self, *symbols: str) -> str | None:
+        kind, value, _, _ = self.tokens[self.next]
+        if kind == "op" and value in symbols:
+            self.next += 1
+            return value
+        return None
+
+    def expect(self, symbol: str, where: str) -> None:
+        if self.accept(symbol) is None:
+            kind, value, at, _ = self.tokens[self.next]
+            found = "the end" if kind == "end" else repr(value)
+            raise self.error(f"expected {symbol!r} {where}, found {found}", at)
+
+    def enter(self, at: int) -> None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise self.error(f"nested deeper than {MAX_DEPTH}", at)
+
+    def whole(self) -> Node:
+        node = self.sum()
+        kind, value, at, _ = self.tokens[self.next]
+        if kind != "end":
+            raise self.error(f"unexpected {value!r} after the expression", at)
+        return node
+
+    def sum(self) -> Node:
+        return self.chain(("+", "-"), self.product)
+
+    def product(self) -> Node:
+        return self.chain(("*", "/"), self.signed)
+
+    def chain(self, symbols: tuple[str, ...], operand) -> Node:
+        at = self.tokens[self.next][2]
+        first = operand()
+        rest = []
+        while symbol := self.accept(*symbols):
+            rest.append((symbol, operand()))
+        return Chain(first, tuple(rest), at) if rest else first
+
+    def signed(self) -> Node:
+        at = self.tokens[self.next][2]
+        sign = self.accept("+", "-")
+        if sign is None:
+            return self.power()
+        self.enter(at)
+        operand = self.signed()
+        self.depth -= 1
+        return Negative(operand, at) if sign == "-" else operand
+
+    def power(self) -> Node:
+        base = self.atom()
+        at = self.tokens[self.next][2]
+        if self.accept("**") is None:
+            return base
+        self.enter(at)
+        exponent = self.signed()
+        self.depth -= 1
+        return Power(base, exponent, at)
+
+    def atom(self) -> Node:
+        kind, value, at, degree = self.tokens[self.next]
+        if kind == "number":
+            self.next += 1
+            return self.number(value, at, degree)
+        if kind == "name":
+            self.next += 1
+            if value[0] not in "\"'" and self.accept("(") is not None:
+                return self.call(value.upper(), at)
+            return Name(value.strip("\"'").upper(), at)
+        if self.accept("(") is not None:
+            self.enter(at)
+            node = self.sum()
+            self.depth -= 1
+            self.expect(")", "to close the bracket")
+            return node
+        found = "the end" if kind == "end" else repr(value)
+        raise self.error(f"expected a number, a function or a bracket, found {found}", at)
+
+    def number(self, text: str, at: int, degree: bool) -> Number:
+        value = float(re.sub("[dD]", "E", text))
+        if abs(value) > 1e300:
+            raise self.error(f"the number {text} is too large", at)
+        if degree:
+            return Number(value * 0.017453292519943295, at)
+        return Number(value, at, int(text) if text.isdigit() and len(text) < 19 else None)
+
+    def call(self, name: str, at: int) -> Node:
+        self.enter(at)
+        args: list[Node] = []
+        if self.accept(")") is None:
+            args.append(self.sum())
+            while self.accept(",", ":") is not None:
+                args.append(self.sum())
+            self.expect(")", f"to close {name}")
+        self.depth -= 1
+        return Call(name, tuple(args), at)
+
+
+def shown(text: str) -> str:
+    """Return an expression for a message, shortened when it is long."""
+    flat = " ".join(text.split())
+    return repr(flat if len(flat) <= 90 else flat[:87] + "...")
+
+
+def parse(text: str) -> Node:
+    """Read a function expression into its syntax tree.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    Node
+
+    Raises
+    ------
+    ExpressionError
+        With the column and what was expected there.
+    """
+    if not text.strip():
+        raise ExpressionError("the expression is empty; give at least a number")
+    return _Parser(text).whole()
+
+
+def unparse(node: Node, rename: Callable[[Call], Node] = lambda call: call) -> str:
+    """Write a syntax tree as text again.
+
+    Parameters
+    ----------
+    node : Node
+    rename : callable
+        Given every function call before it is written; returns what to write instead.
+    """
+    if isinstance(node, Number):
+        return str(node.integer) if node.integer is not None else repr(node.value)
+    if isinstance(node, Name):
+        return node.text if re.fullmatch(r"[A-Z_.$][A-Z0-9_.$]*", node.text) else f'"{node.text}"'
+    if isinstance(node, Negative):
+        return f"(-{unparse(node.operand, rename)})"
+    if isinstance(node, Power):
+        return f"({unparse(node.base, rename)})**({unparse(node.exponent, rename)})"
+    if isinstance(node, Chain):
+        rest = "".join(f" {symbol} {unparse(operand, rename)}" for symbol, operand in node.rest)
+        return f"({unparse(node.first, rename)}{rest})"
+    call = rename(node)
+    if not isinstance(call, Call):
+        return unparse(call, rename)
+    return f"{call.name}({', '.join(unparse(a, rename) for a in call.args)})"
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """Yield a syntax tree's nodes, parents first."""
+    yield node
+    children: Sequence[Node] = ()
+    if isinstance(node, Negative):
+        children = (node.operand,)
+    elif isinstance(node, Power):
+        children = (node.base, node.exponent)
+    elif isinstance(node, Chain):
+        children = (node.first, *(operand for _, operand in node.rest))
+    elif isinstance(node, Call):
+        children = node.args
+    for child in children:
+        yield from walk(child)
+
+
+__all__ = ["ExpressionError", "Scope", "SplineData", "Units", "parse", "unparse", "walk"]

@@ -1,0 +1,221 @@
+"""Force elements of a mechanism."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, Diagnostic
+from gearmbs.kernels.jit import njit
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.functions import TimeFunction
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """What a force element hands to the equations, see `gearmbs.dae.equations.loads.forces`.
+
+    Attributes
+    ----------
+    kernel : compiled function
+        With the signature ``FORCE_SIG``.
+    integers, reals : sequence
+        The element's own tables, SI.
+    functions : tuple of (compiled function, signature)
+        Their addresses go before the integers.
+    sees : tuple of Marker, optional
+        Markers whose frames the kernel is given; default: those on which the element acts.
+    reactions : tuple of str
+        Names of joints whose reactions, F and N on I's body at marker I, are inputs: six each, before ``times``.
+    times : tuple of TimeFunction
+        Functions of time whose values are inputs.
+    angles : tuple of (int, Marker, Marker)
+        Counted angles AX, AY, AZ (0, 1, 2) of one marker about another, whose references are the last inputs.
+    scratch : int
+    """
+
+    kernel: Any
+    integers: Sequence[int] | np.ndarray = ()
+    reals: Sequence[float] | np.ndarray = ()
+    functions: tuple[tuple[Any, Any], ...] = ()
+    sees: tuple[Marker, ...] | None = None
+    reactions: tuple[str, ...] = ()
+    times: tuple[TimeFunction, ...] = ()
+    angles: tuple[tuple[int, Marker, Marker], ...] = ()
+    scratch: int = 0
+
+
+@dataclass(frozen=True)
+class StartOverlap:
+    """A force element whose parts stand deep in each other at the start.
+
+    Attributes
+    ----------
+    text : str
+        What stands where and how deep.
+    remedy : str
+    wrench : ndarray, shape (6,)
+        Force, N, and torque about I's origin, N m, on I's body, global components; J's body takes the reaction.
+    """
+
+    text: str
+    remedy: str
+    wrench: np.ndarray
+
+
+@dataclass(eq=False)
+class ForceElement(ABC):
+    """A force element with a kernel of its own. A subclass says how it is compiled.
+
+    Attributes
+    ----------
+    name : str
+    i : Marker
+        Marker on whose body F and N act.
+    j : Marker
+        Marker whose body takes the reaction; see `markers` for elements with fewer or more.
+    """
+
+    name: str
+    i: Marker
+    j: Marker
+
+    kind: ClassVar[str] = "force"
+    """The element's name in messages and in the function language."""
+    diagnostics: ClassVar[tuple[Diagnostic, ...]] = ()
+    has_force: ClassVar[bool] = True
+    """Whether F is an unknown."""
+    has_torque: ClassVar[bool] = True
+    """Whether N is an unknown."""
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """Markers on which the element acts; the ground takes the reaction of a single one."""
+        return (self.i, self.j)
+
+    @property
+    def wrenches(self) -> int:
+        """How many wrenches it has: one a marker if there are more than two markers, else one."""
+        return len(self.markers) if len(self.markers) > 2 else 1
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The element's own states."""
+        return ()
+
+    def start_overlap(self) -> StartOverlap | None:
+        """Return how parts stand in each other at the start, if that is deeper than a small share of their size."""
+        return None
+
+    @abstractmethod
+    def compiled(self) -> Compiled:
+        """Return what is handed to the equations; kernels are imported here."""
+
+
+@dataclass(eq=False, repr=False)
+class Torque(ForceElement):
+    """Torque f(t) about the z axis of marker ``axis`` on I's body, its reaction on J's body."""
+
+    axis: Marker
+    function: TimeFunction
+
+    kind = "torque"
+    has_force = False
+
+    def compiled(self) -> Compiled:
+
+        return Compiled(axis_torque, sees=(self.axis,), times=(self.function,))
+
+    def __repr__(self) -> str:
+        return f"Torque({self.name!r}, {self.function} N m on {self.i.body.name!r} about z of {self.axis.name!r})"
+
+
+LINE, AXIS_FORCE, AXIS_TORQUE, COMPONENTS = 0, 1, 2, 3
+
+
+@dataclass(eq=False)
+class Load:
+    """Force and torque given by expressions in the ADAMS function language.
+
+    Attributes
+    ----------
+    name, kind : str
+        The kind is the element's name in the language ("sforce", "gforce", "bushing", ...), for functions that
+        ask for its force.
+    i, j, rm : Marker
+        I feels the load at its origin, J the reaction at the same point; RM gives the directions.
+    mode : int
+        LINE (along the line from J to I), AXIS_FORCE or AXIS_TORQUE (along z of RM), COMPONENTS (in RM's frame).
+    expressions : tuple of str or None
+        One expression, or for COMPONENTS six: fx, fy, fz, tx, ty, tz.
+    parameters : mapping, optional
+        What the expressions were made from, by the names of the method that adds the element and in the mechanism's
+        units; for writing the element as what it is.
+    """
+
+    name: str
+    kind: str
+    i: Marker
+    j: Marker
+    rm: Marker
+    mode: int
+    expressions: tuple[str | None, ...]
+    parameters: Mapping[str, Any] | None = None
+
+    wrenches: ClassVar[int] = 1
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """Markers on which it acts."""
+        return (self.i, self.j)
+
+    @property
+    def has_force(self) -> bool:
+        """Whether F is an unknown."""
+        return self.mode in (LINE, AXIS_FORCE) or (self.mode == COMPONENTS and any(self.expressions[:3]))
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether N is an unknown."""
+        return self.mode == AXIS_TORQUE or (self.mode == COMPONENTS and any(self.expressions[3:]))
+
+    def __repr__(self) -> str:
+        shown = ", ".join(e for e in self.expressions if e)
+        return f"Load({self.name!r}, {self.kind}, I={self.i.name!r}, J={self.j.name!r}, {shown})"
+
+
+@dataclass(eq=False)
+class State:
+    """A state: z' = expression from ``start``, or z = expression when it is algebraic.
+
+    That of a force element has no expression: its kernel knows it. An ``implicit`` algebraic one stands in its own
+    expression; its error is controlled.
+    """
+
+    name: str
+    expression: str = ""
+    start: float = 0.0
+    algebraic: bool = False
+    implicit: bool = False
+
+
+# Kernel of a single torque: a function of time about an axis.
+
+
+@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
+def axis_torque(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
+    """Write N = f(t) z, z the axis of the only frame and f the only input; see `gearmbs.dae.equations.loads.forces`.
+
+    d(f z) = dpi x f z.
+    """
+    for c in range(3):
+        wrench[0, 3 + c] = inputs[0] * frames[0, FRAME_A + 3 * c + 2]
+    if want & DERIVATIVES:
+        x, y, z = wrench[0, 3], wrench[0, 4], wrench[0, 5]
+        jac[3, 4], jac[3, 5] = z, -y
+        jac[4, 3], jac[4, 5] = -z, x
+        jac[5, 3], jac[5, 4] = y, -x

@@ -1,0 +1,1 @@
+"""Simulation, statics, linear analyses and what is measured in them."""

@@ -1,0 +1,263 @@
+"""What can be asked of a finished solution by joint, marker, state or expression."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs._shown import html_table, readable
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.expressions import ExpressionError
+from gearmbs.dae.equations.expressions.measures import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.model.model import Names
+from gearmbs.dae.problem import ModelError
+from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.elements import State
+from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle, kinds_with_displacement
+from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.units import shown
+
+if TYPE_CHECKING:
+    from gearmbs.dae.results.solution import Solution
+    from gearmbs.mechanism.mechanism import Mechanism
+
+SPLINE_POINTS = 4
+"""Outputs from which a cubic spline says more about a speed than its mean between two of them."""
+
+
+def _finer_steps(t: np.ndarray, speed: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return the angles (rad) from output to output by a spline through the speeds, where turns could be miscounted."""
+    if t.size < SPLINE_POINTS or abs(steps).max() < np.pi or np.diff(t).min() <= 0.0:
+        return steps
+    from scipy.interpolate import CubicSpline
+
+    return np.diff(CubicSpline(t, speed).antiderivative()(t))
+
+
+class Measures:
+    """Measurements on a solution of a mechanism; :class:`gearmbs.dae.results.solution.Solution` has them as methods.
+
+    Markers may have been added to the bodies after the run.
+    """
+
+    def __init__(self, mechanism: Mechanism, solution: Solution) -> None:
+        if list(mechanism.bodies) != solution.system.body_names:
+            raise ModelError(f"mechanism '{mechanism.name}': its bodies are no longer those of the solution")
+        self.mechanism, self.solution = mechanism, solution
+
+    # --- joints -------------------------------------------------------------------------------------
+
+    def angle(self, joint: Joint | str) -> np.ndarray:
+        """Return the rotation of I about z_J, full turns counted, shape (m,), rad."""
+        found = self._joint(joint, kinds_with_angle(), "angle")
+        t = self.solution.t
+        ai, aj = self._axes(found.i), self._axes(found.j)
+        wanted = np.arctan2(_dot(ai[:, :, 0], aj[:, :, 1]), _dot(ai[:, :, 0], aj[:, :, 0]))
+        speed = _dot(self._spin(found.i) - self._spin(found.j), aj[:, :, 2])
+        steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
+        # each step is the one nearest to what the speeds make of it
+        rest = np.diff(wanted) - steps
+        turns = np.round(rest / (2 * np.pi))
+        doubtful = np.flatnonzero(np.round((rest + steps - _finer_steps(t, speed, steps)) / (2 * np.pi)) != turns)
+        if doubtful.size:
+            k = int(doubtful[0])
+            warnings.warn(
+                f"joint '{found.name}': its full turns cannot be counted surely from t = {t[k]:.6g} to "
+                f"{t[k + 1]:.6g} s, where it turns {abs(steps[k]) / (2 * np.pi):.3g} times between two outputs and its "
+                "speed changes; simulate with a higher rate",
+                stacklevel=3,
+            )
+        return wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
+
+    def displacement(self, joint: Joint | str) -> np.ndarray:
+        """Return the way of I from J along z_J, shape (m,), m."""
+        found = self._joint(joint, kinds_with_displacement(), "displacement")
+        return _dot(self.place(found.i) - self.place(found.j), self._axes(found.j)[:, :, 2])
+
+    def _joint(self, joint: Joint | str, kinds: list[str], what: str) -> Joint:
+        name = joint.name if isinstance(joint, Joint) else joint
+        found = self.mechanism.joints.get(name)
+        if found is None:
+            raise KeyError(f"joint {name!r}; the joints are {', '.join(self.mechanism.joints) or 'none'}")
+        if found.kind not in kinds:
+            raise ModelError(f"joint '{name}' is {found.kind}; {what} is for {', '.join(kinds)} joints")
+        return found
+
+    # --- markers ------------------------------------------------------------------------------------
+
+    def place(self, marker: Marker | Body | str) -> np.ndarray:
+        """Return the origin of a marker, or of a body's frame, global components, shape (m, 3), m."""
+        return self._motion(marker)[:, KIN_R : KIN_R + 3]
+
+    def velocity(self, marker: Marker | Body | str) -> np.ndarray:
+        """Return the velocity of a marker's, or of a body's frame's, origin, global components, shape (m, 3), m/s."""
+        return self._motion(marker)[:, KIN_V : KIN_V + 3]
+
+    def deflection(self, at: Marker | str) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far a marker of a modal body is displaced (m) and turned (rad) in the body's axes, each (m, 3)."""
+        marker = self._find(at) if isinstance(at, str) else at
+        body = getattr(marker, "body", None)
+        if not isinstance(body, ModalBody):
+            raise ModelError(f"{marker!r} is not a marker of a modal body; rigid bodies do not deflect")
+        found = self.solution.evaluated
+        q = found.modal(found.model.names.bodies.index(body.name) + 1)[0]
+        moved, turned = body.shape_at(marker)
+        return q @ moved, q @ turned
+
+    def _axes(self, marker: Marker) -> np.ndarray:
+        return self._motion(marker)[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+
+    def _spin(self, marker: Marker) -> np.ndarray:
+        return self._motion(marker)[:, KIN_W : KIN_W + 3]
+
+    def _motion(self, marker: Marker | Body | str) -> np.ndarray:
+        """Return the motion of a marker's frame, or of a body's, columns ``KIN_*``, shape (m, 18)."""
+        if isinstance(marker, str):
+            marker = self._find(marker)
+        if isinstance(marker, Body):
+            marker = Marker(f"{marker.name}.frame", marker, np.zeros(3), np.eye(3))
+        if not isinstance(marker, Marker):
+            raise ModelError(f"{marker!r} is not a marker, a body or the name of a marker")
+        body, local = marker.body, marker.position - marker.body.com
+        out = np.zeros((self.solution.t.size, KIN_AXES))
+        if body.is_ground:
+            out[:, KIN_R : KIN_R + 3], out[:, KIN_A : KIN_A + 9] = local, marker.orientation.ravel()
+            return out
+        found = self.solution.evaluated
+        number = found.model.names.bodies.index(body.name) + 1
+        host = body_motion(found, number)
+        if isinstance(body, ModalBody):
+            host, _ = elastic_motion(host, None, found.modal(number), local, *body.shape_at(marker))
+            local = np.zeros(3)
+        axes = host[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+        arm = axes @ local
+        out[:, KIN_R : KIN_R + 3] = host[:, KIN_R : KIN_R + 3] + arm
+        out[:, KIN_V : KIN_V + 3] = host[:, KIN_V : KIN_V + 3] + np.cross(host[:, KIN_W : KIN_W + 3], arm)
+        out[:, KIN_W : KIN_W + 3] = host[:, KIN_W : KIN_W + 3]
+        out[:, KIN_A : KIN_A + 9] = (axes @ marker.orientation).reshape(-1, 9)
+        return out
+
+    def _find(self, name: str) -> Marker:
+        bodies = (self.mechanism.ground, *self.mechanism.bodies.values())
+        found = [m for body in bodies for m in body.markers if m.name == name]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise ModelError(
+                f"marker {name!r} is on {' and '.join(m.body.name for m in found)}; give the marker itself"
+            )
+        known = [m.name for body in bodies for m in body.markers]
+        raise KeyError(f"marker {name!r}; the markers are {', '.join(known) or 'none'}")
+
+    # --- states and expressions ---------------------------------------------------------------------
+
+    def state(self, state: State | str) -> np.ndarray:
+        """Return a user-defined state, shape (m,)."""
+        name = str(state.name if isinstance(state, State) else state)
+        names = [n.upper() for n in self.solution.system.state_names]
+        if name.upper() not in names:
+            raise KeyError(f"state {name!r}; the states are {', '.join(self.solution.system.state_names) or 'none'}")
+        at = int(self.solution.problem.idata[T.H_Z]) + names.index(name.upper())
+        return self.solution.result.y[:, at].copy()
+
+    def expression(self, text: str) -> np.ndarray:
+        """Return the values of an expression, in the mechanism's units, shape (m,)."""
+        from gearmbs.mechanism.building.compile import scope_of, starting_angles
+        from gearmbs.mechanism.language.library import compile_expression
+        from gearmbs.mechanism.language.user_functions import evaluate_series
+
+        scope, builder, marker_named = scope_of(self.mechanism)
+        try:
+            tape = compile_expression(text, scope, accelerations=True)
+        except ExpressionError as error:
+            raise ModelError(str(error)) from error
+        t = self.solution.t
+        y = np.zeros((t.size, max(1, len(tape.algebraic))))
+        for q, key in enumerate(tape.algebraic):
+            y[:, q] = self._unknown(key)
+        tape = tape.bind(tape.algebraic.index)
+        angles = np.zeros((3, max(1, tape.n_angles)))
+        angles[0, : tape.n_angles] = starting_angles(tape, self.mechanism.turns, marker_named)
+        bodies = np.array(builder.marker_body, dtype=np.int64)
+        frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
+        kin, acc = frame_motion(self.solution.evaluated, builder.build(Names()))
+        out = np.zeros(t.size)
+        evaluate_series(
+            tape.ints, tape.floats, t, kin, acc, bodies, frames, y, angles, np.zeros(max(1, tape.gradient_size)),
+            np.zeros(tape.work_size), out,
+        )  # fmt: skip
+        return out
+
+    def _unknown(self, key: tuple) -> np.ndarray:
+        if key[0] in ("diff", "variable"):
+            return self.state(str(key[1]))
+        kind, ref, component = key
+        if kind in ("mode", "mode1"):
+            body = next(name for name in self.mechanism.bodies if name.upper() == ref)
+            return self.solution.modal_motion(body)[int(kind == "mode1")][:, component]
+        for name in self.solution.system.force_names:
+            if name.upper() == str(ref).upper() and kind not in ("joint", "jprim", "motion", "coupler", "gear", "gcon"):
+                return np.hstack(self.solution.load(name))[:, component]
+        for name in self.mechanism.joints:
+            if name.upper() == str(ref).upper():
+                return np.hstack(self.solution.reaction(name))[:, component]
+        raise ModelError(f"the force of {kind} {ref} is not part of the solution")
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("ti,ti->t", a, b)
+
+
+# A mechanism as tables for notebooks.
+
+
+def mechanism_html(mechanism: Mechanism) -> str:
+    """Return the bodies, joints and forces of a mechanism as tables."""
+    rows = sum(len(joint.rows) for joint in mechanism.joints.values())
+    gravity = np.array2string(np.asarray(mechanism.gravity), precision=5, separator=", ")
+    head = f"Mechanism {mechanism.name}: {6 * len(mechanism.bodies)} coordinates, {rows} constraint rows"
+    given = mechanism.given
+    bodies = [
+        (
+            name,
+            _body_setting(given, name, "mass", shown(body.mass, "kg")),
+            _body_setting(given, name, "inertia", ", ".join(f"{v:.4g}" for v in np.diag(body.inertia)) + " kg m^2"),
+            _body_setting(given, name, "position", ", ".join(f"{v:.4g}" for v in body.position) + " m"),
+        )
+        for name, body in mechanism.bodies.items()
+    ]
+    joints = [
+        (
+            name,
+            joint.kind.replace("_", " "),
+            joint.i.body.name,
+            joint.j.body.name,
+            len(joint.rows),
+            _settings(given, name),
+        )
+        for name, joint in mechanism.joints.items()
+    ]
+    forces = [
+        (name, str(getattr(e, "kind", "force")).replace("_", " "), e.i.body.name, e.j.body.name, _settings(given, name))
+        for name, e in mechanism.elements.items()
+        if hasattr(e, "i") and hasattr(e, "j")
+    ]
+    tables = [html_table(head, ("body", "mass", "inertia", "position"), bodies, f"gravity {gravity} m/s^2")]
+    if joints:
+        tables.append(html_table("Joints and motions", ("name", "kind", "I on", "J on", "rows", "given"), joints))
+    if forces:
+        tables.append(html_table("Forces", ("name", "kind", "I on", "J on", "given"), forces))
+    return "".join(tables)
+
+
+def _body_setting(given: dict[str, dict[str, Any]], name: str, key: str, otherwise: str) -> str:
+    """Return a setting of a body as it was given, or in SI."""
+    return readable(given[name][key]) if key in given.get(name, {}) else otherwise
+
+
+def _settings(given: dict[str, dict[str, Any]], name: str) -> str:
+    """Return the settings of a joint or force that were given with units."""
+    return "; ".join(f"{key.replace('_', ' ')} {readable(value)}" for key, value in given.get(name, {}).items())

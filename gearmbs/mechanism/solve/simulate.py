@@ -1,0 +1,363 @@
+"""From a mechanism to a solution in one call."""
+
+from __future__ import annotations
+
+import copy
+import difflib
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs._lazy import uncollected
+from gearmbs.dae.equations import layout as tables
+from gearmbs.dae.equations.kinematics.update import update_tables
+from gearmbs.dae.equations.loads.expressions import value
+from gearmbs.dae.integrators.events import STOP
+from gearmbs.dae.integrators.ida import solve_ida
+from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.wstiff import solve_wstiff
+from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
+from gearmbs.dae.result import DAEResult, Status
+from gearmbs.dae.results.solution import Solution, Stream
+from gearmbs.kernels.jit import njit
+from gearmbs.mechanism.checks import locking_remark, refuse_overlaps, warn_of_spin, warn_of_stiff_seats
+from gearmbs.mechanism.language.user_functions import raised_errors
+from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.progress import time_bar
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.lane_members import Members
+    from gearmbs.dae.model.system import System
+
+# Ends of a simulation where an expression passes a value.
+
+
+@dataclass(frozen=True)
+class StopAt:
+    """End where a state passes a value.
+
+    Attributes
+    ----------
+    state : str
+        Name of a state of the mechanism; an algebraic one holds any expression, see `Mechanism.algebraic_state`.
+    value : float
+    direction : int
+        1: rising only, -1: falling only, 0: either.
+    """
+
+    state: str
+    value: float = 0.0
+    direction: int = 0
+
+
+@njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
+def passes(t, y, yp, out, idata, rdata, work):
+    """Write by how much states exceed their values: both stand at the ends of the tables, their number last.
+
+    An algebraic state is taken from its expression. Between the ends of a step the polynomial through its values would
+    pass where its function jumps later.
+    """
+    count = idata[idata.size - 1]
+    tab = tables.unpack(idata, rdata, work)
+    update_tables(t, y, tab, False)
+    for k in range(count):
+        place = idata[idata.size - 1 - count + k]
+        state = tab.state[place - idata[tables.H_Z]]
+        given = state[tables.STATE_KIND] != tables.STATE_DIFFERENTIAL and state[tables.STATE_TAPE] >= 0
+        now = value(state[tables.STATE_TAPE], t, y, tab) if given else y[place]
+        out[k] = now - rdata[rdata.size - count + k]
+
+
+def with_stops(problem: DAEProblem, names: Sequence[str], first: int, stops: Sequence[StopAt]) -> DAEProblem:
+    """Return a problem that ends where states pass values.
+
+    Parameters
+    ----------
+    problem : DAEProblem
+    names : sequence of str
+        Of all states, in the order of the unknowns.
+    first : int
+        Place of the first among the unknowns.
+    stops : sequence of StopAt
+
+    Raises
+    ------
+    ModelError
+        For a state that is not there.
+    """
+    places = []
+    for stop in stops:
+        if stop.state not in names:
+            raise ModelError(f"stops: there is no state {stop.state!r}; the mechanism has {', '.join(names) or 'none'}")
+        places.append(first + names.index(stop.state))
+    idata = np.concatenate([problem.idata, places, [len(stops)]]).astype(np.int64)
+    rdata = np.concatenate([problem.rdata, [float(stop.value) for stop in stops]])
+    return replace(problem, idata=idata, rdata=rdata, events=passes, n_events=len(stops))
+
+
+def stop_options(stops: Sequence[StopAt]) -> dict[str, Any]:
+    """Return the options of the integrator that go with `with_stops`."""
+    return {"event_direction": [stop.direction for stop in stops], "event_action": [STOP] * len(stops)}
+
+
+INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
+ADVICE = {
+    Status.NOT_FINITE: (
+        "Look at the forces and functions of time acting there: a division by zero, a root of a negative number, a "
+        "table that ends, a load without limit."
+    ),
+    Status.STEP_TOO_SMALL: (
+        "Look for a force or motion that jumps there and smooth it (STEP) or give its time in breakpoints; loosen tol."
+    ),
+    Status.NEWTON_FAILURE: (
+        "Look for a force or motion that jumps there and smooth it (STEP) or give its time in breakpoints; try another "
+        "formulation or integrator."
+    ),
+    Status.TOO_MANY_REJECTIONS: (
+        "Something jumps there: smooth the force or motion (STEP), give its time in breakpoints, or loosen tol."
+    ),
+    Status.TOO_MANY_STEPS: "Raise max_steps or loosen tol.",
+    Status.STALLED: (
+        "The motion may have no continuation there, as where friction jams a joint; look at the forces just before, or "
+        "end the run before."
+    ),
+    Status.SOLVER_FAILURE: ("Loosen tol, let motions and torques start more smoothly, or take the WSTIFF integrator."),
+}
+"""What the modeller of a mechanism can try against a failing integration."""
+
+
+def simulate(
+    mechanism: Mechanism,
+    t_end: float,
+    *,
+    rate: float | None = None,
+    t_eval: np.ndarray | None = None,
+    every_step: bool = False,
+    t_start: float = 0.0,
+    integrator: str = "WSTIFF",
+    formulation: str = "SI2",
+    tol: float = 1e-6,
+    rate_scale: float = 1.0,
+    progress: bool | Callable[[float], None] | None = None,
+    advice: Mapping[Status, str] | None = None,
+    consumer: Callable[[Solution], None] | None = None,
+    lump: bool | None = None,
+    stops: Sequence[StopAt] = (),
+    continued: bool = False,
+    **options,
+) -> Solution:
+    """Integrate a mechanism and return its motion and forces.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The model; it is not changed.
+    t_end : float
+        End of the simulation, s.
+    rate : float, optional
+        Outputs a second from the start on, and one at the end; default: 500 outputs over the span.
+    t_eval : ndarray, optional
+        Output times instead of ``rate``; the first is the start.
+    every_step : bool
+        Outputs at the end of every accepted step instead: uneven times, dense where much happens.
+    t_start : float
+        Start of the simulation, s.
+    integrator : {"WSTIFF", "GSTIFF", "IDA"}
+    formulation : {"SI2", "SI1", "I3"}
+    tol : float
+        Local error allowed a step: in metres or radians and their rates for lengths of the order of 1 m; lengths are
+        scaled by the size of the mechanism.
+    rate_scale : float
+        Velocities are allowed an error this many times larger (1/s) than positions: the angular frequency of the
+        motion one is interested in; 1 is ADAMS's practice.
+    progress : bool or callable, optional
+        A bar, see `gearmbs.progress`: by default after two seconds where somebody watches, with True at once, with
+        False never; a callable is given the time reached.
+    advice : mapping, optional
+        What messages of failures recommend, by status, where it should be something else than for a mechanism.
+    consumer : callable, optional
+        With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
+        and each valid during the call only, instead of keeping all steps in memory; see
+        `gearmbs.dae.results.solution.Stream`. The solution returned then holds nothing but the last step.
+    lump : bool, optional
+        Integrate bodies that fixed joints connect, or fix to the ground, as one, and if all that is left turns about
+        fixed axes, its angles alone; default the mechanism's ``lump``, which only some presets set, and not with
+        ``stops``. Results are about all bodies and joints as without it; reactions inside are recovered exactly. Where
+        that is not possible, as with any body that deforms, all bodies are integrated, and the solution's ``message``
+        says why. See `gearmbs.mechanism.building.lumping.lumped`.
+    stops : sequence of StopAt
+        The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
+        stop. Not with IDA, and not with ``lump``.
+    continued : bool
+        Whether the start is a state in which an earlier run ended: teeth may then be deep in an impact, which else is
+        refused.
+    **options
+        Handed to the integrator.
+
+    Returns
+    -------
+    Solution
+        Also when the integration failed: see its ``status`` and ``message``; what was computed is kept.
+
+    Raises
+    ------
+    ModelError
+        If the model or an option is wrong, or the mechanism cannot be assembled; if teeth start deeper in each other
+        than the loads press them; if a function of the user fails, its
+        ``solution`` has what was computed until then.
+    """
+    if consumer is not None and not every_step:
+        raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
+    t_start = quantity(t_start, "time", "t_start")
+    t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
+    name = _checked(integrator, tol, options)
+    asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
+    with uncollected(), raised_errors(mechanism.functions.values()):
+        if not continued:
+            refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_start))
+        system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
+    if stops:
+        if name == "IDA" or lump:
+            raise ModelError("stops: they need the integrator WSTIFF or GSTIFF, and lump=False")
+        problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
+        options.update(stop_options(stops))
+    problem.advice = {**ADVICE, **(advice or {})}
+    remark = " ".join(text for text in (locking_remark(mechanism, system), lumping if asked else "") if text)
+    stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
+    warn_of_stiff_seats(mechanism.joints, mechanism.elements)
+    bar = time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1]))
+    result = None
+    try:
+        with bar as report, raised_errors(mechanism.functions.values()):
+            result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **options)
+    except ModelError as error:
+        if result is not None and stream is None:
+            cut = replace(result, status=Status.USER_ERROR, message=str(error))
+            error.solution = Solution(system, problem, cut, members, remark)
+        raise
+    solution = Solution(system, problem, result, members, remark)
+    if stream is not None:
+        return _closed(stream, solution, name)
+    warn_of_spin(mechanism.bodies, solution)
+    return solution
+
+
+def _without(mechanism: Mechanism, names: Collection[str]) -> Mechanism:
+    """Return the mechanism without some of its force elements."""
+    part = copy.copy(mechanism)
+    part.elements = {name: element for name, element in mechanism.elements.items() if name not in names}
+    return part
+
+
+def _closed(stream: Stream, solution: Solution, name: str) -> Solution:
+    """Return the solution of a run whose steps were handed on; IDA's are so only now."""
+    if name == "IDA":
+        for part in solution.parts():
+            stream.consumer(part)
+    return stream.close(solution)
+
+
+def _checked(integrator: str, tol: float, options: Mapping[str, Any]) -> str:
+    """Return the integrator's name in capitals; raise a ModelError for a setting or an option that it cannot have."""
+    if not np.isfinite(tol) or tol <= 0.0:
+        raise ModelError(f"tol = {tol}; it must be a positive number")
+    name = integrator.upper()
+    if name not in INTEGRATORS:
+        raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
+    _check_options(name, options)
+    return name
+
+
+def _prepared(
+    mechanism: Mechanism, t_start: float, lump: bool, formulation: str, rate_scale: float
+) -> tuple[System, DAEProblem, Members | None, str]:
+    """Return the system of all bodies, what is integrated, how the first follows from it if it is less, and a remark.
+
+    The remark tells why not less is integrated.
+    """
+    one, why = None, ""
+    if lump:
+        # kernels of bodies that turn about fixed axes are compiled by those alone who ask for it
+        from gearmbs.mechanism.building.lumping import lumped, why_not_lumped
+
+        one = lumped(mechanism, t_start)
+        why = "" if one else why_not_lumped(mechanism)
+    if one is None:
+        system = mechanism.compile(t_start)
+        return system, system.problem(formulation, rate_scale), None, why
+    return one.whole, *one.problem(formulation, rate_scale), one.remark(formulation)
+
+
+def _output_times(
+    start: float, end: float, rate: float | None, given: np.ndarray | None, every_step: bool
+) -> np.ndarray:
+    """Return the output times; see `simulate`."""
+    if every_step and (rate is not None or given is not None):
+        raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
+    if given is not None:
+        # a column of a table is taken apart from it, for the kernels
+        return np.ascontiguousarray(given, dtype=float)
+    if not np.isfinite(end) or end <= start:
+        raise ModelError(f"t_end = {end} s; it must be later than the start {start} s")
+    if rate is None:
+        return np.linspace(start, end, 501)
+    rate = quantity(rate, "frequency", "rate")
+    if not rate > 0.0:
+        raise ModelError(f"rate = {rate} 1/s; it must be positive")
+    return _sampled(start, end, rate)
+
+
+def _integrated(
+    name: str, problem: DAEProblem, t_eval: np.ndarray, every_step: bool, stream: Stream | None, **options
+) -> DAEResult:
+    """Run an integrator to the last of the output times, with outputs there or at its own steps."""
+    times, last = None if every_step else t_eval, float(t_eval[-1])
+    if name == "IDA":
+        return solve_ida(problem, times, t_end=last, **options)
+    # errors are controlled on positions and velocities, and so is the corrector
+    options.setdefault("corrector", "modified")
+    options.setdefault("slopes", times is not None)
+    return solve_wstiff(problem, times, method=name, consumer=stream, t_end=last, **options)
+
+
+def _sampled(start: float, end: float, rate: float) -> np.ndarray:
+    """Return the times at a rate from the start on; the end is always one of them."""
+    span = (end - start) * rate
+    count = int(np.floor(span + 1e-6))
+    times = start + np.arange(count + 1) / rate
+    return np.append(times, end) if span > count + 1e-6 else times
+
+
+def _check_options(name: str, options: Mapping[str, Any]) -> None:
+    """Raise a ModelError for an option the integrator does not have."""
+    known = Options.names(name)
+    for option in options:
+        if option in known:
+            continue
+        remark = "outputs are set by rate, t_eval or every_step" if "step" in option or "out" in option else ""
+        near = difflib.get_close_matches(option, [*known, *SETTINGS], n=1)
+        hint = remark or (f"did you mean {near[0]}?" if near else "")
+        raise ModelError(
+            f"simulate has no option {option!r}{': ' + hint if hint else ''}; besides {', '.join(SETTINGS)} the "
+            f"integrator {name} takes {', '.join(k for k in known if k not in SETTINGS)}"
+        )
+
+
+SETTINGS = (
+    "rate",
+    "t_eval",
+    "every_step",
+    "t_start",
+    "integrator",
+    "formulation",
+    "tol",
+    "rate_scale",
+    "progress",
+    "consumer",
+    "lump",
+    "stops",
+    "continued",
+)

@@ -1,0 +1,1 @@
+"""Reports of recordings: levels, indicators, comparisons, trends, speed maps."""

@@ -1,0 +1,210 @@
+"""RMS of the gear mesh frequency (GMF) harmonics, by band-pass and by orders (section 4 of the paper)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.filters import bandpass_taps, filtered_mean_square
+from gearmbs.signals.rotation.orders import MIN_PERIODS, harmonic_amplitudes
+from gearmbs.signals.signal.signal import check_teeth, common_unit, mesh_frequency, rate_of, units_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+HALF_WIDTH = 0.25
+TRANSITION = 0.25
+ATTENUATION_DB = 100.0
+
+
+def whole_period_count(count: int, rate: float, frequency: float) -> int:
+    """Number of samples, at most `count`, nearest to the largest whole number of periods that fits."""
+    periods = math.floor(count * frequency / rate)
+    if periods < 1:
+        raise SignalError(f"signal: {count} samples at {rate:g} Hz hold no whole period of {frequency:g} Hz")
+    return min(count, round(periods * rate / frequency))
+
+
+def rms(values: np.ndarray) -> np.ndarray:
+    """Root mean square along axis 0, mean included."""
+    return np.sqrt(np.einsum("i...,i...->...", values, values) / values.shape[0])
+
+
+def band_rms(
+    signal: xr.DataArray, frequency: float, *, half_width: float, transition: float, period: float | None = None
+) -> xr.DataArray:
+    """RMS of what a zero-phase band-pass around `frequency` lets through.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    frequency : float
+        Centre of the band in Hz.
+    half_width, transition : float
+        The band is flat over frequency +- half_width and 100 dB down beyond a further `transition`, in Hz.
+    period : float, optional
+        The RMS is taken over the largest whole number of these periods (s) inside the filter's valid range;
+        default 1 / frequency.
+
+    Returns
+    -------
+    xarray.DataArray of dimension (channel,)
+    """
+    return _per_channel(signal, _band_levels(signal, frequency, half_width, transition, period))
+
+
+def _band_levels(
+    signal: xr.DataArray, frequency: float, half_width: float, transition: float, period: float | None
+) -> np.ndarray:
+    """RMS of each channel in a band; see `band_rms`."""
+    rate, n = rate_of(signal), signal.sizes["time"]
+    taps = bandpass_taps(rate, frequency - half_width, frequency + half_width, transition, ATTENUATION_DB)
+    if n < taps.size:
+        raise SignalError(
+            f"signal: has {n} samples, the band-pass at {frequency:g} Hz needs at least {taps.size}; "
+            "give a longer record or a wider transition band"
+        )
+    count = whole_period_count(n - taps.size + 1, rate, 1.0 / period if period else frequency)
+    return np.array([math.sqrt(filtered_mean_square(column, taps, count)) for column in signal.values.T])
+
+
+def order_rms(signal: xr.DataArray, fundamental: float, orders: Sequence[float]) -> xr.DataArray:
+    """RMS of the lines at multiples of `fundamental` (Hz), by the transform over whole periods.
+
+    Returns
+    -------
+    xarray.DataArray of dimensions (order, channel)
+
+    See Also
+    --------
+    gearmbs.signals.rotation.orders.harmonic_amplitudes
+    """
+    import xarray as xr
+
+    orders = [float(k) for k in orders]
+    amplitudes = np.abs(harmonic_amplitudes(signal.values, rate_of(signal), fundamental, np.asarray(orders)))
+    return xr.DataArray(
+        amplitudes / math.sqrt(2.0),
+        dims=("order", "channel"),
+        coords={"order": orders, **_channel_coords(signal)},
+        attrs={"units": common_unit(signal), "long_name": "RMS"},
+    )
+
+
+def gmf_rms(
+    signal: xr.DataArray,
+    gmf: float | None = None,
+    *,
+    harmonics: int = 3,
+    half_width: float = HALF_WIDTH,
+    speed: float | None = None,
+    teeth: int | Sequence[int] | None = None,
+) -> xr.Dataset:
+    """RMS of the first GMF harmonics by two independent ways.
+
+    `band`: zero-phase FIR band-pass, flat over k GMF +- half_width GMF and 100 dB down from a further GMF / 4; RMS over
+    whole mesh periods inside the filter's valid range. Sidebands inside the band count.
+    `orders`: amplitude at exactly k GMF over whole mesh periods, divided by sqrt(2). Sidebands do not count.
+    For a signal periodic in the mesh the two agree to 1e-3. Where the tooth count is known and the record is long
+    enough, whole revolutions take the place of whole mesh periods, so that sidebands are kept apart exactly.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel), at constant speed.
+    gmf : float, optional
+        Gear mesh frequency in Hz; default from `speed` (rad/s) and `teeth`, given here or in the signal.
+    harmonics : int
+        How many harmonics.
+    half_width : float
+        Half width of the pass band as a fraction of GMF, below 0.75.
+    speed, teeth : optional
+        Override the signal's metadata.
+
+    Returns
+    -------
+    xarray.Dataset
+        `band` and `orders` of dimensions (harmonic, channel), in the signal's units; coordinate `frequency` (Hz).
+
+    Raises
+    ------
+    MissingMetadataError
+        If GMF is not given and speed or teeth are unknown.
+    SignalError
+        If a harmonic's band does not fit below half the sampling rate, or the record is too short.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gearmbs.signals import make_signal
+    >>> t = np.arange(12800) / 12800.0
+    >>> signal = make_signal(np.cos(2 * np.pi * 480 * t) + 0.5 * np.cos(2 * np.pi * 960 * t), 12800.0, units="m/s^2")
+    >>> gmf_rms(signal, 480.0)["orders"].values.round(4).ravel().tolist()
+    [0.7071, 0.3536, 0.0]
+    """
+    import xarray as xr
+
+    gmf = mesh_frequency(signal, speed, teeth) if gmf is None else float(gmf)
+    if not (math.isfinite(gmf) and gmf > 0.0):
+        raise SignalError(f"gmf: must be a positive frequency in Hz, got {gmf!r}")
+    if harmonics < 1:
+        raise SignalError(f"harmonics: must be at least 1, got {harmonics!r}")
+    if not 0.0 < half_width < 1.0 - TRANSITION:
+        raise SignalError(f"half_width: must lie between 0 and {1.0 - TRANSITION:g} of the GMF, got {half_width!r}")
+    multiples = np.arange(1, harmonics + 1)
+    per_turn = _whole_turns(signal, gmf, teeth)
+    widths = half_width * gmf, TRANSITION * gmf
+    by_band = np.stack([_band_levels(signal, k * gmf, *widths, per_turn / gmf) for k in multiples])
+    by_orders = order_rms(signal, gmf / per_turn, list(multiples * per_turn)).values
+    units = common_unit(signal)
+    dims = ("harmonic", "channel")
+    return xr.Dataset(
+        {
+            "band": (dims, by_band, {"units": units, "long_name": "RMS in the band around the GMF harmonic"}),
+            "orders": (dims, by_orders, {"units": units, "long_name": "RMS of the line at the GMF harmonic"}),
+        },
+        coords={
+            "harmonic": multiples,
+            "frequency": ("harmonic", multiples * gmf, {"units": "Hz"}),
+            **_channel_coords(signal),
+        },
+        attrs={"gmf": gmf, "half_width": half_width, "transition": TRANSITION, "stop_band_db": ATTENUATION_DB},
+    )
+
+
+def _whole_turns(signal: xr.DataArray, gmf: float, teeth: int | Sequence[int] | None) -> int:
+    """Mesh periods in the unit whose whole number is analysed: a revolution of the first wheel, or one mesh period."""
+    known = teeth if teeth is not None else signal.attrs.get("teeth")
+    if known is None:
+        return 1
+    count = check_teeth(known)[0]
+    shortest = signal.sizes["time"] / rate_of(signal) - _filter_seconds(gmf)
+    return count if shortest * gmf / count >= MIN_PERIODS else 1
+
+
+def _filter_seconds(gmf: float) -> float:
+    """Length of the band-pass in s (Kaiser's formula)."""
+    return (ATTENUATION_DB - 7.95) / (2.285 * 2.0 * math.pi * TRANSITION * gmf)
+
+
+def _channel_coords(signal: xr.DataArray) -> dict:
+    return {
+        "channel": signal["channel"].values,
+        "channel_units": ("channel", np.asarray(units_of(signal), dtype=str)),
+    }
+
+
+def _per_channel(signal: xr.DataArray, values: np.ndarray) -> xr.DataArray:
+    import xarray as xr
+
+    return xr.DataArray(
+        values,
+        dims=("channel",),
+        coords=_channel_coords(signal),
+        attrs={"units": common_unit(signal), "long_name": "RMS"},
+    )

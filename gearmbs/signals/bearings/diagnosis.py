@@ -1,0 +1,381 @@
+"""From a record to a verdict on rolling bearings: prewhitened, squared envelope, evidence line by line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import scipy.fft
+import xarray as xr
+
+from gearmbs.progress import staged
+from gearmbs.signals.bearings.judgement import (
+    CLEAR,
+    HARMONICS,
+    SIGNS,
+    SLIP,
+    EnvelopeSpectrum,
+    Judged,
+    judge,
+    needed_length,
+    power_of,
+    squared_envelope,
+)
+from gearmbs.signals.bearings.report import BearingLines, BearingReport, PartFinding, bearing_lines
+from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.rotation.angular import angular_resample
+from gearmbs.signals.rotation.phase import phase_from_speed
+from gearmbs.signals.rotation.separation import level_lines, prewhiten
+from gearmbs.signals.signal.any_data import takes_data
+from gearmbs.signals.signal.signal import like, rate_of, require, units_of
+from gearmbs.signals.spectra import kurtogram
+from gearmbs.units import to_si
+
+# Spectra of a record's squared envelope in which lines of a bearing are looked for.
+#
+# Three, for no one suits all defects: the prewhitened record as a whole, in which lines of gears are levelled, and in
+# one band, usually that of the highest kurtosis; and the mean over many narrow bands of the record flattened over
+# neighbourhoods of its spectrum. The last is the integral of the squared spectral coherence over the carrier, after
+# Antoni's enhanced envelope spectrum: weak lines that stand in many bands add up, and blows at perfectly even times,
+# which prewhitening lowers to the noise, are kept.
+#
+# References
+# ----------
+# .. [1] J. Antoni, G. Xin, N. Hamzaoui, Fast computation of the spectral correlation, Mechanical Systems and Signal
+#    Processing 92 (2017) 248-277.
+
+
+EDGE = 0.95
+"""Share of half the sampling rate above which no band is chosen: filters against aliasing end there."""
+LEAST_LINES = 3.0
+"""A band is at least so many times as wide as the highest fundamental."""
+MOST_BANDS = 64
+NEIGHBOURHOOD = 4.0
+"""Width over which a spectrum is flattened, in shaft turns."""
+
+
+def envelope_spectra(
+    signal: xr.DataArray,
+    turns: float,
+    highest: float,
+    *,
+    band: tuple[float, float] | None = None,
+    phase: xr.DataArray | None = None,
+) -> tuple[tuple[float, float], list[EnvelopeSpectrum]]:
+    """Return the band of one channel, and the spectra of its squared envelope.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        One channel.
+    turns, highest : float
+        Turns of the shaft and highest fundamental looked for, Hz.
+    band : (float, float), optional
+        Hz; default that of the kurtogram. A band that is given is the only part that is looked at.
+    phase : xarray.DataArray, optional
+        Angle of the shaft, rad: envelopes are followed in angle, and frequencies are those at the mean speed.
+    """
+    rate = rate_of(signal)
+    chosen = choose_band(signal, highest) if band is None else (float(band[0]), float(band[1]))
+    if not 0.0 <= chosen[0] < chosen[1] <= rate / 2:
+        raise SignalError(f"band: must lie inside 0 to {rate / 2:g} Hz, got {band}")
+    white = prewhiten(signal).values[:, 0]
+    words = f"{chosen[0]:.0f} to {chosen[1]:.0f} Hz"
+
+    def spectrum(square: np.ndarray, sampled: float, where: str) -> EnvelopeSpectrum:
+        if phase is not None:
+            square, sampled = _in_angle(signal, square, sampled, phase, turns)
+        power = power_of(square)
+        return EnvelopeSpectrum.of(power, sampled / square.size, turns, where)
+
+    found = [] if band is not None else [spectrum(squared_envelope(white, rate, None), rate, "whole record")]
+    found.append(spectrum(squared_envelope(white, rate, chosen), rate, words))
+    flat = level_lines(signal, NEIGHBOURHOOD * turns).values[:, 0]
+    limits = chosen if band is not None else (0.0, EDGE * rate / 2)
+    pieces = [spectrum(square, sampled, "") for square, sampled in _narrow_bands(flat, rate, limits, highest)]
+    size = min(piece.ratio.size for piece in pieces)
+    mean = np.mean([piece.ratio[:size] for piece in pieces], axis=0)
+    where = f"mean of {len(pieces)} bands" + ("" if band is None else f" in {words}")
+    found.append(EnvelopeSpectrum.of(mean, pieces[0].step, turns, where))
+    return chosen, found
+
+
+def _narrow_bands(
+    values: np.ndarray, rate: float, limits: tuple[float, float], highest: float
+) -> Iterator[tuple[np.ndarray, float]]:
+    """Yield the squared envelope in each of equal bands that do not overlap, and its sampling rate."""
+    line = scipy.fft.rfft(values - values.mean())
+    step = rate / values.size
+    first, last = max(int(limits[0] / step), 1), min(int(limits[1] / step), line.size)
+    width = max(int(LEAST_LINES * highest / step), (last - first) // MOST_BANDS)
+    count = max((last - first) // width, 1)
+    width = (last - first) // count
+    for k in range(count):
+        piece = line[first + k * width : first + (k + 1) * width]
+        # the square of an envelope has twice the band's width
+        yield np.abs(scipy.fft.ifft(piece, 2 * width)) ** 2, 2 * width * step
+
+
+def _in_angle(
+    signal: xr.DataArray, square: np.ndarray, sampled: float, phase: xr.DataArray, turns: float
+) -> tuple[np.ndarray, float]:
+    """Return a squared envelope over the angle of the shaft, and samples a second at the mean speed."""
+    rate = rate_of(signal)
+    if square.size != signal.sizes["time"]:
+        at = np.arange(signal.sizes["time"]) * (sampled / rate)
+        square = np.interp(at, np.arange(square.size), square)
+    angular = angular_resample(like(signal, square[:, None]), phase)
+    return angular.values[:, 0], float(angular.attrs["samples_per_rev"]) * turns
+
+
+def choose_band(signal: xr.DataArray, highest: float) -> tuple[float, float]:
+    """Return the band of highest kurtosis that is wide enough for a line and its sidebands, Hz.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        One channel counts, the first.
+    highest : float
+        Highest fundamental, Hz.
+    """
+    rate, n = rate_of(signal), min(signal.sizes["time"], 1 << 17)
+    fits = int(math.log2(max(rate / 2 / (LEAST_LINES * highest), 2.0)))
+    levels = max(1, min(fits, int(math.log2(max(n // 32, 2)))))
+    found = kurtogram(signal, levels=levels)
+    width, centre = found["bandwidth"].values, found["centre"].values
+    value = np.where(np.isfinite(found["kurtosis"].values[:, 0]), found["kurtosis"].values[:, 0], -np.inf)
+    good = (centre + 0.5 * width <= EDGE * rate / 2) | (found["bands"].values == 1)
+    best = int(np.argmax(np.where(good & (width >= LEAST_LINES * highest), value, -np.inf)))
+    top = min(centre[best] + 0.5 * width[best], EDGE * rate / 2)
+    return float(centre[best] - 0.5 * width[best]), float(top)
+
+
+LEAST_TURNS = 20
+
+
+@takes_data(band="frequency")
+@staged("diagnosing bearings")
+def diagnose_bearing(
+    signal: Any,
+    bearing: Any,
+    speed: Any = None,
+    *,
+    band: tuple[float, float] | None = None,
+    phase: xr.DataArray | None = None,
+    shafts: Sequence[float] | None = None,
+    slip: float = SLIP,
+    harmonics: int = HARMONICS,
+    progress: Callable[[float, str], None] | None = None,
+) -> BearingReport:
+    """Look for the lines of one or several bearings in a record and say what they mean.
+
+    Lines are looked for in three spectra of the squared envelope (`gearmbs.signals.bearings.diagnosis`). A part is
+    named if its lines are no noise (`gearmbs.signals.bearings.judgement`), not those of known shafts, and stronger than
+    families of lines at hardly any other place of the record (`gearmbs.signals.bearings.judgement`).
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
+    bearing : Bearing, str, mapping, BearingLines, or a sequence of these
+        See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds. Those
+        that are alike and turn alike have the same lines and are told as one, "a or b".
+    speed : float, str or curve, optional
+        Of the inner ring's shaft, rad/s or text; default the signal's. Of a curve, as for `speed_curve`, the angle is
+        taken, see ``phase``.
+    band : pair of float or str, optional
+        Hz or texts; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's
+        edge.
+    phase : xarray.DataArray, optional
+        Angle of the shaft over time, rad, where the speed varies: envelopes are then followed in angle.
+    shafts : sequence of float, optional
+        Speeds of the machine's other shafts by that of the reference shaft; empty if there is none. Their lines and the
+        sums of these are left out. Default: those of ``bearing`` and the ratio of the signal's ``teeth``; without any,
+        other shafts are not known, and a line at the cage's turns accuses nothing, for another shaft may turn as fast.
+    slip : float
+        Share by which lines may lie beside their kinematic place.
+    harmonics : int
+        How many harmonics count.
+    progress : callable, optional
+        Called as progress(fraction, channel); without it a bar is shown where somebody watches.
+
+    Returns
+    -------
+    BearingReport
+
+    Raises
+    ------
+    MissingMetadataError
+        If no speed is known.
+    SignalError
+        If a bearing cannot be read, or the record is too short for its lines.
+    """
+    known = _told_apart(_all_lines(bearing))
+    _check_search(slip, harmonics)
+    if phase is None and speed is not None and not isinstance(speed, (int, float, str)):
+        phase = phase_from_speed(signal, speed)
+    shaft, notes = _shaft(signal, speed, phase)
+    rate = rate_of(signal)
+    highest = max(order for lines in known for order in lines.orders.values()) * shaft
+    _check_record(signal.sizes["time"], rate, shaft, None if phase is not None else highest)
+    others = _other_shafts(signal, known, shafts)
+    turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
+    bands, findings, spectra = {}, [], {}
+    for c in range(signal.sizes["channel"]):
+        name = str(signal["channel"].values[c])
+        if progress is not None:
+            progress((c + 0.5) / signal.sizes["channel"], name)
+        bands[name], found = envelope_spectra(signal.isel(channel=[c]), shaft, highest, band=band, phase=phase)
+        judged = judge(found, known, shaft, others, slip=slip, harmonics=harmonics, looks=signal.sizes["channel"])
+        findings += [_finding(name, one, found, shaft, turning) for one in judged]
+        spectra[name] = _table(_shown(found, judged), highest * (harmonics + 1))
+    return BearingReport(
+        source=str(signal.attrs.get("source", signal.name or "signal")),
+        rate=rate,
+        duration=signal.sizes["time"] / rate,
+        shaft=shaft,
+        bearings=known,
+        findings=findings,
+        bands=bands,
+        spectra=spectra,
+        levels=_levels(signal),
+        shafts=others,
+        notes=notes,
+    )
+
+
+def _check_search(slip: float, harmonics: int) -> None:
+    """Refuse settings of the search that make no sense."""
+    if not 0.0 < slip < 0.2:
+        raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
+    if not 1 <= harmonics <= 20:
+        raise SignalError(f"harmonics: must lie between 1 and 20, got {harmonics!r}")
+
+
+def _check_record(samples: int, rate: float, shaft: float, highest: float | None) -> None:
+    """Refuse a record that is too short for lines of a bearing, or sampled too slowly for the highest of them, Hz."""
+    turns = samples / rate * shaft
+    if turns < LEAST_TURNS:
+        raise SignalError(
+            f"signal: holds {turns:.3g} turns of the shaft, lines of a bearing need {LEAST_TURNS}; "
+            f"give a record of {LEAST_TURNS / shaft:.3g} s or more at this speed"
+        )
+    if highest is not None and 2.5 * highest > rate / 2:
+        raise SignalError(
+            f"signal: {highest:.4g} Hz, the highest line of the bearing, needs a sampling rate above "
+            f"{5 * highest:.4g} Hz, it is {rate:g} Hz"
+        )
+
+
+def _all_lines(bearing: Any) -> tuple[BearingLines, ...]:
+    """Return the lines of all bearings given."""
+    if isinstance(bearing, Mapping) and not {str(key).lower() for key in bearing} & {"ftf", "bpfo"}:
+        found = []
+        for name, given in bearing.items():
+            item, ratio = given if isinstance(given, tuple) else (given, 1.0)
+            lines = bearing_lines(item, float(ratio))
+            found.append(BearingLines(str(name), lines.ftf, lines.bsf, lines.bpfo, lines.bpfi, lines.ratio))
+        return tuple(found)
+    if isinstance(bearing, Sequence) and not isinstance(bearing, str):
+        return tuple(bearing_lines(item) for item in bearing)
+    return (bearing_lines(bearing),)
+
+
+def _told_apart(bearings: Sequence[BearingLines]) -> tuple[BearingLines, ...]:
+    """Return bearings with those of the same lines, as two alike on a shaft, as one: no record tells which it is."""
+    names: dict[tuple[float, ...], list[str]] = {}
+    for lines in bearings:
+        names.setdefault((lines.ftf, lines.bsf, lines.bpfo, lines.bpfi, lines.ratio), []).append(lines.name)
+    return tuple(BearingLines(" or ".join(dict.fromkeys(alike)), *lines) for lines, alike in names.items())
+
+
+def _shaft(signal: xr.DataArray, speed: Any, phase: xr.DataArray | None) -> tuple[float, list[str]]:
+    """Return the mean speed in turns a second, and notes."""
+    if phase is not None:
+        time = phase["time"].values
+        return float(phase.values[-1] - phase.values[0]) / (math.tau * float(time[-1] - time[0])), [
+            "Envelopes are followed in angle; frequencies in Hz are those at the mean speed."
+        ]
+    try:
+        given = None if speed is None else to_si(speed, "angular speed", "speed")
+    except (TypeError, ValueError) as error:
+        raise SignalError(str(error)) from None
+    if given is None and signal.attrs.get("speed") is None:
+        # a file may hold a number that looks like the speed
+        told = [str(note) for note in signal.attrs.get("notes", ()) if "--speed" in str(note)]
+        hint = " ".join(told).rstrip(".")
+        remedy = hint[0].lower() + hint[1:] if hint else "pass speed='1500 rpm', say"
+        raise MissingMetadataError("speed", "the diagnosis of a bearing", remedy)
+    return float(require(signal, "speed", given, needed_for="the diagnosis of a bearing")) / math.tau, []
+
+
+def _other_shafts(
+    signal: xr.DataArray, bearings: Sequence[BearingLines], shafts: Sequence[float] | None
+) -> tuple[float, ...] | None:
+    """Return the ratios of shafts beside the reference shaft, None if they are not known."""
+    if shafts is not None:
+        found = tuple(float(ratio) for ratio in shafts)
+        if not all(math.isfinite(ratio) and ratio > 0.0 for ratio in found):
+            raise SignalError(f"shafts: give positive ratios to the speed of the reference shaft, got {shafts!r}")
+        return found
+    teeth = signal.attrs.get("teeth")
+    if isinstance(teeth, Sequence) and len(teeth) == 2:
+        return (float(teeth[0]) / float(teeth[1]),)
+    return tuple(sorted({lines.ratio for lines in bearings} - {1.0})) or None
+
+
+def _finding(
+    channel: str, judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float, turns: Sequence[float]
+) -> PartFinding:
+    lines, part, evidence = judged.lines, judged.part, judged.evidence
+    spectrum = next(s for s in spectra if s.where == evidence.where)
+    sides = _sidebands(spectrum, evidence.found, lines.sidebands[part] * shaft * lines.ratio)
+    return PartFinding(
+        lines.name, part, channel, evidence.kinematic, evidence.found, evidence.ratios, evidence.log_chance, sides,
+        evidence.where, judged.grade, judged.beside, judged.stronger, judged.places, judged.fraction,
+        needed_length(evidence, spectrum, turns),
+    )  # fmt: skip
+
+
+def _sidebands(spectrum: EnvelopeSpectrum, line: float, spacing: float) -> float:
+    """Return the power of the first sidebands by that of the line; NaN where there are none to be expected."""
+    if spacing <= 0.0:
+        return math.nan
+
+    def near(f: float) -> float:
+        k = round(f / spectrum.step)
+        return float(spectrum.ratio[max(k - 2, 1) : k + 3].max(initial=0.0))
+
+    return 0.5 * (near(line - spacing) + near(line + spacing)) / max(near(line), 1e-300)
+
+
+def _shown(spectra: Sequence[EnvelopeSpectrum], judged: Sequence[Judged]) -> EnvelopeSpectrum:
+    """Return the spectrum with the clearest of the lines that were named, without any the first."""
+    named = [one.evidence for one in judged if one.grade in (CLEAR, SIGNS)]
+    if not named:
+        return spectra[0]
+    where = min(named, key=lambda evidence: evidence.log_chance).where
+    return next(spectrum for spectrum in spectra if spectrum.where == where)
+
+
+def _table(spectrum: EnvelopeSpectrum, top: float) -> pd.DataFrame:
+    """Return an envelope spectrum up to a frequency as a table."""
+    keep = spectrum.frequency <= top
+    return pd.DataFrame({"frequency": spectrum.frequency[keep], "power": spectrum.ratio[keep]})
+
+
+def _levels(signal: xr.DataArray) -> pd.DataFrame:
+    """Return RMS, crest factor and kurtosis by channel."""
+    rows = []
+    for c, unit in enumerate(units_of(signal)):
+        values = signal.values[:, c] - signal.values[:, c].mean()
+        rms = float(np.sqrt(np.mean(values**2)))
+        shape = (
+            (float(np.abs(values).max()) / rms, float(np.mean(values**4)) / rms**4) if rms > 0.0 else (np.nan, np.nan)
+        )
+        rows.append((str(signal["channel"].values[c]), unit, rms, *shape))
+    return pd.DataFrame(rows, columns=["channel", "units", "rms", "crest", "kurtosis"])

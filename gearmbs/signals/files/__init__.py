@@ -1,0 +1,1 @@
+"""Recordings in files: a format a module, and the table of formats."""

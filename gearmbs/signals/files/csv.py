@@ -1,0 +1,384 @@
+"""CSV and gzip CSV: columns of numbers, with names, units and metadata in the lines above them.
+
+Written files begin with `# key: value` lines (JSON values) and a row of names with units in brackets. Read are these
+and most others: comma, semicolon, tab or blank as separator, decimal commas, names with or without units, a column of
+times or time stamps, a column that only numbers the rows, headers of instruments, or nothing but numbers.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import re
+import warnings
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import pandas as pd
+
+from gearmbs.signals.errors import SignalError, SignalFileError
+from gearmbs.signals.files.text_tables import (
+    COMMENT,
+    GAP_CELLS,
+    HEAD_LINES,
+    CsvLayout,
+    Times,
+    cell_kind,
+    encoding_of,
+    find_layout,
+    index_meaning,
+    split_cells,
+)
+from gearmbs.signals.signal.record import (
+    REMEDY,
+    Progress,
+    RateCandidate,
+    Record,
+    checked_gaps,
+    chosen_rate,
+    number_of,
+    plain,
+    rate_candidates,
+    rate_from_times,
+    speed_of,
+)
+from gearmbs.signals.signal.signal import check_teeth
+
+CHUNK_ROWS = 1 << 17
+# Times are written with few digits; beyond this many samples a gap is a gap.
+MAX_JUMP = 2.0
+ROUNDED_TIMES = 0.01
+# pandas before 3.1 rounds the last bit unless told otherwise; later versions are exact and warn at the option.
+EXACT: dict[str, Any] = (
+    {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
+)
+COUNT = "gearmbs_samples"
+"""Line of the header that says how many rows follow: a table cut at the end of a row looks whole."""
+CUT = "CHECK THE END: "
+"""Begin of what is said of a table that looks cut off, and warned of."""
+TAIL, TAIL_READ = 1 << 14, 1 << 20
+"""Bytes at the end of a text that are looked at, and that are read at once to come there."""
+FEWEST_FIXED = 20
+"""Rows of the same number of digits that make a format: those without trailing zeros have fewer in one of ten."""
+GAPS = [cell for cell in GAP_CELLS if cell not in ("inf", "-inf")]
+
+
+@contextmanager
+def _open_text(path: Path, packed: bool):
+    with open(path, "rb") as raw:
+        stream: IO[bytes] = gzip.GzipFile(fileobj=raw) if packed else raw  # type: ignore[assignment]
+        encoding = encoding_of(stream.read(1 << 16))
+        stream.seek(0)
+        with io.TextIOWrapper(stream, encoding=encoding, errors="replace", newline=None) as text:
+            yield text, raw
+
+
+def read_csv(
+    path: Path, packed: bool, progress: Progress | None = None, rate: float | None = None, gaps: str | None = None
+) -> Record:
+    """Read a text table; `packed` for gzip. A known `rate` (Hz) stands in for times that are only rounded.
+
+    Raises
+    ------
+    SignalFileError
+        If the file is damaged, binary, has no numbers, a row is short or not numeric (with its line number), or cells
+        are empty and `gaps` does not say what to do with them.
+    """
+    with _damage_named(path):
+        layout = _layout(path, packed)
+        times = Times(layout, path)
+        blocks: list[np.ndarray] = []
+        clocks: list[np.ndarray | None] = []
+        for values, stamped, fraction in _blocks(path, packed, layout, gaps):
+            blocks.append(values)
+            clocks.append(times.seconds(values, stamped))
+            if progress is not None:
+                progress(fraction, "reading")
+        if not blocks:
+            raise SignalFileError(path, "holds no rows of numbers")
+        known = [clock for clock in clocks if clock is not None]
+        clock = np.concatenate(known) if known else None
+        found = _record(path, np.concatenate(blocks), clock, layout, rate)
+        said = _end_checked(path, packed, layout, len(found.values))
+        return replace(found, notes=[*found.notes, *said]) if said else found
+
+
+def _end_checked(path: Path, packed: bool, layout: CsvLayout, count: int) -> list[str]:
+    """Return what is to be said of a table's end: a last row without an end may be cut within its last number.
+
+    Raises
+    ------
+    SignalFileError
+        Of a file of this package whose rows are fewer or more than its header says, or whose last one has no end.
+    """
+    own = number_of(layout.meta.get(COUNT))
+    if own is not None and own[0] != count:
+        raise SignalFileError(path, f"holds {count} of the {own[0]:g} samples that its header names: it is cut off")
+    ended, lines = _tail(path, packed)
+    if own is not None:
+        if not ended:
+            raise SignalFileError(path, "its last line has no end: it is cut off within a number")
+        return []
+    where = f"{path.name}, line {layout.first + count}"
+    told = [_written(split_cells(line, layout.separator)[-1]) for line in lines if split_cells(line, layout.separator)]
+    fixed = len(told) > FEWEST_FIXED and len(set(told[:-1])) == 1 and told[0] not in (None, (0, 0))
+    if fixed and told[-1] != told[0]:
+        how = "The last line has no end, and its" if not ended else "The last line's"
+        return [f"{CUT}{where}: {how} last number has fewer digits than all others before: the file looks cut off."]
+    if ended:
+        return []
+    said = f"{where}: The last line has no end: if the file is cut off, its last sample is wrong."
+    # of numbers written with as many digits as all others nothing is missing
+    return [said if fixed else CUT + said]
+
+
+def _tail(path: Path, packed: bool) -> tuple[bool, list[str]]:
+    """Return whether the last line of a text has an end, and its last lines with numbers."""
+    tail = b""
+    with path.open("rb") as raw:
+        if packed:
+            with gzip.GzipFile(fileobj=raw) as stream:
+                while piece := stream.read(TAIL_READ):
+                    tail = (tail + piece)[-TAIL:]
+        else:
+            raw.seek(0, 2)
+            raw.seek(max(0, raw.tell() - TAIL))
+            tail = raw.read()
+    # the second byte of a character of two, or the last three of four
+    ended = tail.rstrip(b"\0").endswith((b"\n", b"\r"))
+    text = tail.replace(b"\0", b"").decode("utf-8", errors="replace")
+    lines = [line for line in text.splitlines()[1:] if line.strip() and not COMMENT.match(line)]
+    return ended, lines
+
+
+def _written(cell: str) -> tuple[int, int] | None:
+    """Return how many decimals and characters of an exponent a number has; None for what is no number."""
+    found = re.fullmatch(r"[-+]?\d*(?:[.,](\d*))?([eE][-+]?\d*)?", cell.strip())
+    return None if found is None else (len(found.group(1) or ""), len(found.group(2) or ""))
+
+
+def csv_pieces(
+    path: Path, packed: bool, rate: float | None = None, gaps: str | None = None
+) -> Iterator[tuple[Record, float]]:
+    """Read a text table block by block: records in their order, each with the fraction read by then.
+
+    Raises
+    ------
+    SignalFileError
+        As `read_csv`, and if the times of a block do not go on where the last one ended.
+    """
+    with _damage_named(path):
+        layout = _layout(path, packed)
+        times, first, count = Times(layout, path), None, 0
+        for values, stamped, fraction in _blocks(path, packed, layout, gaps):
+            clock = times.seconds(values, stamped)
+            record = _record(path, values, clock, layout, rate if first is None else first.rate)
+            if first is None:
+                first = record
+            elif clock is not None and first.rate is not None:
+                strayed = abs(float(clock[0]) - first.t0 - count / first.rate) * first.rate
+                # the mean rate of rounded times is as good as the given one, and drifts from it as much
+                if strayed > (MAX_JUMP if rate is None else max(MAX_JUMP, ROUNDED_TIMES * count)):
+                    raise SignalFileError(path, f"its times jump by {strayed:.3g} samples after row {count}")
+                record = replace(first, values=record.values)
+            count += len(values)
+            if checked_gaps(gaps) == "interpolate":
+                record = replace(record, values=_filled(record.values))
+            yield record, fraction
+        for words in _end_checked(path, packed, layout, count):
+            warnings.warn(words, UserWarning, stacklevel=2)
+
+
+def _filled(values: np.ndarray) -> np.ndarray:
+    """A block with its gaps interpolated; gaps at its ends hold the nearest sample, so that no row is lost."""
+    bad = ~np.isfinite(values)
+    if not bad.any():
+        return values
+    out = values.copy()
+    at = np.arange(len(values))
+    for c in np.flatnonzero(bad.any(axis=0)):
+        good = ~bad[:, c]
+        if good.any():
+            out[:, c] = np.interp(at, at[good], values[good, c])
+    return out
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (EOFError, gzip.BadGzipFile, zlib.error) as exc:
+        raise SignalFileError(path, f"its gzip data is damaged or cut short ({exc})") from exc
+
+
+def _layout(path: Path, packed: bool) -> CsvLayout:
+    with _open_text(path, packed) as (text, _):
+        head = [line for line, _ in zip(text, range(HEAD_LINES))]
+    if any("\x00" in line for line in head):
+        raise SignalFileError(path, "holds binary data, not text; is it in another format?")
+    return find_layout(head, path)
+
+
+def _blocks(
+    path: Path, packed: bool, layout: CsvLayout, gaps: str | None
+) -> Iterator[tuple[np.ndarray, pd.DataFrame | None, float]]:
+    """Tables of numbers (NaN in columns of time stamps, which come as text beside them), and the fraction read."""
+    width, first, separator = len(layout.names), layout.first, layout.separator
+    size = path.stat().st_size
+    refuse = checked_gaps(gaps) == "refuse"
+    kinds: dict[int, Any] = {i: str if i in layout.stamps else float for i in range(width)}
+    try:
+        with _open_text(path, packed) as (text, raw):
+            for _ in range(first):
+                text.readline()
+            table = pd.read_csv(
+                text,
+                sep=r"\s+" if separator is None else separator,
+                decimal=layout.decimal,
+                header=None,
+                names=list(range(width)),
+                index_col=False,
+                dtype=kinds,
+                na_values=GAPS,
+                comment="#",
+                skip_blank_lines=True,
+                skipinitialspace=True,
+                chunksize=CHUNK_ROWS,
+                **EXACT,
+            )
+            for block in table:
+                stamped = block[list(layout.stamps)] if layout.stamps else None
+                numbers = block.drop(columns=list(layout.stamps)) if layout.stamps else block
+                values = np.full((len(block), width), np.nan)
+                values[:, numbers.columns] = numbers.to_numpy()
+                wanted = [i for i in range(width) if i not in layout.stamps and i not in layout.empty]
+                if refuse and not np.isfinite(values[:, wanted]).all():
+                    raise ValueError("missing values")
+                yield values, stamped, min(1.0, raw.tell() / size)
+    except (ValueError, pd.errors.ParserError) as exc:
+        if isinstance(exc, SignalError):
+            raise
+        raise SignalFileError(path, _first_bad_line(path, packed, layout, width, refuse, exc)) from exc
+
+
+def _record(
+    path: Path, values: np.ndarray, clock: np.ndarray | None, layout: CsvLayout, given: float | None = None
+) -> Record:
+    candidates = rate_candidates(layout.meta)
+    t0 = number_of(layout.meta.get("t0"))
+    start = 0.0 if t0 is None else t0[0]
+    notes = list(layout.notes)
+    dropped = {*layout.stamps, *layout.empty, *([] if layout.clock is None else [layout.clock])}
+    if layout.index is not None:
+        meaning, seconds = index_meaning(values[:, layout.index], clock)
+        if meaning is not None:
+            dropped.add(layout.index)
+            notes.append(meaning)
+            clock = seconds if seconds is not None else clock
+    rate: float | None = None
+    said: list[str] = []
+    if clock is not None and len(clock) > 1:
+        start = float(clock[0])
+        by_clock = _clock_rate(path, clock, given, bool(candidates))
+        if by_clock is not None and candidates:
+            sure = [c for c in candidates if not c.weak]
+            candidates = [*sure, RateCandidate("the column of times", by_clock), *(c for c in candidates if c.weak)]
+        rate = by_clock
+    if candidates:
+        rate, said = chosen_rate(path, candidates, given)
+    speed, more = speed_of(layout.meta)
+    own = layout.meta.get("speed")
+    teeth = layout.meta.get("teeth")
+    try:
+        teeth = None if teeth is None else check_teeth(json.loads(teeth) if isinstance(teeth, str) else teeth)
+        speed = float(own) if isinstance(own, (int, float)) else speed
+    except (SignalError, ValueError, TypeError) as exc:
+        raise SignalFileError(path, f"its header is not understood: {exc}") from exc
+    kept = [i for i in range(len(layout.names)) if i not in dropped]
+    if not kept:
+        raise SignalFileError(path, f"holds no column of samples beside {layout.names}")
+    attrs = layout.meta.get("attrs", {})
+    return Record(
+        values if len(kept) == values.shape[1] else values[:, kept],
+        [layout.names[i] for i in kept],
+        [layout.units[i] for i in kept],
+        rate,
+        start,
+        speed,
+        teeth,
+        attrs if isinstance(attrs, dict) else {},
+        [*notes, *said, *more],
+    )
+
+
+def _clock_rate(path: Path, clock: np.ndarray, given: float | None, others: bool) -> float | None:
+    """Rate of a column of times; where they are only rounded, the given one, or none if the header names one."""
+    try:
+        return rate_from_times(clock, path)
+    except SignalFileError:
+        span = float(clock[-1] - clock[0])
+        mean = (clock.size - 1) / span if span > 0.0 else 0.0
+        rising = bool(np.all(np.diff(clock) >= 0.0))
+        if given is not None and rising and abs(mean - given) <= ROUNDED_TIMES * given:
+            return given
+        if others and rising:
+            return None
+        raise
+
+
+def write_csv(record: Record, path: Path, packed: bool, progress: Progress | None = None) -> None:
+    """Write a text table whose numbers read back to the same bits; `packed` for gzip."""
+    with open(path, "wb") as raw:
+        stream: IO[bytes] = gzip.GzipFile(fileobj=raw, mode="wb", filename="", mtime=0) if packed else raw  # type: ignore
+        with io.TextIOWrapper(stream, encoding="utf-8", newline="\n") as text:
+            meta = {"sampling_rate": record.rate, "t0": record.t0, "speed": record.speed, "teeth": record.teeth}
+            for key, value in meta.items():
+                if value is not None:
+                    text.write(f"# {key}: {json.dumps(value)}\n")
+            text.write(f"# {COUNT}: {len(record.values)}\n")
+            if record.attrs:
+                text.write(f"# attrs: {json.dumps(plain(record.attrs))}\n")
+            cells = [f"{name} [{unit}]" for name, unit in zip(record.names, record.units)]
+            text.write(",".join(_quoted(cell) for cell in cells) + "\n")
+            count = record.values.shape[0]
+            for start in range(0, count, CHUNK_ROWS):
+                block = pd.DataFrame(record.values[start : start + CHUNK_ROWS])
+                # in numpy's legacy print mode, which other packages set, numbers would lose digits
+                with np.printoptions(legacy=False):
+                    block.to_csv(text, header=False, index=False, lineterminator="\n")
+                if progress is not None:
+                    progress(min(1.0, (start + CHUNK_ROWS) / count), "writing")
+
+
+def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, refuse: bool, exc: Exception) -> str:
+    with _open_text(path, packed) as (text, _):
+        for number, line in enumerate(text, 1):
+            if number <= layout.first or not line.strip() or COMMENT.match(line):
+                continue
+            cells = split_cells(line.split("#")[0], layout.separator)
+            if layout.separator == "\t" and len(cells) == width - 1 and layout.empty:
+                cells.append("")
+            if len(cells) > width or (refuse and len(cells) < width):
+                return f"line {number} has {len(cells)} values where {width} are expected: {line.strip()[:60]!r}"
+            for column, cell in enumerate(cells):
+                if column in layout.stamps or column in layout.empty:
+                    continue
+                kind = cell_kind(cell, layout.decimal)
+                if kind == "gap" and refuse:
+                    shown = f"{cell[:40]!r}" if cell else "nothing"
+                    return f"line {number} holds {shown} in column {layout.names[column]!r}; {REMEDY}"
+                if kind not in ("number", "gap"):
+                    return f"line {number} holds {cell[:40]!r}, which is not a number"
+                if refuse and not np.isfinite(float(cell.replace(",", ".") if layout.decimal == "," else cell)):
+                    return f"line {number} holds {cell[:40]!r}; {REMEDY}"
+    return f"cannot be read as a table ({exc})"
+
+
+def _quoted(cell: str) -> str:
+    return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',"\n') else cell

@@ -1,0 +1,177 @@
+"""TDMS of National Instruments, through npTDMS."""
+
+from __future__ import annotations
+
+import json
+import logging
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.signal.record import Record, chosen_rate, plain, rate_candidates, same_rate, speed_of
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
+
+GROUP = "signal"
+BLOCK = 1 << 17
+LEAD_IN = 28
+INCOMPLETE = 0xFFFFFFFFFFFFFFFF
+
+
+def read_tdms(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
+    """Read the channels of a TDMS file; waveform properties give rate, start and units.
+
+    Raises
+    ------
+    SignalFileError
+        If npTDMS is not installed, a segment is cut short, or the channels' lengths or rates differ.
+    """
+    return next(_read(path, channels, None, rate))[0]
+
+
+def tdms_pieces(
+    path: Path, channels: Sequence[str] | None, rate: float | None = None
+) -> Iterator[tuple[Record, float]]:
+    """Read the channels of a TDMS file block by block; see `read_tdms`."""
+    return _read(path, channels, BLOCK, rate)
+
+
+def _read(
+    path: Path, channels: Sequence[str] | None, block: int | None, rate: float | None
+) -> Iterator[tuple[Record, float]]:
+    nptdms = _library(path)
+    _check_segments(path)
+    try:
+        with open(path, "rb") as raw, nptdms.TdmsFile.open(raw) as file:
+            kept, names = _chosen(path, file, channels)
+            count = len(kept[0])
+            for start in range(0, count, block or count):
+                stop = min(start + (block or count), count)
+                values = np.stack([np.asarray(c[start:stop], dtype=float) for c in kept], axis=1)
+                yield _record(path, values, kept, names, file, rate), stop / count
+    except SignalFileError:
+        raise
+    except Exception as exc:
+        raise SignalFileError(path, f"cannot be read as TDMS ({exc})") from exc
+
+
+def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list[Any], list[str]]:
+    """The channels that become the record's and their names; SignalFileError if they do not make one.
+
+    Channels of equal names in different groups are called group/channel.
+    """
+    found = [
+        (group.name, c)
+        for group in file.groups()
+        for c in group.channels()
+        if len(c) and np.issubdtype(c.dtype, np.number) and not np.issubdtype(c.dtype, np.complexfloating)
+    ]
+    plain_names = [c.name for _, c in found]
+    names = [c.name if plain_names.count(c.name) == 1 else f"{group}/{c.name}" for group, c in found]
+    kept = [
+        (name, c)
+        for name, (group, c) in zip(names, found)
+        if channels is None or name in channels or f"{group}/{c.name}" in channels
+    ]
+    if not kept:
+        listed = f"; it holds {', '.join(names) or 'none'}"
+        raise SignalFileError(path, f"holds no samples{'' if channels is None else f' in {list(channels)}'}{listed}")
+    if len({len(c) for _, c in kept}) > 1:
+        listed = ", ".join(f"{name} ({len(c)})" for name, c in kept)
+        raise SignalFileError(
+            path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
+        )
+    wanted = {f"{group}/{c.name}" for group, c in found} & set(channels or ())
+    return [c for _, c in kept], [
+        f"{c.group_name}/{c.name}" if f"{c.group_name}/{c.name}" in wanted else name for name, c in kept
+    ]
+
+
+def _record(
+    path: Path, values: np.ndarray, kept: Sequence[Any], names: list[str], file: Any, given: float | None
+) -> Record:
+    root = dict(file.properties)
+    notes: list[str] = []
+    rates: dict[str, float | None] = {}
+    speed = float(root["speed"]) if isinstance(root.get("speed"), (int, float)) else None
+    for name, channel in zip(names, kept):
+        rates[name], said = _rate(path, file, channel, root, given)
+        notes += [note for note in said if note not in notes]
+    if speed is None:
+        speed, said = speed_of({**root, **dict(file[kept[0].group_name].properties)})
+        notes += said
+    teeth = root.get("teeth")
+    return Record(
+        values,
+        list(names),
+        [str(c.properties.get("unit_string") or UNKNOWN_UNITS) for c in kept],
+        same_rate(path, rates),
+        float(kept[0].properties.get("wf_start_offset", 0.0)),
+        speed,
+        None if teeth is None else check_teeth(json.loads(str(teeth))),
+        json.loads(root.get("attrs", "{}")),
+        notes,
+    )
+
+
+def _rate(path: Path, file: Any, channel: Any, root: dict, given: float | None) -> tuple[float | None, list[str]]:
+    """Rate of a channel: this package's own, the waveform's, or what the properties of channel, group or file name."""
+    if "attrs" in root and "sampling_rate" in root:
+        return float(root["sampling_rate"]), []
+    for properties in (channel.properties, file[channel.group_name].properties, root):
+        found, notes = chosen_rate(path, rate_candidates(dict(properties)), given)
+        if found is not None:
+            return found, notes
+    return None, []
+
+
+def write_tdms(record: Record, path: Path) -> None:
+    """Write one group with one channel per signal channel."""
+    nptdms = _library(path)
+    root: dict[str, Any] = {"sampling_rate": record.rate, "attrs": json.dumps(plain(record.attrs))}
+    if record.speed is not None:
+        root["speed"] = record.speed
+    if record.teeth is not None:
+        root["teeth"] = json.dumps(record.teeth)
+    objects: list[Any] = [nptdms.RootObject(properties=root)]
+    for name, unit, column in zip(record.names, record.units, record.values.T):
+        properties = {
+            "unit_string": unit,
+            "wf_increment": 1.0 / float(record.rate or 1.0),
+            "wf_start_offset": record.t0,
+            "wf_samples": column.size,
+        }
+        objects.append(nptdms.ChannelObject(GROUP, name, np.ascontiguousarray(column), properties=properties))
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(objects)
+
+
+def _check_segments(path: Path) -> None:
+    total = path.stat().st_size
+    at = 0
+    with open(path, "rb") as file:
+        while at < total:
+            file.seek(at)
+            lead = file.read(LEAD_IN)
+            if len(lead) < LEAD_IN or lead[:4] != b"TDSm":
+                raise SignalFileError(path, f"is damaged: no segment begins at byte {at}")
+            big = bool(struct.unpack("<I", lead[4:8])[0] & 0x40)
+            length = struct.unpack(">Q" if big else "<Q", lead[12:20])[0]
+            if length == INCOMPLETE or at + LEAD_IN + length > total:
+                raise SignalFileError(path, f"is cut short: its segment at byte {at} was not written to the end")
+            at += LEAD_IN + length
+
+
+def _library(path: Path) -> Any:
+    try:
+        import nptdms
+    except ImportError as exc:
+        raise SignalFileError(path, "TDMS files need npTDMS; install it with: pip install 'gearmbs[formats]'") from exc
+    # it prints the bytes of damaged texts, pages of them; what is wrong is said by the errors here
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] == "nptdms":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    return nptdms

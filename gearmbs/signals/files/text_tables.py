@@ -1,0 +1,414 @@
+"""How a text table is written: where its numbers begin, separators, names, units, times, and what its header says."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.signal.record import is_clock, name_and_unit, unique_names
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, is_usual
+
+HEAD_LINES = 400
+COMMENT = re.compile(r"^\s*[#%]")
+KEY_VALUE = re.compile(
+    r"^\s*[#%]*\s*[\"']?([A-Za-z_ÄÖÜäöü][^:=;,\t\"']*?)[\"']?\s*(?:[:=][\s,;]*|[,;\t]\s*)(.*?)[\s,;\"']*$"
+)
+GAP_CELLS = frozenset(
+    {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf"}
+)
+DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4})"
+CLOCK = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?"
+STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
+    ("stamp", re.compile(rf"^{DATE}[T ]{CLOCK}$")),
+    ("date", re.compile(rf"^{DATE}$")),
+    ("clock", re.compile(rf"^{CLOCK}$")),
+)
+SEPARATIONS: tuple[tuple[str | None, str], ...] = (
+    (";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ","),
+)  # fmt: skip
+INDEX_NAMES = frozenset(
+    {"", "unnamed: 0", "index", "idx", "sample", "samples", "nr", "no", "no.", "#", "row", "level_0"}
+)
+Kind = Literal["number", "gap", "stamp", "date", "clock", "text"]
+
+
+@dataclass(frozen=True)
+class CsvLayout:
+    """How the table of a file is written.
+
+    Attributes
+    ----------
+    first : int
+        Line of the first numbers, from 0.
+    separator : str or None
+        None for blanks.
+    decimal : str
+    names, units : list of str
+        Of all columns.
+    meta : dict
+        What stands above, by name.
+    clock : int or None
+        Column that holds times.
+    stamps : tuple of int
+        Columns that hold dates or times of day as text; `clock` is the first of them.
+    index : int or None
+        Column that may only number the rows.
+    """
+
+    first: int
+    separator: str | None
+    decimal: str
+    names: list[str]
+    units: list[str]
+    meta: dict[str, Any]
+    clock: int | None = None
+    stamps: tuple[int, ...] = ()
+    index: int | None = None
+    empty: tuple[int, ...] = ()
+    notes: list[str] = field(default_factory=list)
+
+
+def find_layout(head: list[str], path: Path) -> CsvLayout:
+    """Read the layout of a table from its first lines.
+
+    Raises
+    ------
+    SignalFileError
+        If none of them is a row of numbers.
+    """
+    first, separator, decimal, kinds = _find_numbers(head, path)
+    width = len(kinds)
+    labels, header_line = _labels(head[:first], separator, width)
+    units_row = None
+    bare = [name_and_unit(label) for label in labels] if labels else []
+    if labels and header_line is not None:
+        units_row = _units_row(head[:first], separator, width, labels, header_line)
+    if units_row is not None:
+        names, units = units_row
+    else:
+        names = [name for name, _ in bare] or [f"ch{i + 1}" for i in range(width)]
+        units = [unit for _, unit in bare] or [UNKNOWN_UNITS] * width
+    stamps = tuple(i for i, kind in enumerate(kinds) if kind in ("stamp", "date", "clock"))
+    empty = tuple(i for i, kind in enumerate(kinds) if kind == "gap" and i == width - 1 and not names[i].strip())
+    index = None
+    if labels and not stamps and names[0].strip().lower() in INDEX_NAMES and width > 1:
+        index = 0
+    clock = stamps[0] if stamps else next((i for i, n in enumerate(names) if is_clock(n)), None)
+    clock = clock if width - len(stamps) > (0 if stamps else 1) else None
+    return CsvLayout(
+        first,
+        separator,
+        decimal,
+        unique_names(names) if labels else names,
+        units,
+        _metadata(head[:first], separator, header_line),
+        clock,
+        stamps,
+        index if index != clock else None,
+        empty,
+    )
+
+
+def cell_kind(cell: str, decimal: str) -> Kind:
+    """What a cell holds: a number, a gap, a time stamp, a date, a time of day, or text."""
+    text = cell.strip().strip('"').strip()
+    if text.lower() in GAP_CELLS:
+        return "gap"
+    if is_number(text, decimal):
+        return "number"
+    for kind, pattern in STAMPS:
+        if pattern.match(text):
+            return kind  # type: ignore[return-value]
+    return "text"
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """True for a number with this decimal sign."""
+    try:
+        float(cell.replace(",", ".") if decimal == "," else cell)
+    except ValueError:
+        return False
+    return "_" not in cell
+
+
+def split_cells(line: str, separator: str | None) -> list[str]:
+    """The cells of a line."""
+    line = line.strip("\r\n") if separator == "\t" else line.strip()
+    if separator == ",":
+        try:
+            return [cell.strip() for cell in next(csv.reader([line]))]
+        except (StopIteration, csv.Error):
+            return []
+    cells = [cell.strip().strip('"') for cell in line.split(separator)]
+    return cells[:-1] if separator is not None and cells and cells[-1] == "" else cells
+
+
+def _find_numbers(head: list[str], path: Path) -> tuple[int, str | None, str, list[Kind]]:
+    rows = [(i, line) for i, line in enumerate(head) if line.strip() and not COMMENT.match(line)]
+    fallback = None
+    for place, (index, line) in enumerate(rows):
+        following = rows[place + 1][1] if place + 1 < len(rows) else None
+        for separator, decimal in SEPARATIONS:
+            if separator is not None and separator not in line:
+                continue
+            kinds = _row(line, separator, decimal)
+            if kinds is None or (fallback is not None and fallback[0] == index and len(fallback[3]) > len(kinds)):
+                continue
+            after = None if following is None else _row(following, separator, decimal)
+            alone = following is None and fallback is None
+            if alone or (after is not None and len(after) == len(kinds)):
+                return index, separator, decimal, kinds
+            if fallback is None and "gap" not in kinds:
+                fallback = (index, separator, decimal, kinds)
+    # a table whose second row is damaged is still a table: the row that is wrong is named when it is read
+    if fallback is not None and (len(fallback[3]) > 1 or fallback[0] == (rows[0][0] if rows else 0)):
+        return fallback
+    sample = next((line.strip() for line in head if line.strip()), "")
+    if not sample:
+        raise SignalFileError(path, "holds nothing but empty lines")
+    raise SignalFileError(
+        path, f"holds no row of numbers in its first {len(head)} lines; it begins with {sample[:60]!r}"
+    )
+
+
+def _row(line: str, separator: str | None, decimal: str) -> list[Kind] | None:
+    """Kinds of the cells of a row of data, or None if it is none."""
+    kinds = [cell_kind(cell, decimal) for cell in split_cells(line.split("#")[0], separator)]
+    if "number" not in kinds or "text" in kinds:
+        return None
+    if any(kind in ("stamp", "date", "clock") for kind in kinds[2:]):
+        return None
+    return kinds
+
+
+def _labels(above: list[str], separator: str | None, width: int) -> tuple[list[str], int | None]:
+    """The row of names above the numbers, and its line; ([], None) if there is none."""
+    rows = [(i, line) for i, line in enumerate(above) if line.strip() and not COMMENT.match(line)]
+    if not rows:
+        return [], None
+    at, line = rows[-1]
+    if width == 1:
+        return ([], None) if KEY_VALUE.match(line) and re.search(r"[:=]", line) else ([line.strip().strip('"')], at)
+    cells = split_cells(line, separator)
+    if separator not in (None, ",") and len(cells) == width - 1 and line.rstrip("\r\n").endswith(separator or " "):
+        cells.append("")
+    if len(cells) == width - 1 and all(not is_number(cell, ".") for cell in cells):
+        # names of the columns but not of the one that numbers the rows
+        return ["", *cells], at
+    return (cells, at) if len(cells) == width else ([], None)
+
+
+def _units_row(
+    above: list[str], separator: str | None, width: int, labels: list[str], line: int
+) -> tuple[list[str], list[str]] | None:
+    """Names and units where the units stand in a row of their own below the names, else None.
+
+    Units are in brackets, or plain where the names above begin with the time's.
+    """
+    rows = [text for text in above[:line] if text.strip() and not COMMENT.match(text)]
+    upper = split_cells(rows[-1], separator) if rows else []
+    in_brackets = [re.match(r"^\s*[\[(]([^\[\]()]*)[\])]\s*$", label) for label in labels]
+    if (
+        len(upper) == width
+        and all(m or not label.strip() for m, label in zip(in_brackets, labels))
+        and any(in_brackets)
+    ):
+        return upper, [(m.group(1).strip() if m else "") or UNKNOWN_UNITS for m in in_brackets]
+    plain = [label.strip() for label in labels]
+    if len(upper) == width and is_clock(upper[0]) and plain[0] and all(not unit or is_usual(unit) for unit in plain):
+        return upper, [unit or UNKNOWN_UNITS for unit in plain]
+    return None
+
+
+def _metadata(above: list[str], separator: str | None, header_line: int | None) -> dict[str, Any]:
+    """What the lines above the table say, by name."""
+    found: dict[str, Any] = {}
+    for number, line in enumerate(above):
+        match = KEY_VALUE.match(line)
+        if not match or (number == header_line and not COMMENT.match(line)):
+            continue
+        key, text = match.group(1).strip(), match.group(2).strip()
+        if COMMENT.match(line):
+            try:
+                found[key] = json.loads(text)
+                continue
+            except ValueError:
+                pass
+        for name, value in _values(key, text, separator):
+            found.setdefault(name, value)
+    return found
+
+
+def _values(key: str, text: str, separator: str | None) -> Sequence[tuple[str, str]]:
+    """One value, or one for each column where they differ."""
+    cells = [text]
+    for sign in (separator, ";", "\t"):
+        if sign and sign in text:
+            cells = [cell.strip() for cell in text.split(sign) if cell.strip()]
+            break
+    if len(cells) < 2 or (separator == "," and re.fullmatch(r"\d{1,3}(,\d{3})+", text)):
+        return [(key, text)]
+    if len(set(cells)) == 1:
+        return [(key, cells[0])]
+    return [(f"{key} {i + 1}" if i else key, cell) for i, cell in enumerate(cells)]
+
+
+# Columns of times in text tables: seconds, time stamps, dates and times of day; and columns that number the rows.
+
+
+FACTORS = {"ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+NAMED_UNIT = re.compile(r"[_\s](ms|us|ns|min)$", re.IGNORECASE)
+DAY = 86400.0
+EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
+"""Numbers this large are not seconds since 1970 but parts of them."""
+
+
+class Times:
+    """Seconds of the rows of a table, block by block, from the first row on for time stamps."""
+
+    def __init__(self, layout: CsvLayout, path: Path) -> None:
+        self.layout, self.path = layout, path
+        self.origin: float | None = None
+        self.first_tick: int | None = None
+        self.last = -np.inf
+        self.days = 0.0
+
+    def seconds(self, values: np.ndarray, stamped: pd.DataFrame | None) -> np.ndarray | None:
+        """Times in s of a block, or None if the table has none.
+
+        Raises
+        ------
+        SignalFileError
+            If a stamp cannot be read.
+        """
+        layout = self.layout
+        if layout.clock is None:
+            return None
+        if stamped is None:
+            return self._of_numbers(values[:, layout.clock])
+        texts = stamped.iloc[:, 0].astype(str).str.strip().str.strip('"')
+        for column in stamped.columns[1:]:
+            texts = texts + " " + stamped[column].astype(str).str.strip().str.strip('"')
+        texts = texts.str.replace(",", ".", regex=False)
+        if re.match(r"^\d{1,2}:", texts.iloc[0]):
+            seconds = self._of_clocks(texts)
+        else:
+            seconds = self._of_dates(texts)
+        if self.origin is None:
+            self.origin = float(seconds[0])
+        return seconds - self.origin
+
+    def _of_numbers(self, column: np.ndarray) -> np.ndarray:
+        clock = self.layout.clock
+        assert clock is not None
+        named = NAMED_UNIT.search(self.layout.names[clock])
+        unit = (
+            self.layout.units[clock].lower() if self.layout.units[clock] != "unknown" else (named[1] if named else "s")
+        )
+        factor = FACTORS.get(unit.lower(), 1.0)
+        largest = float(np.nanmax(np.abs(column), initial=0.0))
+        if factor == 1.0:
+            factor = next((f for limit, f in EPOCHS if largest > limit), 1.0)
+        if largest * factor > 1e8:
+            # seconds since 1970 leave too few digits for the fraction
+            self.origin = float(column[0]) if self.origin is None else self.origin
+            return (column - self.origin) * factor
+        return column * factor
+
+    def _of_dates(self, texts: pd.Series) -> np.ndarray:
+        try:
+            found = pd.to_datetime(_iso(texts), format="ISO8601", utc=True)
+        except (ValueError, OverflowError) as exc:
+            raise SignalFileError(self.path, f"its time stamps cannot be read ({str(exc).splitlines()[0]})") from exc
+        if found.isna().any():
+            row = int(np.argmax(found.isna().to_numpy()))
+            raise SignalFileError(
+                self.path, f"its time stamp in row {row + 1} of the table is missing or cannot be read"
+            )
+        ticks = found.dt.as_unit("ns").astype("int64").to_numpy()
+        self.first_tick = int(ticks[0]) if self.first_tick is None else self.first_tick
+        return (ticks - self.first_tick) * 1e-9
+
+    def _of_clocks(self, texts: pd.Series) -> np.ndarray:
+        padded = texts.where(texts.str.count(":") == 2, texts + ":00")
+        try:
+            seconds = pd.to_timedelta(padded).dt.total_seconds().to_numpy(dtype=float)
+        except ValueError as exc:
+            raise SignalFileError(self.path, f"its times of day cannot be read ({str(exc).splitlines()[0]})") from exc
+        before = np.concatenate(([self.last if np.isfinite(self.last) else seconds[0]], seconds[:-1]))
+        midnights = np.cumsum(seconds - before < -0.5 * DAY)
+        self.last = float(seconds[-1])
+        out = seconds + DAY * (self.days / DAY + midnights)
+        self.days += DAY * float(midnights[-1])
+        return out
+
+
+def _iso(texts: pd.Series) -> pd.Series:
+    """Stamps with their dates as year-month-day; of 3/4/2024 the day comes first unless that cannot be."""
+    year_first = texts.str.extract(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(.*)$")
+    if year_first[0].notna().all():
+        parts = [year_first[k] for k in (0, 1, 2, 3)]
+    else:
+        found = texts.str.extract(r"^(\d{1,2})[-/.](\d{1,2})[-/.](\d{4})(.*)$")
+        if found[0].isna().any():
+            return texts
+        american = bool((found[1].astype(int) > 12).any())
+        parts = [found[k] for k in ((2, 0, 1, 3) if american else (2, 1, 0, 3))]
+    year, month, day, rest = parts
+    return year + "-" + month.str.zfill(2) + "-" + day.str.zfill(2) + rest
+
+
+def index_meaning(column: np.ndarray, clock: np.ndarray | None) -> tuple[str | None, np.ndarray | None]:
+    """What a first column without a name is: words for the reader, and seconds if it holds times; (None, None) if
+    neither.
+
+    0, 1, 2 ... number the rows; other numbers that rise evenly are times in s, where there is no other column of times.
+    """
+    if len(column) < 2 or not np.isfinite(column).all():
+        return None, None
+    steps = np.diff(column)
+    if np.all(steps == 1.0) and column[0] == np.rint(column[0]):
+        return "The first column only numbers the rows and is left out.", None
+    even = np.all(steps > 0.0) and np.allclose(steps, steps.mean(), rtol=0.05)
+    if even and clock is None:
+        return "The first column has no name and rises evenly; it is taken for the time in s.", column
+    return None, None
+
+
+# Text as instruments write it: with byte-order marks, in UTF-8, UTF-16 or Windows' own code.
+
+
+MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+FALLBACK = "cp1252"
+
+
+def encoding_of(head: bytes) -> str:
+    """The encoding of a text from its first bytes: by its mark, UTF-8 if it is valid, else Windows' Western code."""
+    for mark, name in MARKS:
+        if head.startswith(mark):
+            return name
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return FALLBACK
+    return "utf-8"
+
+
+def decoded(data: bytes) -> str:
+    """The text of some bytes; what cannot be decoded becomes the replacement character."""
+    return data.decode(encoding_of(data[: 1 << 16]), errors="replace")

@@ -1,0 +1,1 @@
+"""Averages and diagnosis of planetary sets."""

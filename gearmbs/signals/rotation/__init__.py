@@ -1,0 +1,1 @@
+"""Speed, shaft angle, and signals by angle and order."""

@@ -1,0 +1,300 @@
+"""Shaft angle over time: from a constant speed, from tacho pulses, or from a gear mesh line when there is no tacho."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any, Literal
+
+import numpy as np
+import scipy.fft
+import scipy.interpolate
+import scipy.signal as ss
+import xarray as xr
+
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
+from gearmbs.signals.resampling import monotone_cubic
+from gearmbs.signals.rotation.pulses import described, mended_count, pulse_faults
+from gearmbs.signals.signal.any_data import takes_data
+from gearmbs.signals.signal.given import speed_curve
+from gearmbs.signals.signal.signal import rate_of
+
+LINE_ATTENUATION_DB = 60.0
+PULSE_HYSTERESIS = 0.2
+
+
+@takes_data()
+def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
+    """Angle of a shaft whose speed is known, zero at the first sample.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        The record whose times are meant.
+    speed : float, str, or curve
+        As for `speed_curve`: a number in rad/s, "1500 rpm", points over time, a function. Rest is allowed.
+
+    Returns
+    -------
+    xarray.DataArray
+        rad, dimension (time,): the integral of the speed, over the samples that the curve covers.
+
+    Raises
+    ------
+    SignalError
+        If the speed cannot be read, or its curve covers less than two samples of the record.
+    """
+    times = np.asarray(signal["time"].values, dtype=float)
+    curve = speed_curve(speed, span=(float(times[0]), float(times[-1])))
+    if curve.times.size == 1:
+        return _phase(times, curve.angle(times), "constant speed")
+    half = 0.5 / rate_of(signal)
+    inside = (times >= curve.times[0] - half) & (times <= curve.times[-1] + half)
+    if inside.sum() < 2:
+        raise SignalError(
+            f"speed: the curve spans {curve.times[0]:g} to {curve.times[-1]:g} s, "
+            f"the record {times[0]:g} to {times[-1]:g} s"
+        )
+    return _phase(times[inside], curve.angle(times[inside]), "speed curve")
+
+
+@takes_data()
+def phase_from_tacho(
+    signal: xr.DataArray,
+    channel: str | None = None,
+    *,
+    pulses_per_rev: float = 1.0,
+    threshold: float | None = None,
+    faults: Literal["mend", "refuse", "keep"] = "mend",
+) -> xr.DataArray:
+    """Angle (rad) of the shaft from a tacho channel's rising pulse edges.
+
+    Edges are placed between samples by linear interpolation at the threshold; the signal must fall below the threshold
+    by a fifth of its swing before the next edge counts. A cubic spline through the edges gives the angle between them;
+    where that would turn back, as beside a standstill, a monotone piecewise cubic does.
+
+    Missing and extra pulses, which would put the angle wrong by whole pitches from there on, are told from the
+    intervals beside them where the speed is even enough from pulse to pulse (`gearmbs.signals.rotation.pulses`), and
+    mended with a warning: an interval of k of its neighbours' counts as k pitches, two that add to one as one.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
+    channel : str, optional
+        The tacho's channel; may be left out if there is only one.
+    pulses_per_rev : float
+        Pulses per revolution.
+    threshold : float, optional
+        Level of the edges; default the middle between the 1st and the 99th percentile.
+    faults : {"mend", "refuse", "keep"}
+        What to do about missing and extra pulses: "keep" counts every pulse as it comes, as of a shaft that does jump
+        so, "refuse" raises.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimension (time,), only the samples between the first and the last pulse; attribute `notes`, where there was
+        something to mend.
+
+    Warns
+    -----
+    UserWarning
+        Where pulses are missing or too many, with times and numbers, and where an interval fits no whole number.
+
+    Raises
+    ------
+    SignalError
+        If the channel is unknown or fewer than three pulses are found.
+    """
+    if faults not in ("mend", "refuse", "keep"):
+        raise SignalError(f"faults: must be 'mend', 'refuse' or 'keep', got {faults!r}")
+    names = [str(c) for c in signal["channel"].values]
+    if channel is None and len(names) > 1:
+        raise SignalError(f"channel: name the tacho channel, one of {names}")
+    if channel is not None and channel not in names:
+        raise SignalError(f"channel: there is no {channel!r}, only {names}")
+    if not (math.isfinite(pulses_per_rev) and pulses_per_rev > 0.0):
+        raise SignalError(f"pulses_per_rev: must be positive, got {pulses_per_rev!r}")
+    pulses = signal.values[:, names.index(channel) if channel is not None else 0]
+    low, high = np.percentile(pulses, [1.0, 99.0])
+    if high <= low:
+        low, high = float(pulses.min()), float(pulses.max())
+    level = 0.5 * (low + high) if threshold is None else float(threshold)
+    crossings = np.flatnonzero((pulses[:-1] < level) & (pulses[1:] >= level))
+    floor = level - PULSE_HYSTERESIS * (high - low)
+    kept: list[int] = []
+    previous = 0
+    for index in crossings.tolist():
+        if not kept or pulses[previous : index + 1].min() < floor:
+            kept.append(index)
+            previous = index + 1
+    if len(kept) < 3:
+        raise SignalError(
+            f"channel: {len(kept)} pulses cross the threshold {level:g} in {channel or names[0]!r}, "
+            "at least 3 are needed; check the channel or pass threshold=..."
+        )
+    at = np.asarray(kept)
+    times = signal["time"].values
+    edges = times[at] + (level - pulses[at]) / (pulses[at + 1] - pulses[at]) / rate_of(signal)
+    places = [] if faults == "keep" else pulse_faults(edges, pulses_per_rev)
+    notes = [f"Tacho {channel or names[0]!r}: {words}" for words in described(edges, places)]
+    if notes and faults == "refuse":
+        raise SignalError(f"faults: {' '.join(notes)} Mend them with faults='mend', or take them with faults='keep'")
+    for note in notes:
+        warnings.warn(note, UserWarning, stacklevel=3)
+    kept_edges, numbers = mended_count(edges.size, places)
+    edges, angles = edges[kept_edges], 2.0 * np.pi / pulses_per_rev * numbers
+    inside = (times >= edges[0]) & (times <= edges[-1])
+    phase = scipy.interpolate.CubicSpline(edges, angles)(times[inside])
+    if np.any(np.diff(phase) <= 0.0):
+        phase = monotone_cubic(edges, angles, times[inside])
+    result = _phase(times[inside], phase, "tacho")
+    if notes:
+        result.attrs["notes"] = notes
+    return result
+
+
+@takes_data(frequency="frequency", half_bandwidth="frequency")
+def phase_from_line(
+    signal: xr.DataArray, frequency: float, order: float, *, half_bandwidth: float | None = None
+) -> xr.DataArray:
+    """Angle (rad) of the shaft from the phase of one line, such as a gear mesh harmonic.
+
+    Each channel is shifted down by `frequency`, low-passed (zero-phase FIR, flat to half_bandwidth, 60 dB down at twice
+    that) and its phase unwrapped; the channel whose line holds up best over time (fifth percentile of the envelope over
+    its RMS) is used.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
+    frequency : float
+        Mean frequency of the line in Hz.
+    order : float
+        Line frequency over shaft frequency, e.g. the tooth count times the harmonic.
+    half_bandwidth : float, optional
+        Largest deviation to follow, in Hz; default 0.15 shaft frequencies, which keeps out sidebands of the shaft and
+        of most mating shafts.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimension (time,), the samples for which the filter, 3.9 / half_bandwidth seconds long, lies inside the record;
+        attributes `channel`, `quality` (0 to 1) and `mean_speed` in rad/s.
+
+    Raises
+    ------
+    SignalError
+        If the record is too short for the filter, or a parameter is out of range.
+    """
+    rate = rate_of(signal)
+    if not 0.0 < frequency < rate / 2 or not order > 0.0:
+        raise SignalError(
+            f"frequency, order: must be positive and below {rate / 2:g} Hz, got {frequency!r} and {order!r}"
+        )
+    half = 0.15 * frequency / order if half_bandwidth is None else float(half_bandwidth)
+    if not 0.0 < half < frequency / 2:
+        raise SignalError(f"half_bandwidth: must lie between 0 and half the line's frequency, got {half!r} Hz")
+    line_filter = _LineFilter(rate, half)
+    step, first = line_filter.step, line_filter.reach
+    n = signal.sizes["time"]
+    times = signal["time"].values
+    if n < 2 * first + 1:
+        raise SignalError(
+            f"signal: has {n} samples, following the line needs at least {2 * first + 1}; "
+            f"widen half_bandwidth ({half:g} Hz)"
+        )
+    best: tuple[float, int, np.ndarray] | None = None
+    for channel, column in enumerate(signal.values.T):
+        line = line_filter(column, frequency / rate)
+        size = np.abs(line)
+        level = float(np.sqrt(np.mean(size**2)))
+        quality = float(np.percentile(size, 5.0)) / level if level > 0.0 else 0.0
+        if best is None or quality > best[0]:
+            best = (quality, channel, line)
+    assert best is not None
+    quality, channel, line = best
+    slow = np.unwrap(np.angle(line))
+    at = (first + step * np.arange(slow.size)) / rate
+    if at.size < 4:
+        raise SignalError(f"signal: {n / rate:g} s are too short to follow a line within {half:g} Hz")
+    track = scipy.interpolate.CubicSpline(at, slow)
+    last = first + step * (slow.size - 1)
+    angle = np.empty(last + 1 - first)
+    for start in range(0, angle.size, BLOCK):
+        t = np.arange(first + start, first + min(start + BLOCK, angle.size)) / rate
+        angle[start : start + t.size] = (2.0 * np.pi * frequency * t + track(t)) / order
+    angle -= angle[0]
+    if np.diff(angle).min() <= 0.0:
+        raise SignalError("frequency: the line at this frequency is too weak to follow; give a tacho or the speed")
+    result = _phase(times[first : last + 1], angle, "line")
+    span = at[-1] - at[0]
+    mean = float((2.0 * np.pi * frequency + ((slow[-1] - slow[0]) / span if span > 0.0 else 0.0)) / order)
+    result.attrs.update(channel=str(signal["channel"].values[channel]), quality=quality, mean_speed=mean)
+    return result
+
+
+class _LineFilter:
+    """Complex envelope of a line: shifted down to zero, low-passed without delay in two stages, and thinned out.
+
+    The first stage, short, lowers the rate to some 64 times the half bandwidth, the second does the narrow work there.
+    """
+
+    def __init__(self, rate: float, half: float) -> None:
+        self.coarse = max(1, int(rate / (64.0 * half)))
+        slow = rate / self.coarse
+        self.wide = (
+            kaiser_taps(slow / 2, slow - 4.0 * half, rate, "lowpass", ATTENUATION_DB) if self.coarse > 1 else None
+        )
+        self.narrow = kaiser_taps(1.5 * half, half, slow, "lowpass", LINE_ATTENUATION_DB)
+        self.fine = max(1, int(slow / (16.0 * half)))
+        self.step = self.coarse * self.fine
+        """Samples of the record between samples of the envelope."""
+        lead = 0 if self.wide is None else self.wide.size // 2
+        self.reach = lead + self.coarse * (self.narrow.size // 2)
+        """Index in the record of the envelope's first sample, and as many samples as are lost at the end."""
+
+    def __call__(self, column: np.ndarray, cycles: float) -> np.ndarray:
+        """Envelope of the line at `cycles` per sample, complex; its phase counts from the first sample."""
+        mean = column.mean()
+        lead = 0 if self.wide is None else self.wide.size // 2
+        count = column.size - 2 * lead
+        block = max(1, BLOCK // self.coarse) * self.coarse
+        pieces = []
+        for start in range(0, count, block):
+            stop = min(start + block, count) + 2 * lead
+            shifted = (column[start:stop] - mean) * np.exp(-2j * np.pi * cycles * np.arange(start, stop))
+            pieces.append(shifted if self.wide is None else _thinned(shifted, self.wide, self.coarse))
+        return _thinned(np.concatenate(pieces), self.narrow, self.fine)
+
+
+def _thinned(line: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
+    parts, _ = apply_zero_phase(np.stack((line.real, line.imag), axis=1), taps, "trim", step)
+    return parts[:, 0] + 1j * parts[:, 1]
+
+
+def instantaneous_speed(phase: xr.DataArray) -> xr.DataArray:
+    """Speed (rad/s) over time, the derivative of the angle."""
+    values = np.gradient(phase.values, phase["time"].values)
+    return xr.DataArray(
+        values, dims=("time",), coords={"time": phase["time"]}, attrs={"units": "rad/s", "long_name": "speed"}
+    )
+
+
+def analytic(column: np.ndarray) -> np.ndarray:
+    """Analytic signal of a column (SciPy's Hilbert transform, at a fast length)."""
+    return ss.hilbert(column, scipy.fft.next_fast_len(column.size))[: column.size]
+
+
+def _phase(times: np.ndarray, angle: np.ndarray, origin: str) -> xr.DataArray:
+    return xr.DataArray(
+        angle,
+        dims=("time",),
+        coords={"time": ("time", times, {"units": "s"})},
+        name="angle",
+        attrs={"units": "rad", "origin": origin},
+    )

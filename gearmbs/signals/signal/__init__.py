@@ -1,0 +1,1 @@
+"""The signal: an array of time and channel with units and what is known of its source."""

@@ -1,0 +1,569 @@
+"""What a file says about a signal, before it becomes one: the meeting point of all readers and writers."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth, make_signal, rate_of, uniform_rate, units_of
+
+# What headers say, by the names that real files use: sampling rates and speeds, and which to believe.
+
+
+RATE_NAMES = frozenset(
+    (
+        "samplingrate samplerate samplingfrequency samplefrequency samplingfreq samplefreq sampfreq samprate fs fsamp "
+        "fsample fsampling sr sf scanrate acquisitionrate daqrate samplespersecond samplespersec sps abtastrate "
+        "abtastfrequenz frequencysampling samplehz samplerateinhz ratehz hz"
+    ).split()
+)
+WEAK_RATE_NAMES = frozenset({"rate"})
+"""Names that mean the sampling rate in some files and the shaft's in others: a better name beside them wins."""
+STEP_NAMES = frozenset(
+    (
+        "xinc xincrement xincr xdelta dx deltax dt deltat deltatime timestep timeincrement timeinterval wfincrement "
+        "sampleinterval samplinginterval sampleperiod samplingperiod samplingtime tsample tsamp abtastintervall"
+    ).split()
+)
+SPEED_NAMES = frozenset(
+    "speed rpm shaftspeed rotationalspeed rotationspeed rotatingspeed motorspeed inputspeed drehzahl n shaftrpm".split()
+)
+SHAFT_FREQUENCIES = frozenset(
+    "shaftrate shaftfrequency rotationfrequency rotationalfrequency rotfreq fr shafthz".split()
+)
+PER_SECOND = {
+    "": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "ks/s": 1e3, "samples/s": 1.0, "sa/s": 1.0,
+    "samples/sec": 1.0, "samples/second": 1.0, "sps": 1.0, "ksps": 1e3, "s^-1": 1.0,
+}  # fmt: skip
+SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+NUMBER = re.compile(r"^\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*[\[(]?\s*([A-Za-zµ/^\-0-9]*)")
+BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+AGREE = 1e-3
+PLAUSIBLE_RPM = (1.0, 200_000.0)
+STEM = re.compile(r"[_.\s-]*(header|data|info|signal|values|samples|properties)$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class RateCandidate:
+    """A sampling rate that a file may mean: the name it stands under, Hz, and whether the name may mean another."""
+
+    name: str
+    rate: float
+    weak: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.name} = {self.rate:g} Hz"
+
+
+def key_of(name: str) -> tuple[str, str]:
+    """A header's name without case, blanks and path, and the unit in its brackets ("" without one)."""
+    last = re.split(r"[./\\]", name.strip().rstrip(":"))[-1] if not BRACKETS.search(name) else name
+    unit = BRACKETS.search(last)
+    bare = re.sub(r"[^a-z0-9äöü]", "", BRACKETS.sub("", last).lower())
+    return bare, unit.group(1).strip() if unit else ""
+
+
+def number_of(value: Any) -> tuple[float, str] | None:
+    """A header's value as a number and its unit; None for what is no number."""
+    if isinstance(value, bool) or value is None:
+        return None
+    if isinstance(value, (int, float, np.number)):
+        return float(value), ""
+    if isinstance(value, np.ndarray):
+        return number_of(value.reshape(-1)[0].item()) if value.size == 1 and value.dtype.kind in "fiuSU" else None
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", errors="replace")
+    if not isinstance(value, str):
+        return None
+    found = NUMBER.match(value.strip(" \t\"',;:="))
+    if found is None:
+        return None
+    digits = found.group(1)
+    if re.fullmatch(r"[-+]?\d{1,3}(,\d{3})+", value.strip(" \t\"';:=").split(" ")[0]):
+        digits = value.strip(" \t\"';:=").split(" ")[0].replace(",", "")
+    return float(digits.replace(",", ".")), found.group(2)
+
+
+def rate_candidates(header: Mapping[str, Any]) -> list[RateCandidate]:
+    """The sampling rates that a header may mean, better names first."""
+    found = []
+    for name, value in header.items():
+        key, unit = key_of(str(name))
+        number = number_of(value)
+        if number is None or not math.isfinite(number[0]) or number[0] <= 0.0:
+            continue
+        unit = (number[1] or unit).lower()
+        if key in RATE_NAMES or key in WEAK_RATE_NAMES:
+            if unit in PER_SECOND:
+                found.append(RateCandidate(str(name), number[0] * PER_SECOND[unit], key in WEAK_RATE_NAMES))
+            elif unit in SECONDS:
+                found.append(RateCandidate(str(name), 1.0 / (number[0] * SECONDS[unit]), True))
+        elif key in STEP_NAMES and unit in SECONDS:
+            found.append(RateCandidate(str(name), 1.0 / (number[0] * SECONDS[unit])))
+    return sorted(found, key=lambda candidate: candidate.weak)
+
+
+def chosen_rate(
+    path: Path, candidates: Sequence[RateCandidate], given: float | None = None
+) -> tuple[float | None, list[str]]:
+    """The sampling rate that a file means, and what is to be said about it.
+
+    Raises
+    ------
+    SignalFileError
+        If the file names two that disagree and the caller (`given`, Hz) none of them.
+    """
+    if not candidates:
+        return None, []
+    sure = [candidate for candidate in candidates if not candidate.weak] or list(candidates)
+    distinct: list[RateCandidate] = []
+    for candidate in sure:
+        if all(abs(candidate.rate / other.rate - 1.0) > AGREE for other in distinct):
+            distinct.append(candidate)
+    if len(distinct) > 1:
+        listed = " and ".join(str(candidate) for candidate in distinct[:4])
+        if given is None:
+            raise SignalFileError(
+                path, f"names two sampling rates that disagree, {listed}; say which: rate=... (--rate)"
+            )
+        return given, [f"The file names {listed}; the rate given, {given:g} Hz, is used."]
+    first = distinct[0]
+    if given is not None and first.weak and abs(given / first.rate - 1.0) > AGREE:
+        return given, [
+            f"The file's {first.name} = {first.rate:g} is not taken for the sampling rate; {given:g} Hz is given."
+        ]
+    others = [c for c in candidates if c.weak and c not in sure and abs(c.rate / first.rate - 1.0) > AGREE]
+    notes = [
+        f"The sampling rate is {first}; {other.name} = {other.rate:g} is something else. If it is the shaft's speed in "
+        f"Hz, say so: speed='{other.rate:g} Hz' (--speed \"{other.rate:g} Hz\")."
+        for other in others
+    ]
+    return first.rate, notes
+
+
+def own_header(header: Mapping[str, Any], channel: str) -> dict[str, Any]:
+    """The part of a header that speaks of a channel: what stands beside it or above it, or else all of it."""
+    beside = {k: v for k, v in header.items() if k.rpartition(".")[0] == channel}
+    if rate_candidates(beside):
+        return beside
+    prefix = channel.rpartition(".")[0]
+    above = {k: v for k, v in header.items() if prefix == k.rpartition(".")[0] or not k.rpartition(".")[0]}
+    if rate_candidates(above):
+        return above
+    above = {k: v for k, v in header.items() if prefix.startswith(k.rpartition(".")[0])}
+    if rate_candidates(above):
+        return above
+    stem = STEM.sub("", channel)
+    beside = {k: v for k, v in header.items() if STEM.sub("", k.rpartition(".")[0]) == stem}
+    return beside if rate_candidates(beside) else dict(header)
+
+
+def speed_of(header: Mapping[str, Any]) -> tuple[float | None, list[str]]:
+    """The shaft's speed (rad/s) that a header names with its unit, and what is to be said about it."""
+    found: list[tuple[str, float]] = []
+    unclear = []
+    for name, value in header.items():
+        key, unit = key_of(str(name))
+        number = number_of(value)
+        if number is None or not math.isfinite(number[0]) or number[0] <= 0.0:
+            continue
+        unit = (number[1] or unit).lower()
+        if key in SHAFT_FREQUENCIES and unit in ("", "hz", "1/s"):
+            found.append((str(name), number[0] * math.tau))
+        elif key.endswith("rpm") or (key in SPEED_NAMES and unit in ("rpm", "1/min", "u/min", "r/min", "rev/min")):
+            found.append((str(name), number[0] * math.pi / 30.0))
+        elif key in SPEED_NAMES and unit in ("hz", "1/s"):
+            found.append((str(name), number[0] * math.tau))
+        elif key in SPEED_NAMES and unit == "rad/s":
+            found.append((str(name), number[0]))
+        elif key in SPEED_NAMES and key != "n" and str(name) != "speed":
+            unclear.append(f"{name} = {number[0]:g} has no unit; pass speed='{number[0]:g} rpm' if it is in rpm.")
+    found = [(n, s) for n, s in found if PLAUSIBLE_RPM[0] <= s * 30.0 / math.pi <= PLAUSIBLE_RPM[1]]
+    if not found:
+        return None, unclear
+    name, speed = found[0]
+    if any(abs(other / speed - 1.0) > AGREE for _, other in found):
+        listed = ", ".join(f"{n} ({s * 30 / math.pi:g} rpm)" for n, s in found)
+        return None, [f"The file names several speeds: {listed}; say which with speed=... (--speed)."]
+    return speed, [f"The speed, {speed * 30.0 / math.pi:.6g} rpm, is the file's {name}."]
+
+
+def same_rate(path: Path, rates: Mapping[str, float | None]) -> float | None:
+    """The one rate of all channels; SignalFileError that lists them where they differ."""
+    known: Iterable[float] = {rate for rate in rates.values() if rate is not None}
+    distinct: list[float] = []
+    for rate in known:
+        if all(abs(rate / other - 1.0) > AGREE for other in distinct):
+            distinct.append(rate)
+    if len(distinct) > 1:
+        listed = ", ".join(f"{name} {rate:g} Hz" for name, rate in rates.items() if rate is not None)
+        raise SignalFileError(
+            path, f"its channels have different sampling rates: {listed}; choose with channels=[...] (--channel)"
+        )
+    return next((rate for rate in rates.values() if rate is not None), None)
+
+
+# Labels of columns as people write them: a name and its unit, times among them, no two alike.
+
+
+NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
+SUFFIX = re.compile(r"[_\s](s|sec|ms|us|µs|ns|min)$", re.IGNORECASE)
+CLOCK_NAMES = frozenset(
+    "time t times timesec timeseconds timestamp timestamps zeit zeitpunkt datetime elapsedtime relativetime "
+    "xvalue sampletime tempo temps timems timeus".split()
+)
+
+
+def name_and_unit(label: str) -> tuple[str, str]:
+    """The name and the unit of a label such as "acc [m/s^2]" or "acc (g)"; the unit is "unknown" without one."""
+    found = NAME_UNIT.match(label)
+    if found and found.group(1):
+        return found.group(1), found.group(2).strip() or UNKNOWN_UNITS
+    return label, UNKNOWN_UNITS
+
+
+def is_clock(name: str) -> bool:
+    """True for the names that columns of times have."""
+    return key_of(SUFFIX.sub("", name))[0] in CLOCK_NAMES
+
+
+def unique_names(names: Sequence[str]) -> list[str]:
+    """Names made different by a number where they are not; empty ones become ch1, ch2 ..."""
+    named = [name or f"ch{i + 1}" for i, name in enumerate(names)]
+    return [n if named.count(n) == 1 else f"{n}_{named[:i].count(n) + 1}" for i, n in enumerate(named)]
+
+
+# Samples that are missing or not finite: refused, interpolated, or cut out, and said.
+
+
+Gaps = Literal["refuse", "interpolate", "longest"]
+CHOICES = get_args(Gaps)
+REMEDY = "pass gaps='interpolate' or gaps='longest' (--gaps), or cut or repair the record first"
+
+
+def checked_gaps(gaps: str | None) -> str:
+    """`gaps` as one of the choices; SignalError for any other."""
+    if gaps is None:
+        return "refuse"
+    if gaps not in CHOICES:
+        raise SignalError(f"gaps: must be one of {', '.join(CHOICES)}, got {gaps!r}")
+    return gaps
+
+
+def without_gaps(values: np.ndarray, gaps: str | None, rate: float | None = None) -> tuple[np.ndarray, int, list[str]]:
+    """Samples without gaps, the index of the first that is kept, and what was done in words.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n, channels)
+    gaps : {"refuse", "interpolate", "longest"} or None
+        "refuse" (None): an error. "interpolate": straight lines across each gap, ends without a sample on one side cut
+        off. "longest": the longest stretch in which no channel has a gap.
+    rate : float, optional
+        Sampling rate in Hz, for the words.
+
+    Raises
+    ------
+    SignalError
+        If there are gaps and `gaps` is "refuse", or nothing is left.
+    """
+    how = checked_gaps(gaps)
+    bad = ~np.isfinite(values)
+    if not bad.any():
+        return values, 0, []
+    row, column = (int(i) for i in np.argwhere(bad)[0])
+    count = int(bad.any(axis=1).sum())
+    if how == "refuse":
+        raise SignalError(
+            f"data: {int(bad.sum())} samples are not finite, the first at row {row}, channel {column}; {REMEDY}"
+        )
+    if bad.all(axis=0).any():
+        raise SignalError(f"gaps: channel {int(np.argmax(bad.all(axis=0)))} holds no sample at all; leave it out")
+    if how == "longest":
+        good = np.concatenate(([False], ~bad.any(axis=1), [False]))
+        turns = np.flatnonzero(np.diff(good.astype(int)))
+        if not turns.size:
+            raise SignalError("gaps: no row has a sample in every channel; choose channels")
+        starts, stops = turns[::2], turns[1::2]
+        k = int(np.argmax(stops - starts))
+        first, last = int(starts[k]), int(stops[k])
+        words = f"Only the longest stretch without gaps is used: samples {first} to {last - 1} of {len(values)}."
+        return values[first:last], first, [words]
+    filled = values.copy()
+    first = int(max(np.argmin(bad[:, c]) for c in range(values.shape[1])))
+    last = int(min(len(values) - np.argmin(bad[::-1, c]) for c in range(values.shape[1])))
+    if last <= first:
+        raise SignalError("gaps: no time at which every channel has samples; choose channels")
+    at = np.arange(len(values))
+    longest = 0
+    for c in range(values.shape[1]):
+        good = ~bad[:, c]
+        filled[:, c] = np.interp(at, at[good], values[good, c])
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], bad[first:last, c].astype(int), [0]))))
+        longest = max(longest, int((edges[1::2] - edges[::2]).max(initial=0)))
+    span = "" if rate is None else f" ({longest / rate:.3g} s)"
+    words = (
+        f"{count} of {len(values)} rows had gaps, filled by straight lines; the longest gap is {longest} samples{span}."
+    )
+    return filled[first:last], first, [words]
+
+
+Progress = Callable[[float, str], None]
+RESERVED_ATTRS = ("sampling_rate", "speed", "teeth", "units")
+
+
+@dataclass
+class Record:
+    """Samples and metadata read from a file.
+
+    Attributes
+    ----------
+    values : ndarray of shape (n, channels)
+    names : list of str
+    units : list of str
+        One per channel, "unknown" where the file is silent.
+    rate : float or None
+        Sampling rate in Hz.
+    t0 : float
+        Time of the first sample in s.
+    speed : float or None
+        rad/s.
+    teeth : tuple of int or None
+    attrs : dict
+        Anything else, JSON-like.
+    notes : list of str
+        What a reader should know: choices made, things left out.
+    """
+
+    values: np.ndarray
+    names: list[str]
+    units: list[str]
+    rate: float | None = None
+    t0: float = 0.0
+    speed: float | None = None
+    teeth: tuple[int, ...] | None = None
+    attrs: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def record_of(signal: xr.DataArray) -> Record:
+    """The record that a writer puts into a file."""
+    teeth = signal.attrs.get("teeth")
+    return Record(
+        values=np.asarray(signal.values, dtype=float),
+        names=[str(c) for c in signal["channel"].values],
+        units=units_of(signal),
+        rate=rate_of(signal),
+        t0=float(signal["time"].values[0]),
+        speed=None if signal.attrs.get("speed") is None else float(signal.attrs["speed"]),
+        teeth=None if teeth is None else check_teeth(teeth),
+        attrs={k: v for k, v in signal.attrs.items() if k not in RESERVED_ATTRS},
+    )
+
+
+def signal_from(
+    record: Record,
+    path: Path,
+    *,
+    rate: float | None,
+    units: str | Sequence[str] | Mapping[str, str] | None,
+    speed: float | None,
+    teeth: int | Sequence[int] | None,
+    channels: Sequence[str] | None,
+    gaps: str | None = None,
+) -> xr.DataArray:
+    """Join what the file and the caller say into a signal; errors name the file."""
+    if channels is not None:
+        missing = [c for c in channels if c not in record.names]
+        if missing:
+            raise SignalFileError(path, f"has no channel {missing}; it holds {record.names}")
+        pick = [record.names.index(c) for c in channels]
+        record.values = record.values[:, pick]
+        record.names = [record.names[i] for i in pick]
+        record.units = [record.units[i] for i in pick]
+    if rate is not None and record.rate is not None and abs(rate - record.rate) > 1e-3 * record.rate:
+        raise SignalFileError(
+            path,
+            f"says its sampling rate is {record.rate:g} Hz, the call says rate={rate:g}; leave rate out, or relabel "
+            "the samples with make_signal(signal.values, rate) if the file is wrong",
+        )
+    found = record.rate if record.rate is not None else rate
+    if found is None:
+        raise MissingMetadataError("rate", str(path), "the file does not hold it; pass rate=... in Hz")
+    if record.speed is not None and speed is not None:
+        record.notes = [note for note in record.notes if not note.startswith("The speed, ")]
+    try:
+        values, first, said = without_gaps(record.values, gaps, found)
+        notes = [*record.notes, *said]
+        return make_signal(
+            values,
+            found,
+            units=_units_said(units, record),
+            channels=record.names,
+            t0=record.t0 + first / found,
+            speed=record.speed if speed is None else speed,
+            teeth=record.teeth if teeth is None else teeth,
+            attrs={**record.attrs, "source": path.name, **({"notes": notes} if notes else {})},
+        )
+    except MissingMetadataError:
+        raise
+    except SignalError as exc:
+        raise SignalFileError(path, str(exc)) from exc
+
+
+def _units_said(units: str | Sequence[str] | Mapping[str, str] | None, record: Record) -> Any:
+    """Return the units of the channels: of a mapping its own, of the other channels the file's."""
+    known = dict(zip(record.names, record.units))
+    return known | dict(units) if isinstance(units, Mapping) else record.units if units is None else units
+
+
+def metadata_json(record: Record) -> str:
+    """Everything but the samples, as one line of JSON."""
+    return json.dumps(
+        {
+            "sampling_rate": record.rate,
+            "t0": record.t0,
+            "channels": record.names,
+            "units": record.units,
+            "speed": record.speed,
+            "teeth": record.teeth,
+            "attrs": plain(record.attrs),
+        }
+    )
+
+
+def record_from_json(values: np.ndarray, text: str, path: Path) -> Record:
+    """Inverse of `metadata_json`; SignalFileError if the text does not fit the samples."""
+    try:
+        meta = json.loads(text)
+        names, units = [str(c) for c in meta["channels"]], [str(u) for u in meta["units"]]
+        record = Record(
+            values,
+            names,
+            units,
+            float(meta["sampling_rate"]),
+            float(meta["t0"]),
+            meta["speed"],
+            None if meta["teeth"] is None else check_teeth(meta["teeth"]),
+            dict(meta["attrs"]),
+        )
+    except (ValueError, KeyError, TypeError) as exc:
+        raise SignalFileError(path, f"its metadata cannot be read ({exc})") from exc
+    if len(names) != values.shape[1] or len(units) != len(names):
+        raise SignalFileError(path, f"its metadata names {len(names)} channels, its samples have {values.shape[1]}")
+    return record
+
+
+def plain(value: Any) -> Any:
+    """Attributes as JSON knows them; what it does not know becomes text."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return value.item()
+    if value is None or isinstance(value, (str, int, float, bool)):
+        return value
+    return str(value)
+
+
+def assemble(
+    path: Path,
+    arrays: Mapping[str, np.ndarray],
+    scalars: Mapping[str, Any],
+    units: Mapping[str, str],
+    channels: Sequence[str] | None,
+    given: float | None = None,
+) -> Record:
+    """Make a record of the named arrays of a file that is not laid out by this package.
+
+    The arrays of the common length become channels, matrices one channel per column; an array called time gives the
+    rate, as does a scalar with a name such as fs, sr or XInc (`gearmbs.signals.signal.record`), beside the channel,
+    above it or, if there is none, anywhere. With `channels`, only the arrays they name (or whose columns they name)
+    count. A rate that the caller has `given` (Hz) decides where the file names two.
+    """
+    clocks = [k for k, v in arrays.items() if is_clock(k.rsplit(".", 1)[-1]) and v.size > 1]
+    columns: dict[str, np.ndarray] = {}
+    column_units: dict[str, str] = {}
+    owner: dict[str, str] = {}
+    for key, array in arrays.items():
+        if key in clocks or array.size < 2:
+            continue
+        flat = np.squeeze(array)
+        if flat.ndim > 2:
+            continue
+        table = flat[:, None] if flat.ndim == 1 else (flat if flat.shape[0] >= flat.shape[1] else flat.T)
+        names = [key] if table.shape[1] == 1 else [f"{key}_{i + 1}" for i in range(table.shape[1])]
+        for i, name in enumerate(names):
+            if channels is None or name in channels:
+                columns[name] = table[:, i]
+                column_units[name] = units.get(key, UNKNOWN_UNITS)
+                owner[name] = key
+    lengths = {name: column.size for name, column in columns.items()}
+    if not columns:
+        raise SignalFileError(path, f"holds no numeric record{_among(arrays, channels)}")
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{name} ({size})" for name, size in lengths.items())
+        raise SignalFileError(
+            path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
+        )
+    notes: list[str] = []
+    rates: dict[str, float | None] = {}
+    for name, key in owner.items():
+        rates[name], said = chosen_rate(path, rate_candidates(own_header(scalars, key)), given)
+        notes += [note for note in said if note not in notes]
+    rate = same_rate(path, rates)
+    count = next(iter(lengths.values()))
+    t0 = 0.0
+    times = next((arrays[k].ravel() for k in clocks if arrays[k].size == count), None)
+    if times is not None and np.asarray(times).dtype.kind in "fiu":
+        t0 = float(times[0])
+        if rate is None:
+            rate = rate_from_times(times, path)
+    known = {k: v for k, v in scalars.items() if not isinstance(v, (list, dict))}
+    speed, said = speed_of(known)
+    own = number_of(scalars.get("speed"))
+    if speed is None and own is not None and not own[1]:
+        speed = own[0]
+    counts = scalars.get("teeth")
+    if isinstance(counts, str):
+        counts = None if number_of(counts) is None else number_of(counts)[0]  # type: ignore[index]
+    try:
+        checked = None if counts is None else check_teeth(counts)
+    except (SignalError, TypeError, ValueError):
+        checked = None
+        notes.append(f"teeth = {counts!r} in the file is no tooth count and left out.")
+    return Record(
+        np.stack([np.asarray(c, dtype=float) for c in columns.values()], axis=1),
+        list(columns),
+        [column_units[name] for name in columns],
+        rate,
+        t0,
+        speed,
+        checked,
+        notes=notes + said,
+    )
+
+
+def rate_from_times(times: np.ndarray, path: Path) -> float:
+    """Sampling rate in Hz of the times in a file; the error names the file."""
+    try:
+        return uniform_rate(np.asarray(times, dtype=float))
+    except SignalError as exc:
+        raise SignalFileError(path, str(exc)) from exc
+
+
+def _among(arrays: Mapping[str, np.ndarray], channels: Sequence[str] | None) -> str:
+    listed = ", ".join(f"{k} {np.shape(v)}" for k, v in arrays.items()) or "nothing numeric"
+    return f" named {list(channels)}; it holds {listed}" if channels is not None else f"; it holds {listed}"

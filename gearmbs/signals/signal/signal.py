@@ -1,0 +1,546 @@
+"""The signal type: an `xarray.DataArray` with dimensions (time, channel) and agreed metadata.
+
+Coordinates: `time` in s (uniform), `channel` (names) and `units` (one text per channel).
+Attributes: `sampling_rate` in Hz, and where known `speed` in rad/s (of the wheel whose tooth count comes
+first), `teeth` (tuple of int), `units` (the common unit of all channels, or "mixed") and anything else.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gearmbs.signals.errors import MissingMetadataError, SignalError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+UNKNOWN_UNITS = "unknown"
+MIXED_UNITS = "mixed"
+CLOCK_TOLERANCE = 0.05
+REMEDIES = {
+    "rate": "pass rate=... in Hz",
+    "speed": "pass speed=... in rad/s, or estimate it with estimate_speed(signal, teeth=...)",
+    "teeth": "pass teeth=..., the tooth counts of the pair, the wheel that turns at `speed` first",
+    "units": "pass units=..., for example 'm/s^2'",
+}
+
+
+def make_signal(
+    data: ArrayLike | Mapping[str, ArrayLike],
+    rate: float | None,
+    *,
+    units: str | Sequence[str] | Mapping[str, str] | None = None,
+    channels: Sequence[str] | None = None,
+    t0: float = 0.0,
+    speed: float | None = None,
+    teeth: int | Sequence[int] | None = None,
+    name: str | None = None,
+    attrs: Mapping[str, Any] | None = None,
+) -> xr.DataArray:
+    """Build a signal from samples and what is known about them.
+
+    Parameters
+    ----------
+    data : array_like of shape (n,) or (n, channels), or mapping of name to array of shape (n,)
+        The samples; stored as float64.
+    rate : float
+        Sampling rate in Hz.
+    units : str, sequence or mapping of str, optional
+        Unit of all channels, of each channel, or by channel name. Default: "unknown".
+    channels : sequence of str, optional
+        Channel names; default "ch1", "ch2", ... or the keys of `data`.
+    t0 : float
+        Time of the first sample in s.
+    speed : float, optional
+        Speed in rad/s of the wheel whose tooth count comes first.
+    teeth : int or sequence of int, optional
+        Tooth counts of the pair.
+    name : str, optional
+        Name of the array.
+    attrs : mapping, optional
+        Further attributes to keep.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions (time, channel).
+
+    Raises
+    ------
+    MissingMetadataError
+        If `rate` is None.
+    SignalError
+        If the shapes do not agree, there are no samples, a sample is not finite, or a value is out of range.
+
+    Examples
+    --------
+    >>> signal = make_signal({"laser": [0.0, 0.1, 0.0, -0.1]}, 12800.0, units="m/s", speed=104.72, teeth=29)
+    >>> signal.dims, signal.attrs["units"], round(mesh_frequency(signal), 1)
+    (('time', 'channel'), 'm/s', 483.3)
+    """
+    import xarray as xr
+
+    values, channels = _columns(data, channels)
+    names = [f"ch{i + 1}" for i in range(values.shape[1])] if channels is None else [str(c) for c in channels]
+    if len(names) != values.shape[1] or len(set(names)) != len(names):
+        raise SignalError(f"channels: need {values.shape[1]} different names, got {names}")
+    rate = check_rate(rate)
+    all_attrs: dict[str, Any] = {**(attrs or {}), "sampling_rate": rate}
+    if speed is not None:
+        all_attrs["speed"] = check_speed(speed)
+    if teeth is not None:
+        all_attrs["teeth"] = check_teeth(teeth)
+    unit_list = _unit_list(units, names)
+    all_attrs["units"] = _common(unit_list)
+    return xr.DataArray(
+        values,
+        dims=("time", "channel"),
+        coords={
+            "time": ("time", t0 + np.arange(values.shape[0]) / rate, {"units": "s"}),
+            "channel": np.asarray(names, dtype=str),
+            "units": ("channel", np.asarray(unit_list, dtype=str)),
+        },
+        name=name,
+        attrs=all_attrs,
+    )
+
+
+def _columns(
+    data: ArrayLike | Mapping[str, ArrayLike], channels: Sequence[str] | None
+) -> tuple[np.ndarray, Sequence[str] | None]:
+    """Return the samples by columns, and the channels' names as far as they are known."""
+    if isinstance(data, Mapping):
+        channels = [str(key) for key in data] if channels is None else channels
+        columns = [np.asarray(column, dtype=float) for column in data.values()]
+        if not columns:
+            raise SignalError("data: has no channels")
+        if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
+            shapes = ", ".join(f"{key} {np.shape(value)}" for key, value in data.items())
+            raise SignalError(f"data: every channel must be one column of the same length, got {shapes}")
+        values = np.stack(columns, axis=1)
+    else:
+        values = np.asarray(data, dtype=float)
+        if values.ndim == 1:
+            values = values[:, None]
+    if values.ndim != 2 or 0 in values.shape:
+        raise SignalError(f"data: must have shape (samples, channels) and be non-empty, got {values.shape}")
+    bad = ~np.isfinite(values)
+    if bad.any():
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        raise SignalError(
+            f"data: {int(bad.sum())} samples are not finite, the first at row {row}, channel {column}; "
+            "cut or repair the record first"
+        )
+    return values, channels
+
+
+def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> xr.DataArray:
+    """Bring a DataArray or a Dataset with a time dimension to the agreed form.
+
+    A Dataset contributes each of its 1-D (time) variables as a channel, with the variable's `units`. The rate comes
+    from `rate`, the attribute `sampling_rate`, or a uniform `time` coordinate in s.
+
+    Raises
+    ------
+    MissingMetadataError
+        If no rate can be had.
+    SignalError
+        If there is no time dimension or the time coordinate is not uniform.
+    """
+    import xarray as xr
+
+    if isinstance(signal, xr.Dataset):
+        variables = {str(k): v for k, v in signal.data_vars.items() if v.dims == ("time",)}
+        if not variables:
+            raise SignalError(f"signal: no variable has exactly the dimension 'time', got {dict(signal.sizes)}")
+        stacked = np.stack([np.asarray(v.values, dtype=float) for v in variables.values()], axis=1)
+        coords = {"time": signal.time} if "time" in signal.coords else {}
+        units = [str(v.attrs.get("units", UNKNOWN_UNITS)) for v in variables.values()]
+        array = xr.DataArray(
+            stacked,
+            dims=("time", "channel"),
+            coords={**coords, "channel": list(variables), "units": ("channel", units)},
+            attrs=signal.attrs,
+        )
+    else:
+        array = signal
+    if "time" not in array.dims or array.ndim > 2:
+        raise SignalError(f"signal: must have dimensions (time, channel) or (time,), got {array.dims}")
+    if array.ndim == 1:
+        label = array.coords["channel"].item() if "channel" in array.coords else (array.name or "ch1")
+        single = str(array.coords["units"].item()) if "units" in array.coords else None
+        data: Any = array.values[:, None]
+        names = [str(label)]
+        unit_list: Any = [single or str(array.attrs.get("units", UNKNOWN_UNITS))]
+    else:
+        other = next(d for d in array.dims if d != "time")
+        array = array.transpose("time", other)
+        data = array.values
+        names = [str(c) for c in array[other].values]
+        unit_list = [str(u) for u in array["units"].values] if "units" in array.coords else None
+        if unit_list is None:
+            unit_list = array.attrs.get("units", UNKNOWN_UNITS)
+    t0 = 0.0
+    found = rate if rate is not None else array.attrs.get("sampling_rate")
+    if "time" in array.coords:
+        times = np.asarray(array["time"].values, dtype=float)
+        t0 = float(times[0]) if times.size else 0.0
+        if found is None and times.size > 1:
+            found = uniform_rate(times)
+    attrs = {k: v for k, v in array.attrs.items() if k not in ("sampling_rate", "speed", "teeth", "units")}
+    return make_signal(
+        data,
+        found,
+        units=unit_list,
+        channels=names,
+        t0=t0,
+        speed=array.attrs.get("speed"),
+        teeth=array.attrs.get("teeth"),
+        name=None if array.name is None else str(array.name),
+        attrs=attrs,
+    )
+
+
+def uniform_rate(times: np.ndarray) -> float:
+    """Sampling rate in Hz of uniform times in s; SignalError if they are not uniform to a twentieth of a step."""
+    step = (times[-1] - times[0]) / (times.size - 1)
+    if not step > 0.0:
+        raise SignalError(f"time: must increase, got {times[0]!r} s to {times[-1]!r} s")
+    # Times written with few digits are rounded to their last place, which is not an uneven clock.
+    resolution = np.spacing(np.abs(times).max()) * 8
+    deviation = np.abs(times - (times[0] + step * np.arange(times.size))).max()
+    if deviation > CLOCK_TOLERANCE * step + resolution:
+        raise SignalError(
+            f"time: is not uniform, it strays {deviation / step:.3g} steps from a constant rate; "
+            "pass rate=... if the times of a file are only rounded, resample the record otherwise"
+        )
+    return nice_rate(1.0 / step, step, times.size)
+
+
+def nice_rate(rate: float, step: float, count: int) -> float:
+    """The roundest rate whose clock agrees with `rate` to a twentieth of a sample over the record."""
+    for digits in range(0, 7):
+        candidate = round(rate, digits)
+        if candidate > 0 and abs(1.0 / candidate - step) * count < CLOCK_TOLERANCE * step:
+            return candidate
+    return rate
+
+
+def rate_of(signal: xr.DataArray) -> float:
+    """Sampling rate in Hz."""
+    rate = signal.attrs.get("sampling_rate")
+    if rate is None and "time" in signal.coords and signal.sizes["time"] > 1:
+        rate = uniform_rate(np.asarray(signal["time"].values, dtype=float))
+    return check_rate(rate)
+
+
+def units_of(signal: xr.DataArray) -> list[str]:
+    """Unit of each channel (a list of one for a single channel)."""
+    if "units" in signal.coords:
+        return [str(u) for u in np.atleast_1d(signal.coords["units"].values)]
+    count = signal.sizes.get("channel", 1)
+    return [str(signal.attrs.get("units", UNKNOWN_UNITS))] * count
+
+
+def common_unit(signal: xr.DataArray) -> str:
+    """The unit all channels share, or "mixed"."""
+    return _common(units_of(signal))
+
+
+def require(signal: xr.DataArray, name: str, value: Any = None, *, needed_for: str) -> Any:
+    """The metadata `name`, from `value` if given, else from the signal, else an error asking for it by name.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        The signal.
+    name : {"speed", "teeth", "rate"}
+        What is wanted.
+    value : optional
+        What the caller passed; wins over the signal's.
+    needed_for : str
+        Completes the message.
+
+    Raises
+    ------
+    MissingMetadataError
+    """
+    if value is None:
+        value = signal.attrs.get("sampling_rate" if name == "rate" else name)
+    if value is None:
+        raise MissingMetadataError(name, needed_for, REMEDIES[name])
+    if name == "teeth":
+        return check_teeth(value)
+    return check_speed(value) if name == "speed" else check_rate(value)
+
+
+def mesh_frequency(signal: xr.DataArray, speed: float | None = None, teeth: int | Sequence[int] | None = None) -> float:
+    """Gear mesh frequency in Hz, z1 omega1 / (2 pi), from the signal's metadata or from what is passed."""
+    omega = require(signal, "speed", speed, needed_for="the gear mesh frequency")
+    return require(signal, "teeth", teeth, needed_for="the gear mesh frequency")[0] * omega / (2.0 * math.pi)
+
+
+def with_metadata(signal: xr.DataArray, **changes: Any) -> xr.DataArray:
+    """A copy that shares the samples, with `speed`, `teeth`, `units` or other attributes set."""
+    result = signal.copy(deep=False)
+    result.attrs = dict(signal.attrs)
+    for key, value in changes.items():
+        if key == "units":
+            unit_list = _unit_list(value, [str(c) for c in np.atleast_1d(signal["channel"].values)])
+            result = result.assign_coords(units=("channel", np.asarray(unit_list, dtype=str)))
+            result.attrs["units"] = _common(unit_list)
+        elif key == "speed":
+            result.attrs["speed"] = check_speed(value)
+        elif key == "teeth":
+            result.attrs["teeth"] = check_teeth(value)
+        elif key in ("rate", "sampling_rate"):
+            raise SignalError("sampling_rate: cannot be relabelled; build the signal anew with make_signal(..., rate)")
+        else:
+            result.attrs[key] = value
+    return result
+
+
+def like(
+    signal: xr.DataArray, values: np.ndarray, *, t0: float | None = None, rate: float | None = None, **changes: Any
+) -> xr.DataArray:
+    """A signal with new samples and the metadata of `signal`, with `changes` as for `with_metadata`.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n, channels)
+    t0, rate : float, optional
+        Start in s and rate in Hz where they differ from those of `signal`.
+    """
+    import xarray as xr
+
+    rate = rate_of(signal) if rate is None else check_rate(rate)
+    t0 = float(signal["time"].values[0]) if t0 is None else t0
+    result = xr.DataArray(
+        values,
+        dims=("time", "channel"),
+        coords={
+            "time": ("time", t0 + np.arange(values.shape[0]) / rate, {"units": "s"}),
+            "channel": signal["channel"].values,
+            "units": ("channel", np.asarray(units_of(signal), dtype=str)),
+        },
+        name=signal.name,
+        attrs={**signal.attrs, "sampling_rate": rate},
+    )
+    return with_metadata(result, **changes) if changes else result
+
+
+def trim(signal: xr.DataArray, start: float | None = None, stop: float | None = None) -> xr.DataArray:
+    """The samples with start <= time < stop (s); SignalError if none are left."""
+    times = signal["time"].values
+    half = 0.5 / rate_of(signal)
+    first = 0 if start is None else int(np.searchsorted(times, start - half))
+    last = times.size if stop is None else int(np.searchsorted(times, stop - half))
+    if last <= first:
+        raise SignalError(f"trim: no samples in [{start}, {stop}) s, the record spans {times[0]:g} to {times[-1]:g} s")
+    return signal.isel(time=slice(first, last))
+
+
+def check_rate(rate: Any) -> float:
+    """`rate` as a positive finite float, or an error that names it."""
+    if rate is None:
+        raise MissingMetadataError("rate", "a signal", REMEDIES["rate"])
+    value = _number("rate", rate)
+    if not (math.isfinite(value) and value > 0.0):
+        raise SignalError(f"rate: must be a positive number of Hz, got {rate!r}")
+    return value
+
+
+def _number(field: str, value: Any) -> float:
+    """`value` as a float, or an error that names its field."""
+    try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise SignalError(f"{field}: give a number, got {value!r}") from None
+
+
+def check_speed(speed: Any) -> float:
+    """`speed` as a positive finite float (rad/s), or an error that names it."""
+    value = _number("speed", speed)
+    if not (math.isfinite(value) and value > 0.0):
+        raise SignalError(f"speed: must be a positive number of rad/s, got {speed!r}")
+    return value
+
+
+def check_teeth(teeth: Any) -> tuple[int, ...]:
+    """`teeth` as a tuple of positive ints, or an error that names it."""
+    counts: Iterable[Any] = np.atleast_1d(teeth).ravel()
+    result = []
+    for count in counts:
+        if (
+            isinstance(count, bool | np.bool_)
+            or not math.isfinite(float(count))
+            or float(count) % 1
+            or float(count) < 1
+        ):
+            raise SignalError(f"teeth: must be positive whole numbers, got {teeth!r}")
+        result.append(int(count))
+    if not result:
+        raise SignalError("teeth: is empty; give the tooth count of at least one wheel")
+    return tuple(result)
+
+
+def _unit_list(units: str | Sequence[str] | Mapping[str, str] | None, names: Sequence[str]) -> list[str]:
+    if units is None:
+        return [UNKNOWN_UNITS] * len(names)
+    if isinstance(units, str):
+        return [units] * len(names)
+    if isinstance(units, Mapping):
+        stray = set(units) - set(names)
+        if stray:
+            raise SignalError(f"units: no channel is named {sorted(stray)}; the channels are {list(names)}")
+        return [str(units.get(name, UNKNOWN_UNITS)) for name in names]
+    result = [str(u) for u in units]
+    if len(result) != len(names):
+        raise SignalError(f"units: need one or {len(names)}, got {len(result)}")
+    return result
+
+
+def _common(units: Sequence[str]) -> str:
+    return units[0] if len(set(units)) == 1 else MIXED_UNITS
+
+
+# The dimension of a unit of vibration (displacement, velocity, acceleration or force) and its factor to SI.
+
+
+DIMENSIONS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
+# In vibration work g is the standard acceleration of gravity; unit libraries read g and mg as masses.
+ALIASES = {
+    "g": "standard_gravity", "gn": "standard_gravity", "G": "standard_gravity", "mg": "millistandard_gravity",
+}  # fmt: skip
+REPLACEMENTS = (("²", "^2"), ("µ", "u"), ("μ", "u"), ("m/s2", "m/s^2"), ("ms^-2", "m/s^2"), ("·", "*"))
+
+
+def unit_dimension(unit: str) -> tuple[str, float]:
+    """Dimension of a unit ("displacement", "velocity", "acceleration" or "force") and its factor to SI.
+
+    Raises
+    ------
+    SignalError
+        If the unit is unknown or of another dimension.
+    """
+    from pint.errors import PintError
+
+    try:
+        return _dimension(unit)
+    except (PintError, AttributeError, ValueError, TypeError, AssertionError) as exc:
+        raise SignalError(
+            f"units: {unit!r} is not a unit of displacement, velocity, acceleration or force; "
+            "set the right one with with_metadata(signal, units=...)"
+        ) from exc
+
+
+@lru_cache(maxsize=128)
+def _dimension(unit: str) -> tuple[str, float]:
+    text = unit.strip()
+    for old, new in REPLACEMENTS:
+        text = text.replace(old, new)
+    quantity = unit_registry().Quantity(1.0, ALIASES.get(text, text))
+    for dimension, si in DIMENSIONS.items():
+        if quantity.is_compatible_with(si):
+            return dimension, float(quantity.to(si).magnitude)
+    raise ValueError(unit)
+
+
+@lru_cache(maxsize=1)
+def unit_registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+# Whether a text is a unit at all: what a caller writes is checked, what files say is kept.
+
+
+USUAL = (
+    "m", "mm", "um", "m/s", "mm/s", "in/s", "m/s^2", "mm/s^2", "g", "mg", "N", "kN", "N*m", "V", "mV", "A", "mA", "Pa",
+    "kPa", "bar", "rpm", "Hz", "rad/s", "deg/s", "rad", "deg", "degC", "K", "s", "ms", "W", "kW", "%", "1", "dB", "ips",
+)  # fmt: skip
+VIBRATION = ("'m/s^2'", "'g'", "'mg'", "'mm/s'", "'um'", "'N'")
+ELECTRICAL = frozenset({"V", "mV", "uV", "µV", "A", "mA", "C", "pC", "nC"})
+COUNTS = frozenset(
+    {"", "unknown", "mixed", "counts", "count", "lsb", "digits", "digit", "adc", "eu", "a.u.", "au", "raw", "-"}
+)
+"""Texts that say that nothing is known of the unit, or that it is the converter's own."""
+
+
+def check_units(units: Any) -> None:
+    """Raise a SignalError for the first text among `units` (text, sequence or mapping of texts) that is no unit."""
+    if units is None:
+        return
+    texts = [units] if isinstance(units, str) else list(units.values() if isinstance(units, Mapping) else units)
+    for text in texts:
+        if not isinstance(text, str):
+            raise SignalError(f"units: must be text such as 'm/s^2', got {text!r}")
+        if _is_level(text):
+            raise SignalError(
+                f"units: {text!r} is a level, of which no RMS or spectrum can be had; give the samples as they were "
+                f"before the logarithm, in one of {', '.join(VIBRATION)}"
+            )
+        if (ratio := _sensitivity(text)) is not None:
+            raise SignalError(
+                f"units: {text!r} is a sensitivity or a scale, not a unit of samples; give units={ratio[0]!r} as they "
+                f"are, or scale them and give units={ratio[1]!r}"
+            )
+        if not _is_unit(text):
+            near = difflib.get_close_matches(text, USUAL, 2, 0.5)
+            hint = (
+                f"; did you mean {' or '.join(repr(n) for n in near)}?"
+                if near
+                else "; write for example 'm/s^2' or 'g'"
+            )
+            raise SignalError(f"units: {text!r} is not a unit{hint}")
+
+
+def _is_level(text: str) -> bool:
+    return re.fullmatch(r"\s*dB\W?(?:[A-Za-z].*)?\s*", text) is not None
+
+
+def _sensitivity(text: str) -> tuple[str, str] | None:
+    """Return the electrical and the mechanical unit of "mV/g", or of "g/V"; None for what is no such ratio."""
+    first, last = text.partition("/"), text.rpartition("/")
+    electrical, mechanical = (first[0], first[2]) if first[0].strip() in ELECTRICAL else (last[2], last[0])
+    electrical, mechanical = electrical.strip(), mechanical.strip(" ()")
+    # V/m is the strength of a field
+    if electrical not in ELECTRICAL or mechanical in ("", "m"):
+        return None
+    try:
+        unit_dimension(mechanical)
+    except SignalError:
+        return None
+    return electrical, mechanical
+
+
+def is_usual(text: str) -> bool:
+    """True for the units of measured signals themselves, in any of their spellings; not for all that could be one."""
+    for old, new in REPLACEMENTS:
+        text = text.replace(old, new)
+    return text in USUAL or text in ALIASES
+
+
+def _is_unit(text: str) -> bool:
+    clean = text.strip()
+    if clean in USUAL or clean in ALIASES or clean in DIMENSIONS.values() or clean.lower() in COUNTS:
+        return True
+    for old, new in (*REPLACEMENTS, ("°", "deg"), ("%", "percent")):
+        clean = clean.replace(old, new)
+
+    try:
+        unit_registry().Unit(clean.replace("Nm", "N*m").replace("ips", "inch/s"))
+    except Exception:
+        return False
+    return True

@@ -1,0 +1,1 @@
+"""A case: everything that makes one run of a gear pair."""

@@ -1,0 +1,177 @@
+"""What a case must satisfy to give a useful record, checked before it is simulated and after.
+
+The record goes through an anti-alias filter and through band-passes about the mesh harmonics. Whether their bands fit
+below half the sampling rate and whether the record is long enough follows from the settings alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gearmbs.gears.spec import COUNTED_TWICE
+from gearmbs.signals.analysis.bands import ATTENUATION_DB, HALF_WIDTH, TRANSITION
+from gearmbs.signals.filters import bandpass_taps, decimation_taps
+from gearmbs.signals.rotation.orders import MIN_PERIODS
+from gearmbs.studies.case.case import Case, CaseError
+
+HARMONICS = 3
+EDGE = 0.01
+"""Simulated beyond both ends of the record at least, s, for the filters to settle."""
+
+DEEPEST = 0.25
+"""Static penetration of one tooth pair, in modules, beyond which teeth would have to pass through each other."""
+
+LEAST_TURNS = 4.25
+"""Revolutions that a record of changing speed must hold."""
+
+SLIPPED = 0.5
+"""Transmission error, in base pitches, beyond which teeth have passed each other."""
+
+
+def edge(case: Case) -> float:
+    """Return what must be simulated beyond both ends of the record, s: half the length of the anti-alias filter."""
+    rate = case.output_rate
+    ratio = round(rate / case.signal_rate)
+    if ratio == 1:
+        return EDGE
+    taps = decimation_taps(ratio, rate).size
+    return max(EDGE, math.ceil(0.5 * taps + 1) / rate)
+
+
+def check_record(case: Case, source: str = "") -> None:
+    """Refuse a case whose record could not be evaluated.
+
+    Parameters
+    ----------
+    case : Case
+    source : str
+        Where it comes from, for messages; default its name.
+
+    Raises
+    ------
+    CaseError
+        If the bands of the mesh harmonics do not fit below half the signal rate, if the record is too short for the
+        filters, if it begins too early, or if the contact is too soft to carry the load.
+    """
+    source = source or f"case '{case.name}'"
+    operation, gmf, rate = case.operation, case.mesh_frequency, case.signal_rate
+    turns = f"operation.speed = {operation.top_speed:.6g} rad/s ({operation.top_speed * 30.0 / math.pi:.6g} rpm)"
+    top = (HARMONICS + HALF_WIDTH + TRANSITION) * gmf
+    if top >= 0.5 * rate:
+        enough = (math.floor(2.0 * top / rate) + 1) * rate
+        finer = case.changed(solver={"signal_rate": enough, "output_rate": None}).output_rate
+        raise CaseError(
+            f"{source}: solver.signal_rate = {rate:g} Hz: {turns} with {case.gears.teeth[0]} teeth puts "
+            f"the band of mesh harmonic {HARMONICS} up to {top:.6g} Hz, above half that rate; give signal_rate = "
+            f"{enough:g} and output_rate = {finer:g}, leave both out so that they follow the "
+            "mesh frequency, or give a lower speed (a plain number is in rad/s; write '1000 rpm')"
+        )
+    if operation.speed_curve is None:
+        _check_length(case, source)
+    else:
+        _check_curve(case, source)
+    ahead = edge(case)
+    if operation.run_up + operation.settling < ahead:
+        raise CaseError(
+            f"{source}: operation.settling = {operation.settling:g} s: run_up and settling are "
+            f"{operation.run_up + operation.settling:g} s together, but the anti-alias filter at signal_rate = "
+            f"{rate:g} Hz needs {ahead:.3g} s before the record; give a longer settling"
+        )
+    check_stiffness(case, source)
+
+
+def _check_length(case: Case, source: str) -> None:
+    """Refuse a record at constant speed that is too short for its filters."""
+    operation, gmf, rate = case.operation, case.mesh_frequency, case.signal_rate
+    taps = max(
+        bandpass_taps(rate, (k - HALF_WIDTH) * gmf, (k + HALF_WIDTH) * gmf, TRANSITION * gmf, ATTENUATION_DB).size
+        for k in range(1, HARMONICS + 1)
+    )
+    need = max((taps + 1) / rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / rate)
+    if operation.duration < need:
+        least = math.ceil(1e4 * need) / 1e4
+        raise CaseError(
+            f"{source}: operation.duration = {operation.duration:g} s: the band-pass about the mesh frequency of "
+            f"{gmf:.6g} Hz needs a record of at least {least:g} s, that is {math.ceil(need * gmf)} mesh periods; give "
+            "a longer duration"
+        )
+
+
+def _check_curve(case: Case, source: str) -> None:
+    """Refuse a run-up in which the driver turns less than the window that its orders are tracked with."""
+    turned = case.angle_turned / math.tau
+    if turned < LEAST_TURNS:
+        raise CaseError(
+            f"{source}: operation.speed: the driver makes {turned:.3g} revolutions in the record of "
+            f"{case.operation.duration:g} s, orders are tracked over {LEAST_TURNS:g} and more; give a longer curve or "
+            "higher speeds"
+        )
+
+
+def check_stiffness(case: Case, source: str) -> None:
+    """Refuse a contact in which the load would press the teeth through each other.
+
+    Raises
+    ------
+    CaseError
+        If one tooth pair needs a penetration above `DEEPEST` modules to carry the torque.
+    """
+    pair = case.pair()
+    depth = pair.penetration()
+    if depth > DEEPEST * case.gears.module:
+        raise CaseError(
+            f"{source}: contact.stiffness = {case.contact.stiffness!r}: at operation.torque = "
+            f"{case.operation.top_torque:g} N m a tooth pair would be pressed in by {depth * 1e3:.4g} mm, a module is "
+            f"{case.gears.module * 1e3:.4g} mm; give a stiffer contact (the paper's is '2.9852e5 N/mm^1.3') or less "
+            "torque"
+        )
+
+
+def slip(case: Case, t: np.ndarray, transmission_error: np.ndarray) -> str | None:
+    """Return a sentence about the first time teeth passed each other, or None if they never did.
+
+    Parameters
+    ----------
+    t, transmission_error : ndarray, shape (m,)
+        s and m, at the driven base circle.
+    """
+    limit = SLIPPED * case.pair().driver.base_pitch
+    beyond = np.flatnonzero(~(np.abs(transmission_error) <= limit))
+    if beyond.size == 0:
+        return None
+    first = int(beyond[0])
+    return (
+        f"the wheels slipped past each other: at t = {t[first]:.6g} s the transmission error passes half a base pitch "
+        f"({limit * 1e3:.4g} mm). The contact does not hold the load; raise contact.stiffness, or lower "
+        "operation.torque or operation.speed, or make operation.run_up longer"
+    )
+
+
+def remarks(case: Case) -> list[str]:
+    """Return what a user should know about a case that is possible but unusual."""
+    found = []
+    ratio = case.pair().contact_ratio
+    if ratio < 1.0:
+        found.append(
+            f"contact ratio {ratio:.3g} is below 1: for part of each mesh period no flanks are in contact but a tip "
+            "edge runs along the mate's flank"
+        )
+    for number, wheel in enumerate(case.pair().wheels, 1):
+        shafts = case.shafts
+        total = wheel.mass + shafts.density * math.pi * shafts.radius**2 * shafts.length
+        twice = wheel.mass_within(shafts.radius, shafts.length)
+        if twice > COUNTED_TWICE * total:
+            found.append(
+                f"{twice:.4g} kg of the {total:.4g} kg of gear {number} and its shaft are counted twice: "
+                f"gears.bore_radius is {1e3 * wheel.bore_radius:g} mm, shafts.radius {1e3 * shafts.radius:g} mm; "
+                "give a bore of the shaft's radius"
+            )
+    solver = case.solver
+    if solver.integrator == "IDA" and solver.used_tolerance > 2e-7:
+        found.append(
+            f"solver.tolerance = {solver.used_tolerance:g} with IDA: the paper's mesh harmonics are off by up to 12 % "
+            "at 1e-6, 1 % at 1e-7"
+        )
+    return found

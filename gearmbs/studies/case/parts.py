@@ -1,0 +1,164 @@
+"""How a rig is driven and loaded over time: at a constant speed and torque, or along curves."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.gears import faults
+from gearmbs.gears.tables import tooth_deviations
+from gearmbs.mechanism import TimeFunction, polyline, polyline_integral, ramp, step
+from gearmbs.units import to_si
+
+if TYPE_CHECKING:
+    from gearmbs.gears.modifications import ToothDeviations
+    from gearmbs.gears.pair import GearPair
+
+
+def drive_angle(speed: Any, run_up: float, start: float, sense: int = 1) -> TimeFunction:
+    """Return the driver's angle over time, rad; see `gearmbs.studies.run.rig.gear_rig`."""
+    if not _is_curve(speed):
+        return ramp(sense * to_si(speed, "angular speed", "speed"), over=run_up)
+    return polyline_integral(*_after_run_up(speed, "angular speed", "speed", run_up, start, sense), soft_start=True)
+
+
+def load_torque(torque: Any, run_up: float, start: float, sense: int = 1) -> TimeFunction:
+    """Return the load torque over time, N m; see `gearmbs.studies.run.rig.gear_rig`."""
+    if not _is_curve(torque):
+        return step(0.0, 0.0, run_up, sense * to_si(torque, "torque", "torque"))
+    return polyline(*_after_run_up(torque, "torque", "torque", run_up, start, sense), soft_start=True)
+
+
+def _is_curve(value: Any) -> bool:
+    return isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str) and np.ndim(value) > 0
+
+
+def _after_run_up(
+    points: Any, dimension: str, field: str, run_up: float, start: float, sense: int
+) -> tuple[list[float], list[float]]:
+    """Return times and values of a curve that begins at ``start``, with the way from rest to its first value."""
+    try:
+        pairs = [(to_si(t, "time", field), sense * to_si(value, dimension, field)) for t, value in points]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{field}: give a value or points [(time, value), ...]; {error}") from None
+    times, values = [0.0, run_up], [0.0, pairs[0][1]]
+    for t, value in pairs:
+        if start + t > times[-1]:
+            times.append(start + t)
+            values.append(value)
+    return times, values
+
+
+# Faults of teeth in a case: from the text and tables of a user to the classes of `gearmbs.gears.faults`.
+#
+# A fault is a name, such as ``"chipped corner"``, or a table ``{"kind": "chipped corner", "height": "2 mm"}``, or an
+# object of :mod:`gearmbs.gears.faults`. A case holds it as a table of plain numbers in SI.
+
+
+def kinds() -> dict[str, type[faults.Fault]]:
+    """Return the faults a case can hold by their labels, such as "broken tooth"; modifications meant come last."""
+    found = (value for value in vars(faults).values() if isinstance(value, type) and issubclass(value, faults.Fault))
+    ordered = sorted(found, key=lambda kind: kind.__module__ != faults.__name__)
+    return {kind.label: kind for kind in ordered if kind is not faults.Fault}
+
+
+def tooth_fault(value: Any) -> faults.Fault:
+    """Return the fault that a name, a table or a fault stands for.
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind or key, or a value of the wrong unit; the message names what would do.
+
+    Examples
+    --------
+    >>> tooth_fault({"kind": "broken_tooth", "lost": 0.5, "wheel": "driven"}).severity
+    0.5
+    """
+    if isinstance(value, faults.Fault):
+        return value
+    table = {"kind": value} if isinstance(value, str) else value
+    if not isinstance(table, Mapping) or not isinstance(table.get("kind"), str):
+        raise ValueError(f"{value!r} is no fault; write its name or a table with 'kind', one of {', '.join(kinds())}")
+    wanted = _plain(table["kind"])
+    kind = next((k for label, k in kinds().items() if wanted in (_plain(label), _plain(k.__name__))), None)
+    if kind is None:
+        near = difflib.get_close_matches(table["kind"].lower(), kinds(), n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise ValueError(f"kind {table['kind']!r} is unknown; known ones are {', '.join(kinds())}{hint}")
+    settings: dict[str, Any] = {str(key): item for key, item in table.items() if key != "kind"}
+    known = [field.name for field in fields(kind)]
+    for key in settings:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ValueError(f"{kind.label}: unknown key {key!r}; known ones are {', '.join(known)}{hint}")
+    return kind(**settings)
+
+
+def fault_table(fault: faults.Fault) -> dict[str, Any]:
+    """Return a fault as a table of its kind and its values in SI, from which `tooth_fault` makes it again."""
+    return {"kind": fault.label, **asdict(fault)}
+
+
+def fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
+    """Return the tables of one fault or several.
+
+    Raises
+    ------
+    ValueError
+        As `tooth_fault`, beginning with the fault's place: ``[0].tooth is 1.5; ...``.
+    """
+    several = value if isinstance(value, (list, tuple)) else (value,)
+    return tuple(fault_table(_placed(one, place)) for place, one in enumerate(several))
+
+
+def check_each_fault(pair: GearPair, tables: Sequence[Mapping[str, Any]]) -> None:
+    """Apply every fault to a sound pair by itself, to find those that do not fit their wheel before anything is run.
+
+    Raises
+    ------
+    ValueError
+        Naming the fault by its place, ``[0].lost``, with its value and what would do.
+    """
+    for place, table in enumerate(tables):
+        fault = tooth_fault(table)
+        try:
+            _check_size(tooth_deviations(pair.with_changes(faults=(fault,))), pair)
+        except ValueError as error:
+            raise ValueError(_at(place, fault, error)) from None
+
+
+def _check_size(deviations: tuple[ToothDeviations, ToothDeviations], pair: GearPair) -> None:
+    """Refuse flanks that are displaced by more than a tooth is thick."""
+    for gear, deviation in zip(pair.wheels, deviations, strict=True):
+        most = max(float(abs(part).max(initial=0.0)) for part in (deviation.offset, deviation.shape))
+        if most > gear.tooth_thickness:
+            raise ValueError(
+                f"a flank would be displaced by {1e3 * most:.4g} mm, more than a tooth is thick "
+                f"({1e3 * gear.tooth_thickness:.4g} mm); give less (a plain number is in m)"
+            )
+
+
+def _placed(value: Any, place: int) -> faults.Fault:
+    try:
+        return tooth_fault(value)
+    except ValueError as error:
+        raise ValueError(_at(place, None, error)) from error
+
+
+def _at(place: int, fault: faults.Fault | None, error: ValueError) -> str:
+    text = str(error)
+    names = [type(fault).__name__] if fault is not None else [kind.__name__ for kind in kinds().values()]
+    for name in names:
+        if text.startswith(f"{name}."):
+            return f"[{place}]{text.removeprefix(name)}"
+    return f"[{place}]: {text}"
+
+
+def _plain(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())

@@ -1,0 +1,1 @@
+"""The paper's study: six cases, their levels, their claims."""

@@ -1,0 +1,287 @@
+"""The report of the paper's study, in Markdown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.studies.case.case import Case
+from gearmbs.studies.paper.preset import DEFAULT_COMPONENT, Claim, paper_cases
+
+# What the paper leaves open, and what a study chose for it, from the study's own cases.
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing the paper leaves open.
+
+    Attributes
+    ----------
+    what : str
+    chosen : str
+        The study's value, with its unit.
+    preset : str
+        The preset's value.
+    why : str
+        Reason of the preset's value.
+    """
+
+    what: str
+    chosen: str
+    preset: str
+    why: str
+
+    @property
+    def changed(self) -> bool:
+        """Whether the study differs from the preset."""
+        return self.chosen != self.preset
+
+
+WHY = {
+    "speed": "puts three harmonics far below half the sampling rate",
+    "penetration d of full damping": "ADAMS's default; 0.01 mm is stiffer and damps far more",
+    "stiffness K": "the exponent is 1.3, so K is per mm^1.3; the printed N/mm^(3/2) contradicts it",
+    "damping C": "the paper's C = 0.001 K, read as the number of K times 0.001",
+    "normal backlash": "by thinning; the table's standard teeth have none, and no real pair runs without",
+    "face width": "a usual ratio to the module",
+    "gears": "steel discs of the pitch radius",
+    "shafts": "solid steel cylinders",
+    "misalignment": "in parallel planes (skew) about the middle of the driven face",
+    "centre distance": "the paper's figure",
+    "friction": "ADAMS's velocity law with usual coefficients of steel",
+    "start": "STEP of speed and torque, then settling, then the record",
+    "record": "as the paper's measurements were sampled",
+    "which force": "the fixed joint between driven gear and shaft; every component is stored and judged",
+    "mean": "removed before scaling; the band-pass removes it anyway",
+    "scaling": "keeps states and loads comparable",
+    "filter band": "neighbouring harmonics stay apart",
+}
+
+
+def choices(cases: list[Case], component: str) -> list[Choice]:
+    """Return what a study of the six cases chose, beside the preset.
+
+    Parameters
+    ----------
+    cases : list of Case
+        As :func:`gearmbs.studies.paper.preset.paper_cases` returns them.
+    component : str
+        Force component of the figures.
+    """
+    chosen, preset = _values(cases, component), _values(paper_cases(), DEFAULT_COMPONENT)
+    return [Choice(what, chosen[what], preset[what], why) for what, why in WHY.items()]
+
+
+def _values(cases: list[Case], component: str) -> dict[str, str]:
+    case = cases[0]
+    pair = case.pair()
+    o, f, c, r, s = case.operation, case.fault, case.contact, case.friction, case.shafts
+    tilts = [x.fault for x in cases if x.fault.misalignment]
+    shifts = [x.fault.centre_distance_error for x in cases if x.fault.centre_distance_error]
+    wheels = " and ".join(f"{w.mass:.4g} kg" for w in pair.wheels)
+    tilt = "none"
+    if tilts:
+        pivot = f", pivot {1e3 * tilts[0].pivot:+.4g} mm along the axis" if tilts[0].pivot else ""
+        tilt = f"{np.rad2deg(tilts[0].misalignment):.4g} degree, {tilts[0].plane}{pivot}"
+    friction = "none"
+    if r.enabled:
+        friction = (
+            f"{r.static:.4g} below {r.static_speed:.4g} m/s, {r.dynamic:.4g} above {r.dynamic_speed:.4g} m/s of sliding"
+        )
+    return {
+        "speed": f"{o.top_speed * 30 / np.pi:.6g} rpm: GMF {case.mesh_frequency:.2f} Hz",
+        "penetration d of full damping": f"{1e3 * c.depth:.4g} mm",
+        "stiffness K": f"{c.stiffness}, exponent {c.exponent:g}",
+        "damping C": str(c.damping),
+        "normal backlash": f"{1e3 * f.backlash:.4g} mm",
+        "face width": f"{1e3 * pair.narrower_face_width:.4g} mm",
+        "gears": wheels,
+        "shafts": f"diameter {2e3 * s.radius:.4g} mm, length {1e3 * s.length:.4g} mm",
+        "misalignment": tilt,
+        "centre distance": f"{1e3 * shifts[0]:+.4g} mm" if shifts else "nominal",
+        "friction": friction,
+        "start": f"over {o.run_up:.4g} s, settling {o.settling:.4g} s",
+        "record": f"{o.duration:.4g} s at {case.signal_rate:.6g} Hz",
+        "which force": component.replace("_", " "),
+        "mean": "removed",
+        "scaling": "one factor from the healthy signal at low load, kept for the other five",
+        "filter band": "a quarter of the GMF to both sides of each harmonic, zero phase",
+    }
+
+
+class StudyTables(Protocol):
+    """What the report needs of a study; :class:`gearmbs.studies.PaperStudy` has it."""
+
+    @property
+    def records(self) -> xr.Dataset:
+        """All cases, over load and state."""
+
+    @property
+    def component(self) -> str:
+        """The default component."""
+
+    @property
+    def cases(self) -> list[Case]:
+        """The six cases."""
+
+    def table(self, component: str | None = None, way: str = "band") -> xr.DataArray:
+        """Scaled RMS of the harmonics."""
+
+    def claims(self, component: str | None = None, way: str = "band") -> list[Claim]:
+        """The three claims, judged."""
+
+
+def paper_report(study: StudyTables) -> str:
+    """Return the report of a study: verdicts, tables, settings, choices.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    sections = (_claims, _contact, _harmonics, _choices, _settings, _integration)
+    return "\n".join(line for section in sections for line in section(study)) + "\n"
+
+
+def _claims(study: StudyTables) -> list[str]:
+    records = study.records
+    gmf = float(records.frequency.sel(harmonic=1))
+    torques = ", ".join(f"{float(t):g}" for t in records.torque.values)
+    parts = [
+        "# The paper's study: GMF harmonics of a gear pair",
+        "",
+        f"Six cases: healthy, misaligned by {np.rad2deg(_largest(records, 'fault_misalignment')):g} degree, centre "
+        f"distance {1e3 * _largest(records, 'fault_centre_distance_error'):+g} mm; "
+        f"{torques} N m. GMF {gmf:.2f} Hz. Acceleration of the driven gear from the force in its shaft joint, "
+        f"scaled ({records.attrs['scaling']}).",
+        "",
+        "## The three claims",
+        "",
+        f"Default component: {_plain(study.component)}.",
+        "",
+        "| claim | " + " | ".join(_plain(c) for c in records.component.values) + " |",
+        "|---|" + "---|" * records.sizes["component"],
+    ]
+    verdicts = {str(c): study.claims(str(c)) for c in records.component.values}
+    for k, claim in enumerate(study.claims()):
+        row = " | ".join("held" if verdicts[str(c)][k].held else "**not held**" for c in records.component.values)
+        parts.append(f"| {claim.name} | {row} |")
+    parts += ["", "Numbers for the default component:", ""]
+    parts += [
+        f"* {c.name}: **{'held' if c.held else 'not held'}** (held means: {c.rule}). {c.numbers}."
+        for c in study.claims()
+    ]
+    held = "Held says that this model with these settings behaves as the paper reports; the settings matter, see below."
+    return [*parts, "", held, ""]
+
+
+def _contact(study: StudyTables) -> list[str]:
+    return [
+        "## Contact",
+        "",
+        "A driving pair carries the torque with its drive flanks. Two-flank contact braces the wheels: the forces of",
+        "both flanks oppose each other, and their sum exceeds what the torque needs.",
+        "",
+        *_contact_table(study),
+        "",
+    ]
+
+
+def _harmonics(study: StudyTables) -> list[str]:
+    parts = ["## RMS of the GMF harmonics", ""]
+    for component in study.records.component.values:
+        parts += [f"### {_plain(component)}", "", *_table(study, str(component)), ""]
+    how = "Band: zero-phase band-pass about each harmonic. Orders: amplitudes over whole mesh periods. Scaled, m/s^2."
+    return [*parts, how, ""]
+
+
+def _choices(study: StudyTables) -> list[str]:
+    parts = [
+        "## What the paper left open, and what was chosen",
+        "",
+        "| what the paper leaves open | chosen here | why |",
+        "|---|---|---|",
+    ]
+    for c in choices(study.cases, study.component):
+        chosen = f"**{c.chosen}** (preset: {c.preset})" if c.changed else c.chosen
+        parts.append(f"| {c.what} | {chosen} | {c.why} |")
+    return [
+        *parts,
+        "",
+        "The claims depend on these choices, most of all on backlash (two-flank contact under misalignment), on the",
+        "penetration depth, the speed and the force component. `gearmbs paper` takes each as an option; the",
+        "documentation has maps.",
+        "",
+    ]
+
+
+def _settings(study: StudyTables) -> list[str]:
+    parts = ["## Settings", "", "| parameter | value |", "|---|---|"]
+    skip = ("solver_healthy", "solver_misaligned", "solver_distance", "case_", "title", "scaling")
+    attrs = study.records.attrs
+    for key, value in attrs.items():
+        if not key.startswith(skip) and not key.endswith("_units"):
+            parts.append(f"| {key} | {_value(value)} {attrs.get(f'{key}_units', '')}".rstrip() + " |")
+    return [*parts, ""]
+
+
+def _integration(study: StudyTables) -> list[str]:
+    parts = [
+        "## Integration",
+        "",
+        "| case | steps | residuals | Jacobians | wall time s | times real time | ms a mesh cycle |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for case in study.cases:
+        key = f"solver_{case.name.replace(', ', '_').replace(' ', '_')}"
+        numbers = [study.records.attrs[f"{key}_{item}"] for item in ("steps", "residuals", "jacobians", "wall_time")]
+        speed = study.records.attrs[f"{key}_real_time_factor"]
+        cycle = 1e3 * study.records.attrs[f"{key}_time_per_mesh_cycle"]
+        row = " | ".join(_value(v) for v in numbers)
+        parts.append(f"| {case.name} | {row} | {speed:.3g} | {cycle:.3g} |")
+    return parts
+
+
+def _table(study: StudyTables, component: str) -> list[str]:
+    lines = ["| load | state | 1 x band | 2 x band | 3 x band | 1 x orders | 2 x orders | 3 x orders |"]
+    lines.append("|---|---|---|---|---|---|---|---|")
+    band, orders = study.table(component, "band"), study.table(component, "orders")
+    for load in band["load"].values:
+        for state in band.state.values:
+            values = [*band.sel(load=load, state=state).values, *orders.sel(load=load, state=state).values]
+            lines.append(f"| {load} | {state} | " + " | ".join(f"{v:.4g}" for v in values) + " |")
+    return lines
+
+
+def _contact_table(study: StudyTables) -> list[str]:
+    """Mean sum of normal forces against torque over base radius, shares of the record in each kind of contact."""
+    lines = [
+        "| load | state | mean normal force, N | torque / base radius, N | both flanks, % of time | no contact, % |",
+        "|---|---|---|---|---|---|",
+    ]
+    radius = study.cases[0].pair().wheels[1].base_radius
+    for load in study.records["load"].values:
+        for state in study.records["state"].values:
+            one = study.records.sel(load=load, state=state)
+            drive, back = one["pairs_drive"].values > 0, one["pairs_back"].values > 0
+            lines.append(
+                f"| {load} | {state} | {float(one['normal_force'].mean()):.5g} | {float(one.torque) / radius:.5g} "
+                f"| {100.0 * (drive & back).mean():.3g} | {100.0 * (~drive & ~back).mean():.3g} |"
+            )
+    return lines
+
+
+def _largest(records: xr.Dataset, name: str) -> float:
+    values = records[name].values
+    return float(values[np.argmax(np.abs(values))])
+
+
+def _plain(name: object) -> str:
+    return str(name).replace("_", " ")
+
+
+def _value(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

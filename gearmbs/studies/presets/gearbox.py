@@ -1,0 +1,390 @@
+"""An industrial gearbox as a preset: two helical stages on parallel shafts, rigid shafts and wheels, elastic teeth.
+
+Such a rigid-elastic model is what Kong et al. made of a big industrial gearbox. Teeth, modules and helix angles are
+those published for the two parallel stages of a gearbox of 750 kW; what is not published is a choice, listed by
+`gearbox_choices`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.drivetrain import (
+    Accelerometer,
+    Drivetrain,
+    ElasticBearing,
+    ElasticClutch,
+    Fan,
+    GearMesh,
+    Housing,
+    HousingMode,
+    IdealBearing,
+    InductionMotor,
+    Mount,
+    RunSettings,
+    Shaft,
+    SpeedDrive,
+    SpeedSensor,
+    TorqueSensor,
+    Wheel,
+)
+from gearmbs.gears import ContactLaw, GearPair, GearSpec
+from gearmbs.progress import told_of_span
+from gearmbs.studies.presets.bench import BenchChoice
+from gearmbs.studies.run.store import write_dataset, write_text
+from gearmbs.studies.trains.modes import mesh_orders, train_modes
+from gearmbs.studies.trains.report import train_report
+from gearmbs.studies.trains.trains import run_train
+from gearmbs.units import Quantity, to_si
+
+if TYPE_CHECKING:
+    from gearmbs.dae.analyses.eigenvalues import Modes
+
+STAGES = {"high": (22, 88, 5e-3, 0.110), "low": (23, 82, 8.25e-3, 0.170)}
+"""Teeth of pinion and wheel, normal module (m) and face width (m) of each stage."""
+HELIX = math.radians(14.0)
+SHAFTS = ("high", "lay", "low")
+
+
+@dataclass(frozen=True)
+class GearboxSettings:
+    """What the industrial gearbox is made of; see `gearbox_choices` for why.
+
+    Parameters
+    ----------
+    speed, power : float or str
+        Of the motor.
+    motor : {"speed", "induction"}
+    curve : sequence of (time, speed), optional
+        Of the motor at a prescribed speed: a run-up or coast-down.
+    helix_angle : float or str
+        0: spur wheels.
+    bearing_stiffness : float
+        Radial stiffness of the high-speed shaft's bearings, N/m; the lay shaft's are twice, the low-speed shaft's four
+        times as stiff.
+    housing_mass : float
+        kg.
+    mount_stiffness : float
+        Of each of four mounts, N/m.
+    damping_ratio : float
+        Of the tooth contacts, of critical damping of each stage on its mesh.
+    faults : mapping of str to sequence of Fault, optional
+        Of the meshes "high stage" and "low stage".
+    """
+
+    speed: Quantity = "1793 rpm"
+    power: Quantity = "750 kW"
+    motor: str = "speed"
+    curve: tuple[tuple[Quantity, Quantity], ...] | None = None
+    helix_angle: Quantity = HELIX
+    bearing_stiffness: float = 8.2e8
+    housing_mass: float = 3000.0
+    mount_stiffness: float = 8e7
+    damping_ratio: float = 0.05
+    faults: Any = None
+
+
+def industrial_gearbox(settings: GearboxSettings | None = None) -> Drivetrain:
+    """Return the gearbox between a motor and a machine whose torque grows with the square of its speed.
+
+    Parameters
+    ----------
+    settings : GearboxSettings, optional
+
+    Returns
+    -------
+    Drivetrain
+        Shafts motor, high, lay, low and machine; meshes "high stage" and "low stage"; an accelerometer on the housing
+        at every bearing's seat.
+
+    Examples
+    --------
+    >>> train = industrial_gearbox()
+    >>> round(train.kinematics.mesh_frequency("high stage"), 2), round(train.kinematics.ratio("high", "low"), 4)
+    (657.43, 14.2609)
+    """
+    s = settings or GearboxSettings()
+    speed, power = to_si(s.speed, "angular speed", "speed"), to_si(s.power, "power", "power")
+    if s.motor not in ("speed", "induction"):
+        raise ValueError(f"motor is {s.motor!r}; choose 'induction' or 'speed'")
+    ratio = math.prod(z2 / z1 for z1, z2, _, _ in STAGES.values())
+    wheels = _wheels(to_si(s.helix_angle, "angle", "helix_angle"))
+    drive: Any = SpeedDrive(name="drive", shaft="motor", speed=speed, curve=s.curve)
+    if s.motor == "induction":
+        drive = InductionMotor(name="drive", shaft="motor", speed=speed, power=power, poles=4,
+                               frequency=1.006 * speed / math.pi, breakdown=2.5)  # fmt: skip
+    torque = power / speed * ratio
+    return Drivetrain(
+        "industrial gearbox",
+        shafts=[
+            Shaft(name="motor", length=0.4, inertia=16.0),
+            Shaft(name="high", length=0.65, radius=0.045),
+            Shaft(name="lay", length=0.65, radius=0.075),
+            Shaft(name="low", length=0.65, radius=0.14),
+            Shaft(name="machine", length=0.4, inertia=60.0),
+        ],
+        wheels=wheels,
+        meshes=[_mesh("high stage", "z1", "z2", 0.0, (wheels[0].gear, wheels[1].gear), s),
+                _mesh("low stage", "z3", "z4", math.radians(-30.0), (wheels[2].gear, wheels[3].gear), s)],
+        couplings=[
+            ElasticClutch(name="motor clutch", first="motor", second="high", stiffness=1.5e5, relative_damping=0.6,
+                          damping_frequency=70.0),
+            ElasticClutch(name="machine clutch", first="low", second="machine", stiffness=2e7, relative_damping=0.6,
+                          damping_frequency=90.0),
+        ],
+        bearings=[
+            IdealBearing(name="motor bearing", shaft="motor", on="ground"),
+            *(bearing for k, shaft in enumerate(SHAFTS) for bearing in _bearings(shaft, 2.0**k * s.bearing_stiffness)),
+            IdealBearing(name="machine bearing", shaft="machine", on="ground"),
+        ],
+        housings=[_housing(s)],
+        drives=[drive],
+        loads=[Fan(name="machine load", shaft="machine", torque=torque, at_speed=speed / ratio)],
+        sensors=[
+            *(Accelerometer(name=f"housing at {shaft} {side}", bearing=f"{shaft} {side}", direction=(0.0, 1.0, 0.0))
+              for shaft in SHAFTS for side in "ab"),
+            SpeedSensor(name="speed", shaft="high"),
+            TorqueSensor(name="torque", of="motor clutch"),
+        ],
+        running=True,
+        run_up=0.05,
+    )  # fmt: skip
+
+
+def _wheels(helix: float) -> list[Wheel]:
+    """Return the four wheels: pinions on the high-speed and lay shaft, whose axial forces oppose on the lay shaft."""
+    stations = {"high": 0.18, "low": 0.44}
+    out = []
+    for k, (stage, (z1, z2, module, width)) in enumerate(STAGES.items()):
+        for n, (teeth, shaft) in enumerate(zip((z1, z2), SHAFTS[k : k + 2], strict=True), 1):
+            # both wheels of the lay shaft have one hand: one is driven, the other drives
+            right = n == 2 if k == 0 else n == 1
+            name = f"z{2 * k + n}"
+            gear = GearSpec(teeth, module, face_width=width, helix_angle=helix, hand="right" if right else "left",
+                            name=name)  # fmt: skip
+            out.append(Wheel(name=name, shaft=shaft, station=stations[stage], gear=gear))
+    return out
+
+
+def _mesh(
+    name: str, driver: str, driven: str, direction: float, wheels: tuple[GearSpec, GearSpec], s: GearboxSettings
+) -> GearMesh:
+    bare = GearPair(*wheels).with_iso_stiffness()
+    k = bare.contact.stiffness
+    mass = 1.0 / sum(wheel.base_radius**2 / wheel.inertia[2] for wheel in wheels)
+    contact = ContactLaw.linear(k, damping=2.0 * s.damping_ratio * math.sqrt(k * mass), depth="2 um")
+    settings: dict[str, Any] = {"backlash": "0.2 mm", "contact": contact}
+    if s.faults and name in s.faults:
+        settings["faults"] = tuple(s.faults[name])
+    return GearMesh(name=name, driver=driver, driven=driven, direction=direction, settings=settings)
+
+
+def _bearings(shaft: str, k: float) -> list[ElasticBearing]:
+    # the left one also locates the shaft
+    return [
+        ElasticBearing(name=f"{shaft} {side}", shaft=shaft, station=z, stiffness=(k, k, axial * k), damping_time=1e-5)
+        for side, z, axial in (("a", 0.05, 0.4), ("b", 0.60, 0.1))
+    ]
+
+
+def _housing(s: GearboxSettings) -> Housing:
+    # a box of 0.9 x 1.0 x 0.7 m about the shafts
+    m = s.housing_mass
+    inertia = (m * (0.9**2 + 0.7**2) / 12.0, m * (1.0**2 + 0.7**2) / 12.0, m * (1.0**2 + 0.9**2) / 12.0)
+    corners = [(x, -0.6, z) for x in (-0.2, 0.9) for z in (0.0, 0.65)]
+    k = s.mount_stiffness
+    # 5 % of critical damping of the housing on its mounts
+    c = 2.0 * 0.05 * math.sqrt(4.0 * k * m) / 4.0
+    mounts = [
+        Mount(name=f"mount {n}", at=at, stiffness=(k, k, k), damping=(c, c, c)) for n, at in enumerate(corners, 1)
+    ]
+    modes = [_panel("front wall", 310.0, "a", (0.0, 0.6, 0.8), m), _panel("rear wall", 420.0, "b", (0.0, 0.6, -0.8), m)]
+    return Housing(name="housing", mass=m, inertia=inertia, at=(0.38, -0.15, 0.325), mounts=tuple(mounts),
+                   modes=tuple(modes))  # fmt: skip
+
+
+def _panel(name: str, frequency: float, side: str, shape: tuple[float, float, float], mass: float) -> HousingMode:
+    """Return the mode of a wall, in which the seats of one side move together."""
+    own = 0.1 * mass
+    seats = {f"{shaft} {side}": shape for shaft in SHAFTS}
+    return HousingMode(name=name, mass=own, stiffness=own * (2.0 * math.pi * frequency) ** 2, shape=seats,
+                       damping_ratio=0.02)  # fmt: skip
+
+
+def gearbox_choices(settings: GearboxSettings | None = None) -> list[BenchChoice]:
+    """Return what is published of the gearbox, and every choice with its reason."""
+    s = settings or GearboxSettings()
+    teeth = ", ".join(f"{z1}/{z2}, m {1e3 * m:g} mm" for z1, z2, m, _ in STAGES.values())
+    widths = " and ".join(f"{1e3 * b:g} mm" for *_, b in STAGES.values())
+    rows = [
+        ("stages", f"{teeth}, helix 14 degrees", "published: the parallel stages of a wind turbine of 750 kW"),
+        ("sense", "the motor drives the high-speed shaft", "an industrial reducer; the turbine drives the other end"),
+        ("face widths", widths, "about 0.95 and 0.9 of the pinions' diameters"),
+        ("bodies", "rigid shafts and wheels, elastic teeth", "the rigid-elastic model of the literature"),
+        ("teeth", f"ISO 6336-1 stiffness, {100 * s.damping_ratio:g} % damping", "no other is published"),
+        ("hands", "one hand on the lay shaft", "its two axial forces oppose each other"),
+        ("bearings", f"{s.bearing_stiffness:.3g} N/m radially on the high-speed shaft, twice and four times on the "
+         "others; the left ones locate", "8.2e8 N/m is published for the high-speed shaft of a larger gearbox"),
+        ("housing", f"{s.housing_mass:g} kg on four mounts of {s.mount_stiffness:.3g} N/m, walls at 310 and 420 Hz",
+         "mounts at some 50 Hz; a mode a wall, so that a housing shakes where it is measured"),
+        ("motor", "prescribed speed" if s.motor == "speed" else "induction motor, Kloss", "a run-up needs its speed"),
+        ("machine", "60 kg m^2, torque with the square of the speed", "a fan or mill"),
+        ("couplings", "1.5e5 and 2e7 N m/rad, relative damping 0.6", "torsional modes of the ends at 60 to 100 Hz"),
+    ]  # fmt: skip
+    return [BenchChoice(*row) for row in rows]
+
+
+# The industrial gearbox, studied: modes, Campbell diagram, steady state and run-up, bearing forces, housing.
+
+
+HIGHEST = 2000.0
+"""Modes up to this frequency are told, Hz."""
+SETTLING = 0.3
+"""Time from the load's coming on to the record, s: the clutches' modes have then lost all but a thousandth."""
+HELD = 0.1
+"""Share of the run-up at whose end the speed is held, so that windows of order tracking fit into the steady part."""
+SLOWEST = 0.25
+"""Speed at which the run-up begins, over the operating speed."""
+
+
+@dataclass(frozen=True)
+class GearboxStudy:
+    """What was computed of the industrial gearbox.
+
+    Attributes
+    ----------
+    train : Drivetrain
+    modes : Modes
+        Under load, see `gearmbs.studies.train_modes`.
+    steady, run_up : Dataset
+        Records at the operating speed and of a run-up to it, see `gearmbs.studies.run_train`.
+    settings : GearboxSettings
+    """
+
+    train: Drivetrain
+    modes: Modes
+    steady: xr.Dataset
+    run_up: xr.Dataset
+    settings: GearboxSettings
+
+    def campbell(self) -> xr.Dataset:
+        """Return the Campbell diagram: modes under load, mesh harmonics, and where they meet."""
+        from gearmbs.signals import campbell
+
+        operating = float(self.train.drives[0].speed)
+        found = campbell(self.modes, np.linspace(0.0, 1.2 * operating, 13), mesh_orders(self.train), maximum=HIGHEST)
+        return found.assign_attrs(operating_speed=operating)
+
+    def report(self) -> str:
+        """Return the report in Markdown: modes, critical speeds, the steady state, the run-up, choices."""
+        from gearmbs.signals.analysis.campbell import critical_speeds
+
+        lines = [
+            "# Industrial gearbox",
+            "",
+            "## Modes under load",
+            "",
+            "| mode | Hz | damping ratio |",
+            "|---|---|---|",
+        ]
+        modes = self.modes.oscillating
+        told = zip(self.modes.frequencies[modes], self.modes.damping_ratios[modes], strict=True)
+        for k, (f, zeta) in enumerate((pair for pair in told if 0.1 < pair[0] < HIGHEST), 1):
+            lines.append(f"| {k} | {f:.5g} | {zeta:.3g} |")
+        lines += ["", "## Critical speeds of the motor, from half of the operating speed on", "",
+                  "| rpm | Hz | mode | mesh harmonic |", "|---|---|---|---|"]  # fmt: skip
+        found = critical_speeds(self.campbell())
+        for row in found[found.speed_rpm > 0.5 * self.train.drives[0].speed * 30.0 / np.pi].itertuples():
+            lines.append(f"| {row.speed_rpm:.5g} | {row.frequency_hz:.5g} | {row.mode} | {row.order} |")
+        lines += ["", train_report(self.train, self.steady).replace("# industrial gearbox", "# Steady state", 1)]
+        lines += [train_report(self.train, self.run_up).replace("# industrial gearbox", "# Run-up", 1)]
+        lines += ["# Choices", "", "| what | chosen | why |", "|---|---|---|"]
+        lines += [f"| {c.what} | {c.chosen} | {c.why} |" for c in gearbox_choices(self.settings)]
+        return "\n".join(lines) + "\n"
+
+    def figures(self) -> dict[str, Any]:
+        """Return the Campbell diagram, and housing and bearings along the run-up, by name."""
+        from gearmbs.view import campbell_plot
+        from gearmbs.view.figures.style import look, new_figure
+
+        tracks = self.run_up["mesh_track"]
+        rpm = tracks["track_speed"].values * 30.0 / np.pi
+        with look():
+            figure = new_figure(8.0, 6.0)
+            upper, lower = figure.subplots(2, 1, sharex=True)
+            for mesh in self.train.meshes:
+                for shaft in SHAFTS:
+                    row = tracks.sel(mesh=mesh.name, harmonic=1)
+                    label = f"{shaft} b, {mesh.name}"
+                    upper.plot(rpm, row.sel(signal=f"housing at {shaft} b").values, label=label, lw=1.0)
+                    lower.plot(rpm, row.sel(signal=f"{shaft} b y").values, label=label, lw=1.0)
+            upper.set_ylabel("housing, 1st mesh harmonic,\nm/s² RMS")
+            upper.legend(frameon=False, ncols=2)
+            lower.set(ylabel="bearing force y,\nN RMS", xlabel="motor, rpm", yscale="log")
+        return {"campbell": campbell_plot(self.campbell(), title="industrial gearbox"), "run_up": figure}
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write records, report and figures to a folder; return the paths."""
+        from gearmbs.view import save_figure
+
+        folder = Path(folder)
+        paths = [folder / "steady.nc", folder / "run_up.nc", folder / "report.md"]
+        for path, record in zip(paths, (self.steady, self.run_up), strict=False):
+            write_dataset(path, record)
+        write_text(paths[2], self.report())
+        for name, figure in self.figures().items():
+            paths += save_figure(figure, folder / name)
+        return paths
+
+
+def run_gearbox(
+    settings: GearboxSettings | None = None,
+    *,
+    duration: float = 1.0,
+    run_up: float = 4.0,
+    tolerance: float = 1e-6,
+    progress: Callable[[str, float], None] | None = None,
+) -> GearboxStudy:
+    """Compute modes, steady state and a run-up of the industrial gearbox.
+
+    Parameters
+    ----------
+    settings : GearboxSettings, optional
+        Without ``curve``, at a prescribed speed.
+    duration : float
+        Of the record at the operating speed, s.
+    run_up : float
+        Time from a quarter of the operating speed to it, of which the last tenth holds it, s.
+    tolerance : float
+    progress : callable, optional
+        Called with "steady" or "run-up" and the part of it that is done.
+
+    Raises
+    ------
+    ValueError
+        If the settings have a curve, or a motor whose speed is not prescribed.
+    SimulationFailed
+        If a run stops early.
+    """
+    s = settings or GearboxSettings()
+    if s.curve is not None or s.motor != "speed":
+        raise ValueError("settings: a run-up is added here; leave curve out, and motor 'speed'")
+    train = industrial_gearbox(s)
+    speed = to_si(s.speed, "angular speed", "speed")
+    reached = SETTLING + (1.0 - HELD) * run_up
+    points = ((SETTLING, SLOWEST * speed), (reached, speed), (SETTLING + run_up, speed))
+    faster = industrial_gearbox(replace(s, curve=points))
+    modes = train_modes(train)
+    records = []
+    for name, one, length in (("steady", train, duration), ("run-up", faster, run_up)):
+        run = RunSettings(settling=SETTLING, duration=length, tolerance=tolerance)
+        told = told_of_span(progress, name, one.run_up + run.settling + length)
+        records.append(run_train(one, run, progress=told))
+    return GearboxStudy(train, modes, records[0], records[1], s)

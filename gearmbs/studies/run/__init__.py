@@ -1,0 +1,1 @@
+"""From a case to its record: the rig, the simulation, many at once, and files."""

@@ -1,0 +1,486 @@
+"""What the record of a case is made from, taken from the solution while it is being computed."""
+
+from __future__ import annotations
+
+import functools
+import json
+import platform
+from collections.abc import Collection
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+import gearmbs
+from gearmbs.dae.results.solution import Solution
+from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, gmf_rms, make_signal, trim
+from gearmbs.signals.resampling import MARGIN, monotone_cubic
+from gearmbs.studies.case.case import Case, CaseError, units_of_fields
+from gearmbs.studies.case.limits import HARMONICS, edge, remarks
+from gearmbs.studies.case.parts import drive_angle
+from gearmbs.studies.run import rig
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from gearmbs.mechanism import Mechanism
+
+SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
+COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
+"""Contact quantities of a record, with units; numbers of tooth pairs cannot be interpolated."""
+
+TURN_BEFORE = 0.02
+"""Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
+
+
+class Measured(NamedTuple):
+    """What a record is made from, at the output times of a solution or some of them.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+    forces : ndarray, shape (m, 6)
+        Force of shaft 1 on gear 1, then of shaft 2 on gear 2, N.
+    error : ndarray, shape (m,)
+        Lag of the driven wheel behind the driver at the driven base circle, m.
+    contact : dict of ndarray
+        The quantities of `SMOOTH` and `COUNTS`.
+    """
+
+    t: np.ndarray
+    forces: np.ndarray
+    error: np.ndarray
+    contact: dict[str, np.ndarray]
+
+
+class _Columns(NamedTuple):
+    """The quantities of `Measured` for some output times, the wheels' x axes, (m, 2, 3), in place of the error."""
+
+    t: np.ndarray
+    forces: np.ndarray
+    x_axes: np.ndarray
+    contact: np.ndarray
+
+
+def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> Measured:
+    """Return what a record is made from at the output times ``rows`` of a solution, default all."""
+    recorder = Recorder(case)
+    return recorder.joined([recorder.columns(part) for part in solution.parts(rows)])
+
+
+def rows_of_record(case: Case, t: np.ndarray) -> np.ndarray:
+    """Return the numbers of the output times a record is made from.
+
+    Before the span of its filters only a few are needed, to follow the turning wheels.
+    """
+    first = int(np.searchsorted(t, span_begin(case)))
+    teeth = case.gears.teeth
+    turn = 2.0 * np.pi / (case.operation.top_speed * max(1.0, teeth[0] / teeth[1]))
+    interval = np.floor(t[: first + 1] / (TURN_BEFORE * turn))
+    return np.concatenate([np.flatnonzero(np.diff(interval) > 0.0), np.arange(first, t.size)])
+
+
+def span_begin(case: Case) -> float:
+    """Return the time at which the span of a record's filters begins, s."""
+    operation = case.operation
+    return operation.run_up + operation.settling - edge(case) - (MARGIN + 1) / case.output_rate
+
+
+class Recorder:
+    """Collects what the record of a case needs from the parts of a solution, as a consumer of `simulate`.
+
+    Of the steps before the span of the record's filters the unknowns are kept, and evaluated only as far as needed.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        pair = case.pair()
+        place = pair.placement(0.0)
+        self._axes = (place.axes_1, place.axes_2)
+        self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
+        self._lag = pair.rotation * pair.wheels[1].base_radius
+        self._begin = span_begin(case)
+        self._early: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._columns: list[_Columns] = []
+        self._model: Solution | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing has been taken yet."""
+        return self._model is None
+
+    def take(self, part: Solution) -> None:
+        """Take the next steps of a run."""
+        if self._columns:
+            self._columns.append(self.columns(part))
+            return
+        self._model = part.over(np.empty(0), part.result.y[:0], part.result.epochs)
+        self._early.append((part.t.copy(), part.result.y.copy(), part.result.epochs[0][1]))
+        if part.t[-1] < self._begin:
+            return
+        wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]))
+        self._columns = [self.columns(piece) for piece in self._kept(wanted).parts()]
+
+    def measured(self) -> Measured:
+        """Return what the record is made from: all steps inside the span of its filters, some before."""
+        return self.joined(self._columns)
+
+    def everything(self) -> Measured:
+        """Return the same at all steps from the start on, for a run that failed."""
+        early = self._kept()
+        columns = [self.columns(part) for part in early.parts()]
+        return self.joined([*columns, *(c for c in self._columns if c.t[0] > early.t[-1])])
+
+    def _kept(self, wanted: np.ndarray | None = None) -> Solution:
+        """Return the solution over the steps whose unknowns were kept, or over some of them, by increasing numbers."""
+        assert self._model is not None
+        times, rows, tables = zip(*self._early, strict=True)
+        ends = np.cumsum([t.size for t in times])
+        wanted = np.arange(ends[-1]) if wanted is None else wanted
+        places = np.searchsorted(wanted, [0, *ends])
+        inside = [wanted[a:b] - end + t.size for a, b, end, t in zip(places, places[1:], ends, times)]
+        epochs = [(int(k), table) for k, table in zip(places, tables)]
+        return self._model.over(
+            np.concatenate([t[k] for t, k in zip(times, inside)]),
+            np.concatenate([y[k] for y, k in zip(rows, inside)]),
+            epochs,
+        )
+
+    def columns(self, part: Solution) -> _Columns:
+        """Return what is recorded of one part of a solution."""
+        forces = np.concatenate([part.reaction_force(seat) for seat in rig.SEATS], axis=1)
+        x_axes = np.stack([part.orientation(gear)[:, :, 0] for gear in rig.GEARS], axis=1)
+        diagnostics = part.contact(rig.MESH)
+        return _Columns(part.t.copy(), forces, x_axes, np.stack([diagnostics[n] for n in (*SMOOTH, *COUNTS)], axis=1))
+
+    def joined(self, columns: list[_Columns]) -> Measured:
+        """Return the parts as one, with the transmission error from the wheels' angles."""
+        whole = _Columns(*(np.concatenate(c) for c in zip(*columns, strict=True)))
+        turned = [self._turned(whole.x_axes[:, wheel], axes) for wheel, axes in enumerate(self._axes)]
+        error = self._lag * (turned[0] * self._ratio + turned[1])
+        contact = {name: whole.contact[:, k] for k, name in enumerate((*SMOOTH, *COUNTS))}
+        return Measured(whole.t, whole.forces, error, contact)
+
+    @staticmethod
+    def _turned(x_axis: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """Return the angle by which a wheel has turned, rad, from its x axis in the frame of its shaft."""
+        along, across = (x_axis @ axes[:, k] for k in range(2))
+        return np.unwrap(np.arctan2(across, along))
+
+
+# From what was measured of a solution to the variables of a record; only those that are asked for.
+
+
+FORCES = ("force_1", "force_2")
+LEVELS = ("gmf_rms", "order_rms")
+"""RMS of the mesh harmonics: at constant speed, and of a run-up. A record has one of them."""
+
+SERIES = (*FORCES, "transmission_error", *SMOOTH, *COUNTS)
+VARIABLES = (*SERIES, "acceleration", *LEVELS)
+"""Variables of a record."""
+
+
+def check_variables(variables: Collection[str] | None) -> None:
+    """Refuse names that are no variables of a record.
+
+    Raises
+    ------
+    CaseError
+    """
+    for name in variables or ():
+        if name not in VARIABLES:
+            raise CaseError(f"variables: {name!r} is unknown; choose of {', '.join(VARIABLES)}")
+
+
+def evaluate(case: Case, known: Measured, *, even: bool, variables: Collection[str] | None = None) -> xr.Dataset:
+    """Return variables of a case's record, without attributes; see `gearmbs.studies.run_case`.
+
+    Parameters
+    ----------
+    known : Measured
+        At the output rate, or at uneven times that are brought to it through an anti-alias filter.
+    even : bool
+        Which of the two.
+    variables : collection of str, optional
+        Of `VARIABLES`; default all.
+    """
+    import xarray as xr
+
+    level = LEVELS[0 if case.operation.speed_curve is None else 1]
+    wanted = set(VARIABLES if variables is None else variables) - (set(LEVELS) - {level})
+    start = case.operation.run_up + case.operation.settling
+    stop = start + case.operation.duration
+    dataset = xr.Dataset()
+    forces = _even_forces(case, known, start, stop, wanted, even=even)
+    if wanted & set(SERIES):
+        dataset = _series(case, known, forces, (start, stop), wanted, even=even)
+    if not wanted & {"acceleration", *LEVELS}:
+        return dataset
+    assert forces is not None
+    acceleration = _acceleration(case, forces, start, stop)
+    plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
+    dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
+    dataset["acceleration"].attrs.update(
+        units="m/s^2",
+        long_name="force on the driven gear over its mass (Newton's second law)",
+        teeth_in_mesh=teeth_in_mesh(case, start),
+    )
+    if case.operation.speed_curve is not None:
+        dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
+    if level in wanted:
+        dataset[level] = (
+            _mesh_levels(acceleration) if level == "gmf_rms" else _tracked_levels(case, acceleration, dataset)
+        )
+    if "acceleration" not in wanted:
+        dataset = dataset.drop_vars(["acceleration", "signal_time", "speed", "angle"], errors="ignore")
+    return dataset
+
+
+def _even_forces(
+    case: Case, known: Measured, start: float, stop: float, wanted: set[str], *, even: bool
+) -> xr.DataArray | None:
+    """Return the forces that are needed at the output rate, with the edges that filters use up; None if none are."""
+    wheels = [1] if "force_1" in wanted else []
+    wheels += [2] if wanted & {"force_2", "acceleration", *LEVELS} else []
+    if not wheels:
+        return None
+    rate, ahead = case.output_rate, edge(case)
+    labels: dict[str, Any] = {"units": "N", "speed": case.operation.top_speed, "teeth": case.gears.teeth}
+    names = [f"{wheel}{axis}" for wheel in wheels for axis in "xyz"]
+    columns = [3 * (wheel - 1) + k for wheel in wheels for k in range(3)]
+    if even:
+        keep = known.t >= start - ahead - 0.5 / rate
+        values = known.forces[keep][:, columns]
+        return make_signal(values, rate, channels=names, t0=float(known.t[keep][0]), **labels)
+    values = known.forces if len(columns) == 6 else known.forces[:, columns]
+    return even_signal(known.t, values, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels)
+
+
+def _series(
+    case: Case, known: Measured, forces: xr.DataArray | None, span: tuple[float, float], wanted: set[str], *, even: bool
+) -> xr.Dataset:
+    """Return the variables over time that are wanted."""
+    rate = case.output_rate
+    t = _even_times(case, known, *span, even=even) if forces is None else forces["time"].values
+    inside = slice(*np.searchsorted(t, [at - 0.5 / rate for at in span]))
+    t = t[inside].copy()
+    values: dict[str, np.ndarray] = {}
+    for name in FORCES:
+        if name in wanted and forces is not None:
+            first = list(forces["channel"].values).index(f"{name[-1]}x")
+            values[name] = forces.values[inside, first : first + 3].copy()
+    if "transmission_error" in wanted:
+        values["transmission_error"] = monotone_cubic(known.t, known.error, t)
+    values |= {name: np.interp(t, known.t, known.contact[name]) for name in SMOOTH if name in wanted}
+    if wanted & set(COUNTS):
+        latest = np.clip(np.searchsorted(known.t, t, side="right") - 1, 0, known.t.size - 1)
+        values |= {name: known.contact[name][latest] for name in COUNTS if name in wanted}
+    return time_series(t, values)
+
+
+def _even_times(case: Case, known: Measured, start: float, stop: float, *, even: bool) -> np.ndarray:
+    """Return the times at which forces would be, to the last digit."""
+    rate, ahead = case.output_rate, edge(case)
+    if even:
+        return known.t[known.t >= start - ahead - 0.5 / rate]
+    first, last = int(np.ceil((start - ahead) * rate - 1e-6)), int(np.floor((stop + ahead) * rate + 1e-6))
+    return first / rate + np.arange(last - first + 1) / rate
+
+
+def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
+    """Return the dataset of variables over time, whichever of `SERIES` there are."""
+    import xarray as xr
+
+    units = {**SMOOTH, **COUNTS, "transmission_error": "m"}
+    long_names = {"transmission_error": "lag of the driven wheel at its base circle"}
+    data: dict[str, Any] = {}
+    for name in SERIES:
+        if name not in values:
+            continue
+        if name in FORCES:
+            wheel = name[-1]
+            text = f"force of shaft {wheel} on gear {wheel}"
+            data[name] = (("time", "xyz"), values[name], {"units": "N", "long_name": text})
+        else:
+            text = long_names.get(name, name.replace("_", " "))
+            data[name] = ("time", values[name], {"units": units[name], "long_name": text})
+    coords: dict[str, Any] = {"time": ("time", t, {"units": "s"})}
+    if any(name in data for name in FORCES):
+        coords["xyz"] = ["x", "y", "z"]
+    return xr.Dataset(data, coords=coords)
+
+
+def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -> xr.DataArray:
+    """Return the components of the force on the driven gear over its mass, at the signal rate."""
+    pair = case.pair()
+    components = force_components(
+        forces, pressure_angle=pair.working_pressure_angle, sense=pair.rotation, channels=("2x", "2y", "2z")
+    )
+    acceleration = force_to_acceleration(components, pair.wheels[1].mass)
+    if case.signal_rate < case.output_rate:
+        acceleration = decimate(acceleration, case.signal_rate)
+    return trim(acceleration, start, stop)
+
+
+def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
+    """Return the RMS of the mesh harmonics by both ways."""
+    import xarray as xr
+
+    levels = gmf_rms(acceleration)
+    ways = ("band", "orders")
+    found = xr.DataArray(
+        np.stack([levels[way].values for way in ways]),
+        dims=("way", "harmonic", "component"),
+        coords={
+            "harmonic": levels["harmonic"].variable,
+            "frequency": levels["frequency"].variable,
+            "component": levels["channel"].values,
+            "way": list(ways),
+        },
+    )
+    found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
+    return found
+
+
+def _tracked_levels(case: Case, acceleration: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
+    """Return the RMS of the mesh orders along a run-up, by order tracking over four revolutions at a time."""
+    # what only run-ups need takes longer to load than many a simulation
+    from gearmbs.signals import order_track
+
+    turning = {name: ("time", dataset[name].values, dataset[name].attrs) for name in ("speed", "angle")}
+    orders = [float(case.gears.teeth[0] * k) for k in range(1, HARMONICS + 1)]
+    tracks = order_track(acceleration.assign_coords(turning), orders=orders, scaling="rms")
+    found = tracks.rename(time="track_time", speed="track_speed", angle="track_angle", order="harmonic")
+    found = found.rename(channel="component").drop_vars(["units", "channel_units"], errors="ignore")
+    found = found.assign_coords(harmonic=np.arange(1, HARMONICS + 1))
+    found.attrs = {"units": "m/s^2", "long_name": "RMS of the mesh orders along the run-up"}
+    return found
+
+
+def teeth_in_mesh(case: Case, time: float) -> list[float]:
+    """Return which teeth are on the line of centres at a time: ``[time, number, step, number, step]``, driver first.
+
+    A wheel turned by psi from where its tooth 0 points along x has tooth z (mu - psi) / (2 pi) in the direction mu of
+    the mesh: pi from the driven wheel, and from a driver inside a ring, else 0. A step is what the number changes by
+    for each pitch that passes, 1 or -1; wheels turn against each other unless one is a ring.
+    """
+    operation, pair = case.operation, case.pair()
+    sense = pair.operating_point.rotation
+    driver = drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling, sense)(time)
+    teeth, external = case.gears.teeth, pair.geometry.sign > 0
+    driven = pair.driven_angle(0.0) - (1 if external else -1) * driver * teeth[0] / teeth[1]
+    out = [float(time)]
+    for count, mesh, angle, step in (
+        (teeth[0], pair.geometry.mesh_angle, driver, -sense),
+        (teeth[1], np.pi, driven, sense if external else -sense),
+    ):
+        out += [float((mesh - angle) * count / (2.0 * np.pi) % count), float(step)]
+    return out
+
+
+def _turning(case: Case, t: np.ndarray) -> dict[str, Any]:
+    """Return speed and angle of the driver over the times of a signal, as prescribed."""
+    operation = case.operation
+    start = operation.run_up + operation.settling
+    function = drive_angle(operation.speed, operation.run_up, start)
+    begin = function(start)
+    angle, speed, _ = np.array([function.derivatives(at) for at in t]).T
+    return {
+        "speed": ("signal_time", speed, {"units": "rad/s", "long_name": "speed of the driver"}),
+        "angle": ("signal_time", angle - begin, {"units": "rad", "long_name": "angle of the driver"}),
+    }
+
+
+# What a record says of itself: every parameter of its case, its bearings, the versions, and what the run cost.
+
+
+_version = functools.cache(version)
+
+
+def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:
+    """Return every parameter of a case, the versions and the solver's statistics as flat attributes.
+
+    The unit of a quantity is beside it: ``operation_speed`` has ``operation_speed_units``. What is unusual about the
+    case is said in ``remarks``.
+    """
+    out: dict[str, Any] = {"title": f"gear pair: {case.name}", "case": case.name}
+    for section in ("gears", "shafts", "operation", "fault", "contact", "friction", "solver"):
+        settings = getattr(case, section)
+        units = units_of_fields(settings)
+        for key, value in settings.model_dump().items():
+            name = f"{section}_{key}"
+            if name in ("operation_speed", "operation_torque") and isinstance(value, tuple):
+                out[f"{name}_curve"] = json.dumps(value)
+                value = max(number for _, number in value)
+            if value is None:
+                out[name] = "default"
+            elif name == "fault_teeth":
+                out[name] = json.dumps(value)
+            elif isinstance(value, bool):
+                out[name] = int(value)
+            else:
+                out[name] = list(value) if isinstance(value, tuple) else value
+                if key in units and not isinstance(value, str):
+                    out[f"{name}_units"] = units[key]
+    out["solver_tolerance"] = case.solver.used_tolerance
+    for name, rate in (("signal_rate", case.signal_rate), ("output_rate", case.output_rate)):
+        out[f"solver_{name}"], out[f"solver_{name}_units"] = rate, "Hz"
+    pair = case.pair()
+    out["operation_torque_of"] = "driven wheel"
+    out["contact_law"] = str(pair.contact)
+    out["contact_ratio"] = pair.contact_ratio
+    out["face_slices"] = pair.face_slices
+    out["remarks"] = "; ".join(remarks(case)) or "none"
+    out["mesh_frequency"] = case.mesh_frequency
+    out["mesh_frequency_units"] = "Hz"
+    out["case_json"] = case.model_dump_json()
+    out["gearmbs_version"] = gearmbs.__version__
+    for package in ("numpy", "scipy", "numba", "scikit-sundae", "xarray"):
+        out[f"{package.replace('-', '_')}_version"] = _version(package)
+    out["python_version"] = platform.python_version()
+    if solution is not None:
+        out.update({f"solver_{key}": value for key, value in solution.stats.as_dict().items()})
+        out.update(cost(case, solution))
+    return out
+
+
+def cost(case: Case, solution: Solution) -> dict[str, Any]:
+    """Return what a run cost: seconds simulated in a second of the solver, and its time for each cycle of the mesh.
+
+    The first falls with the speed of the wheels, the second hardly does.
+    """
+    operation = case.operation
+    end, spent = float(solution.t[-1]), solution.stats.wall_time
+    angle = drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling)
+    cycles = case.gears.teeth[0] * (angle(end) - angle(0.0)) / (2.0 * np.pi)
+    return {
+        "solver_mesh_cycles": cycles,
+        "solver_real_time_factor": end / spent if spent > 0.0 else 0.0,
+        "solver_time_per_mesh_cycle": spent / cycles if cycles > 0.0 else 0.0,
+        "solver_time_per_mesh_cycle_units": "s",
+    }
+
+
+def bearing_attributes(mechanism: Mechanism | None, title: str = "") -> dict[str, Any]:
+    """Return what a record says of the rolling bearings of its mechanism, which its case does not know.
+
+    Returns
+    -------
+    dict
+        ``title``; ``bearings`` and ``bearing_defects`` in words; ``bearings_json``: of each by name its bearing, the
+        settings other than the defaults and its defects with labels, in SI. Empty without rolling bearings.
+    """
+    if mechanism is None or not any(e.kind == "rolling bearing" for e in mechanism.elements.values()):
+        return {}
+    from gearmbs.bearings.life import described
+
+    told = described(mechanism)
+    words = {name: [d["label"] for d in one["defects"]] for name, one in told.items()}
+    kinds = {one["bearing"]["designation"] or one["bearing"]["kind"] for one in told.values()}
+    return {
+        "title": f"{title} on rolling bearings",
+        "bearings": f"{len(told)} rolling bearings {', '.join(sorted(kinds))}",
+        "bearing_defects": "; ".join(f"{name}: {', '.join(labels)}" for name, labels in words.items() if labels)
+        or "none",
+        "bearings_json": json.dumps(told),
+    }

@@ -1,0 +1,339 @@
+"""Simulate a case and record what the paper recorded."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs._lazy import uncollected
+from gearmbs.dae.result import Status
+from gearmbs.dae.results.solution import Solution
+from gearmbs.gears.contact_element import contact_kernels
+from gearmbs.mechanism.solve.simulate import simulate
+from gearmbs.studies.case.case import Case, CaseError, Operation, Solver
+from gearmbs.studies.case.limits import check_record, edge, slip
+from gearmbs.studies.run import rig
+from gearmbs.studies.run.record import (
+    Measured,
+    Recorder,
+    attributes_of,
+    bearing_attributes,
+    check_variables,
+    evaluate,
+    measure,
+    rows_of_record,
+    time_series,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from gearmbs.bearings import Bearing
+    from gearmbs.mechanism import Mechanism
+
+ADVICE = {
+    Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
+    Status.NEWTON_FAILURE: "Raise contact.depth, lower contact.stiffness, or try another solver.integrator.",
+    Status.TOO_MANY_REJECTIONS: "Loosen solver.tolerance, raise contact.depth, or make operation.run_up longer.",
+    Status.NOT_FINITE: "Lower operation.torque or operation.speed, or make operation.run_up longer.",
+    Status.SOLVER_FAILURE: "Loosen solver.tolerance, make operation.run_up longer, or take the WSTIFF integrator.",
+}
+"""What the settings of a case offer against a failing integration."""
+
+
+KERNELS = (
+    "gearmbs.dae.model.side_by_side",
+    "gearmbs.mechanism.parts.elements",
+    "gearmbs.signals.resampling",
+    "gearmbs.signals.resampling",
+)
+"""Modules of kernels that are called late in a run, besides those of the contact."""
+
+LUMPED_KERNELS = ("gearmbs.dae.model.fixed_axes", "gearmbs.dae.model.fixed_axes")
+"""The same of a run in which gear and shaft turn as one."""
+
+
+class SimulationFailed(RuntimeError):
+    """The integrator stopped early, or what it computed is no motion of meshing gears.
+
+    Attributes
+    ----------
+    solution : Solution or None
+        What was computed until then; None if the case ran in another process.
+    case : Case or None
+    """
+
+    def __init__(
+        self,
+        message: str,
+        solution: Solution | None = None,
+        case: Case | None = None,
+        partial: xr.Dataset | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.solution = solution
+        self.case = case
+        self._partial = partial
+
+    def partial(self) -> xr.Dataset | None:
+        """Return what was computed until then; see `partial_record`."""
+        if self._partial is None and self.case is not None and self.solution is not None:
+            self._partial = partial_record(self.case, self.solution)
+        return self._partial
+
+    def __reduce__(self) -> tuple:
+        return type(self), (str(self), None, self.case, self.partial())
+
+
+class SimulationInterrupted(SimulationFailed):
+    """The run was interrupted by the user; what was computed until then is kept."""
+
+
+def simulate_case(
+    case: Case,
+    progress: bool | Callable[[float], None] | None = None,
+    *,
+    mechanism: Mechanism | None = None,
+    every_step: bool = False,
+    **options,
+) -> Solution:
+    """Integrate the mechanism of a case from rest to the end of its record.
+
+    Parameters
+    ----------
+    case : Case
+    progress : bool or callable, optional
+        Show a bar, or ``progress(t)`` with the time reached, s.
+    mechanism : Mechanism, optional
+        Integrate this one; default `case_mechanism` with joints as bearings.
+    every_step : bool
+        Outputs at the integrator's own steps instead of the case's output rate.
+    **options
+        Handed to the integrator.
+
+    Returns
+    -------
+    Solution
+        Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
+        without aliases; see its ``status``.
+    """
+    _load_kernels(case)
+    mechanism = case_mechanism(case) if mechanism is None else mechanism
+    operation, solver = case.operation, case.solver
+    t_end = operation.run_up + operation.settling + operation.duration + edge(case)
+    # up to a whole sample
+    t_end = np.ceil(t_end * case.output_rate - 1e-6) / case.output_rate
+    return simulate(
+        mechanism,
+        t_end,
+        rate=None if every_step else case.output_rate,
+        every_step=every_step,
+        integrator=solver.integrator,
+        formulation=solver.formulation,
+        tol=solver.used_tolerance,
+        rate_scale=operation.top_speed * case.gears.teeth[0],
+        lump=solver.lump,
+        progress=progress,
+        advice=ADVICE,
+        **options,
+    )
+
+
+def case_mechanism(
+    case: Case,
+    bearing: Bearing | str | None = None,
+    *,
+    each: Mapping[str, dict[str, Any]] | None = None,
+    **settings: Any,
+) -> Mechanism:
+    """Return the mechanism of a case.
+
+    Parameters
+    ----------
+    case : Case
+    bearing : Bearing or str, optional
+        Rolling bearing of which two stand on each shaft, see `rolling_rig`, or its designation; default joints.
+    each : mapping of str to dict, optional
+        Settings of single bearings by name, which overrule those of all.
+    **settings
+        Of all four bearings, as of `gearmbs.bearings.RollingBearing`.
+
+    Examples
+    --------
+    >>> from gearmbs.studies import Case
+    >>> sorted(case_mechanism(Case(), "6206/CN").elements)
+    ['bearing 1 a', 'bearing 1 b', 'bearing 2 a', 'bearing 2 b', 'load', 'mesh']
+    >>> spall = {"kind": "spall", "width": "1 mm", "angle": "250 deg"}
+    >>> m = case_mechanism(Case(), "6206/CN", each={"bearing 1 a": {"defects": [spall]}})
+    >>> len(m.elements["bearing 1 a"].defects), len(m.elements["bearing 1 b"].defects)
+    (1, 0)
+    """
+    operation, shafts = case.operation, case.shafts
+    rigged: dict[str, Any] = {
+        "speed": operation.speed,
+        "torque": operation.torque,
+        "run_up": operation.run_up,
+        "start": operation.run_up + operation.settling,
+        "shaft_radius": shafts.radius,
+        "shaft_length": shafts.length,
+        "shaft_density": shafts.density,
+    }
+    if bearing is None:
+        return rig.gear_rig(case.pair(), **rigged)
+    from gearmbs.bearings import Bearing
+    from gearmbs.studies.run.rig import rolling_rig
+
+    one = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
+    return rolling_rig(case.pair(), one, settings=settings, each=each, **rigged)
+
+
+def run_case(
+    case: Case,
+    progress: bool | Callable[[float], None] | None = None,
+    *,
+    mechanism: Mechanism | None = None,
+    variables: Collection[str] | None = None,
+    **settings: Any,
+) -> xr.Dataset:
+    """Simulate a case and return its record: a pure function of the case.
+
+    Parameters
+    ----------
+    case : Case
+    progress : bool or callable, optional
+        Show a bar, or ``progress(t)`` with the time reached, s.
+    mechanism : Mechanism, optional
+        Simulate this one, such as ``case_mechanism(case, "6206/CN")`` with rolling bearings; it has the case's wheels,
+        seats and mesh by their names. Default: the case's own.
+    variables : collection of str, optional
+        Evaluate only these of the variables below, with the same values; default all.
+    **settings
+        None: what else there is to set, such as ``lump``, belongs to the case, and is refused here by its place there.
+
+    Returns
+    -------
+    Dataset
+        ``force_1``, ``force_2``: force of the shaft on each gear at its seat, N, over ``time`` at the output rate;
+        ``acceleration``: force on the driven gear over its mass, decimated to the signal rate, by component;
+        ``gmf_rms``: RMS of the first three mesh harmonics by component, by band-pass and by orders; of a run-up instead
+        ``order_rms``, the same followed by order tracking over ``track_time`` and ``track_speed``, and ``speed`` and
+        ``angle`` of the driver over ``signal_time``; transmission error, contact forces and penetrations; parameters,
+        versions and solver statistics in the attributes, with ``bearings``, ``bearing_defects`` and ``bearings_json``
+        where the mechanism has rolling bearings.
+
+    Raises
+    ------
+    CaseError
+        If the record could not be evaluated; see :func:`gearmbs.studies.case.limits.check_record`. Nothing is
+        simulated.
+    SimulationFailed
+        If the integrator stops early or teeth slip past each other; the exception carries the solution so far.
+    """
+    for name, value in settings.items():
+        raise CaseError(_misplaced(name, value))
+    if not isinstance(case, Case):
+        raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
+    check_record(case)
+    check_variables(variables)
+    _load_kernels(case)
+    recorder = Recorder(case)
+    solution = simulate_case(case, progress, mechanism=mechanism, every_step=True, consumer=recorder.take)
+    if not solution.success:
+        kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
+        known = _partial(case, solution, recorder, mechanism)
+        raise kind(f"case '{case.name}': {solution.message}", solution, case, known)
+    try:
+        dataset = _evaluated(case, solution, recorder.measured(), even=False, variables=variables)
+    except SimulationFailed as failure:
+        known = _partial(case, solution, recorder, mechanism)
+        raise SimulationFailed(str(failure), solution, case, known) from None
+    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    return dataset
+
+
+def _misplaced(name: str, value: Any) -> str:
+    """Return what is said of a setting of a case that is given to a function instead."""
+    for table, section in (("solver", Solver), ("operation", Operation)):
+        if name in section.model_fields:
+            given = f"{table}={{{name!r}: {value!r}}}"
+            return f"{name}: is a setting of the case's {table}; give run_case(case.changed({given}))"
+    return f"{name}: run_case takes a case, progress, mechanism and variables; settings belong to the case"
+
+
+def _load_kernels(case: Case) -> None:
+    """Import the kernels of a run before the first is called, so that all that are missing are compiled at once."""
+    with uncollected():
+        contact_kernels()
+        for name in (*KERNELS, *(LUMPED_KERNELS if case.solver.lump else ())):
+            importlib.import_module(name)
+
+
+def _partial(case: Case, solution: Solution, recorder: Recorder, mechanism: Mechanism | None) -> xr.Dataset | None:
+    if recorder.is_empty:
+        return None
+    dataset = _partial_dataset(case, solution, recorder.everything())
+    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    return dataset
+
+
+def partial_record(case: Case, solution: Solution) -> xr.Dataset:
+    """Return the quantities of a record that need no filter, from the start to where the solution ends.
+
+    Returns
+    -------
+    Dataset
+        As of :func:`run_case` without ``acceleration`` and ``gmf_rms``; status and message in the attributes.
+    """
+    return _partial_dataset(case, solution, measure(case, solution))
+
+
+def _partial_dataset(case: Case, solution: Solution, known: Measured) -> xr.Dataset:
+    forces = {"force_1": known.forces[:, :3], "force_2": known.forces[:, 3:]}
+    dataset = time_series(known.t, {**forces, "transmission_error": known.error, **known.contact})
+    attributes = attributes_of(case, solution)
+    dataset.attrs = {**attributes, "status": solution.status.name, "message": solution.message}
+    return dataset
+
+
+def record(case: Case, solution: Solution, mechanism: Mechanism | None = None) -> xr.Dataset:
+    """Return the record of a simulated case; see :func:`run_case`.
+
+    Forces at uneven times are brought to the output rate through an anti-alias filter, the other series interpolated.
+
+    Parameters
+    ----------
+    case : Case
+    solution : Solution
+    mechanism : Mechanism, optional
+        The one that was simulated, if it was not the case's own: the record then says on which rolling bearings it ran.
+
+    Raises
+    ------
+    SimulationFailed
+        If teeth slipped past each other.
+    """
+    known = measure(case, solution, rows_of_record(case, solution.t))
+    dataset = _evaluated(case, solution, known, even=_is_even(solution.t, case.output_rate))
+    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    return dataset
+
+
+def _evaluated(
+    case: Case, solution: Solution, known: Measured, *, even: bool, variables: Collection[str] | None = None
+) -> xr.Dataset:
+    """Return the record of what was measured, at even times or not; see `record`."""
+    slipped = slip(case, known.t, known.error)
+    if slipped is not None:
+        raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
+    # the first one loads xarray and what xarray loads
+    with uncollected():
+        dataset = evaluate(case, known, even=even, variables=variables)
+    dataset.attrs = attributes_of(case, solution)
+    return dataset
+
+
+def _is_even(t: np.ndarray, rate: float) -> bool:
+    return bool(np.allclose(np.diff(t) * rate, 1.0, atol=1e-6))

@@ -1,0 +1,83 @@
+"""Results of studies as files that appear under their final name only when they are whole, and are found again.
+
+A dataset becomes a file in memory first: the library that writes the format ends the whole program where a disk is
+full. Where a file cannot be written, the record is kept elsewhere, and the message says where.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import xarray as xr
+
+import gearmbs
+from gearmbs.files import KeptElsewhere, check_place, keep, whole_file
+from gearmbs.files import write_whole as write_text
+from gearmbs.studies.case.case import Case
+
+__all__ = [
+    "KeptElsewhere",
+    "check_place",
+    "file_stem",
+    "keep",
+    "keep_dataset",
+    "record_size",
+    "stored_record",
+    "whole_file",
+    "write_dataset",
+    "write_text",
+]
+
+BYTES, COLUMNS, PACKED = 8, 13, 0.6
+"""Of a number, numbers an output time holds, and what compression leaves of them at best."""
+
+
+def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
+    """Write a dataset as compressed NetCDF, as a whole, and return its path.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written or the disk is full; nothing is left behind.
+    """
+    encoding = {
+        name: {"zlib": True, "complevel": 1, "shuffle": True}
+        for name, variable in dataset.data_vars.items()
+        if variable.dtype.kind == "f" and variable.size > 1000
+    }
+    content = dataset.to_netcdf(engine="h5netcdf", encoding=encoding)
+    with whole_file(path) as part:
+        part.write_bytes(content)
+    return Path(path)
+
+
+def keep_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
+    """Write a dataset, and if that is impossible somewhere else where it is possible; see `keep`."""
+    return keep(lambda place: write_dataset(place, dataset), path)
+
+
+def record_size(case: Case) -> float:
+    """Return about how many bytes the record of a case takes as a file, rather less than more."""
+    samples = COLUMNS * case.output_rate + 5.0 * case.signal_rate
+    return PACKED * BYTES * samples * case.operation.duration + 2e4
+
+
+def file_stem(name: str) -> str:
+    """Return the name of a case as part of a file's name."""
+    return name.replace(", ", "_").replace("/", "_")
+
+
+def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
+    """Return the record of exactly this case on joints from a folder, None if there is none made by this version."""
+    path = Path(folder) / f"{file_stem(case.name)}.nc"
+    if not path.is_file():
+        return None
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as found:
+            known = found.attrs.get("case_json"), found.attrs.get("gearmbs_version")
+            # the case says nothing of rolling bearings, so a record on them is not that of the case alone
+            on_joints = "bearings" not in found.attrs
+            return found.load() if on_joints and known == (case.model_dump_json(), gearmbs.__version__) else None
+    except (OSError, ValueError, KeyError):
+        # damaged, or not one of ours: the case is computed again
+        return None

@@ -1,0 +1,243 @@
+"""One setting of a case over many values: resumable, with tables, signals and a figure."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from gearmbs._shown import Shown, html_table
+from gearmbs.signals.files.simulated import record_signal
+from gearmbs.studies.case.case import Case, CaseError, readable
+from gearmbs.studies.case.section import SHOWN, Section, measures_of
+from gearmbs.studies.paper.preset import DEFAULT_COMPONENT
+from gearmbs.studies.run.parallel import run_cases
+from gearmbs.studies.run.store import file_stem, write_dataset, write_text
+
+
+@dataclass(frozen=True)
+class Sweep(Shown):
+    """Records of a case over the values of one setting.
+
+    Attributes
+    ----------
+    case : Case
+        What all have in common.
+    field : str
+        The setting, ``"operation.speed"``.
+    cases : list of Case
+    results : list
+        The record of each case, or its error where errors were kept.
+    """
+
+    case: Case
+    field: str
+    cases: list[Case]
+    results: list[Any]
+
+    @property
+    def records(self) -> list[xr.Dataset]:
+        """The records, without cases that failed."""
+        return [result for result in self.results if isinstance(result, xr.Dataset)]
+
+    @property
+    def failures(self) -> dict[str, Exception]:
+        """The errors of cases that failed, by name."""
+        return {c.name: r for c, r in zip(self.cases, self.results, strict=True) if isinstance(r, Exception)}
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values in tables and figures."""
+        measure = _measure(self.case, self.field)
+        return "1" if measure is None else measure.shown or measure.unit
+
+    @property
+    def values(self) -> np.ndarray:
+        """The setting's values of the records, in `unit`."""
+        numbers = [_value(c, self.field) for c, r in zip(self.cases, self.results, strict=True) if _is_record(r)]
+        return np.array(numbers, dtype=float) / SHOWN.get(self.unit, 1.0)
+
+    def component(self, name: str | None = None) -> str:
+        """Return a force component's name: the one asked for, or the default.
+
+        Raises
+        ------
+        CaseError
+            If the records have no such component.
+        """
+        known = [str(c) for c in self.records[0].component.values] if self.records else [DEFAULT_COMPONENT]
+        wanted = name or DEFAULT_COMPONENT
+        if wanted not in known:
+            raise CaseError(f"component: {wanted!r} is unknown; choose one of {', '.join(known)}")
+        return wanted
+
+    def signals(self, component: str | None = None) -> list[xr.DataArray]:
+        """Return the acceleration of each record as a signal, for everything that signals are good for."""
+        return [record_signal(record, self.component(component)) for record in self.records]
+
+    def table(self, component: str | None = None) -> pd.DataFrame:
+        """Return RMS of the mesh harmonics (m/s^2), the mesh frequency (Hz) and the solver's cost, a row a value."""
+        name = self.component(component)
+        rows = []
+        for record in self.records:
+            row = {"mesh frequency, Hz": record.attrs["mesh_frequency"]}
+            if "gmf_rms" in record:
+                levels = record["gmf_rms"].sel(component=name, way="band")
+                row |= {f"{int(h)} x GMF": float(level) for h, level in zip(levels.harmonic, levels, strict=True)}
+            row["ms a mesh cycle"] = 1e3 * record.attrs["solver_time_per_mesh_cycle"]
+            rows.append(row)
+        index = pd.Index(self.values, name=f"{self.field.rpartition('.')[2]}, {self.unit}")
+        return pd.DataFrame(rows, index=index)
+
+    def waterfall(self, component: str | None = None, **settings: Any) -> xr.DataArray:
+        """Return the spectra of the records over speed; ``settings`` are those of `gearmbs.signals.waterfall`."""
+        from gearmbs.signals import waterfall
+
+        return waterfall(self.signals(component), **settings)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write the records that are there, the table and the figure to a folder; return the paths."""
+        from gearmbs.view import save_figure
+
+        folder = Path(folder)
+        paths = [write_dataset(folder / f"{file_stem(r.attrs['case'])}.nc", r) for r in self.records]
+        table = write_text(folder / "table.csv", self.table().to_csv())
+        return [*paths, table, *save_figure(self.plot(), folder / "figure")]
+
+    def _repr_html_(self) -> str:
+        table = self.table()
+        rows = [(float(value), *row) for value, row in zip(table.index, table.itertuples(index=False), strict=True)]
+        note = "; ".join(f"{name} failed: {error}" for name, error in self.failures.items())
+        return html_table(f"Sweep of {self.field}, {self.case.name}", (table.index.name, *table.columns), rows, note)
+
+    def __str__(self) -> str:
+        return f"{self!r}\n{self.table().to_string(float_format='{:.5g}'.format)}"
+
+    def __repr__(self) -> str:
+        return f"Sweep({self.case.name!r}, {self.field}: {len(self.records)} of {len(self.cases)} records)"
+
+
+def sweep(
+    case: Case,
+    field: str,
+    values: Sequence[Any],
+    *,
+    folder: str | Path | None = None,
+    workers: int | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
+    errors: Literal["raise", "keep"] = "raise",
+) -> Sweep:
+    """Run a case for many values of one of its settings.
+
+    Sampling rates that the case leaves open are those of the value that needs the highest, so that spectra fit
+    together.
+
+    Parameters
+    ----------
+    case : Case
+        Everything else.
+    field : str
+        Section and setting, such as ``"operation.speed"`` or ``"fault.misalignment"``.
+    values : sequence
+        As the setting takes them: texts with units, or numbers in SI.
+    folder : path, optional
+        Records are written there as they come; a call that was interrupted goes on where it stopped.
+    workers, progress, errors
+        See `run_cases`.
+
+    Returns
+    -------
+    Sweep
+        Shows itself as a table and with ``plot()``: over speeds a waterfall of spectra.
+
+    Raises
+    ------
+    CaseError
+        If there is no such setting, or a value is impossible; nothing is simulated then.
+    SimulationFailed
+        If a case fails and errors are not kept.
+
+    Examples
+    --------
+    >>> speeds = [f"{n} rpm" for n in range(300, 3001, 300)]
+    >>> study = sweep(Case(), "operation.speed", speeds, folder="speeds")  # doctest: +SKIP
+    >>> study.plot()  # doctest: +SKIP
+    """
+    cases = cases_of_sweep(case, field, values)
+    results = run_cases(cases, workers=workers, progress=progress, errors=errors, folder=folder)
+    return Sweep(case, field, cases, results)
+
+
+def cases_of_sweep(case: Case, field: str, values: Sequence[Any]) -> list[Case]:
+    """Return the cases of `sweep`; CaseError if there is no such setting, or a value is impossible."""
+    section, _, name = field.partition(".")
+    _check_field(case, field)
+    if isinstance(values, str) or not len(values):
+        raise CaseError(f"values: {values!r}; give a sequence of values of {field}")
+    cases = []
+    for place, value in enumerate(values, 1):
+        plain = value.item() if isinstance(value, np.generic) else value
+        try:
+            one = case.changed(**{section: {name: plain}})
+        except CaseError as error:
+            raise CaseError(f"value {place} of {field}: {str(error).partition(': ')[2] or error}") from None
+        cases.append(one)
+    rates = {"signal_rate": max(c.signal_rate for c in cases), "output_rate": max(c.output_rate for c in cases)}
+    if case.solver.signal_rate is None and case.solver.output_rate is None:
+        cases = [c.changed(solver=rates) for c in cases]
+    cases = [c.changed(name=f"{case.name}, {name} {readable(getattr(c, section), name)}") for c in cases]
+    return cases
+
+
+def between(ends: Sequence[str], count: int, case: Case, field: str) -> list[Any]:
+    """Return values evenly from the first to the second of two texts, in SI."""
+    if len(ends) != 2 or count < 2:
+        raise CaseError(f"values: {', '.join(ends)} with a count of {count}; give two values and a count from 2 up")
+    _check_field(case, field)
+    low, high = (_plain(one, field) for one in cases_of_sweep(case, field, ends))
+    return list(np.linspace(low, high, count))
+
+
+def _plain(case: Case, field: str) -> float:
+    section, _, name = field.partition(".")
+    value = getattr(getattr(case, section), name)
+    if not isinstance(value, (int, float)):
+        raise CaseError(f"{field} is {value!r}, no number: give its values one by one, without a count")
+    return float(value)
+
+
+def _is_record(result: Any) -> bool:
+    return isinstance(result, xr.Dataset)
+
+
+def _check_field(case: Case, field: str) -> None:
+    known = [
+        f"{section}.{name}"
+        for section in type(case).model_fields
+        if isinstance(getattr(case, section), Section)
+        for name in type(getattr(case, section)).model_fields
+    ]
+    if field not in known:
+        near = difflib.get_close_matches(field, known, n=1) or [k for k in known if k.endswith(f".{field}")]
+        hint = f"did you mean {near[0]}?" if near else f"settings are {', '.join(known)}"
+        raise CaseError(f"field: {field!r} is no setting of a case; {hint}")
+
+
+def _measure(case: Case, field: str) -> Any:
+    section, _, name = field.partition(".")
+    return measures_of(type(getattr(case, section))).get(name)
+
+
+def _value(case: Case, field: str) -> float:
+    """Return the value of a setting as a number; of a curve its largest, of two wheels the first."""
+    section, _, name = field.partition(".")
+    value = getattr(getattr(case, section), name)
+    if isinstance(value, tuple):
+        value = max(v for _, v in value) if isinstance(value[0], tuple) else value[0]
+    return float("nan") if isinstance(value, str) or value is None else float(value)

@@ -1,0 +1,1 @@
+"""Studies of drivetrains and planetary sets."""

@@ -1,0 +1,338 @@
+"""Planetary sets from files: a set, how it runs, its faults; simulated to a record of meshes, speeds, a ring sensor."""
+
+from __future__ import annotations
+
+import inspect
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.bearings import Bearing, RollingBearing
+from gearmbs.dae import Status
+from gearmbs.dae.results.solution import Solution
+from gearmbs.gears import ContactLaw, ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.gears.planetary.rig import PinBearing
+from gearmbs.mechanism import Mechanism
+from gearmbs.signals import fixed_sensor
+from gearmbs.studies.case.parts import tooth_fault
+from gearmbs.studies.case.section import CaseError
+from gearmbs.units import to_si
+
+MEMBERS = ("sun", "carrier", "ring")
+OVERSAMPLING = 4
+SECTIONS = ("planetary", "contact", "friction", "operation", "support", "pins", "rim", "fault")
+
+
+@dataclass(frozen=True)
+class PlanetaryRun:
+    """A planetary set and how it runs.
+
+    Attributes
+    ----------
+    gears : PlanetarySet
+    speeds, torques : dict of str to str or float
+        Of the members, as for `planetary_mechanism`.
+    held : str or None
+    run_up, settling, duration : float
+        s; the record begins when the set has settled.
+    rate : float
+        Hz.
+    tolerance : float
+    supports : dict of str to Support
+    pins : Support or callable, optional
+        See `planetary_mechanism` and `rolling_pins`.
+    rim : ElasticRim, optional
+        Lets the ring's rim bend.
+    """
+
+    gears: PlanetarySet
+    speeds: Mapping[str, Any] = field(default_factory=dict)
+    torques: Mapping[str, Any] = field(default_factory=dict)
+    held: str | None = "ring"
+    run_up: float = 0.02
+    settling: float = 0.03
+    duration: float = 0.2
+    rate: float = 12_800.0
+    tolerance: float = 1e-6
+    supports: Mapping[str, Support] = field(default_factory=dict)
+    pins: Support | PinBearing | None = None
+    rim: ElasticRim | None = None
+
+    def mechanism(self) -> Mechanism:
+        """Return the mechanism that is simulated."""
+        return planetary_mechanism(
+            self.gears,
+            speeds=self.speeds,
+            torques=self.torques,
+            held=self.held,
+            run_up=self.run_up,
+            supports=self.supports,
+            pins=self.pins,
+            rim=self.rim,
+        )
+
+
+def load_planetary(path: str | Path) -> PlanetaryRun:
+    """Read a planetary set and its run from a TOML file.
+
+    Raises
+    ------
+    CaseError
+        For whatever is wrong with it; the message names the file's section and key, the value and the remedy.
+    """
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError) as error:
+        raise CaseError(f"{path}: {error}") from None
+    try:
+        return planetary_run(data)
+    except (ValueError, TypeError) as error:
+        raise CaseError(f"{Path(path).name}: {error}") from None
+
+
+def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
+    """Return the set and its run that tables as of a TOML file describe.
+
+    Raises
+    ------
+    ValueError
+        For unknown sections and keys, and values that do not make a set.
+    """
+    unknown = set(data) - set(SECTIONS)
+    if unknown:
+        raise ValueError(f"unknown section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
+    if "planetary" not in data:
+        raise ValueError("section [planetary] is missing; give teeth and module")
+    table = dict(data["planetary"])
+    simple = list(inspect.signature(planetary).parameters)[:-1]
+    others = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "faults")]
+    _check_keys("planetary", table, {*simple, *others} - {"contact", "friction", "pin_errors"} | {"pin_errors"})
+    for name in ("teeth", "module"):
+        if name not in table:
+            raise ValueError(f"planetary.{name} is missing")
+    if "pin_errors" in table:
+        # a planet's number, from 1, and how far its pin is off
+        table["pin_errors"] = {
+            int(k) - 1: tuple(to_si(v, "length", f"planetary.pin_errors.{k}") for v in pair)
+            for k, pair in table["pin_errors"].items()
+        }
+    for name in ("ideal", "teeth", "profile_shifts"):
+        if name in table:
+            table[name] = tuple(table[name])
+    if "contact" in data:
+        table["contact"] = _law(dict(data["contact"]))
+    if "friction" in data:
+        table["friction"] = FlankFriction(**data["friction"])
+    places = []
+    for one in data.get("fault", []):
+        one = dict(one)
+        where = str(one.pop("at", ""))
+        places.append((where, tooth_fault(one)))
+    gears = planetary(faults=places, **table)
+    operation = dict(data.get("operation", {}))
+    allowed = {"speeds", "torques", "held", "run_up", "settling", "duration", "rate", "tolerance"}
+    _check_keys("operation", operation, allowed)
+    if operation.get("held") in ("none", ""):
+        operation["held"] = None
+    for name, kind in (("run_up", "time"), ("settling", "time"), ("duration", "time"), ("rate", "frequency")):
+        if name in operation:
+            operation[name] = to_si(operation[name], kind, f"operation.{name}")
+    supports = {name: Support(**values) for name, values in data.get("support", {}).items()}
+    pins = _pins(dict(data["pins"])) if "pins" in data else None
+    rim = ElasticRim(**data["rim"]) if "rim" in data else None
+    return PlanetaryRun(gears, supports=supports, pins=pins, rim=rim, **operation)
+
+
+def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
+    """Return what puts rolling bearings between pins and planets, for `planetary_mechanism` and `PlanetaryRun`.
+
+    Parameters
+    ----------
+    bearing : Bearing or str
+        A `gearmbs.bearings.Bearing` or its designation. The inner ring is on the pin.
+    **settings
+        Of `gearmbs.bearings.RollingBearing`: defects, damping, ...
+
+    Raises
+    ------
+    BearingError
+        If the designation is unknown.
+    """
+    kind = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
+
+    def make(name: str, pin: Any, bore: Any) -> RollingBearing:
+        return RollingBearing(name, pin, bore, bearing=kind, **settings)
+
+    return make
+
+
+def _pins(table: dict[str, Any]) -> Support | PinBearing:
+    rolling = table.pop("rolling", None)
+    return Support(**table) if rolling is None else rolling_pins(rolling, **table)
+
+
+def _check_keys(section: str, table: Mapping[str, Any], known: set[str]) -> None:
+    for key in table:
+        if key not in known:
+            raise ValueError(f"unknown key {section}.{key}; known ones are {', '.join(sorted(known))}")
+
+
+def _law(table: dict[str, Any]) -> ContactLaw:
+    kind = str(table.pop("law", "impact")).replace("-", "_")
+    makers: dict[str, Callable[..., ContactLaw]] = {
+        "impact": ContactLaw.impact,
+        "hunt_crossley": ContactLaw.hunt_crossley,
+        "linear": ContactLaw.linear,
+    }
+    if kind not in makers:
+        raise ValueError(f"contact.law is {kind!r}; choose {', '.join(makers)}")
+    return makers[kind](**table)
+
+
+def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = None) -> xr.Dataset:
+    """Simulate a planetary set and return its record.
+
+    Parameters
+    ----------
+    run : PlanetaryRun
+    progress : callable, optional
+        Called with the simulated time, s.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``time``: ``speed`` (member), ``force`` of the meshes with the sun and the ring (mesh, planet), ``share``
+        of the load, ``ring_sensor``, the forces on the ring weighted by the planets' path past a sensor at angle 0,
+        ``carrier_angle``, and with a rim that bends ``rim_velocity``, its radial velocity at angle 0.
+        Attributes hold the frequencies of `PlanetarySet.frequencies`.
+
+    Raises
+    ------
+    RuntimeError
+        If the integration does not reach its end.
+    """
+    from scipy.signal import resample_poly
+
+    gears = run.gears
+    mechanism = run.mechanism()
+    begin = run.run_up + run.settling
+    # mesh forces have corners: what the sensor hears is filtered before it is sampled
+    options: dict[str, Any] = {"rate": run.rate * OVERSAMPLING, "tol": run.tolerance}
+    if progress is not None:
+        options["progress"] = progress
+    solution = mechanism.simulate(begin + run.duration, **options)
+    if solution.status is not Status.SUCCESS:
+        raise RuntimeError(f"{gears.name}: {solution.message}")
+    fine = solution.t >= begin - 0.5 / run.rate / OVERSAMPLING
+    kept = np.flatnonzero(fine)[::OVERSAMPLING]
+    planets = range(1, gears.planets + 1)
+    # all bodies and forces at all outputs would need far more memory than what is wanted of them
+    told = _joined([_wanted(run, mechanism, part) for part in solution.parts()])
+    both = {"sun": told["sun"], "ring": told["ring"]}
+    motion: dict[str, Any] = {}
+    if run.rim is not None:
+        told_rate = resample_poly(told["rim"][fine], 1, OVERSAMPLING, padtype="line")
+        motion["rim_velocity"] = (
+            "time",
+            told_rate,
+            {"units": "m/s", "long_name": "radial velocity of the rim at angle 0"},
+        )
+    turned = np.unwrap(told["carrier angle"])
+    heard = fixed_sensor(both["ring"][fine], turned[fine], [float(a) for a in gears.angles or ()])
+    heard = resample_poly(heard, 1, OVERSAMPLING, padtype="line")
+    both = {mesh: force[kept] for mesh, force in both.items()}
+    spin = {m: told[f"{m} speed"][kept] for m in MEMBERS}
+    angle = turned[kept]
+    total = both["sun"].sum(axis=1, keepdims=True)
+    share = np.divide(both["sun"], total, out=np.zeros_like(both["sun"]), where=total != 0)
+    mean = {m: float(w.mean()) for m, w in spin.items()}
+    rates = gears.frequencies(sun=mean["sun"], carrier=mean["carrier"])
+    time = solution.t[kept] - begin
+    # what `analyse` can tell faults of
+    plain = gears.planet_at_ring is None and run.held == "ring"
+    return xr.Dataset(
+        {
+            "speed": (("time", "member"), np.column_stack([spin[m] for m in MEMBERS]), {"units": "rad/s"}),
+            "force": (("time", "mesh", "planet"), np.stack([both["sun"], both["ring"]], axis=1), {"units": "N"}),
+            "share": (("time", "planet"), share, {"units": "1"}),
+            "ring_sensor": ("time", heard, {"units": "N", "long_name": "ring forces past the sensor"}),
+            "carrier_angle": ("time", angle, {"units": "rad"}),
+            **motion,
+        },
+        coords={
+            "time": ("time", time, {"units": "s"}),
+            "member": list(MEMBERS),
+            "mesh": ["sun", "ring"],
+            "planet": list(planets),
+        },
+        attrs={
+            "title": gears.name,
+            "sampling_rate": run.rate,
+            **{f"law_{mesh}": gears.law(mesh) for mesh in ("sun", "ring")},
+            "teeth": [gears.sun.teeth, gears.planet.teeth, gears.ring.teeth],
+            **({"planet_angles": [float(a) for a in gears.angles or ()]} if plain else {}),
+            **{f"frequency_{name}": value for name, value in rates.items()},
+        },
+    )
+
+
+def _wanted(run: PlanetaryRun, mechanism: Mechanism, part: Solution) -> dict[str, np.ndarray]:
+    """Return what the record is made from, of one part of a solution."""
+    planets = range(1, run.gears.planets + 1)
+
+    def forces(form: str) -> np.ndarray:
+        return np.column_stack([part.diagnostics(form.format(k))["normal_force"] for k in planets])
+
+    found = {"sun": forces("sun-planet {}"), "carrier angle": _angle(part, "carrier")}
+    found |= {f"{m} speed": part.angular_velocity(m)[:, 2].copy() for m in MEMBERS}
+    if run.rim is None:
+        return {**found, "ring": forces("planet {}-ring")}
+    told = part.diagnostics("ring meshes")
+    found["ring"] = np.column_stack([told[f"normal_force_{k}"] for k in planets])
+    found["rim"] = mechanism.elements["ring meshes"].rim_motion(part, 0.0)["radial_velocity"].copy()
+    return found
+
+
+def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _angle(solution: Any, body: str) -> np.ndarray:
+    axes = solution.orientation(body)
+    return np.arctan2(axes[:, 1, 0], axes[:, 0, 0])
+
+
+def interaction(run: PlanetaryRun, backlash: Any, progress: Callable[[float], None] | None = None) -> xr.Dataset:
+    """Simulate a set sound and faulty, without and with backlash: what a defect and backlash do together.
+
+    Parameters
+    ----------
+    run : PlanetaryRun
+        With its faults.
+    backlash : float or str
+        Normal backlash of all meshes, m, of the two runs that have it.
+    progress : callable, optional
+
+    Returns
+    -------
+    xarray.Dataset
+        ``deviation``, the standard deviation of the ring sensor in N, over ``fault`` and ``backlash`` (no, yes), and
+        ``excess``: by how much both together exceed the sum of what each does alone.
+    """
+    levels = np.zeros((2, 2))
+    for i, faults in enumerate(((), run.gears.faults)):
+        for j, play in enumerate((0.0, backlash)):
+            gears = replace(run.gears, faults=faults, backlash_sun=play, backlash_ring=play)
+            levels[i, j] = float(run_planetary(replace(run, gears=gears), progress)["ring_sensor"].std())
+    base = levels[0, 0]
+    excess = (levels[1, 1] - base) - (levels[1, 0] - base) - (levels[0, 1] - base)
+    return xr.Dataset(
+        {"deviation": (("fault", "backlash"), levels, {"units": "N"}), "excess": ((), excess, {"units": "N"})},
+        coords={"fault": ["no", "yes"], "backlash": ["no", "yes"]},
+        attrs={"backlash_m": float(to_si(backlash, "length", "backlash"))},
+    )

@@ -1,0 +1,409 @@
+"""Simulate a drivetrain and record it: meshes, bearings, sensors, speeds, harmonics of every mesh."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import gearmbs
+from gearmbs.dae.result import Status
+from gearmbs.dae.results.solution import Solution
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
+from gearmbs.drivetrain.description import Description, read_description
+from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.solve.simulate import simulate
+from gearmbs.signals import even_signal, make_signal
+from gearmbs.signals.files.simulated import holds_speed, placed_lines
+from gearmbs.signals.resampling import MARGIN, monotone_cubic
+from gearmbs.signals.rotation.orders import MIN_PERIODS, harmonic_amplitudes
+from gearmbs.studies.case.parts import tooth_fault
+from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
+from gearmbs.studies.trains.recorder import CONTACT, TrainColumns, TrainRecorder
+from gearmbs.studies.trains.speed import TURN, HeldSpeed, by_angle, held_speeds, speed_attributes, warn_of_speeds
+
+COUNTED = ("pairs_drive", "pairs_back")
+TRACK_MOMENTS = 60
+"""Moments of a run-up at which mesh harmonics are told."""
+TRACK_CYCLES = 16.0
+"""Mesh cycles in a window around each."""
+
+
+def load_train(path: str | Path) -> Description:
+    """Read a drivetrain and its run settings from a TOML file, faults of teeth included.
+
+    Raises
+    ------
+    DrivetrainError
+        One line that names the file, the part, the key, the value and the remedy.
+    """
+    return read_description(path, tooth_fault)
+
+
+def run_train(
+    train: Drivetrain,
+    run: RunSettings | None = None,
+    *,
+    mechanism: Mechanism | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Simulate a drivetrain and return its record.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    run : RunSettings, optional
+    mechanism : Mechanism, optional
+        What is simulated instead of ``train.build()``: that, with parts added or changed.
+    progress : bool or callable, optional
+
+    Returns
+    -------
+    Dataset
+        Over ``time``, evenly sampled behind an anti-alias filter: by ``mesh`` normal force, penetrations, numbers of
+        tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft;
+        by ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal``
+        (the normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the record's mean
+        speed, and NaN where the speed is not steady, see `gearmbs.studies.trains.speed`; of a run-up or coast-down
+        (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the same at 60 moments. The attribute
+        ``remarks`` names speeds that are not the nominal ones.
+
+    Raises
+    ------
+    DrivetrainError
+        If the record is too short for its harmonics.
+    SimulationFailed
+        If the integrator stops early; the exception carries the solution so far.
+
+    Warns
+    -----
+    UserWarning
+        Of meshes that are damped above critical by their contact law, of drives that cannot carry the loads, and of
+        speeds that are not steady or far from the nominal ones.
+    """
+    run = run or RunSettings()
+    warn_of_overdamped_meshes(train)
+    rate = run.output_rate(train)
+    check_record(train, run)
+    begin = train.run_up + run.settling
+    ahead = (MARGIN + 4) / rate
+    m = train.build() if mechanism is None else mechanism
+    recorder = TrainRecorder(train, m, max(0.0, begin - ahead))
+    end = np.ceil((begin + run.duration + ahead) * rate) / rate
+    solution = simulate(
+        m, float(end), every_step=True, consumer=recorder.take, integrator=run.integrator, tol=run.tolerance,
+        rate_scale=train.rate_scale, progress=progress,
+    )  # fmt: skip
+    if not solution.success:
+        kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
+        partial = None if recorder.is_empty else raw_record(train, recorder.joined(), solution)
+        raise kind(f"drivetrain '{train.name}': {solution.message}", solution, None, partial)
+    return evaluated(train, run, recorder.joined(), solution)
+
+
+def check_record(train: Drivetrain, run: RunSettings) -> None:
+    """Refuse a record that cannot hold the harmonics asked for.
+
+    Raises
+    ------
+    DrivetrainError
+    """
+    rate = run.output_rate(train)
+    for mesh in train.meshes:
+        frequency = train.kinematics.mesh_frequency(mesh.name)
+        if frequency == 0.0:
+            continue
+        if run.harmonics * frequency * 1.05 >= rate / 2:
+            raise DrivetrainError(
+                f"run.rate is {rate:g} Hz: {run.harmonics} harmonics of {mesh.label} reach "
+                f"{run.harmonics * frequency:.6g} Hz; give more than {2.1 * run.harmonics * frequency:.6g} Hz, or "
+                "fewer harmonics"
+            )
+        least = (MIN_PERIODS + 1) / frequency
+        if run.duration < least:
+            raise DrivetrainError(
+                f"run.duration is {run.duration:g} s: {mesh.label} has {frequency:.4g} mesh cycles a second; give at "
+                f"least {least:.3g} s"
+            )
+
+
+def raw_record(train: Drivetrain, known: TrainColumns, solution: Solution) -> xr.Dataset:
+    """Return what was computed at the integrator's own steps, for a run that failed."""
+    out = _dataset(train, known.t, known.contact, known.bearing_force, known.sensors, known.speed,
+                   transmission_error(train, known.turned))  # fmt: skip
+    out.attrs = {**attributes(train, None, solution), "status": solution.status.name, "message": solution.message}
+    return out
+
+
+def transmission_error(train: Drivetrain, turned: np.ndarray) -> np.ndarray:
+    """Return the lag of the driven wheel along the line of action, from the touching start, shape (m, meshes), m."""
+    names = [shaft.name for shaft in train.shafts]
+    out = np.empty((turned.shape[0], len(train.meshes)))
+    for k, mesh in enumerate(train.meshes):
+        driver, driven = train.wheels_of(mesh)
+        pair = train.pairs[mesh.name]
+        ratio = pair.geometry.sign * driver.gear.teeth / driven.gear.teeth
+        sense = pair.rotation * pair.geometry.driven.base_radius
+        lag = sense * (turned[:, names.index(driver.shaft)] * ratio + turned[:, names.index(driven.shaft)])
+        start = sense * (train.layout.angles[driver.shaft] * ratio + train.layout.angles[driven.shaft])
+        # full turns, counted from wherever the record begins, are no lag
+        pitch = abs(pair.geometry.driver.base_pitch)
+        out[:, k] = lag - start - pitch * np.round((lag[0] - start) / pitch)
+    return out
+
+
+def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution: Solution) -> xr.Dataset:
+    """Return the record of what was measured at the integrator's own steps; see `run_train`."""
+    rate = run.output_rate(train)
+    start = train.run_up + run.settling
+    stop = start + run.duration
+    m = known.t.size
+    forces = np.concatenate([known.contact[:, :, 0], known.bearing_force.reshape(m, -1), known.sensors], axis=1)
+    channels = [str(k) for k in range(forces.shape[1])]
+    even = even_signal(known.t, forces, rate, start=start, stop=stop, channels=channels)
+    # compiled code takes no arrays that are read only
+    inside = even["time"].values < stop - 0.5 / rate
+    t, values = even["time"].values[inside], even.values[inside]
+    meshes, bearings = len(train.meshes), len(train.bearings)
+    contact = np.empty((t.size, meshes, len(CONTACT)))
+    latest = np.clip(np.searchsorted(known.t, t, side="right") - 1, 0, m - 1)
+    for k in range(meshes):
+        for c, name in enumerate(CONTACT):
+            column = known.contact[:, k, c]
+            contact[:, k, c] = column[latest] if name in COUNTED else np.interp(t, known.t, column)
+        contact[:, k, 0] = values[:, k]
+    error = transmission_error(train, known.turned)
+    error = _interpolated(known.t, error, t)
+    speed = _interpolated(known.t, known.speed, t)
+    bearing = values[:, meshes : meshes + 3 * bearings].reshape(t.size, bearings, 3)
+    out = _dataset(train, t, contact, bearing, values[:, meshes + 3 * bearings :], speed, error)
+    if train.changes_speed:
+        out["mesh_track"] = mesh_tracks(train, run, out, known)
+        out.attrs = attributes(train, run, solution)
+        return out
+    held = held_speeds(train, out)
+    out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop, held)
+    out.attrs = attributes(train, run, solution) | speed_attributes(held)
+    warn_of_speeds(train, held)
+    return out
+
+
+def _interpolated(t: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return columns at other times, by a monotone cubic."""
+    out = np.empty((at.size, values.shape[1]))
+    for k in range(values.shape[1]):
+        out[:, k] = monotone_cubic(t, np.ascontiguousarray(values[:, k]), at)
+    return out
+
+
+def _signals(train: Drivetrain, record: xr.Dataset) -> tuple[list[str], np.ndarray]:
+    """Return names and values, shape (m, signals), of all that mesh harmonics are told of."""
+    names = [f"force of {m.name}" for m in train.meshes]
+    columns = [record["normal_force"].values]
+    for k, bearing in enumerate(train.bearings):
+        names += [f"{bearing.name} {axis}" for axis in "xyz"]
+        columns.append(record["bearing_force"].values[:, k])
+    names += [s.name for s in train.sensors]
+    columns.append(record["measured"].values)
+    return names, np.concatenate(columns, axis=1)
+
+
+def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: TrainColumns) -> xr.DataArray:
+    """Return the RMS of each signal at the harmonics of each mesh along a run-up or coast-down.
+
+    Returns
+    -------
+    DataArray
+        Dims (signal, mesh, harmonic, moment); ``track_time`` (s), ``track_speed`` (of the first drive's shaft, rad/s)
+        and, by mesh, ``track_frequency`` (Hz) of each moment. A moment is the middle of a window of some mesh cycles,
+        see `gearmbs.signals.order_track`; NaN where a mesh does not turn enough for one.
+    """
+    from gearmbs.signals import SignalError, order_track
+
+    names, signals = _signals(train, record)
+    t = record["time"].values
+    moments = np.linspace(t[0], t[-1], TRACK_MOMENTS + 2)[1:-1]
+    orders = np.arange(1, run.harmonics + 1)
+    rms = np.full((len(names), len(train.meshes), run.harmonics, moments.size), np.nan)
+    frequency = np.zeros((len(train.meshes), moments.size))
+    shafts = [shaft.name for shaft in train.shafts]
+    for k, mesh in enumerate(train.meshes):
+        driver, _ = train.wheels_of(mesh)
+        column = shafts.index(driver.shaft)
+        # the angle in mesh cycles: an order is then a harmonic of the mesh
+        angle = xr.DataArray(driver.gear.teeth * np.abs(np.interp(t, known.t, known.turned[:, column])), dims="time",
+                             coords={"time": t}, attrs={"units": "rad"})  # fmt: skip
+        frequency[k] = driver.gear.teeth * np.abs(np.interp(moments, known.t, known.speed[:, column])) / (2.0 * np.pi)
+        signal = make_signal(signals, float(run.output_rate(train)), units="1", channels=names, t0=float(t[0]))
+        try:
+            found = order_track(signal, orders=orders.tolist(), phase=angle, scaling="rms", revolutions=TRACK_CYCLES)
+        except SignalError:
+            continue
+        at = found["time"].values
+        inside = (moments >= at[0]) & (moments <= at[-1])
+        for h in range(run.harmonics):
+            for n in range(len(names)):
+                rms[n, k, h, inside] = np.interp(moments[inside], at, found.values[:, h, n])
+    return xr.DataArray(
+        rms, dims=("signal", "mesh", "harmonic", "moment"),
+        coords={"signal": names, "mesh": [m.name for m in train.meshes], "harmonic": orders,
+                "track_time": ("moment", moments, {"units": "s"}),
+                "track_speed": ("moment", np.abs(np.interp(moments, known.t, known.speed[:, shafts.index(
+                    train.drives[0].shaft)])), {"units": "rad/s"}),
+                "track_frequency": (("mesh", "moment"), frequency, {"units": "Hz"})},
+        attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
+    )  # fmt: skip
+
+
+def _harmonics(
+    train: Drivetrain, run: RunSettings, record: xr.Dataset, rate: float, known: TrainColumns, start: float,
+    stop: float, held: dict[str, HeldSpeed],
+) -> xr.DataArray:  # fmt: skip
+    """Return the RMS of each signal at the harmonics of each mesh, at the mean speed of the record."""
+    names, signals = _signals(train, record)
+    shafts = [shaft.name for shaft in train.shafts]
+    rms = np.full((len(names), len(train.meshes), run.harmonics), np.nan)
+    frequency = np.zeros(len(train.meshes))
+    for k, mesh in enumerate(train.meshes):
+        driver, _ = train.wheels_of(mesh)
+        turned = np.interp([start, stop], known.t, known.turned[:, shafts.index(driver.shaft)])
+        frequency[k] = driver.gear.teeth * abs(turned[1] - turned[0]) / (2.0 * np.pi * (stop - start))
+        orders = np.arange(1, run.harmonics + 1)
+        if not held[mesh.name].is_steady:
+            continue
+        if frequency[k] * (stop - start) >= MIN_PERIODS and orders[-1] * frequency[k] < 0.5 * rate:
+            seen, samples, fundamental = signals, rate, float(frequency[k])
+            if held[mesh.name].smears(fundamental * (stop - start) * orders[-1]):
+                angle = np.interp(record["time"].values, known.t, known.turned[:, shafts.index(driver.shaft)])
+                seen, samples, fundamental = by_angle(signals, driver.gear.teeth * np.abs(angle - angle[0]) / TURN)
+            rms[:, k] = np.abs(harmonic_amplitudes(seen, samples, fundamental, orders)).T / np.sqrt(2.0)
+    return xr.DataArray(
+        rms, dims=("signal", "mesh", "harmonic"),
+        coords={"signal": names, "mesh": [m.name for m in train.meshes], "harmonic": np.arange(1, run.harmonics + 1),
+                "mesh_frequency": ("mesh", frequency, {"units": "Hz"}),
+                "nominal_frequency": ("mesh", [train.kinematics.mesh_frequency(m.name) for m in train.meshes],
+                                      {"units": "Hz"})},
+        attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
+    )  # fmt: skip
+
+
+def _dataset(
+    train: Drivetrain, t: np.ndarray, contact: np.ndarray, bearing: np.ndarray, sensors: np.ndarray, speed: np.ndarray,
+    error: np.ndarray,
+) -> xr.Dataset:  # fmt: skip
+    data: dict[str, Any] = {
+        name: (("time", "mesh"), contact[:, :, c], {"units": unit, "long_name": name.replace("_", " ")})
+        for c, (name, unit) in enumerate(CONTACT.items())
+    }
+    data["transmission_error"] = (("time", "mesh"), error, {"units": "m", "long_name": "lag of the driven wheel"})
+    data["bearing_force"] = (
+        ("time", "bearing", "xyz"), bearing, {"units": "N", "long_name": "force of the seat on the shaft"}
+    )  # fmt: skip
+    data["measured"] = (("time", "sensor"), sensors, {"long_name": "what the sensors measure"})
+    data["speed"] = (("time", "shaft"), speed, {"units": "rad/s", "long_name": "speed about the shaft's axis"})
+    coords = {
+        "time": ("time", t, {"units": "s"}),
+        "mesh": [m.name for m in train.meshes],
+        "bearing": [b.name for b in train.bearings],
+        "xyz": ["x", "y", "z"],
+        "sensor": [s.name for s in train.sensors],
+        "shaft": [s.name for s in train.shafts],
+        "sensor_units": ("sensor", [s.unit for s in train.sensors]),
+    }
+    return xr.Dataset(data, coords=coords)
+
+
+def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -> dict[str, Any]:
+    """Return what a record says of its drivetrain, settings and solver."""
+    out: dict[str, Any] = {
+        "title": f"drivetrain: {train.name}",
+        "train_json": json.dumps(plain({name: part for name, part in train.parts.items()})),
+        "gearmbs_version": gearmbs.__version__,
+    }
+    if train.meshes:
+        out["mesh_laws"] = json.dumps({
+            name: {"law": m.law, "stiffness": m.stiffness, "damping": m.damping, "damping_ratio": m.damping_ratio,
+                   "frequency": m.frequency}
+            for name, m in train.mesh_dynamics.items()
+        })  # fmt: skip
+        out["known_lines"] = json.dumps(train.kinematics.known_lines())
+        given = train.kinematics.for_analysis(train.meshes[0])
+        out |= {"mesh_speed": given["speed"], "mesh_speed_units": "rad/s", "mesh_teeth": list(given["teeth"])}  # type: ignore[call-overload]
+    if run is not None:
+        out |= {f"run_{f.name}": v for f in fields(run) if (v := getattr(run, f.name)) is not None}
+        out["run_rate"] = run.output_rate(train)
+    out.update({f"solver_{key}": value for key, value in solution.stats.as_dict().items()})
+    cycles = float(solution.t[-1]) * sum(train.kinematics.mesh_frequency(m.name) for m in train.meshes)
+    if cycles > 0.0 and "solver_wall_time" in out:
+        out["solver_time_per_mesh_cycle"] = out["solver_wall_time"] / cycles
+    return out
+
+
+def plain(value: Any) -> Any:
+    """Return a description made of tables, lists, numbers and texts."""
+    if is_dataclass(value) and not isinstance(value, type):
+        shown = {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.init}
+        return {"kind": getattr(value, "kind", type(value).__name__), **shown}
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value if isinstance(value, str | int | float | bool) or value is None else repr(value)
+
+
+def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> xr.DataArray:
+    """Return one channel of a drivetrain's record as a signal with speed and teeth, for `analyse` and its like.
+
+    Where the speed of the record is not steady the signal has neither a speed nor known lines.
+
+    Parameters
+    ----------
+    record : Dataset
+        From `run_train`, or its file.
+    channel : str
+        A sensor; "force of <mesh>"; or "<bearing> x", "<bearing> y", "<bearing> z".
+    mesh : str, optional
+        Whose driver and teeth the signal names; default the first.
+
+    Raises
+    ------
+    DrivetrainError
+        For an unknown channel or mesh.
+    """
+    names = [str(s) for s in record.sensor.values]
+    bearings = {f"{b} {axis}": (str(b), axis) for b in record.bearing.values for axis in "xyz"}
+    meshes = [str(m) for m in record.mesh.values]
+    forces = {f"force of {m}": m for m in meshes}
+    unit = "N"
+    if channel in names:
+        values = record["measured"].sel(sensor=channel)
+        unit = str(record.sensor_units.sel(sensor=channel).item())
+    elif channel in forces:
+        values = record["normal_force"].sel(mesh=forces[channel])
+    elif channel in bearings:
+        bearing, axis = bearings[channel]
+        values = record["bearing_force"].sel(bearing=bearing, xyz=axis)
+    else:
+        known = ", ".join([*names, *forces, *bearings])
+        raise DrivetrainError(f"record: there is no channel '{channel}'; known are {known}")
+    mesh = mesh or (meshes[0] if meshes else None)
+    if mesh not in meshes:
+        raise DrivetrainError(f"record: there is no mesh '{mesh}'; known are {', '.join(meshes)}")
+    parts = json.loads(record.attrs["train_json"])
+    wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
+    steady = holds_speed(record)
+    speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean())) if steady else None
+    lines = {"known_lines": placed_lines(record)} if steady else {}
+    return make_signal(
+        values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],
+        t0=float(record.time.values[0]), speed=speed, teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
+        attrs={"source": record.attrs["title"], **lines},
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Figures of signals, maps, reports and bodies."""

@@ -1,0 +1,1 @@
+"""Wheels and bodies as profiles, meshes and solids, and their files."""

@@ -1,0 +1,1 @@
+"""Scenes in space, their pages and pictures."""
