@@ -100,8 +100,8 @@ def test_a_program_says_that_it_compiles(tmp_path):
     assert "failed" not in first.stderr
     assert first.stdout == "True\n"
     kept = {path.name.partition("-")[0] for path in tmp_path.rglob("*.entry")}
-    assert "dae.equations.rotation.rotation_matrix" in kept
-    assert all(name.startswith("dae.equations.rotation.") for name in kept)
+    assert "dae.equations.kinematics.rotation.rotation_matrix" in kept
+    assert all(name.startswith("dae.equations.kinematics.rotation.") for name in kept)
     second = run(tmp_path, "-c", PROGRAM)
     assert second.stderr == ""
     assert second.stdout == "True\n"
@@ -148,7 +148,7 @@ def test_what_a_run_needs_is_known_at_once(program):
 
 def test_looking_for_calls_imports_nothing():
     """Packages whose names are imported late stay as they are: their kernels would be compiled, too."""
-    code = "import sys; from gearmbs.kernels.calls import entries, kernels; import gearmbs.mechanism.simulate; "
+    code = "import sys; from gearmbs.kernels.calls import entries, kernels; import gearmbs.mechanism.solve.simulate; "
     code += "loaded = [n for n in sys.modules if n.startswith('gearmbs.')]; entries(kernels(loaded), loaded); "
     code += "print(*({n for n in sys.modules if n.startswith('gearmbs.')} - {*loaded}))"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

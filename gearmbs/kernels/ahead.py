@@ -96,7 +96,7 @@ def compile_missing(kernel: Kernel) -> bool:
     from gearmbs.kernels.calls import entries, kernels
 
     package = kernel.__module__.partition(".")[0]
-    if _failures or HELPER in os.environ or package != __package__ or not cache.writable(package):
+    if _failures or HELPER in os.environ or package != __package__.partition(".")[0] or not cache.writable(package):
         return False
     loaded = [name for name in list(sys.modules) if name.partition(".")[0] == package]
     # who needs one late kernel needs others
@@ -287,7 +287,7 @@ def _started() -> subprocess.Popen:
     """Start a helper process that imports and keeps what this process would, wherever it was started."""
     from numba.core import config
 
-    root = str(Path(__file__).resolve().parent.parent)
+    root = str(Path(__file__).resolve().parents[2])
     paths = [os.path.abspath(path) for path in sys.path if path]
     if root not in map(os.path.realpath, paths):
         # this package was found in the current folder

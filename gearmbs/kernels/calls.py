@@ -20,7 +20,9 @@ from typing import Any
 
 from gearmbs.kernels.jit import Kernel
 
-MAKES_KERNELS = re.compile(r"^(?:from [\w.]*jit import|import numba|from numba import .*\bnjit\b)", re.M)
+MAKES_KERNELS = re.compile(
+    r"^(?:from [\w.]*(?:jit|kernels\.records) import|import numba|from numba import .*\bnjit\b)", re.M
+)
 MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "late")}
 """Modules that make kernels and hold none."""
 

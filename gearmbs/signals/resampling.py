@@ -11,47 +11,11 @@ from numba import float64, int64, void
 from gearmbs.kernels.jit import njit
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import decimation_taps
+from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.signals.signal.signal import check_rate, make_signal
 
 if TYPE_CHECKING:
     import xarray as xr
-
-# Piecewise cubic through given values that rises and falls where they do, and not between.
-#
-# As `scipy.interpolate.PchipInterpolator`, whose import takes longer than many a simulation.
-
-
-def monotone_cubic(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return the monotone piecewise cubic Hermite interpolant of some values.
-
-    Slopes inside are harmonic means of the neighbouring differences, weighted by the intervals, and zero where the
-    differences change sign; at the ends they are of second order, limited to keep the shape.
-
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        Increasing, two or more.
-    y : ndarray, shape (n,) or (n, columns)
-    at : ndarray, shape (m,)
-        Where to evaluate, within ``x``; fastest if it increases.
-
-    Returns
-    -------
-    ndarray, shape (m,) or (m, columns)
-        Each column on end in memory.
-
-    References
-    ----------
-    .. [1] F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM J.
-       Sci. Stat. Comput. 5, 1984.
-    """
-
-    x, at = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(at, dtype=float)
-    columns = np.ascontiguousarray(y, dtype=float).reshape(x.size, -1)
-    out = np.empty((columns.shape[1], at.size))
-    interpolate(x, columns, at, out)
-    return out.T.reshape(at.shape + y.shape[1:])
-
 
 FINE_RATE = 400e3
 """Rate, Hz, that the values are interpolated to at least before the anti-alias filter."""
@@ -198,7 +162,7 @@ def products(values, weights, every, out):
         out[k] = total
 
 
-# The kernel of `gearmbs.signals.resampling`: in one pass, with no table of coefficients.
+# The kernel of `gearmbs.signals.monotone_cubic`: in one pass, with no table of coefficients.
 
 
 _MAT = float64[:, ::1]

@@ -82,7 +82,7 @@ def case_plot(case: Case, *, title: str | None = None) -> Figure:
 
 
 def _speed(case: Case, t: np.ndarray) -> np.ndarray:
-    from gearmbs.studies.case.parts import drive_angle
+    from gearmbs.studies.case.drive import drive_angle
 
     o = case.operation
     angle = drive_angle(o.speed, o.run_up, o.run_up + o.settling)
@@ -90,7 +90,7 @@ def _speed(case: Case, t: np.ndarray) -> np.ndarray:
 
 
 def _torque(case: Case, t: np.ndarray) -> np.ndarray:
-    from gearmbs.studies.case.parts import load_torque
+    from gearmbs.studies.case.drive import load_torque
 
     o = case.operation
     load = load_torque(o.torque, o.run_up, o.run_up + o.settling)

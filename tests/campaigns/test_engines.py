@@ -14,7 +14,7 @@ import time
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError
-from gearmbs.campaigns.case_runner import TimeLimitReached, limited
+from gearmbs.campaigns.limits import TimeLimitReached, limited
 from gearmbs.campaigns.runners.dask import batch_cluster, job_script
 from tests.campaigns.support import digest, small
 

@@ -126,7 +126,7 @@ def test_sweep_writes_records_table_and_figure_and_is_taken_up(tmp_path):
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert files == ["figure.png", "figure.svg", "one_speed 1500 rpm.nc", "one_speed 900 rpm.nc", "table.csv"]
     stamp = (tmp_path / "out" / "one_speed 900 rpm.nc").stat().st_mtime_ns
-    record = gm.signals.simulated.read_any(tmp_path / "out" / "one_speed 900 rpm.nc")
+    record = gm.signals.files.simulated.read_any(tmp_path / "out" / "one_speed 900 rpm.nc")
     assert record.attrs["speed"] == pytest.approx(30 * np.pi)
     again = invoked("sweep", case, "operation.speed", "900 rpm", "--workers", 1, "--out", tmp_path / "out")
     assert again.exit_code == 0, again.output

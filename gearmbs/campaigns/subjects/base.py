@@ -212,7 +212,7 @@ def check_keep(subject: Subject, keep: Sequence[str]) -> None:
 
 def tooth_fault_unit(table: Mapping[str, Any], key: str) -> str:
     """Return the SI unit of a parameter of a fault of a tooth, given as a table with its kind."""
-    from gearmbs.studies.case.parts import kinds, tooth_fault
+    from gearmbs.studies.case.tooth_faults import kinds, tooth_fault
 
     label = tooth_fault(str(table.get("kind"))).label
     dimension = kinds()[label].units.get(key, "dimensionless")

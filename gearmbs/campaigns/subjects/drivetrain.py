@@ -27,7 +27,7 @@ class DrivetrainSubject(TablesSubject):
     def made(self, tables: dict[str, Any]) -> Any:
         """Return the drivetrain and its run."""
         from gearmbs.drivetrain.description import make_description
-        from gearmbs.studies.case.parts import tooth_fault
+        from gearmbs.studies.case.tooth_faults import tooth_fault
         from gearmbs.studies.trains.trains import check_record
 
         found = make_description(tables, str(tables.get("name", "drivetrain")), tooth_fault)

@@ -147,7 +147,7 @@ class UserFunction:
 
 def place_of(error: BaseException) -> str:
     """Return file and line of the user's code in which an error arose, "" if it arose in none."""
-    own = str(Path(__file__).parents[1])
+    own = str(Path(__file__).parents[2])
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith((own, "<"))]
     return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else ""
 

@@ -14,7 +14,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
-from gearmbs.signals.resampling import monotone_cubic
+from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.signals.rotation.pulses import described, mended_count, pulse_faults
 from gearmbs.signals.signal.any_data import takes_data
 from gearmbs.signals.signal.given import speed_curve

@@ -188,7 +188,7 @@ class Operation(Section):
 
 
 def _fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
-    from gearmbs.studies.case.parts import fault_tables
+    from gearmbs.studies.case.tooth_faults import fault_tables
 
     return fault_tables(value) if value else ()
 
@@ -352,7 +352,7 @@ class Case(Section, Shown):
                 )
         sound = self._pair(())
         if f.teeth:
-            from gearmbs.studies.case.parts import check_each_fault
+            from gearmbs.studies.case.tooth_faults import check_each_fault
 
             try:
                 check_each_fault(sound, f.teeth)
@@ -385,7 +385,7 @@ class Case(Section, Shown):
 
     def pair(self) -> GearPair:
         """Return the gear pair of the case."""
-        from gearmbs.studies.case.parts import tooth_fault
+        from gearmbs.studies.case.tooth_faults import tooth_fault
 
         key = self._sections_key
         if key not in self._pairs:
@@ -452,7 +452,7 @@ class Case(Section, Shown):
         operation = self.operation
         if operation.speed_curve is None:
             return operation.top_speed * operation.duration
-        from gearmbs.studies.case.parts import drive_angle
+        from gearmbs.studies.case.drive import drive_angle
 
         start = operation.run_up + operation.settling
         angle = drive_angle(operation.speed, operation.run_up, start)

@@ -11,7 +11,7 @@ from gearmbs.bearings import Bearing, BearingError, RollingBearing, add_bearing
 from gearmbs.bearings.errors import require
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
-from gearmbs.studies.case.parts import drive_angle, load_torque
+from gearmbs.studies.case.drive import drive_angle, load_torque
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:

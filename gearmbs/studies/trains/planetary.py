@@ -19,8 +19,8 @@ from gearmbs.gears import ContactLaw, ElasticRim, FlankFriction, PlanetarySet, S
 from gearmbs.gears.planetary.rig import PinBearing
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals import fixed_sensor
-from gearmbs.studies.case.parts import tooth_fault
 from gearmbs.studies.case.section import CaseError
+from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.units import to_si
 
 MEMBERS = ("sun", "carrier", "ring")

@@ -21,9 +21,10 @@ from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.files.simulated import holds_speed, placed_lines
-from gearmbs.signals.resampling import MARGIN, monotone_cubic
+from gearmbs.signals.monotone_cubic import monotone_cubic
+from gearmbs.signals.resampling import MARGIN
 from gearmbs.signals.rotation.orders import MIN_PERIODS, harmonic_amplitudes
-from gearmbs.studies.case.parts import tooth_fault
+from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
 from gearmbs.studies.trains.recorder import CONTACT, TrainColumns, TrainRecorder
 from gearmbs.studies.trains.speed import TURN, HeldSpeed, by_angle, held_speeds, speed_attributes, warn_of_speeds
