@@ -175,5 +175,6 @@ def serve(path: str | Path) -> None:
 
 if __name__ == "__main__":
     # the classes of the answers must be those of the module, not of the script
+    from gearmbs.campaigns.case_runner import serve as serve_here
 
-    serve(sys.argv[1])
+    serve_here(sys.argv[1])

@@ -32,7 +32,7 @@ def monotone_cubic(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
     .. [1] F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM J.
        Sci. Stat. Comput. 5, 1984.
     """
-    from gearmbs.signals.resampling import interpolate
+    from gearmbs.signals.piecewise_cubic import interpolate
 
     x, at = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(at, dtype=float)
     columns = np.ascontiguousarray(y, dtype=float).reshape(x.size, -1)

@@ -29,13 +29,13 @@ if TYPE_CHECKING:
         spectrogram_plot,
         waterfall_plot,
     )
-    from gearmbs.view.figures.maps import (
+    from gearmbs.view.figures.curves import (
         contact_pattern_plot,
         load_sharing_plot,
-        sensitivity_map,
         stiffness_plot,
         transmission_error_plot,
     )
+    from gearmbs.view.figures.maps import sensitivity_map
     from gearmbs.view.figures.records import average_plot, named_lines_plot, order_plot, spectrum_plot, time_plot
     from gearmbs.view.figures.reports import analysis_figures, bearing_plot, comparison_figures, report_plot
     from gearmbs.view.figures.style import COLOURS, comparison_bars, gmf_bars, save_figure
@@ -140,14 +140,14 @@ late(
         "changing_speed_figures": ".figures.changing_speed",
         "comparison_bars": ".figures.style",
         "comparison_figures": ".figures.reports",
-        "contact_pattern_plot": ".figures.maps",
+        "contact_pattern_plot": ".figures.curves",
         "gear_outline": ".geometry.profile",
         "gear_scene": ".scenes.scenes",
         "gear_solid": ".geometry.solid",
         "gmf_bars": ".figures.style",
         "planetary_plot": ".scenes.scenes",
         "planetary_scene": ".scenes.scenes",
-        "load_sharing_plot": ".figures.maps",
+        "load_sharing_plot": ".figures.curves",
         "mechanism_plot": ".figures.transverse",
         "mechanism_scene": ".scenes.scenes",
         "mesh_animation": ".figures.animation",
@@ -168,9 +168,9 @@ late(
         "spectrogram_plot": ".figures.changing_speed",
         "spectrum_plot": ".figures.records",
         "static_motion": ".scenes.motion",
-        "stiffness_plot": ".figures.maps",
+        "stiffness_plot": ".figures.curves",
         "time_plot": ".figures.records",
-        "transmission_error_plot": ".figures.maps",
+        "transmission_error_plot": ".figures.curves",
         "waterfall_plot": ".figures.changing_speed",
         "wheel_plot": ".figures.transverse",
         "write_dxf": ".geometry.flat",

@@ -14,7 +14,7 @@ from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.dae.analyses.statics import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.expressions import eval_gradient
-from gearmbs.dae.equations.expressions.measures import KIN_A, KIN_R
+from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.equations.kinematics.update import AXES as ANGLE_NAMES

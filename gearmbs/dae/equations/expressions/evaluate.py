@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.marker_motion import KIN_V, KIN_W
 from gearmbs.dae.equations.expressions.measure_derivatives import (
     cosine_gradient,
     euler_parameter_gradient,
@@ -20,8 +21,6 @@ from gearmbs.dae.equations.expressions.measure_derivatives import (
 )
 from gearmbs.dae.equations.expressions.measures import (
     AXIS,
-    KIN_V,
-    KIN_W,
     VECTOR,
     euler_parameter,
     marker_axis,

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.marker_motion import KIN_AXES, KIN_W
 from gearmbs.dae.equations.expressions.measures import (
     ARM_I,
     ARM_J,
     AXIS,
-    KIN_AXES,
-    KIN_W,
     OTHER,
     VECTOR,
     euler_parameter,
