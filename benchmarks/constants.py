@@ -107,7 +107,8 @@ def _robertson() -> tuple[Any, float]:
     from gearmbs.dae.solve import solve_dae
 
     p, rtol = robertson(), 1e-6
-    result = solve_dae(p.fun, (0.0, p.t_end), p.y0, rtol=rtol, atol=rtol * p.atol, t_eval=[0.0, p.t_end])
+    span = 0.0, p.t_end
+    result = solve_dae(p.fun, span, p.y0, rtol=rtol, atol=rtol * p.atol, t_eval=np.array(span))
     return result, p.error(result.y[-1])
 
 
@@ -160,7 +161,7 @@ def _bouncing() -> tuple[Any, float]:
 
     span, start = (0.0, 0.6), np.array([0.0, 0.05, 0.0, 0.0])
     exact = solve_ivp(rates, span, start, method="DOP853", rtol=1e-12, atol=1e-13, max_step=1e-3).y[:, -1]
-    result = solve_dae(_ball, span, start, rtol=1e-7, atol=1e-8, t_eval=span)
+    result = solve_dae(_ball, span, start, rtol=1e-7, atol=1e-8, t_eval=np.array(span))
     return result, float(np.abs(result.y[-1] - exact).max())
 
 
@@ -185,7 +186,7 @@ def _jumping() -> tuple[Any, float]:
     """Restarts at jumps, an algebraic unknown that varies between steps, an event, a start off by 5e-7."""
     from gearmbs.dae.solve import solve_dae
 
-    times, start = np.linspace(0.0, 1.0, 41), [0.2, 0.1, 5e-7]
+    times, start = np.linspace(0.0, 1.0, 41), np.array([0.2, 0.1, 5e-7])
     result = solve_dae(_filter, (0.0, 1.0), start, rtol=1e-6, atol=1e-8, t_eval=times, events=_half, breakpoints=JUMPS)
     exact = np.empty((times.size, 3))
     x, z, at = start[0], start[1], 0.0
