@@ -44,6 +44,7 @@ TAPERS = {
 ANGLES = {"C": 15.0, "AC": 25.0, "A": 30.0, "B": 40.0}
 """Contact angle of angular contact bearings by the letter behind the digits, degrees."""
 FOUR_POINTS = 35.0
+"""Contact angle of four-point contact bearings QJ, degrees."""
 CYLINDRICAL = re.compile(r"^(?:NU|NJ|NUP|N)\s*([23])(\d\d)(?!\d)")
 TAPERED = re.compile(r"^30([23])(\d\d)(?!\d)")
 ANGULAR = re.compile(r"^7([23])(\d\d)\s*-?\s*(AC|[ABC])(?![A-Z])")
@@ -109,6 +110,7 @@ def dimension_series(designation: str) -> tuple[str, str, str] | None:
 
 
 INCH = 25.4e-3
+"""Metres."""
 
 OUTSIDE = {
     "60": {8: 22, 9: 24, 10: 26, 12: 28, 15: 32, 17: 35, 20: 42, 25: 47, 30: 55, 35: 62, 40: 68, 45: 75, 50: 80,

@@ -173,6 +173,7 @@ DEPTH = 1e-6
 LANDS = 0.4
 """Where a ring sits on its seat: so many widths to either side of its middle."""
 STEEL = 7800.0
+"""Density of a ring, kg/m^3."""
 GROOVE = 0.35
 """Middle radius of a ring's raceway from the pitch radius, in ball diameters."""
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from gearmbs.bearings.geometry import Bearing
 
 STANDARD_GROOVE = 0.52
+"""Radius of the inner ring's groove, in ball diameters, that ISO 281 and ISO 76 state their ratings for."""
 PRESSURE = 4.2e9
 """Of the static rating of ball bearings, Pa."""
 REDUCTION = {"deep groove": 0.95, "angular contact": 0.95, "four point": 0.95, "cylindrical roller": 0.83,

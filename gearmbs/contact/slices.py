@@ -374,6 +374,7 @@ def end_force(law, strip, i, width, u, sign, limit, pair, sums, want):
 
 
 LEAST_VOLUME = 1e-300
+"""Least measure of an overlap that its centroid is divided by: below it is nothing, or what is no normal double."""
 
 
 @kernel

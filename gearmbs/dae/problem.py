@@ -13,6 +13,10 @@ from typing import Any
 import numpy as np
 from numba import types
 
+EPS = 2.220446049250313e-16
+"""Distance from one to the next larger double, 2^-52."""
+
+
 # Errors a modeller can act on.
 
 

@@ -18,6 +18,7 @@ from gearmbs.progress import time_bar
 
 IDA_DEFAULT_OUTPUTS = 201
 DEFAULT_RTOL = 1e-6
+"""Relative tolerance where none is given: six digits, a local error far below that of most data."""
 OF_EQUATIONS = ("error_mask", "differential", "jac", "jac_sparsity", "p", "scale", "names")
 """Arguments of `as_problem` that `solve_dae` hands on."""
 

@@ -18,8 +18,12 @@ from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.pointers import PythonCallback
 
 RATES_STEP = 1e-12
+"""Step of implicit Euler over which rates are solved for, as part of the span: so short that no rate moves its unknown
+by a tolerance, and long enough for y to change by more than rounding where rates are of the order of y by the span."""
 RATES_SWEEPS = 3
 RATES_RATIO = 100.0
+"""By which that step is shortened where an unknown still moves by a tolerance; in all to some 1e-34 of the span. The
+move of a rate shrinks on the way, a jump does not."""
 RATES_ROUNDS = 12
 RATES_ITERATIONS = 100
 """From rates a million times too large Newton's method takes ln 1e6/ln(p/(p - 1)) of them with a power p: 62 with 5."""

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 
 
 MM = 1e3
+"""Millimetres a metre, for messages."""
 COAXIAL = 1e-6
+"""Distance, m, up to which axes are one and faces touch without overlap: far below any gap of a drawing."""
 HELD = 1e-9
 """Part of the largest singular value below which a motion counts as free."""
 
@@ -245,6 +247,7 @@ def _wheels_of_one_shaft(train: Drivetrain, shaft: Shaft) -> None:
 
 
 SAME_POINT = 1e-9
+"""Distance, m, up to which a point is a bearing's seat: rounding of places computed in two ways."""
 
 
 def build(train: Drivetrain) -> Mechanism:

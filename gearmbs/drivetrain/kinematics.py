@@ -249,6 +249,7 @@ class KinematicTable:
 
 
 RPM = 9.549296585513721
+"""Revolutions a minute in 1 rad/s, 30/pi."""
 SAME_SPEED = 1e-9
 """Relative difference of speeds that are one."""
 BALANCED = 0.99

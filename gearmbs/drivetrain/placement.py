@@ -24,6 +24,7 @@ CLOSED = 1e-6
 """Largest distance between what two ways round a closed chain give, m, and angle, rad."""
 ANGLE_STEPS = 30
 MM = 1e3
+"""Millimetres a metre, for messages."""
 
 
 class Seat(NamedTuple):

@@ -437,6 +437,7 @@ class FlankMap(Fault):
 
 
 MICRON = 1e-6
+"""Metres: ISO 1328-1 states its tolerances in micrometres."""
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ SAINSOT = {
     "Q": (-6.2042e-5, 9.0889e-3, -4.0964e-4, 7.8297e-3, -0.1472, 0.6904),
 }
 ISO_STEEL_MODULUS = 206e9
+"""Young's modulus, Pa, that the formulae of ISO 6336-1 are stated for."""
 SPECIFIC_LOAD = 3e5
 """Load per face width at which the flattening is taken where none is given, N/m: ISO 6336-1 has c'_th at 300 N/mm."""
 FLATTEST = 1e-3

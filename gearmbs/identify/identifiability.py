@@ -155,6 +155,8 @@ class Identifiability:
 
 
 STRETCH = 2.0
+"""Largest stretch a of a move, whose density is 1/sqrt(g) between 1/a and a: the value of J. Goodman, J. Weare,
+"Ensemble samplers with affine invariance", Comm. Appl. Math. Comput. Sci. 5 (2010) 65-80."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gearmbs.identify.parameters import Scale
 
 LEVEL = 0.95
+"""Probability of intervals where none is given, the customary one."""
 DOUBTFUL = 0.01
 """Probability of residuals as large as these below which the noise given cannot be all."""
 

@@ -33,6 +33,7 @@ KEPT_FILES = {".entry", ".part", ".lock", ".tmp"}
 """What is in a folder of kernels: machine code, LLVM code, and what processes that were killed may have left."""
 
 PRUNED_AFTER = 30.0
+"""Days without use after which `--prune` deletes a kernel: a month, so that work on a branch survives a holiday."""
 
 SILENT = 5.0
 """Seconds of compiling in a program before it tells how far it is, and between two such lines."""

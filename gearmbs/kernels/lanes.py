@@ -255,6 +255,7 @@ QUARTERS = 2.0 / np.pi
 HALF_PI = 1.5707963267341256
 """First 33 bits of pi/2: times an n below 2^20 it has no rounding."""
 HALF_PI_REST = 6.077100506506192e-11
+"""What is left of pi/2, to a double: `pio2_1t` of fdlibm, as `HALF_PI` is its `pio2_1`."""
 
 SINE = (-1.0 / 6.0, 0.008333333333330936, -0.00019841269836740532, 2.7557316093198404e-06,
         -2.5051129896450185e-08, 1.5917988979397432e-10)  # fmt: skip

@@ -15,7 +15,10 @@ from gearmbs.signals.signal.signal import DIMENSIONS, like, rate_of, unit_dimens
 Dimension = Literal["displacement", "velocity", "acceleration"]
 DERIVATIVE = {"displacement": 0, "velocity": 1, "acceleration": 2}
 TAPER = 0.25
+"""Part of the edge's frequency over which the window falls at either end of the band."""
 EDGE_PERIODS = 6.0
+"""Periods of the lowest frequency that are lost at either end: the fall there, `TAPER` wide, rings over 1.5 reciprocal
+widths."""
 
 
 def convert(

@@ -21,6 +21,7 @@ from gearmbs.signals.signal.signal import check_rate, common_unit, like, make_si
 
 XYZ = ("x", "y", "z")
 DECAY_TIMES = 10.0
+"""Time constants of a mode after which its start is forgotten: e^-10 is 4.5e-5, 87 dB."""
 
 
 @dataclass(frozen=True)

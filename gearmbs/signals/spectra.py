@@ -165,6 +165,7 @@ def spectral_unit(unit: str, scaling: str, axis: str = "Hz") -> str:
 
 
 FLOOR = 1e-12
+"""Part of a segment's largest power below which logarithms are cut off: 120 dB, as in a recorder of 20 bits."""
 
 
 @takes_data(segment="time")

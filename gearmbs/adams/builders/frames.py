@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from gearmbs.adams.builders.builder import Builder
 
 PARALLEL = 1e-10
+"""Sine of the angle between the axis and the second direction below which the two give no plane, as rounding of
+points."""
 
 
 def axes_from_points(

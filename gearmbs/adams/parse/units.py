@@ -6,8 +6,11 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism.language.syntax import Units
 
 INCH = 0.0254
+"""Metres; exact by definition, the international yard and pound agreement of 1959."""
 POUND = 0.45359237
+"""Kilograms; exact by the same agreement."""
 STANDARD_GRAVITY = 9.80665
+"""m/s^2; exact by definition (3rd CGPM, 1901)."""
 POUND_FORCE = POUND * STANDARD_GRAVITY
 
 FORCE = {

@@ -15,6 +15,8 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.contacts.element import SolidContact
 
 TIGHTER = 0.01
+"""Part of its error at which an analysis is solved again: the second solution's own error is then small beside the
+change that is looked at."""
 TIGHTEST = 1e-11
 """Least error asked for: what is smaller may be rounding."""
 TELLING = 1e-9

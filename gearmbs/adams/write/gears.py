@@ -26,6 +26,7 @@ from gearmbs.gears import GearPair
 from gearmbs.gears.contact_element import GearContact
 
 PARALLEL = 1e-9
+"""Sine of the angle between two axes up to which they are parallel but for rounding of a model's orientations."""
 EDGE = 0.01
 """Width over which a pair takes and leaves the load, in base pitches."""
 

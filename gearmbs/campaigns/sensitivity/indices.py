@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 RESAMPLES = 200
 CONFIDENCE = 0.95
+"""Probability of the intervals of indices, the customary one."""
 
 
 @dataclass(frozen=True)

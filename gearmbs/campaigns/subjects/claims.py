@@ -35,7 +35,10 @@ PERIODS = 40
 """Least length of a record in mesh periods, for the band-pass filters."""
 
 SHORTEST = 0.1
+"""Least length of a record, s: 48 mesh periods at the preset's speed."""
 RUN_UP = 0.03
+"""Seconds of run-up, and as many of settling, before a record: less than the 0.05 of a case, for there are thousands of
+them."""
 
 
 class ClaimsSubject(Subject):

@@ -512,7 +512,6 @@ def _direct(balanced: Balanced, root: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 RIGID, OSCILLATING, REAL, SLIDING = "rigid", "oscillating", "real", "damped rigid"
-REAL_TOLERANCE = 1e-9
 CRITICAL = 1e-6
 """Imaginary part by magnitude up to which a pair does not oscillate.
 
@@ -630,7 +629,7 @@ def linear_modes(system: System) -> Modes:
     found = spectrum(reduced)
     values, vectors = found.values, found.vectors
     real = np.abs(values.imag) <= CRITICAL * np.abs(values)
-    kept = real | (values.imag >= -REAL_TOLERANCE * np.abs(values))
+    kept = real | (values.imag > 0.0)
     values, vectors, real = values[kept], vectors[:, kept], real[kept]
     values = np.where(real, values.real + 0j, values)
     sliding = real & _unresisted(reduced, values, vectors)

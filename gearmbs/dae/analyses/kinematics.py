@@ -134,9 +134,11 @@ class Instant:
 
 
 LARGEST_TURN = 0.2
+"""Angle, rad, by which a body may turn in a step: Newton's method from the prediction then stays with its assembly."""
 MAX_ITERATIONS = 30
 MAX_HALVINGS = 40
 TOLERANCE = 1e-13
+"""Part of the mechanism's length to which positions are solved: a few hundred units of the last digit."""
 
 
 def kinematic(system: System, t_eval: np.ndarray) -> Solution:

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.model import Model
 
 LARGEST_TURN = 0.5
+"""Angle, rad, by which a body may turn in an iteration: beyond it what is linear in small rotations says nothing."""
 ROUNDING_STEP = 1e-13
+"""Correction, as part of the mechanism's length or of 1 m, below which positions are at their rounding, and no shorter
+step lowers the forces further."""
 FARTHEST = 1e6
 """Lengths of the mechanism after which a body is taken to be moving away for ever."""
 DENSE_LIMIT = 600

@@ -56,6 +56,8 @@ MODAL = ("p_f", "v_f", "q_f")
 LIGHTEST = 1e-12
 """Smallest inertia, kg m^2, by which a momentum is scaled."""
 GRAVITY = 9.81
+"""Acceleration, m/s^2, that turns the heaviest body into a typical force: it scales equations, and is no load of a
+model."""
 
 
 @dataclass(frozen=True)

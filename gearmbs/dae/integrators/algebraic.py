@@ -31,13 +31,12 @@ import numpy as np
 from numba import float64, int64, types
 
 from gearmbs.dae.integrators.messages import list_names
-from gearmbs.dae.problem import RESIDUAL_SIG, DAEProblem
+from gearmbs.dae.problem import EPS, RESIDUAL_SIG, DAEProblem
 from gearmbs.dae.result import combine, lagrange_weights
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, no_events, no_hook
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 
-EPS = 2.220446049250313e-16
 SETTLED = 1e-6
 """Part of its tolerance by which an unknown may be off after the iteration: so little that an output does not depend on
 which others are asked for. A matrix that fits takes two iterations to it, as to any other part."""
@@ -58,8 +57,7 @@ SHORTEST = 1e-6
 SPAN_OF_CONSTRAINTS = 1e-2
 """Spacing s of the differences along the solution in units of the step, for constraints. Over four of them the error is
 s^4/30 of the fifth derivative in units of the step, 3e-10 of what a step can tell apart; rounding is divided by s h."""
-WIDER = 30.0
-WIDENINGS = 5
+WIDER, WIDENINGS = 30.0, 5
 """Times 30 the span is tried where rounding of the differences exceeds the tolerance, up to four times: steps at starts
 shrink with the tolerance and are far shorter than what changes in the constraints."""
 SPAN_OF_SLOPES = 2e-3
@@ -77,7 +75,11 @@ MOST_RANKED = 200
 RANK = 1e-8
 """Singular value of the equilibrated dG/dx' below which it counts as zero, as rounding."""
 PROBE = 1e-6
+"""Part of an unknown by which it is moved to see in which equations it stands. Any change tells: it only has to be far
+above rounding, and to leave the unknown where its equations are defined."""
 PROBE_OF_RATE = 1e-3
+"""The same of a rate, and of one where the rate is smaller, as most are zero at a start. Equations are linear in their
+rates as a rule: a larger move then has less rounding and no error of its own."""
 
 
 class AlgebraicPart(Struct):

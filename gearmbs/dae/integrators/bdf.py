@@ -25,6 +25,8 @@ from gearmbs.kernels.lanes import bits_of, double_of
 MAX_ORDER = 6
 HISTORY = MAX_ORDER + 2
 MAX_STEP_RATIO = 8.0
+"""Largest ratio of the step found to the one the search starts from: the eight that first steps may grow by. Over
+longer ones a divided difference of the past says nothing."""
 STEP_SEARCH_SWEEPS = 3
 
 _VEC = float64[::1]

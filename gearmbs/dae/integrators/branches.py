@@ -7,6 +7,7 @@ import numpy as np
 from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
 from gearmbs.dae.integrators.run_state import copy, rows_from
 from gearmbs.dae.linalg.sparse_lu import solve
+from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
 
 UNFORESEEN = 100.0
@@ -21,7 +22,6 @@ CUTS_TO_TELL = 4
 LARGER_GAMMA = 10.0
 """Ratio of the gamma at which the pencil is looked at to the largest leading coefficient of the run. Its first steps
 resolve the fastest modes, whose entries, wrong in differences by 1e-8, would drown the derivatives at a smaller one."""
-EPS = 2.220446049250313e-16
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -10,6 +10,7 @@ from gearmbs.dae.integrators.controller import meets_kinks
 from gearmbs.dae.integrators.run_state import STATE_TYPE
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
+from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import bits_of, double_of
 
@@ -82,20 +83,37 @@ SLOW = 1
 NOT_FINITE = 2
 
 RATE_LIMIT = 0.9
+"""Ratio of successive corrections from which on an iteration counts as one that does not converge: as in DASSL and
+IDA."""
 RATE_FLOOR = 0.02
+"""Least rate that is believed. With it a first correction of fifty times what may be left is accepted without a second
+one. Tuned, see the table of constants."""
 RATE_MEMORY = 0.3
+"""Part of the rate known so far that stays where a new one is smaller, as in CVODE (CRDOWN): a single ratio may be
+small by chance."""
 RATE_AGEING = 1.5
+"""Growth of the rate with every step that its first correction ends, since nothing has confirmed it there. Tuned, see
+the table of constants."""
 RATE_UNKNOWN = 0.1
+"""Rate at which this growth ends: iterations with a matrix of some steps ago, as they are, hardly converge more slowly.
+Tuned, see the table of constants."""
 ROUNDING_LEVEL = 0.1
+"""Part of a tolerance that a corrector which gets no further may have for its last correction, and below which rounding
+is no obstacle. Tuned, see the table of constants."""
 ROUNDING_LEVEL_FRESH = 0.5
+"""The same with a matrix of this step, whose age cannot be to blame. Half a tolerance is no more than the error test
+allows a step. Tuned, see the table of constants."""
 LOOSEST = 0.03
+"""Part of a tolerance that a corrector may leave of a smooth solution; at orders above 5 it is 2^-order. See "Order and
+step size" in the theory of the equations. Tuned, see the table of constants."""
 LOOSEST_AT_KINKS = 0.1
+"""The same where derivatives jump: the noise of the corrector is far below the differences there. Tuned, see the table
+of constants."""
 HELD = 0.05
 """Part of the tolerance of an unknown within which an equation has to be satisfied: about what a corrector that
 converges leaves. Over a whole tolerance the matrix may change."""
 ROUNDED_TERMS = 16.0
 """Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
-EPS = 2.220446049250313e-16
 SETTLED_RATE = 0.01
 """Part of a rate by which its last correction may move it where G is not linear in y'. In a short step the tolerance of
 y allows any rate; a correction of that size leaves about its square."""
@@ -222,7 +240,7 @@ def correct(functions, st, plan, factors):
     y, yp, res, delta = st.y, st.yp, st.res, st.delta
     t, gamma = st.t_new, st.gamma
     damp = 2.0 / (1.0 + gamma / st.gamma_factored) - 1.0
-    limit = st.newton_tolerance * amount_left(st)
+    limit = amount_left(st)
     previous = 0.0
     iterations = st.max_iterations
     for m in range(iterations):
@@ -264,9 +282,15 @@ def correct(functions, st, plan, factors):
 
 NOISE_SAMPLES = 2
 NOISE_MARGIN = 4.0
+"""Ratio to the estimated rounding up to which it explains a correction: a few samples of signs miss the largest effect
+of rounding by some small factor. Tuned, see the table of constants."""
 NOISY_ALLOWED = 60
 PREDICTION_ERROR = 2.0
+"""Tolerances by which a prediction is off without noise. Steps whose error is a fifth of a tolerance have their
+corrector 0.2 (1 + 1/r) from their prediction, 0.6 at order 1 and 3.6 at order 6; r as in
+`gearmbs.dae.integrators.bdf`."""
 GOLDEN_FRACTION = 0.6180339887498949
+"""(sqrt(5) - 1)/2, the golden ratio less one."""
 
 
 @njit(float64(STATE_TYPE, PLAN_TYPE, FACTORS_TYPE), cache=True, nogil=True, error_model="numpy")

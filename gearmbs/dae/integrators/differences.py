@@ -24,7 +24,7 @@ from functools import cache
 import numpy as np
 from numba import int64, types
 
-from gearmbs.dae.problem import EVENTS_SIG, JACOBIAN_SIG, RESIDUAL_SIG
+from gearmbs.dae.problem import EPS, EVENTS_SIG, JACOBIAN_SIG, RESIDUAL_SIG
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import call_address
 
@@ -43,6 +43,9 @@ NONLINEAR_RATES = 10
 N_HEADER = 11
 
 INCREMENT = 1.4901161193847656e-08
+"""Square root of the rounding, 2^-26: for a one-sided difference of a function of its own size, the error of the second
+derivative is then that of rounding (J. E. Dennis, R. B. Schnabel, "Numerical Methods for Unconstrained Optimization and
+Nonlinear Equations", Prentice-Hall 1983, section 5.4)."""
 INCREMENT_OF_RATE = 6e-6
 """Part of a rate by which it is moved to both sides: the cube root of the rounding, where its error is that of the
 third derivative, 1e-11."""
@@ -50,7 +53,6 @@ FAR_BELOW = 1e-3
 """Part of the typical magnitude below which the least one counts as far below it."""
 VISIBLE = 100.0
 """Units in the last place of the terms of an equation that a difference must exceed to be trusted."""
-EPS = 2.220446049250313e-16
 
 _IVEC = int64[::1]
 _VEC = types.float64[::1]

@@ -21,7 +21,7 @@ from gearmbs.dae.integrators.messages import StallWatch
 from gearmbs.dae.integrators.options import Options, output_times
 from gearmbs.dae.integrators.records import Records
 from gearmbs.dae.integrators.run_state import newest_point
-from gearmbs.dae.integrators.step import advance
+from gearmbs.dae.integrators.step import JUMP_LIMIT, advance
 from gearmbs.dae.linalg.entry_lists import (
     FEWEST_ENTRIES,
     LEAVING_PLANS,
@@ -32,7 +32,7 @@ from gearmbs.dae.linalg.entry_lists import (
 )
 from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
-from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 from gearmbs.kernels.pointers import bind, direct, no_events, no_hook
 
@@ -47,20 +47,31 @@ Failure = tuple[Status, str]
 FIRST_MOVE = 0.5
 """Tolerances by which the fastest unknown may move in the first step."""
 FIRST_OF_SPAN = 1e-3
+"""Largest first step, as part of the span: that of DASSL and IDA."""
 FIRST_TRIED = 1e-7
 """Part of the span that is tried as the first step where the fastest unknown would want a shorter one."""
 FIRST_ERROR = 0.25
+"""Error of a step of implicit Euler, in tolerances, up to which its size is taken for the first one: about the fifth
+that later steps aim at. Tuned, see the table of constants."""
 TRIALS = 4
 SMALLEST_OF_SPAN = 1e-14
+"""Smallest step, as part of the span: 45 units of its last digit, below which times differ by rounding."""
 SMALLEST_OF_FIRST = 1e-6
+"""The same, as part of the first step that rates and span allow: so that a short start of a long span may be resolved.
+Tuned, see the table of constants."""
 CHECK_STEP = 1e-10
+"""Part of the span over which starting values are checked first: too short for rates to move an unknown by its
+tolerance, while values off a constraint still jump by all that they are off. Tuned, see the table of constants."""
 CHECK_ROUNDS = 12
 CHECK_RATIO = 0.01
 """The step of the check shrinks by this in each round: from 1e-10 to 1e-34 of the span."""
-JUMP_LIMIT = 100.0
 REPAIR_FROM = 1.0
+"""Tolerances by which starting values may be off before they are moved onto the constraints, where they are not
+refused."""
 REPAIR_SWEEPS = 4
 ROUNDED_RESIDUAL = 1e-10
+"""Largest residual that may be rounding, for unknowns of the size of one: a million times the last digit leaves room
+for large terms that cancel."""
 
 
 def choose_steps(run: Run) -> None:
@@ -291,9 +302,9 @@ def _repair(run: Run, h: float) -> Failure | None:
 FIRST_CHUNK = 16
 """Accepted steps, so that the first Ctrl-C is heeded within a second where a step takes 60 ms."""
 CHUNK_SECONDS = 0.05
+"""Seconds between two looks at Ctrl-C and reports of progress; results do not depend on it."""
 SINGULAR_RETRIES = 8
 DROP_ROUNDS_ALLOWED = 3
-EPS = 2.220446049250313e-16
 LEAST_DIGITS = 16.0
 """Units of the last digit that a tolerance has to be: differences of order k + 1, by which errors are told, amplify
 rounding by 2^k. At 27 oscillators take ten times the steps of a hundredfold tolerance, at 9 some do not end."""

@@ -16,6 +16,7 @@ SECANTS = 20
 ROOT_ITERATIONS = 80
 """Tries in all; the last 60 halve what is left, to rounding whatever the function does: a jump has no root."""
 ROOT_EPS = 4e-16
+"""Part of the time within which a crossing lies: one to three neighbouring doubles."""
 
 SAMPLES = 64
 """Parts of a step, at most, in each of which an event function may change sign once."""

@@ -22,7 +22,7 @@ import scipy
 
 from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
 from gearmbs.dae.integrators.branches import SAME_EQUATION, UNFORESEEN
-from gearmbs.dae.integrators.corrector import EPS, ROUNDED_TERMS
+from gearmbs.dae.integrators.corrector import ROUNDED_TERMS
 from gearmbs.dae.integrators.initial_state import LARGE_GAMMA, LARGEST_PENCIL
 from gearmbs.dae.integrators.messages import (
     advice,
@@ -33,14 +33,17 @@ from gearmbs.dae.integrators.messages import (
     unknown_name,
 )
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
 if TYPE_CHECKING:
     from sksundae.ida import IDA
 
 UNCONTROLLED = 1e10
+"""Absolute tolerance of unknowns outside error control: so large, for multipliers in N and N m, that IDA's norms do not
+see them."""
 SMALLEST_RTOL = 1e-14
+"""Least relative tolerance, 45 units of the last digit of an unknown."""
 OF_NONLINEAR_RATES = 0.01
 """Part of the tolerances IDA is given where G is not linear in y'. It judges its first correction by the convergence of
 earlier steps, which says nothing of this one, and cannot be told otherwise: over y' + eps y'^3 = f it is 250 tolerances

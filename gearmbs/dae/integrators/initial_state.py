@@ -12,7 +12,6 @@ from gearmbs.dae.integrators.options import Options, event_rules
 from gearmbs.dae.integrators.run_state import KINK_MEMORY, RunState, Sizes, newest_point, state_layout
 from gearmbs.dae.problem import DAEProblem
 
-NEWTON_TOLERANCE = 1.0
 MAX_ITERATIONS = 10
 RECORD_BYTES = 8_000_000
 CONSUMED_BYTES = 2_000_000
@@ -29,7 +28,10 @@ LARGE_GAMMA = 1e6
 """Times the reciprocal span: faster growth than that would leave no solution, and differences of 1e-8 of the unknowns
 change their rates by a hundredth of the unknowns a span."""
 RATE_ALLOWED = 0.12
+"""Rate of a corrector from which on the next step gets a new matrix: another iteration would cost more. Tuned, see the
+table of constants."""
 RATE_ALLOWED_IF_DEAR = 0.2
+"""The same where a matrix is dear. Tuned, see the table of constants."""
 DEAR = 12
 """Residuals from which on a matrix is dear, and worth its price only at slower rates of the corrector."""
 
@@ -64,7 +66,6 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.t_end = t_end
     st.h_max = np.inf if options.max_step is None else options.max_step
     st.rtol = options.rtol
-    st.newton_tolerance = NEWTON_TOLERANCE
     st.rate_allowed = RATE_ALLOWED_IF_DEAR if problem.jacobian_residuals >= DEAR else RATE_ALLOWED
     st.max_order = options.highest_order if options.max_order is None else options.max_order
     st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else options.max_iterations

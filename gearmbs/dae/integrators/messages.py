@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import Status
 
 # Find runs that go on without getting anywhere.
@@ -147,7 +147,6 @@ class StallWatch:
 
 
 NAMES_SHOWN = 6
-EPS = 2.220446049250313e-16
 NOISE_WORTH_TELLING = 0.1
 """Movement by rounding, in units of the tolerance, from which on rounding is named as a cause."""
 

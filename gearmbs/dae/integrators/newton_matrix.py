@@ -8,11 +8,15 @@ from gearmbs.dae.linalg.sparse_lu import fits, refactor
 from gearmbs.kernels.jit import njit
 
 GAMMA_DRIFT = 0.2
+"""Change of the leading coefficient up to which factors serve, since 2/(1 + gamma/gamma_J) makes up for it: the rate it
+leaves is at most |1 - gamma/gamma_J|/(1 + gamma/gamma_J), a tenth. CVODE allows 0.3 (DGMAX), IDA 2/3. Tuned, see the
+table of constants."""
 GAMMA_DRIFT_AT_KINKS = 0.3
 """Larger where steps change so often that factors serve but a few of them."""
 MATRIX_MAX_AGE = 50
 SLOPE_MAX_AGE = 20
 RATE_OF_FRESH = 0.1
+"""Rate that is expected of a new matrix until its own is known. Tuned, see the table of constants."""
 PLANNED_RANGE = 1e4
 """Ratio of leading coefficients within which a plan that leaves negligible entries out is trusted."""
 DROPPED_STEPS = 5

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.integrators.corrector import EPS, HELD, ROUNDED_TERMS
+from gearmbs.dae.integrators.corrector import HELD, ROUNDED_TERMS
 from gearmbs.dae.integrators.run_state import rows_from
+from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
 
-NEAR = 0.49
-FAR = 0.51
+NEAR, FAR = 0.49, 0.51
 """Parts of an interval at which it is divided, by turns: at its middle a pole that lies alike from both ends would be
 met, and divided by."""
 DIVISIONS = 40

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import (
     KEPT_LAYOUTS,
@@ -111,7 +112,6 @@ class RunState(Struct):
     h_max: float
     h_min: float
     rtol: float
-    newton_tolerance: float  # of the corrector, in units of the error tolerance
     max_order: int
     max_iterations: int
     max_steps: int  # 0: no limit
@@ -335,9 +335,6 @@ def state_layout(sizes: Sizes) -> BlockLayout[RunState]:
 #
 # Points stand newest first from row ``st.newest`` of the window on. A step takes the row before; at the front of the
 # window the rows still needed are moved to its end, once in many steps.
-
-
-EPS = 2.220446049250313e-16
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

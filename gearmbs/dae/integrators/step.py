@@ -45,17 +45,19 @@ from gearmbs.dae.integrators.run_state import (
 )
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
-from gearmbs.dae.problem import HISTORY_CHANGED
+from gearmbs.dae.problem import EPS, HISTORY_CHANGED
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import bits_of, double_of
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE
 
-EPS = 2.220446049250313e-16
 ROUNDED_STEP = 16.0 * EPS
 """Smallest step in units of the time, whose last digit is as much as is left of smaller ones."""
 MAX_FAILS = 16
 NEWTON_SHRINK = 0.25
+"""Ratio of a step to the one before it whose corrector failed with a fresh matrix: as in DASSL, IDA and CVODE."""
 RESTART_SHRINK = 0.1
+"""Ratio of the first step without a past to the refused one with it. Where the equations have jumped its error falls
+with its size, and `shorten_first_step` takes it from there. Tuned, see the table of constants."""
 RESTART_AFTER = 6
 DROP_AFTER = 3
 DROP_LEVELS = 3
@@ -65,8 +67,11 @@ RENEWALS = 3
 RENEWALS_AT_JUMPS = 20
 """The same where shorter steps have not helped: an algebraic unknown may jump, and Newton's method has a long way."""
 SAME_ERROR = 0.1
-JUMP_LIMIT = 50.0
-"""Error, in tolerances, up to which a run passes a jump that does not shrink with the step."""
+"""Relative change of the error up to which it is the same in two attempts, the second shorter at least by a fifth.
+Tuned, see the table of constants."""
+JUMP_LIMIT = 100.0
+"""Tolerances by which a first step may move an unknown that does not move by less in a shorter one: values of the start
+that are off by more are refused, and a run passes no larger jump. Its error is half of that, as of any first step."""
 FIRST_TARGET = 0.01
 """Error of the first step after refused attempts, in tolerances: half of what the next ones are meant to have."""
 FIRST_SHRINK = (1e-3, 0.5)
@@ -303,7 +308,7 @@ def passes_error_test(st, plan, factors):
     st.error = constant * correction_norm(st, row)
     if st.error <= 1.0 + constant * 2.0 ** (st.order + 1) * st.noise:
         return True
-    if st.n_past == 1 and st.error_fails > 1 and st.error <= JUMP_LIMIT:
+    if st.n_past == 1 and st.error_fails > 1 and st.error <= constant * JUMP_LIMIT:
         # what steps of any size show is no error of theirs, but what an earlier corrector has left
         if abs(st.error - before) <= SAME_ERROR * st.error:
             return True

@@ -26,11 +26,17 @@ THRESHOLDS = (0.01, 0.1, 0.5)
 """Fraction of its column's largest entry a pivot must reach; the next is taken where entries grow too much."""
 
 GROWTH_ALLOWED = 1e4
+"""Growth of entries during elimination that is put up with: it costs four of sixteen digits."""
 ROW_SINGLETON_THRESHOLD = 1e-3
+"""Such a fraction in a row with one entry: it changes no other column, so that its multipliers may be larger without
+any growth, as long as `GROWTH_LIMIT` of the factorisation is far."""
 CANCELLED = 1e-14
+"""Part of the largest value a column ever had below which what is left of it is rounding: 45 units of the last
+digit."""
 SEARCH_LIMIT = 12
 EQUILIBRATION_SWEEPS = 8
 TINY = 1e-300
+"""In place of zero, as the divisor for a matrix without entries; near the smallest normal double."""
 
 _VEC = float64[::1]
 _IVEC = int64[::1]

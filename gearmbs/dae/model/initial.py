@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.configuration import Configuration, PosedModel
 
 POSITION_TOLERANCE = 1e-12
+"""Part of the mechanism's length, or of 1 m, within which constraints hold: some thousand times the rounding of their
+terms."""
 RANK_TOLERANCE = 1e-9
+"""Distance of a row of length one from the rows before it, in a QR decomposition with pivots, below which it depends on
+them: rounding of the rows is 1e-16, and positions are known to 1e-12."""
 LEAST = 1e-6
 """Distance of a constraint row of length 1 from the others above which it is independent."""
 NEARLY = 1e-4

@@ -28,6 +28,8 @@ the friction coefficient."""
 REMEMBERED = 12
 """Earlier passes that are looked at where they do not come closer."""
 CLOSER = 0.9
+"""Ratio of the changes of two passes below which plain passes go on, a digit in at most 22; slower ones are
+extrapolated."""
 MAX_STATE_ITERATIONS = 100
 
 

@@ -17,6 +17,8 @@ BALL, BOX, FRUSTUM, TORUS, ELLIPSOID, HALF_SPACE, MESH = 0, 1, 2, 3, 4, 5, 6
 """Kinds of shapes. A cylinder is a frustum with equal radii."""
 
 TINY = 1e-300
+"""In place of zero in a divisor, near the smallest normal double: at a centre or on an axis, where a direction is
+arbitrary."""
 ITERATIONS = 100
 """Bisections for the point of an ellipsoid next to another: down to the last digit."""
 

@@ -110,6 +110,7 @@ def local_point(pose, x, out):
 
 FACE, EDGE, CORNER = 0, 1, 2
 TINY = 1e-300
+"""In place of zero in a divisor, near the smallest normal double: of triangles and edges without extent."""
 BLOCK = 16
 """Vertices or triangles that share a box, and such boxes that share another; neighbours in the tables are neighbours in
 space."""

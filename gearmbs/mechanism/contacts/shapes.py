@@ -17,6 +17,7 @@ LEVELS = 24
 NOTHING = 1e-12
 """Part of the cube of its length that a solid's volume exceeds: that of a sheet is rounding."""
 TINY = 1e-300
+"""In place of zero in a divisor, near the smallest normal double: the size of a mesh of a single point."""
 PLACED = {"axes": "dimensionless", "offset": "length"}
 """Fields of a shape's place, and what they are."""
 

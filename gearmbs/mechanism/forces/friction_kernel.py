@@ -57,6 +57,8 @@ MAX_TORQUE = 20
 REALS = 21
 
 TINY = 1e-6
+"""Part of its own scale, a limit or a transition velocity, below which the length of a vector is rounded off, so that
+its derivative exists at zero. A length of that scale is off by 5e-13 of it."""
 
 PRESSING, SPEED, STEP, FACTOR, SHARE, HELP, PART = 0, 1, 2, 3, 4, 5, 6
 """Rows of the scratch; the next have one for each slip."""

@@ -301,6 +301,7 @@ STEPS = 4
 STATE_STEP = 1e-6
 """Step of a state, of its size."""
 SMALLEST_STATE_STEP = 1e-9
+"""Least step of a state that is zero, or next to it; states have no unit that would give a better one."""
 
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")

@@ -20,6 +20,7 @@ from gearmbs.kernels.pointers import PythonCallback
 STEP = 6e-6
 """Relative step of first differences, the cube root of the rounding error."""
 SECOND_STEP = 1e-4
+"""Relative step of second differences, the fourth root of the rounding error."""
 WIDE_STEP = 0.02
 """Step where all second derivatives are asked for, as for a constraint, of the size of an argument."""
 SIZE = 0.1

@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 HALF_WIDTH = 0.25
+"""Half width of the band about a mesh harmonic, in mesh frequencies: sidebands belong to it, the next harmonic's do
+not."""
 TRANSITION = 0.25
+"""Over which the band falls, in mesh frequencies: with the half width it ends in the middle between two harmonics."""
 ATTENUATION_DB = 100.0
+"""Of what lies beyond: a line a hundred thousand times larger than the band's own counts as much."""
 
 
 def whole_period_count(count: int, rate: float, frequency: float) -> int:

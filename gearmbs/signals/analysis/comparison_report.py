@@ -151,6 +151,7 @@ def _listed(names: list[str]) -> str:
 
 
 TIE = 0.01
+"""Relative difference up to which two levels are equal: levels of a repeated measurement scatter by as much at best."""
 
 
 def ordinal_agreement(experiment: np.ndarray, model: np.ndarray, tie: float = TIE) -> float:
@@ -186,9 +187,13 @@ def _order(a: float, b: float, tie: float) -> int:
 
 
 CHANGE_DB = 1.0
+"""From which a level counts as changed: an eighth, as two measurements of one machine differ."""
 STAYS_DB = 3.0
+"""Within which a level counts as unchanged where it is expected to stay: a factor 1.4."""
 INDICATOR_TIE = 0.05
+"""Relative change of an indicator from which it counts: a twentieth, as they scatter from record to record."""
 CONTRADICTION_DB = 3.0
+"""By which a level has to fall on one channel and rise on another for the report to say that channels contradict."""
 
 
 @dataclass

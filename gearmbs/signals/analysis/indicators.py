@@ -30,6 +30,7 @@ from gearmbs.signals.rotation.phase import analytic
 
 BLOCK = 1 << 17
 CONSTANT = 1e-11
+"""Deviation of an envelope, as part of its mean, up to which it is constant: rounding of the filters that make it."""
 INDICATORS = (
     "rms",
     "peak_to_peak",

@@ -46,6 +46,7 @@ def _row(cells: Sequence[str]) -> str:
 
 
 LINE_SECONDS = 2.0
+"""Length of the segments of spectra that are searched for lines: a resolution of half a hertz."""
 KURTOGRAM_LEVELS = 6
 SAME_LINE = 1e-9
 """Known lines closer than this part of their frequency are one."""

@@ -36,6 +36,7 @@ from gearmbs.units import to_si
 Progress = Callable[[float, str], None]
 Pieces = Iterator[tuple[Record, float]]
 LEAST_PART = 0.5
+"""Part of a section that the rest at the end of a record must reach to be one itself."""
 
 
 def sections(

@@ -213,10 +213,12 @@ ORDERS = 10
 VELOCITY_BAND = (10.0, 1000.0)
 """Band of the RMS velocity in Hz, as in ISO 20816 for machines above 600 rpm."""
 EDGE = 0.05
+"""A band ends at least this part of its width above zero and below half the sampling rate."""
 LEAST_FALL = 16.0
+"""Least width of a band's fall, in reciprocal lengths of the record: a filter of 100 dB takes 6.4 reciprocal widths,
+here 0.4 of the record."""
 LEAST_BAND = 16
 """Envelopes are taken in bands of at least this part of half the sampling rate: a narrow one holds only slow lines."""
-"""A band ends at least this part of its width above zero and below half the sampling rate."""
 SPEED_DIFFERS = 1e-3
 """Share from which a report says in words that the shaft's own lines are beside the given speed."""
 NO_SPEED = "the speed is not known; give speed='1500 rpm' (--speed), a curve or a tacho"

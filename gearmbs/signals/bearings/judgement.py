@@ -207,6 +207,7 @@ LEAST_RATIO = 10.0
 MOST_SHARE = 0.025
 """Share of places with a family as strong, the part's own counted, up to which a part is named."""
 LOWEST_ORDER = 0.3
+"""Places are looked at from this order of the shaft on: slightly below a cage's, 0.35 to 0.45."""
 ABOVE = 1.1
 """Places are looked at up to so many times the highest fundamental."""
 PARENTS = 6

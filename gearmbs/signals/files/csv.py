@@ -54,6 +54,7 @@ CHUNK_ROWS = 1 << 17
 # Times are written with few digits; beyond this many samples a gap is a gap.
 MAX_JUMP = 2.0
 ROUNDED_TIMES = 0.01
+"""Relative difference up to which the mean rate of rounded times is the rate that is given."""
 # pandas before 3.1 rounds the last bit unless told otherwise; later versions are exact and warn at the option.
 EXACT: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}

@@ -269,6 +269,7 @@ def _values(key: str, text: str, separator: str | None) -> Sequence[tuple[str, s
 FACTORS = {"ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 NAMED_UNIT = re.compile(r"[_\s](ms|us|ns|min)$", re.IGNORECASE)
 DAY = 86400.0
+"""Seconds."""
 EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 """Numbers this large are not seconds since 1970 but parts of them."""
 

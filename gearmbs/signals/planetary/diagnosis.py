@@ -207,6 +207,7 @@ REACH = 12
 GUARD = 2.5
 """Half width of a line, in lines of the spectrum under a Hann window."""
 HANN_POWER = 0.375
+"""Mean square of a Hann window, 3/8."""
 SLIP = 1e-3
 """Share by which the given speed may be off."""
 FOREIGN = np.concatenate([np.linspace(0.8, 0.98, 200), np.linspace(1.02, 1.2, 200)])

@@ -24,6 +24,7 @@ TURN = 2.0 * math.pi
 KEPT = 0.4
 """Orders up to this part of the samples a revolution are kept without loss."""
 LEAST_TURNS = 4.0
+"""Revolutions of a window at least: a Hann window tells lines two of its own apart, half an order here."""
 
 
 @takes_data()

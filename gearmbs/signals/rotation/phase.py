@@ -21,7 +21,9 @@ from gearmbs.signals.signal.given import speed_curve
 from gearmbs.signals.signal.signal import rate_of
 
 LINE_ATTENUATION_DB = 60.0
+"""Of all beside the line that is followed: a thousandth of a neighbour as large moves its phase by a milliradian."""
 PULSE_HYSTERESIS = 0.2
+"""Part of its range by which a tacho's signal must have fallen below the threshold before the next pulse counts."""
 
 
 @takes_data()

@@ -143,7 +143,10 @@ SPEED_TOLERANCE = 0.02
 VARYING = 0.02
 """A speed that strays more than this part from its mean is followed in angle, not in frequency."""
 OTHER_COMB = 0.03
+"""Relative difference of speeds up to which two combs mean one: a little more than `SPEED_TOLERANCE`, within which the
+given one is looked for."""
 STRONGER_DB = 3.0
+"""By which another comb must be higher to count as stronger: scores of one record scatter by less."""
 SHARED_HARMONIC = 2
 """Combs of which one has lines in common with the other's harmonics up to this one are not told apart."""
 USUAL_RPM = (20.0, 12_000.0)

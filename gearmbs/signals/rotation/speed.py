@@ -17,23 +17,33 @@ from gearmbs.signals.signal.signal import rate_of, require
 from gearmbs.signals.spectra import periodograms
 
 SEGMENT_SECONDS = 2.0
+"""Length of the segments of the spectrum: a resolution of half a hertz, over which speeds hold still."""
 FLOOR_BINS = 64
 CLIP_DB = 30.0
+"""Height from which a line counts no more: a single strong line must not outweigh a comb."""
 RANGE_DB = 120.0
+"""Below the largest line, where spectra are cut off: logarithms of silence."""
 HARMONICS = 4
 # Falling, so that one lone line is its own fundamental and not the second or third harmonic of something lower.
 HARMONIC_WEIGHTS = (1.0, 0.9, 0.8, 0.7)
 SIDEBANDS = 3
 SIDEBAND_WEIGHT = 0.5
+"""Of sidebands in the score of a comb, beside its harmonics: they tell the right shaft, but are weaker."""
 BETWEEN_WEIGHT = 0.5
+"""Of what stands midway between harmonics, taken off the score: half the frequency would have lines there."""
 FEWER_WEIGHT = 0.05
+"""Part of its score that a comb loses for each harmonic beyond the end of the spectrum, which has not been seen."""
 NEARLY_BEST = 0.97
+"""Part of the best score from which combs are told apart by the power they carry."""
 SLOWEST = 8.0 * math.pi
 MIN_QUALITY = 0.05
+"""Least quality of a line by which a changing speed is followed; see `phase_from_line`."""
 MIN_SCORE_DB = 12.0
+"""Mean height of harmonics from which a comb is believed at once."""
 # Weak lines count too, if their comb stands out from all others by that many robust standard deviations.
 MIN_LEAD = 5.5
 SAME_COMB = 0.01
+"""Relative difference of frequencies up to which candidates belong to one comb."""
 MIN_OTHERS = 100
 
 

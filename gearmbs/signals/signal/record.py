@@ -48,6 +48,7 @@ SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e
 NUMBER = re.compile(r"^\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*[\[(]?\s*([A-Za-zµ/^\-0-9]*)")
 BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 AGREE = 1e-3
+"""Relative difference up to which two rates or speeds in a file are one: headers round to three or four digits."""
 PLAUSIBLE_RPM = (1.0, 200_000.0)
 STEM = re.compile(r"[_.\s-]*(header|data|info|signal|values|samples|properties)$", re.IGNORECASE)
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 UNKNOWN_UNITS = "unknown"
 MIXED_UNITS = "mixed"
 CLOCK_TOLERANCE = 0.05
+"""Part of a sample by which times may deviate from an even clock."""
 REMEDIES = {
     "rate": "pass rate=... in Hz",
     "speed": "pass speed=... in rad/s, or estimate it with estimate_speed(signal, teeth=...)",

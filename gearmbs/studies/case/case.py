@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from gearmbs.gears import GearPair
 
 LEAST_TOLERANCE = 1e-12
+"""Least ``solver.tolerance``: below it rounding errors would be larger."""
 LARGEST_TOLERANCE = {"WSTIFF": 5e-6, "GSTIFF": 5e-6, "IDA": 1e-6}
 """Limits of ``solver.tolerance``; see `Solver`."""
 

@@ -13,6 +13,7 @@ from gearmbs.mechanism import Mechanism, polynomial
 from gearmbs.mechanism.parts.bodies import frame_along
 
 GRAVITY = 9.81
+"""m/s^2, as the problems of the IFToMM library state it."""
 
 
 def pendulum() -> Mechanism:
@@ -111,6 +112,7 @@ def bricard() -> Mechanism:
 
 
 DENSITY = 3000.0
+"""Of rods and slider of the governor, kg/m^3, as the problem states it."""
 ROD_MASS, BALL_MASS, SLIDER_MASS = DENSITY * 1e-4, 5.0, DENSITY * 1e-3
 STIFFNESS, DAMPING, REST_LENGTH = 8e5, 4e4, 0.5
 

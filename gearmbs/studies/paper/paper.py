@@ -199,6 +199,7 @@ def combine(cases: list[Case], records: list[xr.Dataset], component: str) -> xr.
 
 
 DURATION = 0.1
+"""Length of the records of the guard, s: some fifty mesh periods."""
 TOLERANCE = 1e-9
 """So tight that rounding, which differs between machines, stays far below the comparison's 0.1 %."""
 

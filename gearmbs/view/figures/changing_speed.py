@@ -23,6 +23,7 @@ from gearmbs.view.figures.style import BLACK, COLOURS, VERMILLION, drawn_on, lab
 
 RPM = 30.0 / math.pi
 RANGE_DB = 60.0
+"""Decibels below the largest level that maps show: what is fainter is noise as a rule."""
 COLOUR_MAP = "magma"
 MAX_CELLS = 700
 """Maps are drawn with at most this many cells along an axis; each shows the largest value that falls into it."""

@@ -38,7 +38,9 @@ if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism
 
 MM = 1e3
+"""Millimetres a metre, the unit of the axes."""
 TOLERANCE = 2e-6
+"""Distance, m, between an outline and its chords: below the width of a drawn line at any size of a page."""
 ARROW = 1.6
 """Length of the arrow of the largest force, modules."""
 

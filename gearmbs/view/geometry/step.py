@@ -38,6 +38,7 @@ from gearmbs.view.geometry.solid import title_of
 
 
 MM = 1e3
+"""Millimetres a metre, the unit of the file."""
 UP = (0.0, 0.0, 1.0)
 DOWN = (0.0, 0.0, -1.0)
 STATIONS_PER_RADIAN = 12

@@ -11,6 +11,7 @@ from gearmbs.view.geometry.mesh import feature_edges
 from gearmbs.view.scenes.solids import SceneData
 
 ARROW = 0.22
+"""Length of the arrow of the largest force, in sizes of the scene."""
 LIGHT = {"ambient": 0.55, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6}
 
 
