@@ -1,7 +1,7 @@
 """The direction of imports: which package may know which, and no circles among modules.
 
-Read from the source of every module: imports at the top, in functions and for type checkers alike, and the names of
-modules in strings.
+Read from the source of every module and the stub of every package: imports at the top, in functions and for type
+checkers alike, and the names of modules in strings.
 """
 
 import ast
@@ -139,7 +139,9 @@ def arrows() -> dict[str, frozenset[str]]:
     found = {}
     for name, path in modules.items():
         package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        named = {n for node in ast.walk(ast.parse(path.read_text())) for n in _named(node, package, modules)}
+        stub = path.with_suffix(".pyi")
+        texts = [p.read_text() for p in (path, stub) if p.exists()]
+        named = {n for text in texts for node in ast.walk(ast.parse(text)) for n in _named(node, package, modules)}
         found[name] = frozenset(n for n in named if n in modules and n != name)
     return found
 
