@@ -33,7 +33,8 @@ def code_stamp() -> str:
     """Return a number of the code and data that executed pages depend on, so that none is kept beyond a change."""
     digest = hashlib.sha256()
     root = HERE.parent
-    sources = ((root / "gearmbs", "*.py"), (root / "benchmarks", "*.py"), (SCRIPTS, "*.py"), (HERE / "data", "*.*"))
+    code = [(root / "gearmbs", "*.py"), (root / "gearmbs", "*.pyi"), (root / "benchmarks", "*.py")]
+    sources = [*code, (SCRIPTS, "*.py"), (HERE / "data", "*.*")]
     for folder, ending in sources:
         for path in sorted(folder.rglob(ending)):
             digest.update(path.read_bytes())

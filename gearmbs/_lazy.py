@@ -6,10 +6,10 @@ import atexit
 import contextlib
 import gc
 import importlib
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from types import ModuleType
-from typing import Any
 
 # the interpreter looks for cycles among all modules once more while it ends, which takes as long as importing them
 atexit.register(gc.freeze)
@@ -30,44 +30,56 @@ def uncollected() -> Iterator[None]:
 class _LatePackage(ModuleType):
     """A package whose public names are found when asked for.
 
-    A public name may be that of the module it lives in, as `gearmbs.signals.envelope`: the name is then what the
-    package says it is, whether or not the module has been imported.
+    A public name may be that of a module, as `gearmbs.identify.fit`: the name is then what the package says it is,
+    whether or not the module has been imported.
     """
 
     _homes: Mapping[str, str]
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         home = self._homes.get(name)
         if home is None:
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
-        module, colon, other = home.partition(":")
         with uncollected():
-            value = importlib.import_module(module, self.__name__)
-        if other or not colon:
-            value = getattr(value, other or name)
+            if home == ".":
+                value: object = importlib.import_module(f".{name}", self.__name__)
+            else:
+                value = getattr(importlib.import_module(home, self.__name__), name)
         ModuleType.__setattr__(self, name, value)
         return value
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         # the import system binds each submodule to its name
-        if not (isinstance(value, ModuleType) and not self._homes.get(name, ":").endswith(":")):
+        if not (isinstance(value, ModuleType) and self._homes.get(name, ".") != "."):
             ModuleType.__setattr__(self, name, value)
 
     def __dir__(self) -> list[str]:
         return sorted({*self.__dict__, *self._homes} - {"_homes"})
 
 
-def late(package: str, homes: Mapping[str, str]) -> None:
-    """Have names of a package imported from elsewhere at their first use.
+def late(package: str) -> list[str]:
+    """Have the public names of a package imported from elsewhere at their first use.
+
+    They are listed once, in the stub beside the package's ``__init__.py``, which type checkers and editors read too:
+    lines ``from .module import name as name``, and ``from . import name as name`` for a module itself.
+    ``lazy_loader.attach_stub`` reads such stubs as well, but refuses names of other packages, lets a module take the
+    place of a function of its name that lives elsewhere, and takes the time to parse them as Python.
 
     Parameters
     ----------
     package : str
         Its ``__name__``.
-    homes : mapping
-        Module by name, ``".module"`` for one of the package; ``"module:other"`` where the name is another there,
-        ``"module:"`` for the module itself.
+
+    Returns
+    -------
+    list of str
+        The names, for ``__all__``.
     """
     module = sys.modules[package]
-    module.__dict__["_homes"] = dict(homes)
+    # by the loader, which may read from an archive
+    text = module.__loader__.get_data(os.path.join(module.__path__[0], "__init__.pyi")).decode()  # type: ignore[union-attr]
+    words = [line.split() for line in text.splitlines() if line.startswith("from ")]
+    homes = {name: home for _, home, _, name, _, _ in words}
+    module.__dict__["_homes"] = homes
     module.__class__ = _LatePackage
+    return sorted(homes)

@@ -1,10 +1,11 @@
 """The direction of imports: which package may know which, and no circles among modules.
 
-Read from the source of every module: imports at the top, in functions and for type checkers alike, and the names of
-modules in strings.
+Read from the source of every module and the stub of every package: imports at the top, in functions and for type
+checkers alike, and the names of modules in strings.
 """
 
 import ast
+import importlib.util
 import re
 from functools import cache
 from pathlib import Path
@@ -49,25 +50,28 @@ and equations share: the problem, results, errors, and the function that solves 
 
 EXCEPTIONS = {
     ("contact", "dae.equations"): "the signature that every force element's kernel has, and IMPACT",
-    ("gears", "dae.equations"): "the same door: a pair hands its kernel to the mechanism",
+    ("gears", "dae.equations"): "the door for force elements: a pair hands its kernel to the mechanism",
     (
         "flexible",
         "dae.equations",
     ): "the door for force elements: beams of large motion hand their kernel to the mechanism",
     ("flexible", "dae"): "the error of models, of which its own is one",
-    ("bearings", "dae.equations"): "the same door: a bearing hands its kernel to the mechanism",
+    ("bearings", "dae.equations"): "the door for force elements: a bearing hands its kernel to the mechanism",
     ("signals", "view"): "its commands draw figures and write files",
     ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
     ("signals", "drivetrain"): "its commands take bearings and shafts from the description of a drivetrain",
     ("bearings", "dae.results"): "lives of bearings follow from the loads of a run",
-    ("drivetrain", "dae.equations"): "the same door: torques about an axis hand their kernels to the mechanism",
+    ("drivetrain", "dae.equations"): "the door for force elements: torques about an axis hand their kernels to it",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
     ("adams", "flexible"): "FLEX_BODY is read from its modal neutral file",
-    ("adams", "view"): "wheels written as solids are those of the 3-D scenes; files that appear when they are whole",
-    ("adams", "solids"): "the bodies of a deck's Parasolid file; the type alone",
+    (
+        "adams",
+        "view",
+    ): "wheels written as solids are those of the 3-D scenes, and files that appear when they are whole",
+    ("adams", "solids"): "the bodies of a deck's Parasolid file, the type alone",
     ("studies", "gearmbs"): "a result says which version made it",
-    ("studies", "dae.analyses"): "the modes of a drivetrain; the type alone",
+    ("studies", "dae.analyses"): "the modes of a drivetrain, the type alone",
     ("studies", "dae.model"): "kernels that a run of many outputs calls, imported ahead of it",
     ("campaigns", "gearmbs"): "the card of a data set says which version made it",
     ("cli", "gearmbs"): "the version",
@@ -139,7 +143,9 @@ def arrows() -> dict[str, frozenset[str]]:
     found = {}
     for name, path in modules.items():
         package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        named = {n for node in ast.walk(ast.parse(path.read_text())) for n in _named(node, package, modules)}
+        stub = path.with_suffix(".pyi")
+        texts = [p.read_text() for p in (path, stub) if p.exists()]
+        named = {n for text in texts for node in ast.walk(ast.parse(text)) for n in _named(node, package, modules)}
         found[name] = frozenset(n for n in named if n in modules and n != name)
     return found
 
@@ -175,6 +181,15 @@ def test_the_page_has_the_same_table():
     for package, (imports, purposes) in told.items():
         assert set(re.findall(r"`([\w.]+)`", imports)) == MAY_KNOW[package], package
         assert set(re.findall(r"`([\w.]+)`: ", purposes)) == {b for a, b in EXCEPTIONS if a == package}, package
+
+
+def test_the_page_is_up_to_date():
+    path = PAGE.parent / "scripts" / "architecture.py"
+    spec = importlib.util.spec_from_file_location("architecture_page", path)
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    assert script.page() == PAGE.read_text(encoding="utf-8"), f"run python {path}"
+    assert script.page().count("| `gearmbs.") == len(MAY_KNOW)
 
 
 def test_dae_does_not_know_gears_by_name():

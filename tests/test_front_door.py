@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import os
 import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -89,10 +91,37 @@ def test_packages_are_found_without_importing_them():
     assert found == [f"gearmbs.{name}" for name in names.split()]
 
 
-def test_modules_do_not_take_the_place_of_functions():
-    """`gearmbs.signals.envelope` is a function and the module it lives in; importing the module changes nothing."""
-    function = gm.signals.envelope if "signals" in vars(gm) else importlib.import_module("gearmbs.signals").envelope
-    module = importlib.import_module("gearmbs.signals.envelope")
-    assert isinstance(module, ModuleType)
-    assert importlib.import_module("gearmbs.signals").envelope is function
-    assert callable(function)
+@pytest.mark.parametrize("module_first", [False, True])
+@pytest.mark.parametrize("name", ["gears.planetary", "identify.fit"])
+def test_modules_do_not_take_the_place_of_functions(name, module_first):
+    """`gearmbs.identify.fit` is a function and the module it lives in; importing the module changes nothing."""
+    steps = [f"module = importlib.import_module('gearmbs.{name}')", f"function = gm.{name}"]
+    code = ["import importlib, inspect", "import gearmbs as gm", *(reversed(steps) if not module_first else steps)]
+    code.append(f"print(inspect.ismodule(module), inspect.isfunction(function), gm.{name} is function)")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    told = subprocess.check_output([sys.executable, "-c", "\n".join(code)], env=environment, text=True, cwd="/")
+    assert told.split() == ["True", "True", "True"]
+
+
+STUBS = sorted(Path(gm.__file__).parent.rglob("__init__.pyi"))
+
+
+def named(stub: Path) -> list[str]:
+    """Return the names that a stub gives a type checker; each is to be called the same where it comes from."""
+    aliases = [a for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom) for a in node.names]
+    assert all(alias.asname == alias.name for alias in aliases), "other imports are private to a stub (PEP 484)"
+    return sorted(alias.name for alias in aliases)
+
+
+@pytest.mark.parametrize("stub", STUBS, ids=lambda stub: stub.parent.name)
+def test_type_checkers_see_the_same_names(stub):
+    package = importlib.import_module(".".join(("gearmbs", *stub.parent.relative_to(STUBS[0].parent).parts)))
+    assert named(stub) == package.__all__
+    for name in package.__all__:
+        assert hasattr(package, name), name
+
+
+def test_every_front_has_a_stub():
+    """Whatever calls ``late`` reads one, and a package that exports names does so by it."""
+    inits = {path for path in STUBS[0].parent.rglob("__init__.py") if "__all__" in path.read_text()}
+    assert inits == {stub.with_suffix(".py") for stub in STUBS}

@@ -21,7 +21,7 @@ from gearmbs.kernels.records import CONTRACT, kernel
 
 _VEC, _MATRIX = float64[::1], float64[:, ::1]
 
-COLUMNS: tuple[str, ...] = (
+GAP_COLUMNS: tuple[str, ...] = (
     "side",
     "tooth_1",
     "tooth_2",
@@ -35,7 +35,7 @@ COLUMNS: tuple[str, ...] = (
     "alpha",
     "stiffness",
 )
-SIDE, TOOTH_1, TOOTH_2, SECTION, GAP, KIND, ROLL_1, ROLL_2, NORMAL, TANGENT, ALPHA, STIFFNESS = range(len(COLUMNS))
+SIDE, TOOTH_1, TOOTH_2, SECTION, GAP, KIND, ROLL_1, ROLL_2, NORMAL, TANGENT, ALPHA, STIFFNESS = range(len(GAP_COLUMNS))
 
 
 # a signature, for Python calls it: kernels without one are compiled at the first call only
@@ -57,7 +57,7 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, sections, rows, work):
     sections : ndarray
         Positions along the mean axis from mid-way between the wheels, m; if empty, the ends of the common face.
     rows : ndarray, shape (n, 12)
-        Out, columns as in ``COLUMNS``: side (+1, -1), tooth numbers, section, gap m, kind (0 flank on flank, 1 or 2
+        Out, columns as in ``GAP_COLUMNS``: side (+1, -1), tooth numbers, section, gap m, kind (0 flank on flank, 1 or 2
         the wheel whose corner bears), lengths of roll on both wheels m, contact point from the centre of wheel 1 along
         normal and tangent m, operating angle of the normal rad (mirrored for side -1), stiffness factor
         of the pair. The gap is infinite in sections where a corner has no foot on the mate's flank.

@@ -142,10 +142,10 @@ def _names(code: CodeType, own: Iterable = (), imported: set | None = None) -> I
 def _if_loaded(module: str, name: str) -> Any:
     """Return what a module calls by a name, None if it is still to be imported; see `gearmbs._lazy.late`."""
     space = vars(sys.modules.get(module, object))
-    home, _, other = space.get("_homes", {}).get(name, "").partition(":")
+    home = space.get("_homes", {}).get(name)
     if home and name not in space:
         space = vars(sys.modules.get(importlib.util.resolve_name(home, module), object))
-    return space.get(other or name)
+    return space.get(name)
 
 
 def _kernels_of(names: set[str], space: dict) -> Iterator[Kernel]:

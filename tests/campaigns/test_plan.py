@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import Campaign, CampaignError, Factor, Specimens, choose, load_plan, make_plan
+from gearmbs.campaigns import (
+    Campaign,
+    CampaignError,
+    Factor,
+    Specimens,
+    choose,
+    load_plan,
+    make_plan,
+    make_subject,
+    subject_kinds,
+)
 from gearmbs.studies import Case
 from tests.campaigns.support import function, ranges, small
 
@@ -160,3 +170,10 @@ def test_a_plan_is_printed_as_what_it_does():
     assert lines[1] == "  operation.torque: 50 to 200 N m, logarithmic"
     assert lines[2].startswith("  operation.speed: one of 52.3")
     assert lines[-1] == "  keeps harmonics"
+
+
+def test_kinds_of_subjects_are_listed():
+    assert {"pair", "drivetrain", "planetary", "bearing", "deck", "function"} <= set(subject_kinds())
+    assert make_subject("pair", {}).base() == Case().settings()
+    with pytest.raises(CampaignError, match="'wheel' is unknown; choose one of pair, "):
+        make_subject("wheel", {})

@@ -12,7 +12,7 @@ import typer
 from gearmbs.cli import app
 from gearmbs.studies import load_case
 from gearmbs.studies.trains.planetary import load_planetary
-from tests.docs.support import DOCS, ROOT, blocks, links, notebooks, pages, run_blocks
+from tests.docs.support import DOCS, FENCE, ROOT, blocks, links, notebooks, pages, run_blocks
 
 ALL = [ROOT / "README.md", *pages()]
 QUICK = ("own_dae.md", "own_mechanism.md", "measured.md", "adams.md", "adams_contact.md")
@@ -39,6 +39,15 @@ def test_relative_links_lead_to_files(path):
         if file and "://" not in target and not target.startswith("mailto:") and not (path.parent / file).exists():
             missing.append(target)
     assert not missing
+
+
+def test_modules_named_in_prose_exist():
+    """A file of Python named as `folder/name.py` ends the path of one that is checked in."""
+    folders = ("gearmbs", "tests", "docs", "benchmarks")
+    files = {f"/{p.relative_to(ROOT).as_posix()}" for folder in folders for p in (ROOT / folder).rglob("*.py")}
+    for page in ALL:
+        for name in re.findall(r"`([a-z_][\w/]*\.py)`", FENCE.sub("", page.read_text(encoding="utf-8"))):
+            assert any(file.endswith(f"/{name}") for file in files), f"{name_of(page)} names {name}"
 
 
 @pytest.mark.parametrize("path", ALL, ids=name_of)

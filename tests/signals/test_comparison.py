@@ -12,6 +12,7 @@ from gearmbs.signals import (
     level_distance,
     make_signal,
     ordinal_agreement,
+    remove_mean,
     write_signal,
 )
 
@@ -179,6 +180,14 @@ def test_compare_files(tmp_path):
 def test_bad_calls_name_the_field(call, match):
     with pytest.raises(SignalError, match=match):
         call()
+
+
+def test_mean_is_removed_from_each_channel():
+    both = make_signal({"acc": [1.0, 2.0, 6.0], "force": [-4.0, 0.0, 1.0]}, RATE, units="m/s^2")
+    less = remove_mean(both)
+    np.testing.assert_allclose(less.sel(channel="acc"), [-2.0, -1.0, 3.0])
+    np.testing.assert_allclose(less.sel(channel="force"), [-3.0, 1.0, 2.0])
+    assert less.attrs == both.attrs
 
 
 def test_units_must_agree():

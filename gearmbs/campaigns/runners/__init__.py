@@ -4,14 +4,6 @@ A runner is called with the folder's path and an iterator of units and yields a 
 order. It takes from the iterator only as many units as it can have on the way.
 """
 
-from typing import TYPE_CHECKING
-
 from gearmbs._lazy import late
 
-if TYPE_CHECKING:
-    from gearmbs.campaigns.runners.dask import DaskRunner
-    from gearmbs.campaigns.runners.processes import ProcessRunner, SerialRunner
-
-__all__ = ["DaskRunner", "ProcessRunner", "SerialRunner"]
-
-late(__name__, {"DaskRunner": ".dask", "ProcessRunner": ".processes", "SerialRunner": ".processes"})
+__all__ = late(__name__)

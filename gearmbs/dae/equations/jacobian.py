@@ -99,10 +99,10 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     update_tables(t, y, tab, True)
     slot = tab.slot
     if mode == NUMBERS:
-        for k in range(vals.size):
-            vals[k] = 0.0
-        for k in range(idata[T.H_QF] - idata[T.H_THETA]):
-            tab.seen[k] = y[idata[T.H_THETA] + k]
+        for j in range(vals.size):
+            vals[j] = 0.0
+        for j in range(idata[T.H_QF] - idata[T.H_THETA]):
+            tab.seen[j] = y[idata[T.H_THETA] + j]
     # a literal 0 would make numba compile every callee once more
     k = np.int64(0)
     for b in range(1, idata[T.H_BODIES]):

@@ -123,9 +123,9 @@ def _pole_between(functions, st, old):
     suspect = np.zeros(n, dtype=np.bool_)
     for i in range(n):
         suspect[i] = _unforeseen(st, i, old)
-    for m in range(st.n_carried):
-        if _outruns_step(st, m):
-            suspect[st.entry_col[st.carried[m]]] = True
+    for k in range(st.n_carried):
+        if _outruns_step(st, k):
+            suspect[st.entry_col[st.carried[k]]] = True
     for i in (st.pole, st.leapt):
         if i >= 0:
             suspect[i] = True

@@ -4,22 +4,6 @@
 numbers, and the energy drift.
 """
 
-from gearmbs.studies.iftomm.benchmark import PROBLEMS, Outcome, Problem, run, table
-from gearmbs.studies.iftomm.models import andrews, bricard, four_bars, governor, pendulum, slider_crank
-from gearmbs.studies.iftomm.references import PUBLISHED, Published
+from gearmbs._lazy import late
 
-__all__ = [
-    "PROBLEMS",
-    "PUBLISHED",
-    "Outcome",
-    "Problem",
-    "Published",
-    "andrews",
-    "bricard",
-    "four_bars",
-    "governor",
-    "pendulum",
-    "run",
-    "slider_crank",
-    "table",
-]
+__all__ = late(__name__)

@@ -1,0 +1,17 @@
+from .baseline import Score as Score
+from .baseline import classifier as classifier
+from .baseline import features as features
+from .baseline import from_simulation_to_recordings as from_simulation_to_recordings
+from .baseline import leak_and_no_leak as leak_and_no_leak
+from .baseline import macro_auroc as macro_auroc
+from .baseline import recording_features as recording_features
+from .baseline import score as score
+from .layers import SensorLayers as SensorLayers
+from .layers import one_state_a_group as one_state_a_group
+from .layers import random_split as random_split
+from .layers import shared_groups as shared_groups
+from .layers import split_by_group as split_by_group
+from .layers import withhold as withhold
+from .make import data_set_plan as data_set_plan
+from .make import feature_table as feature_table
+from .make import write_data_set as write_data_set

@@ -1,0 +1,11 @@
+from .evaluate import angle_rates as angle_rates
+from .evaluate import eval_gradient as eval_gradient
+from .evaluate import eval_request as eval_request
+from .evaluate import eval_value as eval_value
+from .evaluate import update_angles as update_angles
+from .opcodes import ExpressionError as ExpressionError
+from .second import eval_second as eval_second
+from .second import eval_time as eval_time
+from .splines import SplineData as SplineData
+from .tape import Tape as Tape
+from .tape import TapeBuilder as TapeBuilder

@@ -1,0 +1,13 @@
+from .benchmark import PROBLEMS as PROBLEMS
+from .benchmark import Outcome as Outcome
+from .benchmark import Problem as Problem
+from .benchmark import run as run
+from .benchmark import table as table
+from .models import andrews as andrews
+from .models import bricard as bricard
+from .models import four_bars as four_bars
+from .models import governor as governor
+from .models import pendulum as pendulum
+from .models import slider_crank as slider_crank
+from .references import PUBLISHED as PUBLISHED
+from .references import Published as Published
