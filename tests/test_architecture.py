@@ -60,6 +60,7 @@ EXCEPTIONS = {
     ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
     ("signals", "drivetrain"): "its commands take bearings and shafts from the description of a drivetrain",
     ("bearings", "dae.results"): "lives of bearings follow from the loads of a run",
+    ("drivetrain", "dae"): "the table of integrators: names that a description may give",
     ("drivetrain", "dae.equations"): "the same door: torques about an axis hand their kernels to the mechanism",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gearmbs.dae.methods import integrators_table
 from gearmbs.signals.files.table import formats_table
 
 
@@ -18,3 +19,8 @@ class Table:
 def formats() -> Table:
     """Return the formats of recordings."""
     return Table(formats_table())
+
+
+def integrators() -> Table:
+    """Return the integrators."""
+    return Table(integrators_table())

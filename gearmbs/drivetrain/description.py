@@ -57,6 +57,7 @@ from pathlib import Path
 from typing import Any
 
 from gearmbs._shown import Written
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS, any_of
 from gearmbs.drivetrain.bearings import BEARINGS
 from gearmbs.drivetrain.couplings import COUPLINGS
 from gearmbs.drivetrain.drives import DRIVES
@@ -100,7 +101,8 @@ class RunSettings(Written):
         Local error allowed a step.
     rate : float or str, optional
         Of the record, Hz; default: at least twenty samples in the shortest mesh period, 12 800 Hz or more.
-    integrator : {"WSTIFF", "GSTIFF", "IDA"}
+    integrator : str
+        One of `gearmbs.dae.methods.INTEGRATORS`.
     harmonics : int
         Mesh harmonics in the record's table, 1 or more.
     """
@@ -109,7 +111,7 @@ class RunSettings(Written):
     duration: Quantity = 1.0
     tolerance: float = 1e-7
     rate: Quantity = None
-    integrator: str = "WSTIFF"
+    integrator: str = DEFAULT
     harmonics: int = 3
 
     def __post_init__(self) -> None:
@@ -120,8 +122,8 @@ class RunSettings(Written):
                     object.__setattr__(self, name, to_si(value, unit, f"run.{name}"))
         require(self.duration > 0.0, f"run.duration is {self.duration:g} s; it must be positive")
         require(self.settling >= 0.0, f"run.settling is {self.settling:g} s; it must not be negative")
-        require(self.integrator in ("WSTIFF", "GSTIFF", "IDA"),
-                f"run.integrator is {self.integrator!r}; choose WSTIFF, GSTIFF or IDA")  # fmt: skip
+        require(self.integrator in INTEGRATORS,
+                f"run.integrator is {self.integrator!r}; choose {any_of(INTEGRATORS)}")  # fmt: skip
         require(1e-12 <= self.tolerance <= 5e-6, f"run.tolerance is {self.tolerance:g}; give 1e-12 to 5e-6")
         require(self.rate is None or self.rate > 0.0, f"run.rate is {self.rate} Hz; it must be positive")
         whole = isinstance(self.harmonics, Integral) and not isinstance(self.harmonics, bool)

@@ -1,5 +1,6 @@
 """The table of formats is the only list of them: a row and a module make a format known everywhere."""
 
+import importlib
 import re
 import struct
 import subprocess
@@ -17,6 +18,7 @@ from gearmbs.signals.files.format import Content, Format, begins_with
 from gearmbs.signals.files.formats import written_endings
 from gearmbs.signals.files.table import TABLE, Row, format_of, formats_table, known_endings, titles
 from gearmbs.signals.signal.record import Record
+from tests.docs.support import DOCS
 from tests.signals.test_io import assert_same, example
 
 PACKAGE = Path(gm.__file__).parent
@@ -135,6 +137,13 @@ def test_formats_keep_what_they_say(name, tmp_path):
     back = read_signal(write_signal(example(), tmp_path / f"x{ending}", format=name), format=name)
     assert_same(back, example(), attrs=known.keeps_attributes)
     assert ("place" in back.attrs) == known.keeps_attributes
+
+
+def test_the_page_shows_the_table(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS / "scripts"))
+    tables = importlib.import_module("tables")
+    assert tables.formats()._repr_markdown_() == formats_table()
+    assert "tables.formats()" in (DOCS / "howto" / "formats.md").read_text(encoding="utf-8")
 
 
 def test_the_table_is_light():

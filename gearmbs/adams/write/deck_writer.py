@@ -17,6 +17,7 @@ from gearmbs.adams.write.gears import is_gear_contact
 from gearmbs.adams.write.joints import constraint_statements, element_statements, joint_statement, load_statement
 from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
 from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
+from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.contacts import SolidContact
@@ -34,7 +35,7 @@ LONGEST = 80
 """Characters of a comment in the .req."""
 NOT_ASKED = ("coupler", "gear")
 """Elements whose forces are those of their joints."""
-METHODS = ("GSTIFF", "WSTIFF")
+METHODS = sorted(name for name, known in INTEGRATORS.items() if name in known.adams)
 FORMULATIONS = ("I3", "SI2", "SI1")
 
 
