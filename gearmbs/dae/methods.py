@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
@@ -103,12 +103,6 @@ INTEGRATORS: dict[str, Integrator] = {
 }
 DEFAULT = "WSTIFF"
 """The integrator where none is named."""
-
-
-def any_of(names: Iterable[str]) -> str:
-    """Return names as messages list them: "A, B or C"."""
-    *others, last = names
-    return f"{', '.join(others)} or {last}" if others else last
 
 
 def those_that(can: str) -> list[str]:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.methods import any_of, those_that
+from gearmbs.dae.methods import those_that
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
 from gearmbs.dae.user_problem import as_problem
 from gearmbs.progress import time_bar
+from gearmbs.wording import any_of
 
 DEFAULT_OUTPUTS = 201
 DEFAULT_RTOL = 1e-6

@@ -47,7 +47,6 @@ Each kind of part is a table of named tables::
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Callable, Mapping
@@ -57,7 +56,7 @@ from pathlib import Path
 from typing import Any
 
 from gearmbs._shown import Written
-from gearmbs.dae.methods import DEFAULT, INTEGRATORS, any_of
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.drivetrain.bearings import BEARINGS
 from gearmbs.drivetrain.couplings import COUPLINGS
 from gearmbs.drivetrain.drives import DRIVES
@@ -70,6 +69,7 @@ from gearmbs.drivetrain.sensors import SENSORS
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
 from gearmbs.units import Quantity, to_si
+from gearmbs.wording import any_of, did_you_mean
 
 FaultReader = Callable[[Any], Any]
 """Makes a fault of a table."""
@@ -208,8 +208,7 @@ def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
 def _check_keys(where: str, table: Mapping[str, Any], known: Any) -> None:
     for key in table:
         if key not in known:
-            near = difflib.get_close_matches(key, list(known), n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known ones are {', '.join(known)}"
+            hint = did_you_mean(key, known, shown=repr, otherwise=f"known ones are {', '.join(known)}")
             raise DrivetrainError(f"{where}: unknown key {key!r}; {hint}")
 
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from gearmbs.dae.integrators.driver import Run
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.methods import BDF, INTEGRATORS, any_of
+from gearmbs.dae.methods import BDF, INTEGRATORS
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult
+from gearmbs.wording import any_of
 
 
 def solve_wstiff(

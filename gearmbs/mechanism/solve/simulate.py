@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import difflib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from gearmbs.dae.equations.kinematics.update import update_tables
 from gearmbs.dae.equations.loads.expressions import value
 from gearmbs.dae.integrators.events import STOP
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.methods import DEFAULT, INTEGRATORS, any_of, those_that
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution, Stream
@@ -26,6 +25,7 @@ from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.progress import time_bar
+from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.lane_members import Members
@@ -336,8 +336,7 @@ def _check_options(name: str, options: Mapping[str, Any]) -> None:
         if option in known:
             continue
         remark = "outputs are set by rate, t_eval or every_step" if "step" in option or "out" in option else ""
-        near = difflib.get_close_matches(option, [*known, *SETTINGS], n=1)
-        hint = remark or (f"did you mean {near[0]}?" if near else "")
+        hint = remark or did_you_mean(option, [*known, *SETTINGS])
         raise ModelError(
             f"simulate has no option {option!r}{': ' + hint if hint else ''}; besides {', '.join(SETTINGS)} the "
             f"integrator {name} takes {', '.join(k for k in known if k not in SETTINGS)}"

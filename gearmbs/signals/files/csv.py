@@ -22,6 +22,7 @@ from typing import IO, Any
 import numpy as np
 import pandas as pd
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.format import Asked, Content, Format, begins_with
 from gearmbs.signals.files.lvm import read_lvm
@@ -45,7 +46,6 @@ from gearmbs.signals.signal.record import (
     checked_gaps,
     chosen_rate,
     number_of,
-    plain,
     rate_candidates,
     rate_from_times,
     speed_of,

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.format import Asked, Content, Format, begins_with
-from gearmbs.signals.signal.record import Record, assemble, plain, rate_candidates, rate_from_times
+from gearmbs.signals.signal.record import Record, assemble, rate_candidates, rate_from_times
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 
 LAYOUT = "gearmbs signal"

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.format import Content, Format, begins_with
-from gearmbs.signals.signal.record import Record, chosen_rate, plain, rate_candidates, same_rate, speed_of
+from gearmbs.signals.signal.record import Record, chosen_rate, rate_candidates, same_rate, speed_of
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 
 GROUP = "signal"

@@ -17,11 +17,12 @@ from gearmbs.cli import app
 from gearmbs.dae import Options, solve_dae
 from gearmbs.dae.integrators.bdf import MAX_ORDER
 from gearmbs.dae.integrators.wstiff import solve_wstiff
-from gearmbs.dae.methods import BDF, DEFAULT, INTEGRATORS, Integrator, any_of, integrators_table
+from gearmbs.dae.methods import BDF, DEFAULT, INTEGRATORS, Integrator, integrators_table
 from gearmbs.dae.problem import ModelError
 from gearmbs.drivetrain.description import RunSettings
 from gearmbs.drivetrain.errors import DrivetrainError
 from gearmbs.mechanism import Mechanism
+from gearmbs.wording import any_of
 from tests.docs.support import DOCS
 
 PACKAGE = Path(gm.__file__).parent
