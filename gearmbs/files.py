@@ -1,4 +1,4 @@
-"""Files that appear under their final name only when they are whole."""
+"""Files that appear under their final name only when they are whole, and values as such files hold them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import os
 import shutil
 import tempfile
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
 
 
 @contextmanager
@@ -133,3 +135,28 @@ def check_place(target: str | Path, needed: float, what: str = "the result", opt
 
 def _size(count: float) -> str:
     return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
+
+
+def plain(value: Any, other: Callable[[Any], Any] = str) -> Any:
+    """Return a value as JSON knows it: made of tables, lists, numbers and texts.
+
+    Parameters
+    ----------
+    value : object
+        Tables and lists may hold others of their kind, and arrays and scalars of numpy.
+    other : callable
+        Turns anything else into something that JSON knows; default its text.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(item, other) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, other) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist(), other)
+    value = python_scalar(value)
+    return value if value is None or isinstance(value, str | int | float | bool) else other(value)
+
+
+def python_scalar(value: Any) -> Any:
+    """Return a scalar of numpy as Python's; anything else as it is."""
+    return value.item() if isinstance(value, np.generic) else value

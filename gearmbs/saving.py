@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gearmbs.progress import waiting
+from gearmbs.wording import any_of
 
 WRITERS: dict[str, dict[str, str]] = {
     "Case": {".toml": "gearmbs.studies.case.case:write_case"},
@@ -98,10 +99,8 @@ def _by_ending(thing: Any, path: Path, kind: str, writers: dict[str, str]) -> Pa
     endings = ("".join(path.suffixes[-parts:]).lower() for parts in (2, 1))  # of two parts: ".csv.gz"
     writer = next((writers[ending] for ending in endings if ending in writers), None)
     if writer is None:
-        *others, last = writers
-        known = f"{', '.join(others)} or {last}" if others else last
         article = "an" if kind[0] in "AEIOU" else "a"
-        raise ValueError(f"path is {str(path)!r}; {article} {kind} is saved as {known}")
+        raise ValueError(f"path is {str(path)!r}; {article} {kind} is saved as {any_of(writers)}")
     path.parent.mkdir(parents=True, exist_ok=True)
     module, _, name = writer.partition(":")
     written = getattr(importlib.import_module(module), name)(thing, path)

@@ -6,12 +6,13 @@ wrong with it, is left to pint, whose registry of units takes a quarter of a sec
 
 from __future__ import annotations
 
-import difflib
 import functools
 import math
 import re
 from numbers import Real
 from typing import Any
+
+from gearmbs.wording import closest
 
 # A field that takes a float in SI or text with a unit, and holds the float once its object is built.
 Quantity = Any
@@ -282,7 +283,7 @@ def _remedy(text: str, target: str) -> str:
         for name in dict.fromkeys((*COMMON, target))
         if (found := _common(name)) and wanted and found[1] == wanted[1]
     ]
-    near = difflib.get_close_matches(unit, known, 3, 0.5) if unit else []
+    near = closest(unit, known, 3, 0.5) if unit else []
     if number is not None and near:
         # of a unit of two letters one slip is as likely left out as exchanged
         likely = near if len(unit) <= 2 else near[:1]

@@ -17,9 +17,9 @@ import gearmbs
 ROOT = Path(gearmbs.__file__).parent
 PAGE = Path(__file__).parent.parent / "docs" / "architecture.md"
 
-SUPPORT = {"_command", "_deprecation", "_lazy", "_shown", "compile", "files", "progress", "saving", "units"}
+SUPPORT = {"_command", "_deprecation", "_lazy", "_shown", "compile", "files", "progress", "saving", "units", "wording"}
 """Modules of the top that any package may use: lazy imports, how objects show themselves and are saved, files that
-appear when they are whole, progress, units, and the command that compiles ahead."""
+appear when they are whole, progress, units, parts of messages, and the command that compiles ahead."""
 
 MAY_KNOW = {
     "kernels": {"dae"},
@@ -61,6 +61,7 @@ EXCEPTIONS = {
     ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
     ("signals", "drivetrain"): "its commands take bearings and shafts from the description of a drivetrain",
     ("bearings", "dae.results"): "lives of bearings follow from the loads of a run",
+    ("drivetrain", "dae"): "the table of integrators: names that a description may give",
     ("drivetrain", "dae.equations"): "the door for force elements: torques about an axis hand their kernels to it",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",

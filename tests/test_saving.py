@@ -10,7 +10,8 @@ import xarray as xr
 
 import gearmbs as gm
 from gearmbs.mechanism import Mechanism
-from gearmbs.signals.files.formats import SUFFIXES, written_endings
+from gearmbs.signals.files.formats import written_endings
+from gearmbs.signals.files.table import known_endings
 from gearmbs.view import gear_scene, spectrum_plot
 from gearmbs.view.figures import animation
 from gearmbs.view.figures.style import new_figure
@@ -73,7 +74,7 @@ def test_endings_that_will_not_do_are_named(thing, name, words, tmp_path):
 @pytest.mark.parametrize("ending", written_endings())
 def test_signals_are_saved_as_all_that_is_written(ending, tmp_path):
     """What `write_signal` takes, `save` takes; an archive of numpy is called one."""
-    needed = {"tdms": "nptdms", "uff58": "pyuff", "parquet": "pyarrow"}.get(SUFFIXES[ending])
+    needed = {"tdms": "nptdms", "uff58": "pyuff", "parquet": "pyarrow"}.get(known_endings()[ending])
     if needed:
         pytest.importorskip(needed)
     one = signal()

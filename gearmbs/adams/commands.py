@@ -52,7 +52,7 @@ def pair_comments(pair: GearPair) -> list[str]:
         If it holds an object of a class that is not the package's own.
     """
     # blanks at the end of a line would not survive every editor
-    text = json.dumps(_plain(pair), separators=(",", ":")).replace(" ", "\\u0020")
+    text = json.dumps(_held(pair), separators=(",", ":")).replace(" ", "\\u0020")
     return [f"{MARK}{text[k : k + WIDTH]}" for k in range(0, len(text), WIDTH)]
 
 
@@ -73,16 +73,16 @@ def pair_of(text: str) -> GearPair:
     return pair
 
 
-def _plain(value: Any) -> Any:
+def _held(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         name = type(value).__name__
         if known().get(name) is not type(value):
             raise ValueError(f"{name} is a class of your own, which a deck cannot hold")
-        return {KIND: name} | {f.name: _plain(getattr(value, f.name)) for f in fields(value) if f.init}
+        return {KIND: name} | {f.name: _held(getattr(value, f.name)) for f in fields(value) if f.init}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, (tuple, list)):
-        return [_plain(one) for one in value]
+        return [_held(one) for one in value]
     if isinstance(value, (bool, int, str)) or value is None:
         return value
     return float(value)

@@ -10,6 +10,7 @@ from typing import Any
 
 from gearmbs._shown import Written
 from gearmbs.bearings.errors import BearingError, require
+from gearmbs.bearings.kinds import KINDS
 from gearmbs.bearings.laws_kernel import (
     BALL_EXPONENT,
     ROLLER_EXPONENT,
@@ -19,10 +20,6 @@ from gearmbs.bearings.laws_kernel import (
     line_contact,
 )
 from gearmbs.units import Quantity, doubt_of_material, to_si
-
-BALLS = ("deep groove", "angular contact", "four point")
-ROLLERS = ("cylindrical roller", "tapered roller")
-KINDS = (*BALLS, *ROLLERS)
 
 UNITS = {
     "element_diameter": "length", "pitch_diameter": "length", "contact_angle": "angle", "clearance": "length",
@@ -37,7 +34,8 @@ class Bearing(Written):
 
     Parameters
     ----------
-    kind : {"deep groove", "angular contact", "four point", "cylindrical roller", "tapered roller"}
+    kind : str
+        One of `gearmbs.bearings.kinds.KINDS`.
     elements : int
         Rolling elements in one row, Z.
     element_diameter, pitch_diameter : float or str
@@ -140,12 +138,12 @@ class Bearing(Written):
                 self.roller_length is not None,
                 f"Bearing.roller_length is missing; a {self.kind} bearing needs the effective length of its rollers",
             )
-        if self.kind in ("angular contact", "four point", "tapered roller"):
+        if KINDS[self.kind].angle == "needed":
             require(
                 angle > 0.0, f"Bearing.contact_angle is 0; a bearing of kind '{self.kind}' needs one, such as '25 deg'"
             )
-        if self.kind == "cylindrical roller":
-            require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of cylindrical rollers it is 0")
+        if KINDS[self.kind].angle == "none":
+            require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of {self.kind}s it is 0")
 
     @classmethod
     def from_designation(cls, designation: str, **changes: Any) -> Bearing:
@@ -188,7 +186,7 @@ class Bearing(Written):
     @property
     def rollers(self) -> bool:
         """Whether the elements are rollers."""
-        return self.kind in ROLLERS
+        return KINDS[self.kind].rollers
 
     @property
     def ratio(self) -> float:

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.bearings.errors import require
+from gearmbs.bearings.kinds import KINDS
 from gearmbs.bearings.laws_kernel import groove_contact
 
 if TYPE_CHECKING:
@@ -37,24 +38,12 @@ STANDARD_GROOVE = 0.52
 """Radius of the inner ring's groove, in ball diameters, that ISO 281 and ISO 76 state their ratings for."""
 PRESSURE = 4.2e9
 """Of the static rating of ball bearings, Pa."""
-REDUCTION = {"deep groove": 0.95, "angular contact": 0.95, "four point": 0.95, "cylindrical roller": 0.83,
-             "tapered roller": 0.83}  # fmt: skip
-DEEP_GROOVE = (
-    (0.172, 0.19, 2.30), (0.345, 0.22, 1.99), (0.689, 0.26, 1.71), (1.03, 0.28, 1.55), (1.38, 0.30, 1.45),
-    (2.07, 0.34, 1.31), (3.45, 0.38, 1.15), (5.17, 0.42, 1.04), (6.89, 0.44, 1.00),
-)  # fmt: skip
-"""f_0 F_a/C_0, e, Y of single-row deep groove bearings; X = 0.56."""
-ANGULAR = (
-    (20.0, 0.57, 0.43, 1.00), (25.0, 0.68, 0.41, 0.87), (30.0, 0.80, 0.39, 0.76), (35.0, 0.95, 0.37, 0.66),
-    (40.0, 1.14, 0.35, 0.57), (45.0, 1.34, 0.33, 0.50),
-)  # fmt: skip
-"""Contact angle in degrees, e, X, Y of single-row angular contact bearings."""
 
 
 def dynamic_rating(bearing: Bearing) -> float:
     """Return the basic dynamic radial load rating C by ISO 281, N."""
     g, z, cosine = bearing.ratio, bearing.elements, math.cos(bearing.contact_angle)
-    d, factor = 1e3 * bearing.element_diameter, REDUCTION[bearing.kind]
+    d, factor = 1e3 * bearing.element_diameter, KINDS[bearing.kind].reduction
     if bearing.rollers:
         u = 1.04 * ((1 - g) / (1 + g)) ** (143 / 108)
         f_c = 207.9 * factor * g ** (2 / 9) * (1 - g) ** (29 / 27) / (1 + g) ** 0.25 * (1 + u**4.5) ** (-2 / 9)
@@ -96,27 +85,7 @@ def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, 
         For cylindrical rollers under axial load, and contact angles outside the standard's table.
     """
     radial, axial = abs(radial), abs(axial)
-    if bearing.kind == "cylindrical roller":
-        require(
-            axial <= 1e-9 * max(radial, 1.0),
-            f"F_a is {axial:.4g} N; cylindrical rollers carry no axial load: their life counts F_r alone",
-        )
-        return 1.0, 0.0
-    if bearing.kind == "tapered roller":
-        e, x, y = 1.5 * math.tan(bearing.contact_angle), 0.4, 0.4 / math.tan(bearing.contact_angle)
-    elif bearing.kind == "deep groove":
-        table = np.array(DEEP_GROOVE)
-        f_0 = bearing.rating_at_rest / (bearing.elements * (1e3 * bearing.element_diameter) ** 2)
-        level = f_0 * axial / bearing.rating_at_rest
-        e, y = (float(np.interp(level, table[:, 0], table[:, k])) for k in (1, 2))
-        x = 0.56
-    else:
-        degrees, table = math.degrees(bearing.contact_angle), np.array(ANGULAR)
-        require(
-            20.0 <= degrees <= 45.0,
-            f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors are for 20 to 45 deg",
-        )
-        e, x, y = (float(np.interp(degrees, table[:, 0], table[:, k])) for k in (1, 2, 3))
+    e, x, y = KINDS[bearing.kind].load_factors(bearing, radial, axial)
     return (1.0, 0.0) if axial <= e * radial else (x, y)
 
 

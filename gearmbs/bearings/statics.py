@@ -18,6 +18,7 @@ from scipy.optimize import nnls
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.errors import BearingError, require, require_fields
 from gearmbs.bearings.geometry import Bearing
+from gearmbs.bearings.kinds import KINDS
 from gearmbs.bearings.settings import BearingSettings
 from gearmbs.bearings.tables import BearingTables, pack
 from gearmbs.units import Quantity, to_si
@@ -415,10 +416,10 @@ class BearingStatics:
         found, stiffness = self._load(place, cage_angle)
         state = self._state(place, found, stiffness, cage_angle)
         against = -self.settings.sense * float(found[2])
-        if self.bearing.kind == "angular contact" and against > AGAINST * float(state.element_loads.sum()):
+        if KINDS[self.bearing.kind].one_shoulder and against > AGAINST * float(state.element_loads.sum()):
             name = f" {self.bearing.designation}" if self.bearing.designation else ""
             warnings.warn(
-                f"angular contact bearing{name}: {against:.4g} N along the axis press against its sense "
+                f"{self.bearing.kind} bearing{name}: {against:.4g} N along the axis press against its sense "
                 f"({self.settings.sense:+d}) and are carried across the groove, on a shoulder that most such bearings "
                 "do not have; turn the load or the sense, or add a second bearing",
                 stacklevel=2,

@@ -11,6 +11,7 @@ from gearmbs.bearings import defects as df
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
+from gearmbs.bearings.kinds import KINDS
 from gearmbs.bearings.layout import MARGIN, spline_coefficients
 from gearmbs.bearings.settings import BearingSettings
 
@@ -140,7 +141,7 @@ def _scalars(settings: BearingSettings) -> np.ndarray:
             (bearing.inner_curvature - 0.5) * d,
             (bearing.outer_curvature - 0.5) * d,
         )
-        if bearing.kind == "four point":
+        if KINDS[bearing.kind].both_ways:
             reals[B.OUTER_APART] = 2.0 * reals[B.OUTER_REACH] * math.sin(bearing.contact_angle)
     return reals
 
@@ -170,7 +171,7 @@ def _paths(settings: BearingSettings) -> tuple[np.ndarray, np.ndarray]:
     angle, distance = bearing.contact_angle, bearing.groove_distance
     reach = (bearing.inner_curvature - 0.5) * bearing.element_diameter
     rows = []
-    for sign in (1.0, -1.0) if bearing.kind == "four point" else (float(settings.sense),):
+    for sign in (1.0, -1.0) if KINDS[bearing.kind].both_ways else (float(settings.sense),):
         radial = distance * math.cos(angle) - 0.5 * bearing.clearance
         axial = sign * distance * math.sin(angle)
         radius = 0.5 * bearing.pitch_diameter + reach * math.cos(angle)
@@ -186,7 +187,7 @@ def _preload_balls(settings: BearingSettings, rows: list[list[float]]) -> None:
 
     bearing = settings.bearing
     require(
-        bearing.kind == "angular contact",
+        KINDS[bearing.kind].preloaded,
         f"RollingBearing.preload: a {bearing.kind} bearing is preloaded by a negative clearance, or by its neighbour",
     )
     radial, axial = rows[0][0], abs(rows[0][1])
@@ -234,7 +235,7 @@ def _roller_preload(settings: BearingSettings, rows: np.ndarray) -> float:
 
     bearing = settings.bearing
     require(
-        bearing.kind == "tapered roller",
+        KINDS[bearing.kind].preloaded,
         f"RollingBearing.preload: a {bearing.kind} bearing is preloaded by a negative clearance",
     )
     sine = math.sin(bearing.contact_angle)

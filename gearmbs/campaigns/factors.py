@@ -17,6 +17,7 @@ import numpy as np
 from gearmbs.campaigns.settings import CampaignError, fields_error
 from gearmbs.campaigns.settings import whole as whole_number
 from gearmbs.campaigns.subjects.base import Subject
+from gearmbs.files import python_scalar
 from gearmbs.units import to_si
 
 Columns = dict[str, np.ndarray]
@@ -60,7 +61,7 @@ class Factor:
     def __post_init__(self) -> None:
         if isinstance(self.values, str) or not isinstance(self.values, Sequence | np.ndarray):
             raise CampaignError(f"factor {self.path!r}: values = {self.values!r}; give a list of them")
-        object.__setattr__(self, "values", tuple(plain(v) for v in self.values))
+        object.__setattr__(self, "values", tuple(python_scalar(v) for v in self.values))
         object.__setattr__(self, "name", self.name or self.path)
         if self.levels is not None:
             object.__setattr__(self, "levels", whole_number(self.levels, f"factor {self.path!r}: levels", 1))
@@ -131,7 +132,7 @@ class Factor:
 
     def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
         """Set the field in nested data."""
-        set_path(data, self.path, plain(row[self.name]))
+        set_path(data, self.path, python_scalar(row[self.name]))
 
 
 @dataclass(frozen=True)
@@ -364,11 +365,6 @@ def set_path(data: dict[str, Any], path: str, value: Any) -> None:
         data[section] = dict(data.get(section, {}))
         data = data[section]
     data[name] = value
-
-
-def plain(value: Any) -> Any:
-    """Return a numpy scalar as Python's."""
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def _is_range(value: Any) -> bool:

@@ -22,11 +22,11 @@ from gearmbs.campaigns.factors import (
     factor_from,
     factor_table,
     number_in_si,
-    plain,
     set_path,
 )
 from gearmbs.campaigns.settings import CampaignError, check_settings, satisfied, texts, whole
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
+from gearmbs.files import python_scalar
 
 FORMAT = 1
 ALL_CORNERS = 6
@@ -200,7 +200,7 @@ class Plan:
         data = self.subject.base()
         if self.design == "list":
             for name in dict.fromkeys(key for r in self.options["rows"] for key in r):
-                value = plain(row[name])
+                value = python_scalar(row[name])
                 if value is not None and value == value:
                     set_path(data, name, value)
             return data
@@ -254,7 +254,7 @@ class Plan:
         corners = self.corners()
         things, wrong = [], []
         for k in range(len(corners["point"])):
-            row = {name: plain(values[k]) for name, values in corners.items()}
+            row = {name: python_scalar(values[k]) for name, values in corners.items()}
             try:
                 things.append(self.subject.check(self.data(row), f"corner {k}"))
             except ValueError as error:
@@ -397,7 +397,7 @@ def _rows_in_si(plan: Plan) -> list[dict[str, Any]]:
     if not rows or not all(isinstance(row, Mapping) for row in rows):
         raise CampaignError("design list: give options={'rows': [{path: value, ...}, ...]}")
     units = {path: plan.subject.unit_of(path) for row in rows for path in row}
-    found = [{k: number_in_si(plain(v), units[k], k) for k, v in row.items()} for row in rows]
+    found = [{k: number_in_si(python_scalar(v), units[k], k) for k, v in row.items()} for row in rows]
     for path in units:
         column = [row.get(path) for row in found]
         if any(isinstance(v, float) or v is None for v in column):

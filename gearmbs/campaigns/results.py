@@ -165,7 +165,7 @@ def _matlab(campaign: Campaign, target: Path) -> Path:
     found: dict[str, Any] = {}
     for name in (*data.data_vars, *data.coords):
         values = data[name].values
-        found[_plain(str(name))] = (
+        found[_variable_name(str(name))] = (
             np.array([str(v) for v in values], dtype=object) if values.dtype == object else values
         )
     with whole_file(target) as part, part.open("wb") as file:
@@ -173,7 +173,7 @@ def _matlab(campaign: Campaign, target: Path) -> Path:
     return target
 
 
-def _plain(name: str) -> str:
+def _variable_name(name: str) -> str:
     text = "".join(c if c.isalnum() else "_" for c in name)
     return (text if text[0].isalpha() else f"v_{text}")[:60]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import difflib
 import hashlib
 import json
 import math
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.units import to_si
+from gearmbs.wording import did_you_mean
 
 # The error of campaigns.
 
@@ -83,8 +83,7 @@ def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str
 def near(name: str, known: Iterable[str]) -> str:
     """Return the end of a message about an unknown name: what may be meant, or what there is."""
     known = list(known)
-    close = difflib.get_close_matches(str(name), known, 1)
-    return f"; did you mean {close[0]}?" if close else f"; known are {', '.join(known)}"
+    return did_you_mean(name, known, before="; ", otherwise=f"; known are {', '.join(known)}")
 
 
 def texts(value: Any, name: str) -> tuple[str, ...]:

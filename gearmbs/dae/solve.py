@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.wstiff import solve_wstiff
+from gearmbs.dae.methods import those_that
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
 from gearmbs.dae.user_problem import as_problem
 from gearmbs.progress import time_bar
+from gearmbs.wording import any_of
 
-IDA_DEFAULT_OUTPUTS = 201
+DEFAULT_OUTPUTS = 201
 DEFAULT_RTOL = 1e-6
 """Relative tolerance where none is given: six digits, a local error far below that of most data."""
 OF_EQUATIONS = ("error_mask", "differential", "jac", "jac_sparsity", "p", "scale", "names")
@@ -73,8 +73,8 @@ def solve_dae(
         Start and end.
     y0, yp0 : array_like, shape (n,)
         Initial values. ``y0`` must satisfy the algebraic equations. Without ``yp0`` the derivatives are worked out.
-    method : {"WSTIFF", "GSTIFF", "IDA"}
-        Variable-coefficient BDF (default), fixed-leading-coefficient BDF, or SUNDIALS IDA.
+    method : str
+        One of `gearmbs.dae.methods.INTEGRATORS`; default "WSTIFF", BDF with variable coefficients.
     rtol, atol : float or ndarray
         Local error of unknown i per step: ``atol[i] + rtol * |y[i]|``; ``rtol`` is 1e-6 by default. Ignored for a
         `DAEProblem`, which takes ``tol``: its ``atol_scale`` times this is the absolute tolerance.
@@ -121,13 +121,15 @@ def solve_dae(
         problem = _checked_problem(fun, t0, y0, events, of_equations)
     else:
         problem, chosen = _posed(fun, (t0, t_end), y0, yp0, rtol, atol, events, of_equations, chosen, options)
-    if chosen.uses_ida and (chosen.dense_output or problem.n_events):
-        raise ValueError("method='IDA' has neither dense output nor events here; use WSTIFF or GSTIFF")
+    for option, wanted in (("dense_output", chosen.dense_output), ("event_action", bool(problem.n_events))):
+        if wanted and not chosen.integrator.can(option):
+            others = any_of(those_that(option))
+            raise ValueError(f"method={chosen.method!r} has neither dense output nor events here; use {others}")
     with time_bar(chosen.progress, "solving", t0, t_end) as told:
         chosen = replace(chosen, progress=told)
-        if chosen.uses_ida:
-            return _run_ida(problem, chosen, (t0, t_end), t_eval)
-        return solve_wstiff(problem, t_eval, chosen, t_end=t_end)
+        if not chosen.integrator.compiled:
+            return _run_at_outputs(problem, chosen, (t0, t_end), t_eval)
+        return chosen.integrator.solve(problem, t_eval, chosen, t_end=t_end)
 
 
 def _checked_problem(
@@ -176,17 +178,17 @@ def _posed(
     return problem, replace(chosen, tol=1.0, rtol=float(rtol), error_probe=probe, **rules)
 
 
-def _run_ida(
+def _run_at_outputs(
     problem: DAEProblem, options: Options, t_span: tuple[float, float], t_eval: np.ndarray | None
 ) -> DAEResult:
-    """Run IDA over ``t_span``; without ``t_eval`` at evenly spaced times."""
-    times = np.linspace(*t_span, IDA_DEFAULT_OUTPUTS) if t_eval is None else np.asarray(t_eval, dtype=float)
+    """Run an integrator that wants the start among its outputs; without ``t_eval`` at evenly spaced times."""
+    times = np.linspace(*t_span, DEFAULT_OUTPUTS) if t_eval is None else np.asarray(t_eval, dtype=float)
     if times.ndim != 1 or not times.size:
         raise ValueError(f"t_eval has shape {times.shape}; it must be a list of at least one time")
     if times[0] < t_span[0] or times[-1] > t_span[1]:
         raise ValueError(f"t_eval {times[0]:g} .. {times[-1]:g} leaves t_span")
     padded = times if times[0] == t_span[0] else np.concatenate((t_span[:1], times))
-    result = solve_ida(problem, padded, options)
+    result = options.integrator.solve(problem, padded, options)
     if padded is not times:
         result.t, result.y, result.yp = result.t[1:], result.y[1:], result.yp[1:]
     error = options.error_probe() if options.error_probe is not None else None

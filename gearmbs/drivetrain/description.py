@@ -47,7 +47,6 @@ Each kind of part is a table of named tables::
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Callable, Mapping
@@ -57,6 +56,7 @@ from pathlib import Path
 from typing import Any
 
 from gearmbs._shown import Written
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.drivetrain.bearings import BEARINGS
 from gearmbs.drivetrain.couplings import COUPLINGS
 from gearmbs.drivetrain.drives import DRIVES
@@ -69,6 +69,7 @@ from gearmbs.drivetrain.sensors import SENSORS
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
 from gearmbs.units import Quantity, to_si
+from gearmbs.wording import any_of, did_you_mean
 
 FaultReader = Callable[[Any], Any]
 """Makes a fault of a table."""
@@ -100,7 +101,8 @@ class RunSettings(Written):
         Local error allowed a step.
     rate : float or str, optional
         Of the record, Hz; default: at least twenty samples in the shortest mesh period, 12 800 Hz or more.
-    integrator : {"WSTIFF", "GSTIFF", "IDA"}
+    integrator : str
+        One of `gearmbs.dae.methods.INTEGRATORS`.
     harmonics : int
         Mesh harmonics in the record's table, 1 or more.
     """
@@ -109,7 +111,7 @@ class RunSettings(Written):
     duration: Quantity = 1.0
     tolerance: float = 1e-7
     rate: Quantity = None
-    integrator: str = "WSTIFF"
+    integrator: str = DEFAULT
     harmonics: int = 3
 
     def __post_init__(self) -> None:
@@ -120,8 +122,8 @@ class RunSettings(Written):
                     object.__setattr__(self, name, to_si(value, unit, f"run.{name}"))
         require(self.duration > 0.0, f"run.duration is {self.duration:g} s; it must be positive")
         require(self.settling >= 0.0, f"run.settling is {self.settling:g} s; it must not be negative")
-        require(self.integrator in ("WSTIFF", "GSTIFF", "IDA"),
-                f"run.integrator is {self.integrator!r}; choose WSTIFF, GSTIFF or IDA")  # fmt: skip
+        require(self.integrator in INTEGRATORS,
+                f"run.integrator is {self.integrator!r}; choose {any_of(INTEGRATORS)}")  # fmt: skip
         require(1e-12 <= self.tolerance <= 5e-6, f"run.tolerance is {self.tolerance:g}; give 1e-12 to 5e-6")
         require(self.rate is None or self.rate > 0.0, f"run.rate is {self.rate} Hz; it must be positive")
         whole = isinstance(self.harmonics, Integral) and not isinstance(self.harmonics, bool)
@@ -206,8 +208,7 @@ def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
 def _check_keys(where: str, table: Mapping[str, Any], known: Any) -> None:
     for key in table:
         if key not in known:
-            near = difflib.get_close_matches(key, list(known), n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known ones are {', '.join(known)}"
+            hint = did_you_mean(key, known, shown=repr, otherwise=f"known ones are {', '.join(known)}")
             raise DrivetrainError(f"{where}: unknown key {key!r}; {hint}")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,6 +16,7 @@ from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Part, parts_html
 from gearmbs.drivetrain.parts import GearMesh, Housing, Shaft, Wheel
 from gearmbs.drivetrain.sensors import Sensor
+from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.kinematics import KinematicTable, PowerFlow
@@ -147,8 +147,7 @@ class Drivetrain:
         found = self.parts.get(name)
         if found is None or (kind is not None and not isinstance(found, kind)):
             names = [n for n, p in self.parts.items() if kind is None or isinstance(p, kind)]
-            near = difflib.get_close_matches(str(name), names, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"known ones are {', '.join(names) or 'none'}"
+            hint = did_you_mean(name, names, shown=repr, otherwise=f"known ones are {', '.join(names) or 'none'}")
             what = "part" if kind is None else kind.title
             raise DrivetrainError(f"{asked_by or self.name}: there is no {what} '{name}'; {hint}")
         return found  # type: ignore[return-value]

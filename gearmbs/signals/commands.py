@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gearmbs._command import check_kind, guarded, stage_bar
+from gearmbs.signals.files.table import TABLE, titles
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -152,7 +153,7 @@ def hand_over(report: str, out: Path | None, files: list[Path]) -> None:
 
 
 def analyse(
-    file: Annotated[Path, typer.Argument(help="CSV, MAT, UFF, WAV, TDMS, LVM, NPY, Parquet, NetCDF or HDF5.")],
+    file: Annotated[Path, typer.Argument(help=f"{titles()}.")],
     teeth: Annotated[str | None, typer.Option(help='Teeth of the wheel on the reference shaft; or "32,80".')] = None,
     rate: Rate = None,
     speed: Speed = None,
@@ -185,7 +186,9 @@ def analyse(
     planets: Annotated[int, typer.Option(help="How many planets.")] = 3,
     member: Annotated[str, typer.Option(help="Whose speed is given, of a planetary set: carrier or sun.")] = "carrier",
     gaps: Gaps = None,
-    format: Annotated[str | None, typer.Option(help="Format of the file, if its name does not say.")] = None,
+    format: Annotated[
+        str | None, typer.Option(help=f"Format of the file, if its name does not say: {', '.join(TABLE)}.")
+    ] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for spectrum and average as PNG and SVG.")] = None,
     out: ReportFile = None,

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from gearmbs._command import case_bars, check_kind, guarded, kind_of, stage_bar
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.signals.commands import check_targets, hand_over, save_figures
+from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
     from gearmbs.studies.run.simulation import SimulationFailed
@@ -144,7 +146,7 @@ def paper(
     friction: Annotated[bool, typer.Option(help="Coulomb friction between the flanks.")] = True,
     misalignment: Annotated[str, typer.Option(help='Plane of the misalignment: "skew" or "inclination".')] = "skew",
     angle: Annotated[str, typer.Option(help="Angle of the misalignment.")] = "1 deg",
-    integrator: Annotated[str, typer.Option(help="WSTIFF, GSTIFF or IDA.")] = "WSTIFF",
+    integrator: Annotated[str, typer.Option(help=f"{any_of(INTEGRATORS)}.")] = DEFAULT,
     tolerance: Annotated[float | None, typer.Option(help="Integrator tolerance.")] = None,
     component: Annotated[str, typer.Option(help="Force component of the figures.")] = "line_of_action",
     workers: Annotated[int | None, typer.Option(help="Cases at a time; default: the cores.")] = None,

@@ -16,9 +16,9 @@ from .figures.changing_speed import spectrogram_plot as spectrogram_plot
 from .figures.changing_speed import waterfall_plot as waterfall_plot
 from .figures.curves import contact_pattern_plot as contact_pattern_plot
 from .figures.curves import load_sharing_plot as load_sharing_plot
-from .figures.maps import sensitivity_map as sensitivity_map
 from .figures.curves import stiffness_plot as stiffness_plot
 from .figures.curves import transmission_error_plot as transmission_error_plot
+from .figures.maps import sensitivity_map as sensitivity_map
 from .figures.records import average_plot as average_plot
 from .figures.records import named_lines_plot as named_lines_plot
 from .figures.records import order_plot as order_plot

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from gearmbs.campaigns import load_plan
-from gearmbs.campaigns.factors import plain
 from gearmbs.campaigns.subjects.claims import ratios
+from gearmbs.files import python_scalar
 from tests.docs.support import DOCS
 
 
@@ -83,7 +83,7 @@ def test_data_of_the_claims_are_those_of_this_code(scripts, point):
     import claims
 
     data, plan = claims.load(), load_plan(claims.PLAN)
-    row = {name: plain(values[0]) for name, values in plan.columns(plan.points()[point : point + 1]).items()}
+    row = {name: python_scalar(values[0]) for name, values in plan.columns(plan.points()[point : point + 1]).items()}
     thing = plan.subject.check(plan.data(row), "point")
     again = ratios(plan.subject.run(thing, lambda _: None, plan.keep))
     for name in [c for c in data if "." in c]:

@@ -95,6 +95,13 @@ def test_readme_example(in_folder):
     assert swings["broken tooth"] > 1.5 * swings["healthy"]
 
 
+@pytest.mark.parametrize("name", ["extend.md", "own_dae.md", "own_mechanism.md", "measured.md"])
+def test_sources_that_pages_name_are_there(name):
+    """Files and folders of the package, by their paths."""
+    text = (DOCS / "howto" / name).read_text(encoding="utf-8")
+    assert not [path for path in re.findall(r"`(gearmbs/[\w/]*[\w/](?:\.py)?)`", text) if not (ROOT / path).exists()]
+
+
 def test_readme_picture_is_small():
     assert (DOCS / "images" / "paper.png").stat().st_size < 200_000
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -26,6 +25,7 @@ from gearmbs.adams.parse.grammar import (
 )
 from gearmbs.adams.parse.reader import GRAMMARS, read_statement, resolve_statement, unknown_statement
 from gearmbs.adams.parse.source import CONTINUED, RawStatement, read_file, statements
+from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 ONLY_IN_DECKS = ("UNITS", "COUPLER", "CURVE", "FLEX_BODY", "GEAR", "GRAPHICS", "GSE", "LSE", "MATRIX", "TFSISO")
@@ -263,9 +263,8 @@ def _read(script: Script, raw: RawStatement, errors: list[Diagnostic]) -> Comman
         fail(f"{deck_only} is a statement of the deck (.adm), no command of a script; put it there", raw.line)
         return None
     if name is None:
-        near = difflib.get_close_matches(match.group(1).upper()[:40], _NAMES, 1)
-        message = unknown_statement(match.group(1), _NAMES) if not near else f"unknown command; did you mean {near[0]}?"
-        fail(message, raw.line)
+        meant = did_you_mean(match.group(1).upper()[:40], _NAMES, before="unknown command; ")
+        fail(meant or unknown_statement(match.group(1), _NAMES), raw.line)
         return None
     if name in IGNORED_COMMANDS:
         script.diagnostics.append(Diagnostic(IGNORED, f"{name} has no effect here", script.file, raw.line))

@@ -7,7 +7,6 @@ as they stay unambiguous among the statement's own.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from dataclasses import dataclass, field, fields
@@ -15,6 +14,7 @@ from typing import Any
 
 from gearmbs.adams.parse.source import CONTINUED, RawStatement
 from gearmbs.mechanism.language.syntax import ExpressionError, parse
+from gearmbs.wording import did_you_mean
 
 REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE, PATH = range(14)
 """Kinds of arguments; a PATH is a text in which a backslash is part of the name."""
@@ -118,8 +118,8 @@ class Grammar:
 
     def mistyped(self, word: str) -> str | None:
         """Return that a word is no argument, and which it may have been meant to be; None if it resembles none."""
-        near = difflib.get_close_matches(word.upper()[:40], list(self.words), 1) if word[:1].isalpha() else []
-        return f"unknown argument {word.upper()[:40]}; did you mean {near[0]}?" if near else None
+        meant = did_you_mean(word.upper()[:40], self.words) if word[:1].isalpha() else ""
+        return f"unknown argument {word.upper()[:40]}; {meant}" if meant else None
 
 
 class ArgumentReader:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,6 +15,7 @@ from gearmbs.adams.parse.grammar import ArgumentReader, Grammar, StatementError
 from gearmbs.adams.parse.remedies import instead_of_statement
 from gearmbs.adams.parse.source import RawStatement, read_file, statements
 from gearmbs.progress import waiting
+from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 GRAMMARS: dict[type, Grammar] = {cls: Grammar(cls) for cls in st.STATEMENTS.values()}
@@ -183,8 +183,7 @@ def unknown_statement(word: str, names: Iterable[str]) -> str:
     found = [n for n in names if n.startswith(upper)]
     if found:
         return f"{upper[:40]} is ambiguous: it could be {', '.join(found)}"
-    near = difflib.get_close_matches(upper[:40], list(names), 1)
-    return f"unknown statement {upper[:40]!r}" + (f"; did you mean {near[0]}?" if near else "")
+    return f"unknown statement {upper[:40]!r}{did_you_mean(upper[:40], names, before='; ')}"
 
 
 def _count_ignored(deck: Deck) -> None:

@@ -42,6 +42,7 @@ from gearmbs.dae.analyses.eigenvalues import Modes
 from gearmbs.dae.analyses.kinematics import kinematic
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult, initial_conditions, quasi_static, static_equilibrium
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.result import Status
@@ -63,7 +64,8 @@ STATIC_TOLERANCE = 1e-10
 WATCHED = (None, "DYNAMICS", "TRANSIENT", "KINEMATICS", "STATICS")
 """Analyses in which sensors watch, where they go through a span of time."""
 
-METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
+METHODS = {adams: name for name, known in INTEGRATORS.items() for adams in known.adams}
+"""Integrators by what ADAMS calls them."""
 
 
 def run_deck(
@@ -231,16 +233,16 @@ def _settings(session: Session, tol: float | None) -> tuple[dict[str, Any], str 
     """Return the integrator options and a remark when the method is another than asked for."""
     integrator = session.deck.only(st.Integrator) or st.Integrator()
     options: dict[str, Any] = {
-        "integrator": "WSTIFF",
+        "integrator": DEFAULT,
         "formulation": "SI2",
         "tol": DEFAULT_TOLERANCE,
         "corrector": "modified",
     }
     note = None
     if integrator.method is not None:
-        options["integrator"] = METHODS.get(integrator.method, "WSTIFF")
+        options["integrator"] = METHODS.get(integrator.method, DEFAULT)
         if integrator.method not in METHODS:
-            note = f"{integrator.method} is not available; WSTIFF is used"
+            note = f"{integrator.method} is not available; {DEFAULT} is used"
         elif integrator.formulation is None and integrator.method != "SI2_GSTIFF":
             options["formulation"] = "I3"
     if integrator.formulation is not None:

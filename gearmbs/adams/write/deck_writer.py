@@ -17,6 +17,7 @@ from gearmbs.adams.write.gears import is_gear_contact
 from gearmbs.adams.write.joints import constraint_statements, element_statements, joint_statement, load_statement
 from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
 from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
+from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.contacts import SolidContact
@@ -34,7 +35,7 @@ LONGEST = 80
 """Characters of a comment in the .req."""
 NOT_ASKED = ("coupler", "gear")
 """Elements whose forces are those of their joints."""
-METHODS = ("GSTIFF", "WSTIFF")
+METHODS = sorted(name for name, known in INTEGRATORS.items() if name in known.adams)
 FORMULATIONS = ("I3", "SI2", "SI1")
 
 
@@ -60,13 +61,13 @@ def request_statements(writer: WriterContext, requests: Mapping[str, str | Seque
 
 def _functions(writer: WriterContext, n: int, expressions: list[str], comment: str) -> None:
     columns = [f"{c} = {text}\\" for c, text in zip(COLUMNS, expressions)]
-    writer.statement(f"REQUEST/{n}", [*columns, f"COMMENT = {_plain(comment)}"], comment)
+    writer.statement(f"REQUEST/{n}", [*columns, f"COMMENT = {_bare_text(comment)}"], comment)
 
 
 def _bodies_and_elements(writer: WriterContext, n: int) -> None:
     for body in writer.mechanism.bodies.values():
         for kind in ("DISPLACEMENT", "VELOCITY"):
-            comment = f"COMMENT = {_plain(f'{body.name} {kind.lower()}')}"
+            comment = f"COMMENT = {_bare_text(f'{body.name} {kind.lower()}')}"
             writer.statement(f"REQUEST/{n}", [kind, f"I = {writer.centers[id(body)]}", comment])
             n += 1
     functions = {kind: function for function, kind in ELEMENT_FORCES.items() if kind not in NOT_ASKED}
@@ -101,7 +102,7 @@ def integrator_statement(
     writer.statement("INTEGRATOR/", arguments)
 
 
-def _plain(text: str) -> str:
+def _bare_text(text: str) -> str:
     """Return a text without characters that mean something in a deck."""
     return re.sub(r"[^\w .:()+-]+", " ", text).strip()[:LONGEST] or "request"
 

@@ -84,14 +84,16 @@ class BearingSubject(TablesSubject):
         import inspect
 
         from gearmbs.studies import bearing_rig
-        from gearmbs.studies.trains.trains import plain
+        from gearmbs.studies.trains.trains import described
 
         defaults = {
             name: p.default for name, p in inspect.signature(bearing_rig).parameters.items() if p.default is not p.empty
         }
         rig = defaults | thing.rig
         rig["speed"] = float(to_si(rig["speed"], "angular speed"))
-        return in_si({"bearing": plain(thing.bearing), "defects": plain(thing.defects), "run": thing.run, "rig": rig})
+        return in_si(
+            {"bearing": described(thing.bearing), "defects": described(thing.defects), "run": thing.run, "rig": rig}
+        )
 
     def span_and_rate(self, thing: BearingCase) -> tuple[float, float]:
         """Return the length of a record, s, and its sampling rate, Hz."""

@@ -36,12 +36,12 @@ class DrivetrainSubject(TablesSubject):
 
     def canonical(self, thing: Any) -> Any:
         """Return the parts and pairs with their defaults and the run in SI, without the name."""
-        from gearmbs.studies.trains.trains import plain
+        from gearmbs.studies.trains.trains import described
 
-        train = {key: value for key, value in plain(thing.train).items() if key not in ("name", "kind")}
+        train = {key: value for key, value in described(thing.train).items() if key not in ("name", "kind")}
         for mesh in train["meshes"]:
-            mesh["settings"] = plain(thing.train.pairs[mesh["name"]])
-        return in_si({"train": train, "run": plain(thing.run)})
+            mesh["settings"] = described(thing.train.pairs[mesh["name"]])
+        return in_si({"train": train, "run": described(thing.run)})
 
     def span_and_rate(self, thing: Any) -> tuple[float, float]:
         """Return the length of a record, s, and its sampling rate, Hz."""
@@ -107,11 +107,11 @@ class PlanetarySubject(TablesSubject):
 
     def canonical(self, thing: Any) -> Any:
         """Return the set with its defaults and the run in SI; the pins, which become a function, as their table."""
-        from gearmbs.studies.trains.trains import plain
+        from gearmbs.studies.trains.trains import described
 
         run, pins = thing
         speeds = {member: float(to_si(speed, "angular speed")) for member, speed in run.speeds.items()}
-        tree = plain(replace(run, pins=None, speeds=speeds))
+        tree = described(replace(run, pins=None, speeds=speeds))
         tree["gears"].pop("name", None)
         return in_si({"run": tree, "pins": pins})
 

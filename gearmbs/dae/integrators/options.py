@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.integrators.bdf import MAX_ORDER
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS, Integrator
 
-METHODS = ("WSTIFF", "GSTIFF", "IDA")
 CORRECTORS = ("original", "modified")
-IDA_MAX_ORDER = 5
-MOST_ITERATIONS = 100
-IDA_TAKES = (
-    "tol",
-    "rtol",
-    "max_order",
-    "max_step",
-    "first_step",
-    "min_step",
-    "max_iterations",
-    "max_steps",
-    "progress",
-)
 
 Consumer = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
 """Takes t, y of some accepted steps and the integer table valid there; the arrays are valid during the call only."""
@@ -38,8 +24,8 @@ class Options:
 
     Parameters
     ----------
-    method : {"WSTIFF", "GSTIFF", "IDA"}
-        Variable-coefficient BDF, fixed leading coefficients on a re-interpolated equidistant history, or SUNDIALS IDA.
+    method : str
+        One of `gearmbs.dae.methods.INTEGRATORS`; default "WSTIFF".
     tol : float
         Local error per step in units of the problem's ``atol_scale`` (ADAMS: ERROR).
     rtol : float
@@ -86,7 +72,7 @@ class Options:
         For a value that makes no sense; the message names the option, the value and what is allowed.
     """
 
-    method: str = "WSTIFF"
+    method: str = DEFAULT
     tol: float = 1e-6
     rtol: float = 0.0
     corrector: str = "original"
@@ -109,21 +95,21 @@ class Options:
     error_probe: Callable[[], BaseException | None] | None = None
 
     def __post_init__(self) -> None:
-        _check_choice("method", self.method, METHODS)
+        _check_choice("method", self.method, INTEGRATORS)
         _check_choice("corrector", self.corrector, CORRECTORS)
         if not (math.isfinite(self.tol) and self.tol > 0):
             raise ValueError(f"tol (ERROR) must be positive, is {self.tol!r}")
         if not (math.isfinite(self.rtol) and self.rtol >= 0):
             raise ValueError(f"rtol must not be negative, is {self.rtol!r}")
         if self.max_order is not None and not 1 <= self.max_order <= self.highest_order:
-            kind = " for IDA" if self.uses_ida else ""
+            kind = "" if self.integrator.compiled else f" for {self.method}"
             raise ValueError(f"max_order (KMAX) must be 1 to {self.highest_order}{kind}, is {self.max_order!r}")
         self._check_steps()
-        most = np.inf if self.uses_ida else MOST_ITERATIONS
+        most = self.integrator.most_iterations
         if self.max_iterations is not None and not 1 <= self.max_iterations <= most:
-            allowed = "at least 1" if self.uses_ida else f"1 to {MOST_ITERATIONS}"
+            allowed = "at least 1" if math.isinf(most) else f"1 to {most:g}"
             raise ValueError(f"max_iterations (MAXIT) must be {allowed}, is {self.max_iterations!r}")
-        if self.max_steps is not None and not self.max_steps >= (1 if self.uses_ida else 0):
+        if self.max_steps is not None and not self.max_steps >= (0 if self.integrator.compiled else 1):
             raise ValueError(f"max_steps must be at least 1, is {self.max_steps!r}")
 
     def _check_steps(self) -> None:
@@ -135,28 +121,28 @@ class Options:
         for name, value in sizes.items():
             if value is None:
                 continue
-            # IDA takes zero for a size that it may choose
-            if self.uses_ida or "HMIN" in name:
+            # a step of size zero is one that such an integrator may choose
+            if not self.integrator.compiled or "HMIN" in name:
                 if not value >= 0:
                     raise ValueError(f"{name} must not be negative, is {value!r}")
             elif not value > 0:
                 raise ValueError(f"{name} must be positive, is {value!r}")
 
     @property
-    def uses_ida(self) -> bool:
-        """Whether the integrator is SUNDIALS IDA."""
-        return self.method == "IDA"
+    def integrator(self) -> Integrator:
+        """The row of the table of integrators."""
+        return INTEGRATORS[self.method]
 
     @property
     def highest_order(self) -> int:
         """Order the method goes up to."""
-        return IDA_MAX_ORDER if self.uses_ida else MAX_ORDER
+        return self.integrator.highest_order
 
     @staticmethod
     @cache
     def names(method: str) -> tuple[str, ...]:
         """Return the options that a method takes, without ``method`` itself."""
-        return tuple(f.name for f in fields(Options) if f.name != "method" and (method != "IDA" or f.name in IDA_TAKES))
+        return tuple(f.name for f in fields(Options) if f.name != "method" and INTEGRATORS[method].can(f.name))
 
     @classmethod
     def gather(cls, method: str | None, base: Options | None, settings: Mapping[str, Any], more: str = "") -> Options:
@@ -177,8 +163,8 @@ class Options:
         ValueError
             For a setting that the method does not have.
         """
-        chosen = method if method is not None else base.method if base is not None else "WSTIFF"
-        _check_choice("method", chosen, METHODS)
+        chosen = method if method is not None else base.method if base is not None else DEFAULT
+        _check_choice("method", chosen, INTEGRATORS)
         known = cls.names(chosen)
         unknown = sorted(name for name in settings if name not in known)
         if unknown:
@@ -186,7 +172,7 @@ class Options:
         return cls(method=chosen, **settings) if base is None else replace(base, method=chosen, **settings)
 
 
-def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+def _check_choice(name: str, value: str, choices: Iterable[str]) -> None:
     if value not in choices:
         raise ValueError(f"{name} is {value!r}; choose one of {', '.join(choices)}")
 

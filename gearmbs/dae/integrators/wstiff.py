@@ -12,8 +12,10 @@ import numpy as np
 
 from gearmbs.dae.integrators.driver import Run
 from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.methods import BDF, INTEGRATORS
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult
+from gearmbs.wording import any_of
 
 
 def solve_wstiff(
@@ -50,8 +52,9 @@ def solve_wstiff(
         For arguments that make no sense.
     """
     gathered = Options.gather(settings.pop("method", None), options, settings)
-    if gathered.uses_ida:
-        raise ValueError(f"method is {gathered.method!r}; choose 'WSTIFF' or 'GSTIFF'")
+    if gathered.integrator.solver != BDF:
+        own = [repr(name) for name, known in INTEGRATORS.items() if known.solver == BDF]
+        raise ValueError(f"method is {gathered.method!r}; choose {any_of(own)}")
     return Run(problem, t_eval, t_end, gathered).drive()
 
 

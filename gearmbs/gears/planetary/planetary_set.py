@@ -6,7 +6,6 @@ stepped planet has a wheel of its own for the ring.
 
 from __future__ import annotations
 
-import difflib
 import math
 import warnings
 from collections.abc import Mapping, Sequence
@@ -24,6 +23,7 @@ from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, convert_fields, require
 from gearmbs.units import Quantity, to_si
+from gearmbs.wording import did_you_mean
 
 MEMBERS = ("sun", "carrier", "ring")
 FITTING = 1e-6
@@ -532,8 +532,7 @@ def planetary(
     known = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "planets")]
     for key in settings:
         if key not in known:
-            near = difflib.get_close_matches(key, ["planets", *known], 1)
-            hint = f"did you mean {near[0]}?" if near else f"known ones are {', '.join(known)}"
+            hint = did_you_mean(key, ["planets", *known], otherwise=f"known ones are {', '.join(known)}")
             require(False, f"planetary: {key!r} is unknown; {hint}")
     other = {"right": "left", "left": "right"}
     require(hand in other, f"planetary: hand is {hand!r}; choose 'right' or 'left'")

@@ -32,7 +32,7 @@ ROUND = (Ellipsoid, Cylinder, Frustum)
 ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
 
 
-def plain(value: Any, field: str) -> float:
+def dimensionless(value: Any, field: str) -> float:
     """Return a number that has no unit to be given with it."""
     return quantity(value, "dimensionless", field)
 
@@ -58,7 +58,10 @@ class Impact:
 
     def reals(self) -> list[float]:
         """Return the law's part of the table."""
-        k, e = plain(self.stiffness, "impact: stiffness, N/m^exponent"), plain(self.exponent, "impact: exponent")
+        k, e = (
+            dimensionless(self.stiffness, "impact: stiffness, N/m^exponent"),
+            dimensionless(self.exponent, "impact: exponent"),
+        )
         c = quantity(self.damping, "N*s/m", "impact: damping")
         full = quantity(self.full_depth, "length", "impact: full_depth")
         if not (0.0 < k < np.inf and 1.0 <= e < np.inf and 0.0 <= c < np.inf and 0.0 < full < np.inf):
@@ -86,7 +89,10 @@ class Poisson:
 
     def reals(self) -> list[float]:
         """Return the law's part of the table."""
-        p, r = quantity(self.penalty, "N/m", "poisson: penalty"), plain(self.restitution, "poisson: restitution")
+        p, r = (
+            quantity(self.penalty, "N/m", "poisson: penalty"),
+            dimensionless(self.restitution, "poisson: restitution"),
+        )
         if not 0.0 < p < np.inf or not 0.0 <= r <= 1.0:
             raise ModelError(f"poisson: penalty {p} must be positive and finite, and restitution {r} from 0 to 1")
         return [float(POISSON), 0.0, 1.0, 0.0, 1.0, p, r, REVERSAL]
@@ -112,7 +118,7 @@ class Coulomb:
         """Return the law's part of the table."""
         stick = quantity(self.stiction, "speed", "coulomb: stiction")
         slip = quantity(self.transition, "speed", "coulomb: transition")
-        static, dynamic = plain(self.static, "coulomb: static"), plain(self.dynamic, "coulomb: dynamic")
+        static, dynamic = dimensionless(self.static, "coulomb: static"), dimensionless(self.dynamic, "coulomb: dynamic")
         if not (0.0 <= static < np.inf and 0.0 <= dynamic < np.inf and 0.0 < stick <= slip < np.inf):
             raise ModelError(
                 f"coulomb: static {static} and dynamic {dynamic} must not be negative, stiction {stick} m/s "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -12,6 +11,7 @@ from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 from gearmbs.mechanism.language.syntax import Call, Chain, Name, Negative, Node, Number, Power, Ref, Scope, parse, shown
+from gearmbs.wording import did_you_mean
 
 CONSTANTS = {"PI": math.pi, "DTOR": math.pi / 180.0, "RTOD": 180.0 / math.pi}
 
@@ -131,8 +131,7 @@ class Lowering:
             message = f"the function {name} is not supported at column {node.at + 1} of {shown(self.text)}"
             raise NotEvaluatedError(message)
         known = [*UNARY, *BINARY, *ELEMENT_FORCES, *self.functions, *self.scope.functions]
-        near = difflib.get_close_matches(name, known, 1)
-        self.fail(f"unknown function {name}" + (f"; did you mean {near[0]}?" if near else ""), node.at)
+        self.fail(f"unknown function {name}{did_you_mean(name, known, before='; ')}", node.at)
 
     def count(self, node: Call, low: int, high: int) -> None:
         """Check the number of arguments."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import difflib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -15,9 +14,8 @@ from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.kinematics.update import update_tables
 from gearmbs.dae.equations.loads.expressions import value
 from gearmbs.dae.integrators.events import STOP
-from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.wstiff import solve_wstiff
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution, Stream
@@ -27,6 +25,7 @@ from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.progress import time_bar
+from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.lane_members import Members
@@ -103,7 +102,6 @@ def stop_options(stops: Sequence[StopAt]) -> dict[str, Any]:
     return {"event_direction": [stop.direction for stop in stops], "event_action": [STOP] * len(stops)}
 
 
-INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
 ADVICE = {
     Status.NOT_FINITE: (
         "Look at the forces and functions of time acting there: a division by zero, a root of a negative number, a "
@@ -137,7 +135,7 @@ def simulate(
     t_eval: np.ndarray | None = None,
     every_step: bool = False,
     t_start: float = 0.0,
-    integrator: str = "WSTIFF",
+    integrator: str = DEFAULT,
     formulation: str = "SI2",
     tol: float = 1e-6,
     rate_scale: float = 1.0,
@@ -165,7 +163,8 @@ def simulate(
         Outputs at the end of every accepted step instead: uneven times, dense where much happens.
     t_start : float
         Start of the simulation, s.
-    integrator : {"WSTIFF", "GSTIFF", "IDA"}
+    integrator : str
+        One of `gearmbs.dae.methods.INTEGRATORS`; default "WSTIFF".
     formulation : {"SI2", "SI1", "I3"}
     tol : float
         Local error allowed a step: in metres or radians and their rates for lengths of the order of 1 m; lengths are
@@ -190,7 +189,7 @@ def simulate(
         says why. See `gearmbs.mechanism.building.lumping.lumped`.
     stops : sequence of StopAt
         The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
-        stop. Not with IDA, and not with ``lump``.
+        stop. Not with integrators without events, as IDA, and not with ``lump``.
     continued : bool
         Whether the start is a state in which an earlier run ended: teeth may then be deep in an impact, which else is
         refused.
@@ -220,8 +219,9 @@ def simulate(
             refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_start))
         system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
-        if name == "IDA" or lump:
-            raise ModelError("stops: they need the integrator WSTIFF or GSTIFF, and lump=False")
+        if lump or not INTEGRATORS[name].can("event_action"):
+            able = any_of(those_that("event_action"))
+            raise ModelError(f"stops: they need the integrator {able}, and lump=False")
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
         options.update(stop_options(stops))
     problem.advice = {**ADVICE, **(advice or {})}
@@ -253,8 +253,8 @@ def _without(mechanism: Mechanism, names: Collection[str]) -> Mechanism:
 
 
 def _closed(stream: Stream, solution: Solution, name: str) -> Solution:
-    """Return the solution of a run whose steps were handed on; IDA's are so only now."""
-    if name == "IDA":
+    """Return the solution of a run whose steps were handed on; those of some integrators are so only now."""
+    if not INTEGRATORS[name].can("consumer"):
         for part in solution.parts():
             stream.consumer(part)
     return stream.close(solution)
@@ -315,12 +315,10 @@ def _integrated(
 ) -> DAEResult:
     """Run an integrator to the last of the output times, with outputs there or at its own steps."""
     times, last = None if every_step else t_eval, float(t_eval[-1])
-    if name == "IDA":
-        return solve_ida(problem, times, t_end=last, **options)
     # errors are controlled on positions and velocities, and so is the corrector
-    options.setdefault("corrector", "modified")
-    options.setdefault("slopes", times is not None)
-    return solve_wstiff(problem, times, method=name, consumer=stream, t_end=last, **options)
+    wanted = {"corrector": "modified", "slopes": times is not None, "consumer": stream}
+    settings = {option: value for option, value in wanted.items() if INTEGRATORS[name].can(option)} | options
+    return INTEGRATORS[name].solve(problem, times, Options.gather(name, None, settings), t_end=last)
 
 
 def _sampled(start: float, end: float, rate: float) -> np.ndarray:
@@ -338,8 +336,7 @@ def _check_options(name: str, options: Mapping[str, Any]) -> None:
         if option in known:
             continue
         remark = "outputs are set by rate, t_eval or every_step" if "step" in option or "out" in option else ""
-        near = difflib.get_close_matches(option, [*known, *SETTINGS], n=1)
-        hint = remark or (f"did you mean {near[0]}?" if near else "")
+        hint = remark or did_you_mean(option, [*known, *SETTINGS])
         raise ModelError(
             f"simulate has no option {option!r}{': ' + hint if hint else ''}; besides {', '.join(SETTINGS)} the "
             f"integrator {name} takes {', '.join(k for k in known if k not in SETTINGS)}"

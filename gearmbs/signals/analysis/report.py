@@ -252,10 +252,10 @@ def feature_rows(report: Reported, by: By = "record") -> list[dict[str, Any]]:
 def rows_to_frame(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """Rows of plain values as a table; columns in the order in which they first come, notes last."""
     order = list(dict.fromkeys(key for row in rows for key in row if key != "notes"))
-    return pd.DataFrame([{key: _plain(row.get(key)) for key in [*order, "notes"]} for row in rows])
+    return pd.DataFrame([{key: _nan_for_none(row.get(key)) for key in [*order, "notes"]} for row in rows])
 
 
-def _plain(value: Any) -> Any:
+def _nan_for_none(value: Any) -> Any:
     return math.nan if value is None else value
 
 

@@ -1,7 +1,7 @@
 """Long files piece by piece: sections of a given length, so that memory does not grow with the file.
 
-Text, WAV, TDMS and this package's own NetCDF and HDF5 files are read as far as a section needs; other files are read
-at once and then cut.
+Files of formats that have `pieces`, as texts and this package's own NetCDF have, are read as far as a section needs;
+other files are read at once and then cut.
 """
 
 from __future__ import annotations
@@ -22,11 +22,9 @@ from gearmbs.signals.analysis.indicators import INDICATORS
 from gearmbs.signals.analysis.report import AnalysisReport
 from gearmbs.signals.analysis.vibration import VibrationReport
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.csv import csv_pieces
+from gearmbs.signals.files.format import Asked
 from gearmbs.signals.files.formats import checked_format, read_signal
-from gearmbs.signals.files.hdf import hdf_pieces
-from gearmbs.signals.files.tdms import tdms_pieces
-from gearmbs.signals.files.wav import wav_pieces
+from gearmbs.signals.files.table import format_of
 from gearmbs.signals.signal.given import given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.inputs import to_signal
 from gearmbs.signals.signal.record import Record, checked_gaps, signal_from
@@ -268,15 +266,9 @@ def _row(report: AnalysisReport | VibrationReport) -> xr.Dataset:
 def _pieces(path: Path, format: str | None, settings: Mapping[str, Any]) -> Pieces:
     """Records in the order of the file, each with the fraction of the file that is read then."""
     kind, content = checked_format(path, format)
-    streamed: Pieces | None = None
-    if kind in ("csv", "csv.gz"):
-        streamed = None if content == "lvm" else csv_pieces(path, kind == "csv.gz", settings["rate"], settings["gaps"])
-    elif kind == "wav":
-        streamed = wav_pieces(path)
-    elif kind == "tdms":
-        streamed = tdms_pieces(path, settings["channels"], settings["rate"])
-    elif content == "hdf5" and kind in ("netcdf", "hdf5"):
-        streamed = hdf_pieces(path)
+    known = format_of(kind)
+    asked = Asked(content=content, channels=settings["channels"], rate=settings["rate"], gaps=settings["gaps"])
+    streamed = None if known.pieces is None else known.pieces(path, asked)
     if streamed is not None:
         yield from streamed
         return

@@ -23,8 +23,8 @@ from gearmbs.signals.analysis.analysis import AnalysisOptions, analyse
 from gearmbs.signals.analysis.report import By, feature_rows, rows_to_frame
 from gearmbs.signals.analysis.sections import sections
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.formats import SUFFIXES
 from gearmbs.signals.files.simulated import read_any
+from gearmbs.signals.files.table import known_endings
 
 Progress = Callable[[str, float], None]
 Files = str | Path | Iterable[str | Path] | Mapping[Any, str | Path]
@@ -273,7 +273,7 @@ def _files(files: Files) -> tuple[list[Path], list[Any] | None]:
         folder = Path(files)
         if folder.is_dir():
             found = [path for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")]
-            known = [path for path in found if any(path.name.lower().endswith(suffix) for suffix in SUFFIXES)]
+            known = [path for path in found if any(path.name.lower().endswith(suffix) for suffix in known_endings())]
             paths = sorted(known or found, key=_counted)
         elif any(sign in str(files) for sign in "*?["):
             base = Path(folder.anchor) if folder.is_absolute() else Path()

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.format import Content, Format, begins_with
 from gearmbs.signals.signal.record import Record, assemble, metadata_json, record_from_json
 
 OWN = "gearmbs_signal"
@@ -66,3 +67,17 @@ def _scalar(value: np.ndarray) -> Any:
         except ValueError:
             return item
     return item
+
+
+FORMATS = {
+    "npy": Format(
+        read=lambda path, asked: read_npy(path, asked.channels, asked.rate),
+        write=lambda record, path, progress: write_npy(record, path),
+        contents={
+            "npy": Content("an array of numpy", begins_with(b"\x93NUMPY")),
+            "zip": Content("a zip archive, as .npz files are", begins_with(b"PK\x03\x04"), tells=False),
+        },
+        not_written={".npy": "an .npy file holds one array without rate and units; write .npz, which holds all"},
+        through="numpy",
+    )
+}

@@ -22,7 +22,10 @@ from typing import IO, Any
 import numpy as np
 import pandas as pd
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalError, SignalFileError
+from gearmbs.signals.files.format import Asked, Content, Format, begins_with
+from gearmbs.signals.files.lvm import read_lvm
 from gearmbs.signals.files.text_tables import (
     COMMENT,
     GAP_CELLS,
@@ -43,7 +46,6 @@ from gearmbs.signals.signal.record import (
     checked_gaps,
     chosen_rate,
     number_of,
-    plain,
     rate_candidates,
     rate_from_times,
     speed_of,
@@ -67,6 +69,8 @@ TAIL, TAIL_READ = 1 << 14, 1 << 20
 """Bytes at the end of a text that are looked at, and that are read at once to come there."""
 FEWEST_FIXED = 20
 """Rows of the same number of digits that make a format: those without trailing zeros have fewer in one of ten."""
+MOST_ODD = 0.05
+"""Part of the characters of a text that may be none of UTF-8 or of control, as umlauts of older code pages are."""
 GAPS = [cell for cell in GAP_CELLS if cell not in ("inf", "-inf")]
 
 
@@ -383,3 +387,37 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
 
 def _quoted(cell: str) -> str:
     return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',"\n') else cell
+
+
+def _is_text(head: bytes) -> bool:
+    text = head.decode("utf-8", errors="replace")
+    odd = sum(1 for c in text if (ord(c) < 32 and c not in "\t\r\n\f\x1a") or c == "\ufffd")
+    return "\x00" not in text and odd <= MOST_ODD * len(text)
+
+
+def _format(packed: bool, contents: dict[str, Content], also: tuple[str, ...] = ()) -> Format:
+    def read(path: Path, asked: Asked) -> Record:
+        if asked.content == "lvm":
+            return read_lvm(path, asked.rate)
+        return read_csv(path, packed, asked.progress, asked.rate, asked.gaps)
+
+    def pieces(path: Path, asked: Asked) -> Iterator[tuple[Record, float]] | None:
+        return None if asked.content == "lvm" else csv_pieces(path, packed, asked.rate, asked.gaps)
+
+    def write(record: Record, path: Path, progress: Progress | None) -> None:
+        write_csv(record, path, packed, progress)
+
+    return Format(read=read, write=write, pieces=pieces, contents=contents, also=also, through="pandas")
+
+
+FORMATS = {
+    "csv": _format(
+        False,
+        {
+            "utf16": Content("text in UTF-16", begins_with(b"\xff\xfe", b"\xfe\xff")),
+            "text": Content("plain text", _is_text, rest=True),
+        },
+        also=("lvm",),
+    ),
+    "csv.gz": _format(True, {"gzip": Content("gzip data", begins_with(b"\x1f\x8b"))}),
+}

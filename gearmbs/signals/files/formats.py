@@ -1,10 +1,8 @@
-"""Signals in and out of files: one reader and one writer for every format, chosen by name and checked by content."""
+"""Signals in and out of files: formats are chosen by name and checked by content; `table` lists them."""
 
 from __future__ import annotations
 
 import os
-import re
-import struct
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,107 +14,17 @@ import xarray as xr
 
 from gearmbs.progress import staged
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.arrays import read_npy, write_npy
-from gearmbs.signals.files.csv import CUT, read_csv, write_csv
-from gearmbs.signals.files.frames import read_parquet, write_parquet
-from gearmbs.signals.files.hdf import read_hdf, read_netcdf3, write_netcdf
-from gearmbs.signals.files.lvm import read_lvm
-from gearmbs.signals.files.matlab import read_mat, write_mat
-from gearmbs.signals.files.tdms import read_tdms, write_tdms
-from gearmbs.signals.files.uff import read_uff, write_uff
-from gearmbs.signals.files.wav import read_wav, write_wav
+from gearmbs.signals.files.csv import CUT
+from gearmbs.signals.files.format import Asked, Content
+from gearmbs.signals.files.table import TABLE, format_of, known_endings
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
-from gearmbs.signals.signal.record import Progress, Record, checked_gaps, record_of, signal_from
+from gearmbs.signals.signal.record import Progress, checked_gaps, record_of, signal_from
 from gearmbs.signals.signal.signal import as_signal, check_units
 
-FORMATS = (
-    "csv",
-    "csv.gz",
-    "mat5",
-    "mat7.3",
-    "uff58",
-    "wav",
-    "netcdf",
-    "hdf5",
-    "tdms",
-    "npy",
-    "parquet",
-    "feather",
-    "lvm",
-)
-"""Formats of files that are read; all but feather and lvm are written, too, npy as .npz."""
-READ_ONLY = ("feather", "lvm")
-SUFFIXES = {
-    ".csv": "csv",
-    ".txt": "csv",
-    ".tsv": "csv",
-    ".dat": "csv",
-    ".csv.gz": "csv.gz",
-    ".txt.gz": "csv.gz",
-    ".tsv.gz": "csv.gz",
-    ".mat": "mat5",
-    ".uff": "uff58",
-    ".unv": "uff58",
-    ".uf": "uff58",
-    ".wav": "wav",
-    ".nc": "netcdf",
-    ".nc4": "netcdf",
-    ".cdf": "netcdf",
-    ".h5": "hdf5",
-    ".hdf5": "hdf5",
-    ".hdf": "hdf5",
-    ".tdms": "tdms",
-    ".npy": "npy",
-    ".npz": "npy",
-    ".parquet": "parquet",
-    ".pq": "parquet",
-    ".feather": "feather",
-    ".lvm": "lvm",
-    ".asc": "csv",
-    ".prn": "csv",
-}
-# Which contents a name may stand for: version 7.3 of .mat is HDF5, and so is NetCDF-4.
-ACCEPTED = {
-    "csv": {"text", "utf16", "lvm"},
-    "csv.gz": {"gzip"},
-    "mat5": {"mat5", "hdf5", "mat4"},
-    "mat7.3": {"hdf5"},
-    "uff58": {"uff58"},
-    "wav": {"wav"},
-    "netcdf": {"hdf5", "netcdf3"},
-    "hdf5": {"hdf5"},
-    "tdms": {"tdms"},
-    "npy": {"npy", "zip"},
-    "parquet": {"parquet"},
-    "feather": {"feather"},
-    "lvm": {"lvm", "text", "utf16"},
-}
-CONTENT_NAMES = {
-    "text": "plain text",
-    "gzip": "gzip data",
-    "mat5": "a MATLAB 5 file",
-    "hdf5": "HDF5",
-    "uff58": "a universal file",
-    "wav": "a WAV file",
-    "netcdf3": "classic NetCDF",
-    "tdms": "a TDMS file",
-    "utf16": "text in UTF-16",
-    "npy": "an array of numpy",
-    "zip": "a zip archive, as .npz files are",
-    "parquet": "Parquet",
-    "feather": "Feather",
-    "lvm": "a LabVIEW measurement",
-    "mat4": "a MATLAB 4 file",
-    "binary": "binary data of an unknown kind",
-}
-BY_CONTENT = {
-    "text": "csv", "gzip": "csv.gz", "mat5": "mat5", "hdf5": "hdf5", "uff58": "uff58", "wav": "wav",
-    "netcdf3": "netcdf", "tdms": "tdms", "npy": "npy", "parquet": "parquet", "lvm": "lvm", "utf16": "csv",
-}  # fmt: skip
-"""Formats of files whose names end in something else, as many recorders' do."""
-UFF_START = re.compile(rb"^\s*-1[ \t]*\r?\n[ \t]*\d+[a-z]?\b")
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+FORMATS = tuple(TABLE)
+"""Names of the formats that are read; most are written, too (`gearmbs.signals.files.table`)."""
 HEAD_BYTES = 4096
+"""Bytes at the begin of a file by which its content is told."""
 
 
 @staged("reading")
@@ -132,7 +40,7 @@ def read_signal(
     format: str | None = None,
     progress: Progress | None = None,
 ) -> xr.DataArray:
-    """Read a signal from a CSV, gzip CSV, MATLAB (5 to 7.3), UFF 58, WAV, NetCDF, HDF5 or TDMS file.
+    """Read a signal from a file of any of the `FORMATS`.
 
     Parameters
     ----------
@@ -173,7 +81,9 @@ def read_signal(
     checked_gaps(gaps)
     format, content = checked_format(path, format)
     with damage_named(path, format):
-        record = _read(path, format, content, channels, progress, hertz, gaps)
+        record = format_of(format).read(
+            path, Asked(content=content, channels=channels, rate=hertz, gaps=gaps, progress=progress)
+        )
     for words in record.notes:
         if words.startswith(CUT):
             warnings.warn(words, UserWarning, stacklevel=3)
@@ -233,10 +143,13 @@ def write_signal(
     """
     path = Path(path)
     format = _format(path, format)
-    if format in READ_ONLY:
-        raise SignalFileError(path, f"{format} files are read, not written; write for instance .csv, .mat or .tdms")
-    if format == "npy" and path.suffix.lower() == ".npy":
-        raise SignalFileError(path, "an .npy file holds one array without rate and units; write .npz, which holds all")
+    known = format_of(format)
+    if known.write is None:
+        raise SignalFileError(
+            path, f"{format} files are read, not written; write one of {', '.join(written_endings())}"
+        )
+    if path.suffix.lower() in known.not_written:
+        raise SignalFileError(path, known.not_written[path.suffix.lower()])
     record = record_of(as_signal(signal))
     if not path.parent.is_dir():
         raise SignalFileError(path, f"there is no folder {path.parent}; make it first")
@@ -244,7 +157,7 @@ def write_signal(
     os.close(handle)
     part = Path(name)
     try:
-        _write(record, part, format, progress)
+        known.write(record, part, progress)
         mask = os.umask(0)
         os.umask(mask)
         part.chmod(0o666 & ~mask)
@@ -258,87 +171,58 @@ def write_signal(
 
 def written_endings() -> tuple[str, ...]:
     """Return the endings that `write_signal` takes."""
-    return tuple(e for e, format in SUFFIXES.items() if format not in READ_ONLY and e != ".npy")
+    known = {name: format_of(name) for name in TABLE}
+    return tuple(
+        ending
+        for ending, name in known_endings().items()
+        if known[name].write is not None and ending not in known[name].not_written
+    )
 
 
 def checked_format(path: Path, format: str | None) -> tuple[str, str]:
     """The format a file's name or the caller says, and what the file holds; SignalFileError if they do not agree."""
     content = _content(path)
     format = _format(path, format, content)
-    if content not in ACCEPTED[format]:
+    if not format_of(format).accepts(content):
         raise SignalFileError(
             path,
-            f"is named as {format} but holds {CONTENT_NAMES[content]}; rename it or pass format=... "
-            f"(one of {', '.join(FORMATS)})",
+            f"is named as {format} but holds {_words(content)}; rename it or pass format=... "
+            f"(one of {', '.join(TABLE)})",
         )
     return format, content
 
 
-def _read(
-    path: Path,
-    format: str,
-    content: str,
-    channels: Sequence[str] | None,
-    progress: Progress | None,
-    rate: float | None,
-    gaps: str | None = None,
-) -> Record:
-    if content == "lvm" or format == "lvm":
-        return read_lvm(path, rate)
-    if format in ("csv", "csv.gz"):
-        return read_csv(path, format == "csv.gz", progress, rate, gaps)
-    if format in ("mat5", "mat7.3"):
-        return read_mat(path, channels, rate)
-    if format == "uff58":
-        return read_uff(path, channels)
-    if format == "wav":
-        return read_wav(path)
-    if format == "tdms":
-        return read_tdms(path, channels, rate)
-    if format == "npy":
-        return read_npy(path, channels, rate)
-    if format in ("parquet", "feather"):
-        return read_parquet(path, format, rate)
-    return read_netcdf3(path, channels, rate) if content == "netcdf3" else read_hdf(path, channels, rate)
+def _contents() -> dict[str, tuple[str, Content]]:
+    """Return the kinds of bytes that formats know, each with the format whose own it is."""
+    return {content: (name, about) for name in TABLE for content, about in format_of(name).contents.items()}
 
 
-def _write(record: Record, part: Path, format: str, progress: Progress | None) -> None:
-    if format in ("csv", "csv.gz"):
-        write_csv(record, part, format == "csv.gz", progress)
-    elif format in ("mat5", "mat7.3"):
-        write_mat(record, part, format)
-    elif format == "uff58":
-        write_uff(record, part)
-    elif format == "wav":
-        write_wav(record, part)
-    elif format == "tdms":
-        write_tdms(record, part)
-    elif format == "npy":
-        write_npy(record, part)
-    elif format == "parquet":
-        write_parquet(record, part)
-    else:
-        write_netcdf(record, part)
+def _words(content: str) -> str:
+    found = _contents().get(content)
+    return "binary data of an unknown kind" if found is None else found[1].words
 
 
 def _format(path: Path, format: str | None, content: str | None = None) -> str:
     if format is not None:
-        if format not in FORMATS:
-            raise SignalError(f"format: must be one of {', '.join(FORMATS)}, got {format!r}")
+        if format not in TABLE:
+            raise SignalError(f"format: must be one of {', '.join(TABLE)}, got {format!r}")
         return format
     suffixes = [s.lower() for s in path.suffixes]
+    endings = known_endings()
     for suffix in ("".join(suffixes[-2:]), "".join(suffixes[-1:])):
-        if suffix in SUFFIXES:
-            return SUFFIXES[suffix]
-    if content in BY_CONTENT:
-        return BY_CONTENT[content]
+        if suffix in endings:
+            return endings[suffix]
+    if content is not None:
+        name, about = _contents().get(content, (None, None))
+        if name is not None and about is not None and about.tells:
+            return name
     raise SignalFileError(
-        path, f"its ending {path.suffix!r} determines no format; use one of {', '.join(SUFFIXES)} or pass format=..."
+        path, f"its ending {path.suffix!r} determines no format; use one of {', '.join(endings)} or pass format=..."
     )
 
 
 def _content(path: Path) -> str:
-    """What the first bytes are, whatever the name says."""
+    """Return what the first bytes are, whatever the name says."""
     try:
         with open(path, "rb") as file:
             head = file.read(HEAD_BYTES)
@@ -346,51 +230,8 @@ def _content(path: Path) -> str:
         raise SignalFileError(path, f"cannot be opened ({exc.strerror})") from exc
     if not head:
         raise SignalFileError(path, "is empty")
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf16"
-    if head.startswith(b"\x1f\x8b"):
-        return "gzip"
-    if head.startswith(HDF5_MAGIC) or head[512:520] == HDF5_MAGIC:
-        return "hdf5"
-    if head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] == b"WAVE":
-        return "wav"
-    if head.startswith(b"TDSm"):
-        return "tdms"
-    if head.startswith((b"CDF\x01", b"CDF\x02", b"CDF\x05")):
-        return "netcdf3"
-    if head.startswith(b"MATLAB 5.0"):
-        return "mat5"
-    if UFF_START.match(head.removeprefix(b"\xef\xbb\xbf")):
-        return "uff58"
-    if head.startswith(b"\x93NUMPY"):
-        return "npy"
-    if head.startswith(b"PK\x03\x04"):
-        return "zip"
-    if head.startswith(b"PAR1"):
-        return "parquet"
-    if head.startswith((b"ARROW1", b"FEA1")):
-        return "feather"
-    if head.removeprefix(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement"):
-        return "lvm"
-    if _is_mat4(head):
-        return "mat4"
-    # A MATLAB 7.3 header in front of nothing is a cut-off file, still one of HDF5's kind.
-    if head.startswith(b"MATLAB 7.3"):
-        return "hdf5"
-    text = head.decode("utf-8", errors="replace")
-    odd = sum(1 for c in text if (ord(c) < 32 and c not in "\t\r\n\f\x1a") or c == "\ufffd")
-    return "binary" if "\x00" in text or odd > 0.05 * len(text) else "text"
-
-
-def _is_mat4(head: bytes) -> bool:
-    """True for the header of a MATLAB 4 matrix: type, rows, columns, imaginary flag and length of the name."""
-    if len(head) < 21:
-        return False
-    for order in ("<", ">"):
-        kind, rows, columns, imaginary, letters = struct.unpack(f"{order}5i", head[:20])
-        sane = 0 <= kind < 5000 and kind % 10 <= 2 and (kind // 10) % 10 <= 5 and imaginary in (0, 1)
-        if sane and 0 < rows < 1 << 30 and 0 < columns < 1 << 30 and 1 < letters < 64:
-            name = head[20 : 20 + letters - 1]
-            if name[:1].isalpha() and name.replace(b"_", b"").isalnum():
-                return True
-    return False
+    kinds = {content: about for content, (_, about) in _contents().items()}
+    for content in sorted(kinds, key=lambda content: kinds[content].rest):
+        if kinds[content].begins(head):
+            return content
+    return "binary"

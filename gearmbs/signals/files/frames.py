@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from gearmbs.signals.errors import SignalError, SignalFileError
+from gearmbs.signals.files.format import Content, Format, begins_with
 from gearmbs.signals.signal.record import (
     STEP_NAMES,
     Record,
@@ -172,3 +173,19 @@ def _rate(times: np.ndarray, path: Path, given: float | None) -> float:
         raise
     except SignalError as exc:  # pragma: no cover - rate_from_times names the file itself
         raise SignalFileError(path, str(exc)) from exc
+
+
+FORMATS = {
+    "parquet": Format(
+        read=lambda path, asked: read_parquet(path, "parquet", asked.rate),
+        write=lambda record, path, progress: write_parquet(record, path),
+        contents={"parquet": Content("Parquet", begins_with(b"PAR1"))},
+        through="pandas, pyarrow (extra `parquet`)",
+        keeps_attributes=False,
+    ),
+    "feather": Format(
+        read=lambda path, asked: read_parquet(path, "feather", asked.rate),
+        contents={"feather": Content("Feather", begins_with(b"ARROW1", b"FEA1"))},
+        through="pandas, pyarrow (extra `parquet`)",
+    ),
+}

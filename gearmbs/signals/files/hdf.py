@@ -10,16 +10,20 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import xarray as xr
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.signal.record import Record, assemble, plain, rate_candidates, rate_from_times
+from gearmbs.signals.files.format import Asked, Content, Format, begins_with
+from gearmbs.signals.signal.record import Record, assemble, rate_candidates, rate_from_times
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 
 LAYOUT = "gearmbs signal"
 BLOCK = 1 << 17
+MAGIC = b"\x89HDF\r\n\x1a\n"
+USER_BLOCK = 512
+"""Bytes that MATLAB 7.3 puts before the HDF5 data."""
 
 
 def write_netcdf(record: Record, path: Path) -> None:
@@ -54,6 +58,8 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
     SignalFileError
         If the file is damaged, or holds no record, or several of different lengths.
     """
+    import h5py
+
     arrays: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     labels: dict[str, str] = {}
@@ -102,6 +108,8 @@ def hdf_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
     SignalFileError
         If the file is damaged, or its channels differ in length.
     """
+    import h5py
+
     try:
         with h5py.File(path, "r") as file:
             if _value(file.attrs.get("layout")) != LAYOUT or "sampling_rate" not in file.attrs:
@@ -112,6 +120,8 @@ def hdf_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
 
 
 def _slices(path: Path) -> Iterator[tuple[Record, float]]:
+    import h5py
+
     try:
         with h5py.File(path, "r") as file:
             columns = [v for k, v in file.items() if k != "time" and "channel_index" in v.attrs]
@@ -189,3 +199,33 @@ def _value(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return value
+
+
+def _begins_as_hdf5(head: bytes) -> bool:
+    # a header of MATLAB 7.3 in front of nothing is a file cut off, still one of this kind
+    return head.startswith((MAGIC, b"MATLAB 7.3")) or head[USER_BLOCK : USER_BLOCK + len(MAGIC)] == MAGIC
+
+
+def _read(path: Path, asked: Asked) -> Record:
+    read = read_netcdf3 if asked.content == "netcdf3" else read_hdf
+    return read(path, asked.channels, asked.rate)
+
+
+def _format(contents: dict[str, Content], also: tuple[str, ...] = ()) -> Format:
+    return Format(
+        read=_read,
+        write=lambda record, path, progress: write_netcdf(record, path),
+        pieces=lambda path, asked: hdf_pieces(path) if asked.content == "hdf5" else None,
+        contents=contents,
+        also=also,
+        through="xarray, h5py",
+    )
+
+
+FORMATS = {
+    # NetCDF-4 is HDF5
+    "netcdf": _format(
+        {"netcdf3": Content("classic NetCDF", begins_with(b"CDF\x01", b"CDF\x02", b"CDF\x05"))}, ("hdf5",)
+    ),
+    "hdf5": _format({"hdf5": Content("HDF5", _begins_as_hdf5)}),
+}

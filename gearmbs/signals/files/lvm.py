@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.format import Content, Format
 from gearmbs.signals.files.text_tables import decoded
 from gearmbs.signals.signal.record import Record, rate_from_times, same_rate
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
@@ -134,3 +135,18 @@ def _number(text: str, decimal: str) -> float | None:
         return float(text.replace(decimal, "."))
     except ValueError:
         return None
+
+
+FORMATS = {
+    "lvm": Format(
+        read=lambda path, asked: read_lvm(path, asked.rate),
+        contents={
+            "lvm": Content(
+                "a LabVIEW measurement",
+                lambda head: head.removeprefix(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement"),
+            )
+        },
+        also=("text", "utf16"),
+        through="numpy",
+    )
+}

@@ -14,15 +14,18 @@ import warnings
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
-import scipy.io
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.signal.record import Record, assemble, plain
+from gearmbs.signals.files.format import Content, Format, begins_with
+from gearmbs.signals.signal.record import Record, assemble
 from gearmbs.signals.signal.signal import check_teeth
+
+if TYPE_CHECKING:
+    import h5py
 
 # Whether a MATLAB 5 file is whole: the tags of its elements fit into each other, its arrays hold what they promise.
 #
@@ -159,6 +162,8 @@ def read_mat(path: Path, channels: Sequence[str] | None, rate: float | None = No
     SignalFileError
         If the file is damaged or holds no record, or several of different lengths.
     """
+    import h5py
+
     notes: list[str] = []
     try:
         if h5py.is_hdf5(path):
@@ -192,6 +197,8 @@ def _units(scalars: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, s
 
 def _load(path: Path, notes: list[str]) -> dict[str, Any]:
     """The variables of a file of version 4 to 7; several of one name as name, name_2 ..."""
+    import scipy.io
+
     if path.stat().st_size <= LARGEST:
         data = path.read_bytes()
         if data.startswith(b"MATLAB 5.0"):
@@ -247,11 +254,15 @@ def write_mat(record: Record, path: Path, version: str) -> None:
     if record.teeth is not None:
         contents["teeth"] = np.asarray(record.teeth, dtype=float)
     if version == "mat5":
+        import scipy.io
+
         if record.values.nbytes >= 2**31:
             raise SignalFileError(path, "is too large for MATLAB's version 5 (2 GiB an array); use format='mat7.3'")
         cells = {k: np.array(v, dtype=object) if isinstance(v, list) else v for k, v in contents.items()}
         scipy.io.savemat(path, cells, do_compression=True)
         return
+    import h5py
+
     with h5py.File(path, "w", userblock_size=USER_BLOCK) as file:
         for name, value in contents.items():
             _to_hdf(file, name, value)
@@ -305,6 +316,8 @@ def _scalar(value: Any) -> Any:
 
 
 def _from_hdf(item: Any, file: h5py.File) -> Any:
+    import h5py
+
     if isinstance(item, h5py.Group):
         return {k: _from_hdf(v, file) for k, v in item.items()}
     kind = item.attrs.get("MATLAB_class", b"")
@@ -324,6 +337,8 @@ def _from_hdf(item: Any, file: h5py.File) -> Any:
 
 
 def _to_hdf(parent: h5py.Group, name: str, value: Any) -> h5py.Dataset:
+    import h5py
+
     if isinstance(value, str):
         codes = np.frombuffer(value.encode("utf-16-le"), dtype="<u2").reshape(-1, 1)
         dataset = parent.create_dataset(name, data=codes if codes.size else np.zeros(2, dtype="<u8"))
@@ -345,3 +360,37 @@ def _to_hdf(parent: h5py.Group, name: str, value: Any) -> h5py.Dataset:
     dataset = parent.create_dataset(name, data=np.ascontiguousarray(array.T), **chunks)
     dataset.attrs["MATLAB_class"] = np.bytes_("double")
     return dataset
+
+
+def _begins_as_mat4(head: bytes) -> bool:
+    """Return whether bytes are a MATLAB 4 matrix: type, rows, columns, imaginary flag and length of the name."""
+    if len(head) < 21:
+        return False
+    for order in ("<", ">"):
+        kind, rows, columns, imaginary, letters = struct.unpack(f"{order}5i", head[:20])
+        sane = 0 <= kind < 5000 and kind % 10 <= 2 and (kind // 10) % 10 <= 5 and imaginary in (0, 1)
+        if sane and 0 < rows < 1 << 30 and 0 < columns < 1 << 30 and 1 < letters < 64:
+            name = head[20 : 20 + letters - 1]
+            if name[:1].isalpha() and name.replace(b"_", b"").isalnum():
+                return True
+    return False
+
+
+FORMATS = {
+    "mat5": Format(
+        read=lambda path, asked: read_mat(path, asked.channels, asked.rate),
+        write=lambda record, path, progress: write_mat(record, path, "mat5"),
+        contents={
+            "mat5": Content("a MATLAB 5 file", begins_with(b"MATLAB 5.0")),
+            "mat4": Content("a MATLAB 4 file", _begins_as_mat4, tells=False),
+        },
+        also=("hdf5",),
+        through="SciPy, for files of version 7.3 h5py",
+    ),
+    "mat7.3": Format(
+        read=lambda path, asked: read_mat(path, asked.channels, asked.rate),
+        write=lambda record, path, progress: write_mat(record, path, "mat7.3"),
+        also=("hdf5",),
+        through="h5py",
+    ),
+}

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.signal.record import Record, chosen_rate, plain, rate_candidates, same_rate, speed_of
+from gearmbs.signals.files.format import Content, Format, begins_with
+from gearmbs.signals.signal.record import Record, chosen_rate, rate_candidates, same_rate, speed_of
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 
 GROUP = "signal"
@@ -175,3 +177,14 @@ def _library(path: Path) -> Any:
         if name.partition(".")[0] == "nptdms":
             logging.getLogger(name).setLevel(logging.CRITICAL)
     return nptdms
+
+
+FORMATS = {
+    "tdms": Format(
+        read=lambda path, asked: read_tdms(path, asked.channels, asked.rate),
+        write=lambda record, path, progress: write_tdms(record, path),
+        pieces=lambda path, asked: tdms_pieces(path, asked.channels, asked.rate),
+        contents={"tdms": Content("a TDMS file", begins_with(b"TDSm"))},
+        through="npTDMS (extra `formats`)",
+    )
+}

@@ -19,9 +19,11 @@ from typing import Any
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.format import Content, Format
 from gearmbs.signals.signal.record import Record
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth, nice_rate
 
+START = re.compile(rb"^\s*-1[ \t]*\r?\n[ \t]*\d+[a-z]?\b")
 BINARY = re.compile(rb"^\s*58b", re.MULTILINE | re.IGNORECASE)
 HEADER_ROWS = 12
 UNIT_WIDTH = 20
@@ -199,3 +201,18 @@ def _library(path: Path) -> Any:
     except ImportError as exc:
         raise SignalFileError(path, "UFF files need pyuff; install it with: pip install 'gearmbs[formats]'") from exc
     return pyuff
+
+
+FORMATS = {
+    "uff58": Format(
+        read=lambda path, asked: read_uff(path, asked.channels),
+        write=lambda record, path, progress: write_uff(record, path),
+        contents={
+            "uff58": Content(
+                "a universal file", lambda head: START.match(head.removeprefix(b"\xef\xbb\xbf")) is not None
+            )
+        },
+        through="pyuff (extra `formats`), binary doubles",
+        keeps_attributes=False,
+    )
+}

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from scipy.io import wavfile
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.format import Content, Format
 from gearmbs.signals.signal.record import Record, metadata_json, record_from_json
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 
@@ -26,6 +26,8 @@ def read_wav(path: Path) -> Record:
     SignalFileError
         If a chunk is cut short, there are no samples, or the comment contradicts the header.
     """
+    from scipy.io import wavfile
+
     comment = _check_chunks(path)
     try:
         with warnings.catch_warnings():
@@ -44,6 +46,8 @@ def wav_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
     SignalFileError
         As `read_wav`.
     """
+    from scipy.io import wavfile
+
     comment = _check_chunks(path)
     try:
         with warnings.catch_warnings():
@@ -80,6 +84,8 @@ def write_wav(record: Record, path: Path) -> None:
     """Write 64-bit float samples and the metadata as a comment."""
     if record.rate is None or round(record.rate) < 1:
         raise SignalFileError(path, f"a WAV file cannot hold the sampling rate {record.rate} Hz; use another format")
+    from scipy.io import wavfile
+
     buffer = io.BytesIO()
     wavfile.write(buffer, round(record.rate), record.values)
     text = metadata_json(record).encode("utf-8") + b"\0"
@@ -126,3 +132,16 @@ def _check_chunks(path: Path) -> str | None:
     if not seen_data:
         raise SignalFileError(path, "holds no samples")
     return comment
+
+
+FORMATS = {
+    "wav": Format(
+        read=lambda path, asked: read_wav(path),
+        write=lambda record, path, progress: write_wav(record, path),
+        pieces=lambda path, asked: wav_pieces(path),
+        contents={
+            "wav": Content("a WAV file", lambda head: head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] == b"WAVE")
+        },
+        through="SciPy, 64-bit floats; metadata in the comment chunk",
+    )
+}

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import xarray as xr
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth, make_signal, rate_of, uniform_rate, units_of
 
@@ -462,21 +463,6 @@ def record_from_json(values: np.ndarray, text: str, path: Path) -> Record:
     if len(names) != values.shape[1] or len(units) != len(names):
         raise SignalFileError(path, f"its metadata names {len(names)} channels, its samples have {values.shape[1]}")
     return record
-
-
-def plain(value: Any) -> Any:
-    """Attributes as JSON knows them; what it does not know becomes text."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return value.item()
-    if value is None or isinstance(value, (str, int, float, bool)):
-        return value
-    return str(value)
 
 
 def assemble(

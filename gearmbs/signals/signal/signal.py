@@ -7,7 +7,6 @@ first), `teeth` (tuple of int), `units` (the common unit of all channels, or "mi
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -498,13 +498,9 @@ def check_units(units: Any) -> None:
                 f"are, or scale them and give units={ratio[1]!r}"
             )
         if not _is_unit(text):
-            near = difflib.get_close_matches(text, USUAL, 2, 0.5)
-            hint = (
-                f"; did you mean {' or '.join(repr(n) for n in near)}?"
-                if near
-                else "; write for example 'm/s^2' or 'g'"
-            )
-            raise SignalError(f"units: {text!r} is not a unit{hint}")
+            example = "write for example 'm/s^2' or 'g'"
+            hint = did_you_mean(text, USUAL, otherwise=example, count=2, alike=0.5, shown=repr)
+            raise SignalError(f"units: {text!r} is not a unit; {hint}")
 
 
 def _is_level(text: str) -> bool:

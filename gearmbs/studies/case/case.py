@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from gearmbs._shown import Shown
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.studies.case import section as q
 from gearmbs.studies.case.section import SHOWN, CaseError, CaseWarning, Measure, Section, measures_of
 from gearmbs.units import to_si
@@ -35,10 +36,12 @@ from gearmbs.units import to_si
 if TYPE_CHECKING:
     from gearmbs.gears import GearPair
 
+    IntegratorName = str
+else:
+    IntegratorName = Literal[tuple(INTEGRATORS)]
+
 LEAST_TOLERANCE = 1e-12
-"""Least ``solver.tolerance``: below it rounding errors would be larger."""
-LARGEST_TOLERANCE = {"WSTIFF": 5e-6, "GSTIFF": 5e-6, "IDA": 1e-6}
-"""Limits of ``solver.tolerance``; see `Solver`."""
+"""Lower limit of ``solver.tolerance``; upper ones and defaults are in the table of integrators, see `Solver`."""
 
 SIGNAL_RATE, OUTPUT_RATE = 12800.0, 51200.0
 """Least sampling rates, Hz, where a case gives none: natural frequencies do not fall with the speed."""
@@ -267,7 +270,7 @@ class Solver(Section):
 
     section: ClassVar[str] = "solver"
 
-    integrator: Annotated[Literal["WSTIFF", "GSTIFF", "IDA"], BeforeValidator(_upper)] = "WSTIFF"
+    integrator: Annotated[IntegratorName, BeforeValidator(_upper)] = DEFAULT
     formulation: Annotated[Literal["SI2", "SI1", "I3"], BeforeValidator(_upper)] = "SI2"
     tolerance: float | None = None
     output_rate: q.SamplingRate = None
@@ -276,14 +279,14 @@ class Solver(Section):
 
     @property
     def used_tolerance(self) -> float:
-        """The tolerance, or its default: 1e-7, and 1e-8 with IDA, which makes ten times the error at the same value."""
-        return self.tolerance or (1e-8 if self.integrator == "IDA" else 1e-7)
+        """The tolerance, or the integrator's default."""
+        return self.tolerance or INTEGRATORS[self.integrator].tolerance
 
     @model_validator(mode="after")
     def _resolvable(self) -> Solver:
         if self.tolerance is None:
             return self
-        low, high = LEAST_TOLERANCE, LARGEST_TOLERANCE[self.integrator]
+        low, high = LEAST_TOLERANCE, INTEGRATORS[self.integrator].largest_tolerance
         if not low <= self.tolerance <= high:
             why = "steps would skip contacts" if self.tolerance > high else "rounding errors would be larger"
             raise ValueError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import warnings
@@ -15,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationErro
 from pydantic_core import CoreSchema, core_schema
 
 from gearmbs.units import DIMENSIONS, NUMBER, to_si
+from gearmbs.wording import closest
 
 # Quantities of a case: texts with units or plain numbers in SI, within a range that gears can have.
 #
@@ -115,9 +115,11 @@ class Measure:
         low, high = (None if limit is None else limit * factor for limit in (self.low, self.high))
         if (low is None or number >= low * (1.0 - 1e-12)) and (high is None or number <= high * (1.0 + 1e-12)):
             return float(number)
-        span = f"{_plain(self.low)} to {_plain(self.high)}" if self.high is not None else f"{_plain(self.low)} or more"
+        span = (
+            f"{_number(self.low)} to {_number(self.high)}" if self.high is not None else f"{_number(self.low)} or more"
+        )
         if self.low is None:
-            span = f"up to {_plain(self.high)}"
+            span = f"up to {_number(self.high)}"
         if shown == "1":
             raise ValueError(f"give {span}")
         text = f"this is {number / factor:.6g} {shown}; give {span} {shown}"
@@ -129,7 +131,7 @@ class Measure:
         raise ValueError(f"{text} (a plain number is in {self.unit}; write '{value} {shown}' if that is meant)")
 
 
-def _plain(value: float | None) -> str:
+def _number(value: float | None) -> str:
     return "" if value is None else f"{value:g}"
 
 
@@ -411,7 +413,7 @@ def _unknown(loc: tuple, kind: Any) -> str:
         return f"unknown key; {elsewhere[key]}"
     known = list(owner.model_fields)
     text = f"unknown key; known ones are {', '.join(known)}"
-    near = difflib.get_close_matches(key, known, n=1)
+    near = closest(key, known)
     if not near:
         sections = {
             name: field.annotation.model_fields
@@ -419,6 +421,6 @@ def _unknown(loc: tuple, kind: Any) -> str:
             if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)
         }
         places = {f"{name}.{inner}": inner for name, fields in sections.items() for inner in fields}
-        close = difflib.get_close_matches(key, places.values(), n=1)
+        close = closest(key, places.values())
         near = [place for place, inner in places.items() if close and inner == close[0]]
     return f"{text}; did you mean {' or '.join(near)}?" if near else text

@@ -6,13 +6,13 @@ object of :mod:`gearmbs.gears.faults`. A case holds it as a table of plain numbe
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.gears import faults
 from gearmbs.gears.tables import tooth_deviations
+from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.gears.modifications import ToothDeviations
@@ -44,18 +44,16 @@ def tooth_fault(value: Any) -> faults.Fault:
     table = {"kind": value} if isinstance(value, str) else value
     if not isinstance(table, Mapping) or not isinstance(table.get("kind"), str):
         raise ValueError(f"{value!r} is no fault; write its name or a table with 'kind', one of {', '.join(kinds())}")
-    wanted = _plain(table["kind"])
-    kind = next((k for label, k in kinds().items() if wanted in (_plain(label), _plain(k.__name__))), None)
+    wanted = _letters(table["kind"])
+    kind = next((k for label, k in kinds().items() if wanted in (_letters(label), _letters(k.__name__))), None)
     if kind is None:
-        near = difflib.get_close_matches(table["kind"].lower(), kinds(), n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        hint = did_you_mean(table["kind"].lower(), kinds(), before="; ", alike=0.5)
         raise ValueError(f"kind {table['kind']!r} is unknown; known ones are {', '.join(kinds())}{hint}")
     settings: dict[str, Any] = {str(key): item for key, item in table.items() if key != "kind"}
     known = [field.name for field in fields(kind)]
     for key in settings:
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"; did you mean {near[0]}?" if near else ""
+            hint = did_you_mean(key, known, before="; ")
             raise ValueError(f"{kind.label}: unknown key {key!r}; known ones are {', '.join(known)}{hint}")
     return kind(**settings)
 
@@ -120,5 +118,5 @@ def _at(place: int, fault: faults.Fault | None, error: ValueError) -> str:
     return f"[{place}]: {text}"
 
 
-def _plain(name: str) -> str:
+def _letters(name: str) -> str:
     return "".join(c for c in name.lower() if c.isalnum())

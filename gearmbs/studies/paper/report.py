@@ -160,9 +160,9 @@ def _claims(study: StudyTables) -> list[str]:
         "",
         "## The three claims",
         "",
-        f"Default component: {_plain(study.component)}.",
+        f"Default component: {_spaced(study.component)}.",
         "",
-        "| claim | " + " | ".join(_plain(c) for c in records.component.values) + " |",
+        "| claim | " + " | ".join(_spaced(c) for c in records.component.values) + " |",
         "|---|" + "---|" * records.sizes["component"],
     ]
     verdicts = {str(c): study.claims(str(c)) for c in records.component.values}
@@ -193,7 +193,7 @@ def _contact(study: StudyTables) -> list[str]:
 def _harmonics(study: StudyTables) -> list[str]:
     parts = ["## RMS of the GMF harmonics", ""]
     for component in study.records.component.values:
-        parts += [f"### {_plain(component)}", "", *_table(study, str(component)), ""]
+        parts += [f"### {_spaced(component)}", "", *_table(study, str(component)), ""]
     how = "Band: zero-phase band-pass about each harmonic. Orders: amplitudes over whole mesh periods. Scaled, m/s^2."
     return [*parts, how, ""]
 
@@ -279,7 +279,7 @@ def _largest(records: xr.Dataset, name: str) -> float:
     return float(values[np.argmax(np.abs(values))])
 
 
-def _plain(name: object) -> str:
+def _spaced(name: object) -> str:
     return str(name).replace("_", " ")
 
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import xarray as xr
 
+from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.progress import bars
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
@@ -99,7 +100,7 @@ def run_cases(
         for name in found if move is not None else ():
             move(name, 1.0)
         workers = max(1, min(workers or available_cores(), len(left)))
-        compiled = all(case.solver.integrator != "IDA" for case in left)
+        compiled = all(INTEGRATORS[case.solver.integrator].compiled for case in left)
         run = _in_threads if workers == 1 or compiled else _in_processes
         found |= zip((case.name for case in left), run(left, workers, move, done, errors == "keep"), strict=True)
     return [found[name] for name in names]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +12,14 @@ import pandas as pd
 import xarray as xr
 
 from gearmbs._shown import Shown, html_table
+from gearmbs.files import python_scalar
 from gearmbs.signals.files.simulated import record_signal
 from gearmbs.studies.case.case import Case, CaseError, readable
 from gearmbs.studies.case.section import SHOWN, Section, measures_of
 from gearmbs.studies.paper.preset import DEFAULT_COMPONENT
 from gearmbs.studies.run.parallel import run_cases
 from gearmbs.studies.run.store import file_stem, write_dataset, write_text
+from gearmbs.wording import did_you_mean
 
 
 @dataclass(frozen=True)
@@ -182,9 +183,8 @@ def cases_of_sweep(case: Case, field: str, values: Sequence[Any]) -> list[Case]:
         raise CaseError(f"values: {values!r}; give a sequence of values of {field}")
     cases = []
     for place, value in enumerate(values, 1):
-        plain = value.item() if isinstance(value, np.generic) else value
         try:
-            one = case.changed(**{section: {name: plain}})
+            one = case.changed(**{section: {name: python_scalar(value)}})
         except CaseError as error:
             raise CaseError(f"value {place} of {field}: {str(error).partition(': ')[2] or error}") from None
         cases.append(one)
@@ -200,11 +200,11 @@ def between(ends: Sequence[str], count: int, case: Case, field: str) -> list[Any
     if len(ends) != 2 or count < 2:
         raise CaseError(f"values: {', '.join(ends)} with a count of {count}; give two values and a count from 2 up")
     _check_field(case, field)
-    low, high = (_plain(one, field) for one in cases_of_sweep(case, field, ends))
+    low, high = (_number_at(one, field) for one in cases_of_sweep(case, field, ends))
     return list(np.linspace(low, high, count))
 
 
-def _plain(case: Case, field: str) -> float:
+def _number_at(case: Case, field: str) -> float:
     section, _, name = field.partition(".")
     value = getattr(getattr(case, section), name)
     if not isinstance(value, (int, float)):
@@ -224,8 +224,9 @@ def _check_field(case: Case, field: str) -> None:
         for name in type(getattr(case, section)).model_fields
     ]
     if field not in known:
-        near = difflib.get_close_matches(field, known, n=1) or [k for k in known if k.endswith(f".{field}")]
-        hint = f"did you mean {near[0]}?" if near else f"settings are {', '.join(known)}"
+        ends = next((k for k in known if k.endswith(f".{field}")), None)
+        otherwise = f"did you mean {ends}?" if ends else f"settings are {', '.join(known)}"
+        hint = did_you_mean(field, known, otherwise=otherwise)
         raise CaseError(f"field: {field!r} is no setting of a case; {hint}")
 
 

@@ -17,6 +17,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
 from gearmbs.drivetrain.description import Description, read_description
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
+from gearmbs.files import plain
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
@@ -324,7 +325,7 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
     """Return what a record says of its drivetrain, settings and solver."""
     out: dict[str, Any] = {
         "title": f"drivetrain: {train.name}",
-        "train_json": json.dumps(plain({name: part for name, part in train.parts.items()})),
+        "train_json": json.dumps(described({name: part for name, part in train.parts.items()})),
         "gearmbs_version": gearmbs.__version__,
     }
     if train.meshes:
@@ -346,18 +347,16 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
     return out
 
 
-def plain(value: Any) -> Any:
-    """Return a description made of tables, lists, numbers and texts."""
-    if is_dataclass(value) and not isinstance(value, type):
-        shown = {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.init}
-        return {"kind": getattr(value, "kind", type(value).__name__), **shown}
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value if isinstance(value, str | int | float | bool) or value is None else repr(value)
+def described(value: Any) -> Any:
+    """Return a description made of tables, lists, numbers and texts; objects become tables with their kind."""
+    return plain(value, _as_table)
+
+
+def _as_table(value: Any) -> Any:
+    if not is_dataclass(value) or isinstance(value, type):
+        return repr(value)
+    shown = {f.name: described(getattr(value, f.name)) for f in fields(value) if f.init}
+    return {"kind": getattr(value, "kind", type(value).__name__), **shown}
 
 
 def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> xr.DataArray:

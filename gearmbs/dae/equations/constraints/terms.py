@@ -2,7 +2,7 @@
 
 A constraint row is Phi = sum_c coef_c phi_c(I_c, J_c) - f(t).  Each term gives its value, its spatial
 gradient [dR_I, dpi_I, dR_J, dpi_J] (the bodies', not the markers', variations), the partial time
-derivative, and the quadratic velocity part of its second time derivative; `constraint_hessians` has its exact
+derivative, and the quadratic velocity part of its second time derivative; `hessians` has its exact
 Hessian, from which the derivatives of Phi_q^T lambda and Phi_q q' follow.
 """
 
@@ -290,7 +290,7 @@ def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     return (dot3(s, 0, s, 0) - rate * rate + dot3(s, 6, s, 3)) / length
 
 
-# The two commonest constraint terms, POINT and DOT1, without the general path of `constraint_terms`: their motion,
+# The two commonest constraint terms, POINT and DOT1, without the general path above: their motion,
 # the forces of their multipliers, and their gradients in the acceleration system.
 #
 # A POINT term has a unit vector for its translational gradient, a DOT1 term none.

@@ -1,0 +1,237 @@
+"""The table of kinds of rolling bearings: one row each, with all by which kinds differ.
+
+Checks, contacts, ratings, equivalent loads, designations and messages follow from it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from gearmbs.bearings.errors import require
+
+# Bearings are those of `geometry`, which knows this table.
+Bearing = Any
+
+
+@dataclass(frozen=True)
+class Known:
+    """Fields of a bearing that its designation fixes, and the names of those that must be counted or measured."""
+
+    fields: dict[str, Any]
+    asked: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """One kind of bearings.
+
+    Parameters
+    ----------
+    rollers : bool
+        Whether the elements are rollers, in line contact; else balls in grooves.
+    angle : {"free", "needed", "none"}
+        Whether a bearing may, must or cannot have a contact angle.
+    both_ways : bool
+        Balls touch each groove at two points, one for each sense of the axial load.
+    one_shoulder : bool
+        Grooves have one shoulder, across which an axial load against the bearing's sense would be carried.
+    preloaded : bool
+        Whether a preload is set by moving a ring along the axis; else by a negative clearance.
+    reduction : float
+        Factor of the dynamic rating by ISO 281.
+    load_factors : callable
+        ``load_factors(bearing, radial, axial)`` returns e, X and Y of ISO 281.
+    designation : re.Pattern, optional
+        Beginning of designations: digit of the dimension series, code of the bore.
+    known : callable, optional
+        ``known(found, boundary)`` returns what such a designation fixes.
+    unclassed : str
+        Why a class of radial clearance says nothing of such bearings; empty if it does.
+    """
+
+    rollers: bool = False
+    angle: Literal["free", "needed", "none"]
+    both_ways: bool = False
+    one_shoulder: bool = False
+    preloaded: bool = False
+    reduction: float
+    load_factors: Callable[[Bearing, float, float], tuple[float, float, float]]
+    designation: re.Pattern[str] | None = None
+    known: Callable[[re.Match[str], dict[str, Any]], Known] | None = None
+    unclassed: str = ""
+
+
+# Factors of the equivalent load by ISO 281.
+
+
+DEEP_GROOVE = (
+    (0.172, 0.19, 2.30), (0.345, 0.22, 1.99), (0.689, 0.26, 1.71), (1.03, 0.28, 1.55), (1.38, 0.30, 1.45),
+    (2.07, 0.34, 1.31), (3.45, 0.38, 1.15), (5.17, 0.42, 1.04), (6.89, 0.44, 1.00),
+)  # fmt: skip
+"""f_0 F_a/C_0, e, Y of single-row deep groove bearings; X = 0.56."""
+ANGULAR = (
+    (20.0, 0.57, 0.43, 1.00), (25.0, 0.68, 0.41, 0.87), (30.0, 0.80, 0.39, 0.76), (35.0, 0.95, 0.37, 0.66),
+    (40.0, 1.14, 0.35, 0.57), (45.0, 1.34, 0.33, 0.50),
+)  # fmt: skip
+"""Contact angle in degrees, e, X, Y of single-row angular contact bearings."""
+
+
+def _deep_groove_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
+    table = np.array(DEEP_GROOVE)
+    f_0 = bearing.rating_at_rest / (bearing.elements * (1e3 * bearing.element_diameter) ** 2)
+    level = f_0 * axial / bearing.rating_at_rest
+    e, y = (float(np.interp(level, table[:, 0], table[:, k])) for k in (1, 2))
+    return e, 0.56, y
+
+
+def _angular_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
+    degrees, table = math.degrees(bearing.contact_angle), np.array(ANGULAR)
+    require(
+        20.0 <= degrees <= 45.0,
+        f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors are for 20 to 45 deg",
+    )
+    e, x, y = (float(np.interp(degrees, table[:, 0], table[:, k])) for k in (1, 2, 3))
+    return e, x, y
+
+
+def _cylindrical_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
+    require(
+        axial <= 1e-9 * max(radial, 1.0),
+        f"F_a is {axial:.4g} N; cylindrical rollers carry no axial load: their life counts F_r alone",
+    )
+    return math.inf, 1.0, 0.0
+
+
+def _tapered_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
+    return 1.5 * math.tan(bearing.contact_angle), 0.4, 0.4 / math.tan(bearing.contact_angle)
+
+
+# What a designation fixes of cylindrical and tapered roller, angular contact and four-point bearings.
+#
+# Boundary dimensions are those of the dimension series (ISO 15, ISO 355). Of cylindrical roller bearings the raceways F
+# on the inner ring (types NU, NJ, NUP) and E on the outer ring (type N) are standardised, too, since their rings are
+# interchangeable (DIN 5412-1): so the rollers' diameter is (E - F)/2 and their pitch diameter (E + F)/2. Of tapered
+# roller bearings the contact angle is (ISO 355), of the others it is part of the designation. Number and length of
+# rollers, number and diameter of balls are the maker's.
+
+
+RACEWAYS = {
+    "2": {20: (26.5, 41.5), 25: (31.5, 46.5), 30: (37.5, 55.5), 35: (44.0, 64.0), 40: (49.5, 71.5), 45: (54.5, 76.5),
+          50: (59.5, 81.5)},
+    "3": {20: (27.5, 45.5), 25: (34.0, 54.0), 30: (40.5, 62.5), 35: (46.2, 70.2), 40: (52.0, 80.0), 45: (58.5, 88.5),
+          50: (65.0, 97.0)},
+}  # fmt: skip
+"""F and E of cylindrical roller bearings by bore, mm, dimension series 02 and 03."""
+TAPERS = {
+    "2": {20: (15.25, 12, 57, 10), 25: (16.25, 14, 2, 10), 30: (17.25, 14, 2, 10), 35: (18.25, 14, 2, 10),
+          40: (19.75, 14, 2, 10), 45: (20.75, 15, 6, 34), 50: (21.75, 15, 38, 32)},
+    "3": {20: (16.25, 11, 18, 36), 25: (18.25, 11, 18, 36), 30: (20.75, 11, 51, 35), 35: (22.75, 11, 51, 35),
+          40: (25.25, 12, 57, 10), 45: (27.25, 12, 57, 10), 50: (29.25, 12, 57, 10)},
+}  # fmt: skip
+"""Width T in mm and contact angle in degrees, minutes and seconds of tapered roller bearings by bore, mm."""
+ANGLES = {"C": 15.0, "AC": 25.0, "A": 30.0, "B": 40.0}
+"""Contact angle of angular contact bearings by the letter behind the digits, degrees."""
+FOUR_POINTS = 35.0
+
+
+def _middle(boundary: dict[str, Any]) -> float:
+    return 0.5 * (boundary["bore"] + boundary["outside_diameter"])
+
+
+def _cylindrical(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    raceways = RACEWAYS[found[1]].get(round(1e3 * boundary["bore"]))
+    if raceways is None:
+        fields = {**boundary, "pitch_diameter": _middle(boundary)}
+        return Known(fields, ("elements", "element_diameter", "roller_length"))
+    inner, outer = (1e-3 * value for value in raceways)
+    own = {"element_diameter": 0.5 * (outer - inner), "pitch_diameter": 0.5 * (outer + inner)}
+    return Known({**boundary, **own}, ("elements", "roller_length"))
+
+
+def _tapered(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    fields = {**boundary, "pitch_diameter": _middle(boundary)}
+    asked: tuple[str, ...] = ("elements", "element_diameter", "roller_length")
+    taper = TAPERS[found[1]].get(round(1e3 * boundary["bore"]))
+    if taper is None:
+        return Known(fields, (*asked, "contact_angle"))
+    width, degrees, minutes, seconds = taper
+    angle = math.radians(degrees + minutes / 60.0 + seconds / 3600.0)
+    return Known({**fields, "width": 1e-3 * width, "contact_angle": angle}, asked)
+
+
+def _angular(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    fields = {**boundary, "pitch_diameter": _middle(boundary), "contact_angle": math.radians(ANGLES[found[3]])}
+    return Known(fields, ("elements", "element_diameter"))
+
+
+def _four_point(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    fields = {**boundary, "pitch_diameter": _middle(boundary), "contact_angle": math.radians(FOUR_POINTS)}
+    return Known(fields, ("elements", "element_diameter"))
+
+
+SET_WHEN_MOUNTED = "their clearance is set when they are mounted"
+
+KINDS: dict[str, Kind] = {
+    "deep groove": Kind(angle="free", reduction=0.95, load_factors=_deep_groove_factors),
+    "angular contact": Kind(
+        angle="needed",
+        one_shoulder=True,
+        preloaded=True,
+        reduction=0.95,
+        load_factors=_angular_factors,
+        designation=re.compile(r"^7([23])(\d\d)\s*-?\s*(AC|[ABC])(?![A-Z])"),
+        known=_angular,
+        unclassed=SET_WHEN_MOUNTED,
+    ),
+    "four point": Kind(
+        angle="needed",
+        both_ways=True,
+        reduction=0.95,
+        load_factors=_angular_factors,
+        designation=re.compile(r"^QJ\s*([23])(\d\d)(?!\d)"),
+        known=_four_point,
+        unclassed="it is one of axial clearance",
+    ),
+    "cylindrical roller": Kind(
+        rollers=True,
+        angle="none",
+        reduction=0.83,
+        load_factors=_cylindrical_factors,
+        designation=re.compile(r"^(?:NU|NJ|NUP|N)\s*([23])(\d\d)(?!\d)"),
+        known=_cylindrical,
+    ),
+    "tapered roller": Kind(
+        rollers=True,
+        angle="needed",
+        preloaded=True,
+        reduction=0.83,
+        load_factors=_tapered_factors,
+        designation=re.compile(r"^30([23])(\d\d)(?!\d)"),
+        known=_tapered,
+        unclassed=SET_WHEN_MOUNTED,
+    ),
+}
+
+
+def known_of(designation: str, boundary: dict[str, float]) -> Known | None:
+    """Return what a designation fixes, its kind first; None if it begins as that of no kind.
+
+    Parameters
+    ----------
+    designation : str
+        In capitals, without a maker's name.
+    boundary : dict
+        Bore, outside diameter and width by its dimension series, m; empty if there is none.
+    """
+    for name, kind in KINDS.items():
+        found = kind.designation.match(designation) if kind.designation is not None and boundary else None
+        if found is not None and kind.known is not None:
+            known = kind.known(found, boundary)
+            return replace(known, fields={"kind": name, **known.fields})
+    return None

@@ -1,0 +1,58 @@
+"""Parts of messages that all of the package says alike: lists of names, and what an unknown name may have meant."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+
+ALIKE = 0.6
+"""Least likeness, 0 to 1, of a name that may be meant: difflib's default; one wrong letter of five leaves 0.8."""
+
+
+def closest(name: object, known: Iterable[str], count: int = 1, alike: float = ALIKE) -> list[str]:
+    """Return up to ``count`` known names that are most like another, the most alike first."""
+    return difflib.get_close_matches(str(name), list(known), count, alike)
+
+
+def did_you_mean(
+    name: object,
+    known: Iterable[str],
+    *,
+    before: str = "",
+    otherwise: str = "",
+    count: int = 1,
+    alike: float = ALIKE,
+    shown: Callable[[str], str] = str,
+) -> str:
+    """Return the end of a message about an unknown name.
+
+    Parameters
+    ----------
+    name : object
+        What was given.
+    known : iterable of str
+        Names that there are.
+    before : str
+        What goes before the question.
+    otherwise : str
+        What is said instead where no name is alike.
+    count, alike
+        See `closest`.
+    shown : callable
+        How names are written, such as ``repr``.
+
+    Examples
+    --------
+    >>> did_you_mean("sped", ["speed", "torque"], before="; ")
+    '; did you mean speed?'
+    >>> did_you_mean("x", ["speed", "torque"], otherwise="known ones are speed and torque")
+    'known ones are speed and torque'
+    """
+    near = closest(name, known, count, alike)
+    return f"{before}did you mean {' or '.join(shown(one) for one in near)}?" if near else otherwise
+
+
+def any_of(names: Iterable[str]) -> str:
+    """Return names as messages list them: "A, B or C"."""
+    *others, last = names
+    return f"{', '.join(others)} or {last}" if others else last

@@ -1,0 +1,60 @@
+"""What all messages say alike is said by one function each."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearmbs
+from gearmbs.files import plain, python_scalar
+from gearmbs.wording import any_of, closest, did_you_mean
+
+PACKAGE = Path(gearmbs.__file__).parent
+
+
+def sources(pattern):
+    """Return the modules in whose source a pattern stands."""
+    word = re.compile(pattern)
+    found = sorted(PACKAGE.rglob("*.py"))
+    return {path.relative_to(PACKAGE).as_posix() for path in found if word.search(path.read_text(encoding="utf-8"))}
+
+
+def test_one_function_asks_what_was_meant():
+    assert sources(r"difflib") == {"wording.py"}
+    # a unit belongs to its number; a key of a case is looked for in other sections, too; an ending is no slip
+    others = {"units.py", "studies/case/section.py", "studies/run/sweep.py"}
+    assert sources(r"did you mean ") - {"wording.py"} <= others
+
+
+def test_one_function_makes_values_plain():
+    assert sources(r"def _?plain\(") == {"files.py"}
+    assert sources(r"\.item\(\) if isinstance\(\w+, np\.generic\)") == {"files.py"}
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "expected"),
+    [
+        ("sped", {}, "did you mean speed?"),
+        ("sped", {"before": "; ", "shown": repr}, "; did you mean 'speed'?"),
+        ("speek", {"count": 2}, "did you mean speed or speak?"),
+        ("zzz", {"before": "; "}, ""),
+        ("zzz", {"otherwise": "known ones are few"}, "known ones are few"),
+        (3, {}, ""),
+    ],
+)
+def test_names_that_may_be_meant(name, options, expected):
+    assert did_you_mean(name, iter(["torque", "speed", "speak"]), **options) == expected
+
+
+def test_lists_of_names():
+    assert [any_of("A"), any_of("AB"), any_of("ABC")] == ["A", "A or B", "A, B or C"]
+    assert closest("spe", ["speed"], alike=0.9) == []
+
+
+def test_plain_values():
+    value = {1: (np.float64(2.0), np.arange(2)), "a": [np.bool_(True), None, Path("x")]}
+    assert plain(value) == {"1": [2.0, [0, 1]], "a": [True, None, "x"]}
+    assert plain([1j], other=repr) == ["1j"]
+    assert type(python_scalar(np.int64(3))) is int
+    assert python_scalar((np.int64(3),)) == (np.int64(3),)
