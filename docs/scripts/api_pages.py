@@ -138,7 +138,7 @@ MORE = {
     },
     "gearmbs.identify": {
         "gearmbs.identify.fit": EVERYTHING,
-        "gearmbs.identify.posterior": ["make_surrogate"],
+        "gearmbs.identify.identifiability": ["make_surrogate"],
         "gearmbs.identify.study": ["load_problem"],
     },
     "gearmbs.units": {
