@@ -9,6 +9,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,12 +21,15 @@ from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, Spe
 from gearmbs.gears import ContactLaw
 from gearmbs.progress import told_of_span
 from gearmbs.signals import convert
+from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
 from gearmbs.signals.rotation.orders import harmonic_amplitudes
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.paper.paper import PaperStudy, run_paper
 from gearmbs.studies.paper.preset import Claim, judge
+from gearmbs.studies.paper.report import verdict_table
 from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
+from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.run.store import write_dataset, write_text
 from gearmbs.studies.trains.trains import run_train, train_signal
 from gearmbs.units import Quantity, to_si
@@ -275,30 +279,24 @@ class BenchStudy:
     def report(self) -> str:
         """Return the report in Markdown: verdicts of bench and pair side by side, tables, choices."""
         judged = self.judged()
-        lines = ["# The test bench of Fig. 2", "", "## The three claims", "",
-                 "| claim | " + " | ".join(judged) + " |", "|---|" + "---|" * len(judged)]  # fmt: skip
-        for k, claim in enumerate(next(iter(judged.values()))):
-            row = " | ".join("held" if claims[k].held else "**not held**" for claims in judged.values())
-            lines.append(f"| {claim.name} | {row} |")
+        lines = ["# The test bench of Fig. 2", "", "## The three claims", "", verdict_table(judged)]
         for name, claims in judged.items():
             lines += ["", f"{name}:", ""]
             lines += [f"* {c.name}: **{'held' if c.held else 'not held'}** ({c.rule}). {c.numbers}." for c in claims]
-        lines += ["", "## RMS of the mesh harmonics, m/s^2", "", "| sensor | load | state | 1 x | 2 x | 3 x |",
-                  "|---|---|---|---|---|---|"]  # fmt: skip
-        for sensor in SENSORS:
-            for load in PRESSURES:
-                for state in STATES:
-                    levels_of = self.table.sel(sensor=sensor, load=load, state=state).values
-                    lines.append(f"| {sensor} | {load} | {state} | " + " | ".join(f"{v:.4g}" for v in levels_of) + " |")
-        lines += ["", "## Meshes", "", "| load | state | mesh | mean normal force, N | both flanks, % of time |",
-                  "|---|---|---|---|---|"]  # fmt: skip
-        for (load, state), record in self.records.items():
+        rows = [
+            [*place, *(f"{v:.4g}" for v in self.table.sel(dict(zip(("sensor", "load", "state"), place))).values)]
+            for place in product(SENSORS, PRESSURES, STATES)
+        ]
+        header = ["sensor", "load", "state", "1 x", "2 x", "3 x"]
+        lines += ["", "## RMS of the mesh harmonics, m/s^2", "", markdown_table(header, rows)]
+        rows = []
+        for at, record in self.records.items():
             for mesh in record.mesh.values:
                 one = record.sel(mesh=mesh)
-                both = 100 * np.mean((one.pairs_drive.values > 0) & (one.pairs_back.values > 0))
-                lines.append(f"| {load} | {state} | {mesh} | {float(one.normal_force.mean()):.5g} | {both:.3g} |")
-        lines += ["", "## Choices", "", "| what | chosen | why |", "|---|---|---|"]
-        lines += [f"| {c.what} | {c.chosen} | {c.why} |" for c in bench_choices(self.settings)]
+                rows.append([*at, mesh, f"{float(one.normal_force.mean()):.5g}", flank_shares(one)[0]])
+        header = ["load", "state", "mesh", "mean normal force, N", "both flanks, % of time"]
+        lines += ["", "## Meshes", "", markdown_table(header, rows)]
+        lines += ["", "## Choices", "", markdown_table(BenchChoice._fields, bench_choices(self.settings))]
         return "\n".join(lines) + "\n"
 
     def figure(self, load: str):

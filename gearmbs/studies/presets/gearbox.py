@@ -25,6 +25,7 @@ from gearmbs.drivetrain import (
 )
 from gearmbs.gears import ContactLaw, GearPair, GearSpec
 from gearmbs.progress import told_of_span
+from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.presets.bench import BenchChoice
 from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
 from gearmbs.studies.run.store import write_dataset, write_text
@@ -218,27 +219,24 @@ class GearboxStudy:
         """Return the report in Markdown: modes, critical speeds, the steady state, the run-up, choices."""
         from gearmbs.signals.analysis.campbell import critical_speeds
 
-        lines = [
-            "# Industrial gearbox",
-            "",
-            "## Modes under load",
-            "",
-            "| mode | Hz | damping ratio |",
-            "|---|---|---|",
-        ]
         modes = self.modes.oscillating
         told = zip(self.modes.frequencies[modes], self.modes.damping_ratios[modes], strict=True)
-        for k, (f, zeta) in enumerate((pair for pair in told if 0.1 < pair[0] < HIGHEST), 1):
-            lines.append(f"| {k} | {f:.5g} | {zeta:.3g} |")
-        lines += ["", "## Critical speeds of the motor, from half of the operating speed on", "",
-                  "| rpm | Hz | mode | mesh harmonic |", "|---|---|---|---|"]  # fmt: skip
+        rows = [
+            [k, f"{f:.5g}", f"{zeta:.3g}"]
+            for k, (f, zeta) in enumerate((pair for pair in told if 0.1 < pair[0] < HIGHEST), 1)
+        ]
+        lines = ["# Industrial gearbox", "", "## Modes under load", ""]
+        lines += [markdown_table(["mode", "Hz", "damping ratio"], rows), ""]
         found = critical_speeds(self.campbell())
-        for row in found[found.speed_rpm > 0.5 * self.train.drives[0].speed * 30.0 / np.pi].itertuples():
-            lines.append(f"| {row.speed_rpm:.5g} | {row.frequency_hz:.5g} | {row.mode} | {row.order} |")
+        rows = [
+            [f"{row.speed_rpm:.5g}", f"{row.frequency_hz:.5g}", row.mode, row.order]
+            for row in found[found.speed_rpm > 0.5 * self.train.drives[0].speed * 30.0 / np.pi].itertuples()
+        ]
+        lines += ["## Critical speeds of the motor, from half of the operating speed on", ""]
+        lines += [markdown_table(["rpm", "Hz", "mode", "mesh harmonic"], rows)]
         lines += ["", train_report(self.train, self.steady).replace("# industrial gearbox", "# Steady state", 1)]
         lines += [train_report(self.train, self.run_up).replace("# industrial gearbox", "# Run-up", 1)]
-        lines += ["# Choices", "", "| what | chosen | why |", "|---|---|---|"]
-        lines += [f"| {c.what} | {c.chosen} | {c.why} |" for c in gearbox_choices(self.settings)]
+        lines += ["# Choices", "", markdown_table(BenchChoice._fields, gearbox_choices(self.settings))]
         return "\n".join(lines) + "\n"
 
     def figures(self) -> dict[str, Any]:
