@@ -311,5 +311,6 @@ def serve(path: str | Path) -> None:
 
 if __name__ == "__main__":
     # the classes of the answers must be those of the module, not of the script
+    from gearmbs.campaigns import case_runner
 
-    serve(sys.argv[1])
+    case_runner.serve(sys.argv[1])
