@@ -49,10 +49,6 @@ CONSTANTS = {
 """Exported values that are no functions or classes, with the module that defines and describes them."""
 
 DESCRIBED = {
-    "gearmbs.studies.iftomm": {
-        "PROBLEMS": "The benchmark problems by name.",
-        "PUBLISHED": "Numbers published for them, with their sources.",
-    },
     "gearmbs.drivetrain": {
         "BEARINGS": "Classes of bearings by their ``kind`` in files.",
         "COUPLINGS": "Classes of couplings by their ``kind`` in files.",
@@ -129,7 +125,6 @@ MORE = {
         ],
         "gearmbs.studies.run.simulation": ["record"],
         "gearmbs.studies.run.store": ["write_dataset", "write_text", "whole_file"],
-        "gearmbs.studies.iftomm": EXPORTED,
     },
     "gearmbs.campaigns": {
         "gearmbs.campaigns.factors": EVERYTHING,

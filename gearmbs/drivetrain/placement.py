@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gearmbs.drivetrain.errors import DrivetrainError, require
-from gearmbs.drivetrain.parts import GearMesh, Shaft, Wheel, turn_z
+from gearmbs.drivetrain.parts import GearMesh, Shaft, turn_z
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
@@ -57,10 +57,6 @@ class Layout:
     angles: dict[str, float]
     wheels: dict[str, float]
     directions: dict[str, float]
-
-    def wheel_angle(self, wheel: Wheel) -> float:
-        """Return the angle of a wheel's tooth 0 from x of its shaft's frame that does not turn, rad."""
-        return self.angles[wheel.shaft] + self.wheels[wheel.name]
 
 
 class Tie(NamedTuple):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import parse_deck
-from gearmbs.adams.results.msg import read_requests
 from gearmbs.adams.results.res import NAMESPACE
 from gearmbs.adams.run.runner import run_deck
 from gearmbs.adams.write.deck_writer import write_deck
@@ -18,6 +17,7 @@ from gearmbs.mechanism import Mechanism, curve, curve_integral, harmonic, polyno
 from gearmbs.mechanism.language.syntax import Units
 
 from .decks import PENDULUM
+from .requests import read_requests
 
 
 def two_arms() -> Mechanism:

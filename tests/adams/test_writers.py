@@ -12,9 +12,9 @@ from gearmbs.adams import parse_deck, run_deck
 from gearmbs.adams.builders.scopes import KINDS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
-from gearmbs.adams.results.msg import read_requests
 from gearmbs.adams.results.res import ENTITY_TYPES, NAMESPACE
 
+from .requests import read_requests
 from .test_run import model
 
 PARTS = """\

@@ -189,7 +189,8 @@ def test_phase_of_a_mesh_and_assembly_angles():
     train = bench().changed("stage 2", phase=0.5)
     layout = train.layout
     assert layout.wheels["z1"] == pytest.approx(0.0)
-    angle = layout.wheel_angle(train.part("z3")) - np.pi
+    # tooth 0 from x of the shaft's frame that does not turn
+    angle = layout.angles[train.part("z3").shaft] + layout.wheels["z3"] - np.pi
     assert (angle / (2 * np.pi / 29)) % 1.0 == pytest.approx(0.5)
     with pytest.raises(DrivetrainError, match="phase turns wheel 'z3'"):
         _ = train.changed("z3", angle=0.1).layout

@@ -23,3 +23,9 @@ def raise_what_cannot_travel(job, report):
         pass
 
     raise Local("only here")
+
+
+def square_or_die(job, report):
+    if job == "die":
+        os._exit(3)
+    return job**2

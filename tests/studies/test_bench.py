@@ -7,6 +7,7 @@ from gearmbs.drivetrain import RunSettings
 from gearmbs.studies import BenchSettings, bench_choices, bench_train
 from gearmbs.studies.presets.bench import BenchStudy, levels, run_bench
 from gearmbs.studies.run.rig import gear_rig
+from tests.studies.presets import agrees_with_its_file
 
 
 def test_loads_of_the_two_pressures():
@@ -21,6 +22,19 @@ def test_loads_of_the_two_pressures():
     assert "T_0 = 75 N m" in first.chosen
     changed = bench_choices(BenchSettings(phase=0.5))[-1]
     assert changed.chosen == "phase = 0.5"
+
+
+def test_the_file_is_the_bench():
+    agrees_with_its_file("bench", bench_train())
+
+
+def test_joints_need_no_inertia_of_the_pump():
+    """What a bench in joints has not is not asked about: its housing, its shafts that twist, the pump's own shaft."""
+    train = bench_train(settings=BenchSettings(bearings="ideal", pump_inertia=0.0, shafts=0.0))
+    assert [shaft.name for shaft in train.shafts] == ["motor", "one", "two", "four"]
+    assert not train.housings
+    with pytest.raises(ValueError, match="inertia"):
+        bench_train(settings=BenchSettings(pump_inertia=0.0))
 
 
 @pytest.mark.parametrize(("motor", "tol"), [("speed", 1e-7), ("induction", 1e-8)])

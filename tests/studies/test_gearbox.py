@@ -11,6 +11,7 @@ from gearmbs.signals.analysis.campbell import critical_speeds
 from gearmbs.studies import GearboxSettings, gearbox_choices, industrial_gearbox, run_gearbox, train_modes, train_report
 from gearmbs.studies.trains.trains import run_train
 from tests.drivetrain.support import stage
+from tests.studies.presets import agrees_with_its_file
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +29,10 @@ def test_kinematics():
     assert spur.pairs["high stage"].overlap_ratio == 0.0
     with pytest.raises(ValueError, match="motor is 'steam'"):
         industrial_gearbox(GearboxSettings(motor="steam"))
+
+
+def test_the_file_is_the_gearbox():
+    agrees_with_its_file("gearbox", industrial_gearbox())
 
 
 def test_forces_of_helical_stages(study):

@@ -9,9 +9,9 @@ import sys
 import pytest
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
-from gearmbs.studies.run.processes import WorkerDied, run_jobs
+from gearmbs.studies.run.processes import DEATH, RESULT, WorkerDied, messages, run_jobs
 from gearmbs.studies.run.simulation import simulate_case
-from tests.studies.jobs import fail_or_wait, raise_what_cannot_travel, square
+from tests.studies.jobs import fail_or_wait, raise_what_cannot_travel, square, square_or_die
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
 
@@ -45,6 +45,20 @@ def test_a_failure_ends_the_others(job, kind, words):
     with pytest.raises(kind, match=words):
         run_jobs(fail_or_wait, ["wait", job], 2, progress=lambda job, pid: pids.append(pid))
     assert all(gone(pid) for pid in pids)
+
+
+def test_a_worker_that_dies_is_replaced_and_jobs_are_taken_when_one_is_free():
+    taken = []
+
+    def jobs():
+        for job in ("die", 3, 2):
+            taken.append(job)
+            yield job
+
+    told = messages(square_or_die, jobs(), 1)
+    assert next(told) == (0, "die", DEATH, None)
+    assert taken == ["die"]
+    assert list(told) == [(1, 3, RESULT, 9), (2, 2, RESULT, 4)]
 
 
 def test_an_error_that_cannot_be_sent_arrives_as_text():

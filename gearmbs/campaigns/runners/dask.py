@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from gearmbs.campaigns.runners.processes import ONE_THREAD
 from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.campaigns.work import DIED, UnitReport, work_unit
+from gearmbs.studies.run.processes import ONE_THREAD, one_thread
 
 # Job scripts for Slurm and PBS.
 
@@ -227,18 +227,12 @@ def dask_client(address: str, workers: int | None = None, **settings: Any) -> It
     except ImportError:
         raise CampaignError("Dask is not installed; install the extra: pip install 'gearmbs[cluster]'") from None
     if address == "local":
-        saved = {name: os.environ.get(name) for name in ONE_THREAD}
-        os.environ.update(ONE_THREAD)
-        try:
-            with (
-                LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
-                Client(cluster) as client,
-            ):
-                yield client
-        finally:
-            for name, value in saved.items():
-                if value is None:
-                    os.environ.pop(name, None)
+        with (
+            one_thread(),
+            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
+            Client(cluster) as client,
+        ):
+            yield client
         return
     if address in BATCH:
         with batch_cluster(address, **settings) as cluster, Client(cluster) as client:

@@ -32,13 +32,13 @@ def significant(value: float, digits: int = 4) -> str:
     return f"{value:.{digits - 1}e}"
 
 
-def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """A Markdown table; vertical bars inside cells are escaped."""
     lines = [_row(header), "|" + "|".join("---" for _ in header) + "|"]
     return "\n".join(lines + [_row(row) for row in rows])
 
 
-def _row(cells: Sequence[str]) -> str:
+def _row(cells: Sequence[Any]) -> str:
     return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
 
 

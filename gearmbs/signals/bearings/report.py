@@ -17,7 +17,6 @@ from gearmbs.signals.errors import SignalError
 
 
 OUTER, INNER, ELEMENT, CAGE = "outer race", "inner race", "rolling element", "cage"
-PARTS = (OUTER, INNER, ELEMENT, CAGE)
 
 
 @dataclass(frozen=True)

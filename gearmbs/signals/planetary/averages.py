@@ -337,7 +337,6 @@ class PlanetaryModel:
 
 
 SUN, PLANET, RING = "sun", "planet", "ring"
-PARTS = (SUN, PLANET, RING)
 
 
 @dataclass(frozen=True)

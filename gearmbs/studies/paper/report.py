@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import xarray as xr
 
+from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.paper.preset import DEFAULT_COMPONENT, Claim, paper_cases
+from gearmbs.studies.run.record import flank_shares
 
 # What the paper leaves open, and what a study chose for it, from the study's own cases.
 
@@ -162,13 +165,8 @@ def _claims(study: StudyTables) -> list[str]:
         "",
         f"Default component: {_spaced(study.component)}.",
         "",
-        "| claim | " + " | ".join(_spaced(c) for c in records.component.values) + " |",
-        "|---|" + "---|" * records.sizes["component"],
+        verdict_table({_spaced(c): study.claims(str(c)) for c in records.component.values}),
     ]
-    verdicts = {str(c): study.claims(str(c)) for c in records.component.values}
-    for k, claim in enumerate(study.claims()):
-        row = " | ".join("held" if verdicts[str(c)][k].held else "**not held**" for c in records.component.values)
-        parts.append(f"| {claim.name} | {row} |")
     parts += ["", "Numbers for the default component:", ""]
     parts += [
         f"* {c.name}: **{'held' if c.held else 'not held'}** (held means: {c.rule}). {c.numbers}."
@@ -178,6 +176,15 @@ def _claims(study: StudyTables) -> list[str]:
     return [*parts, "", held, ""]
 
 
+def verdict_table(judged: Mapping[str, Sequence[Claim]]) -> str:
+    """Return the verdicts on the claims in Markdown: a row a claim, a column for each by whom they were judged."""
+    rows = [
+        [of_one[0].name, *("held" if claim.held else "**not held**" for claim in of_one)]
+        for of_one in zip(*judged.values(), strict=True)
+    ]
+    return markdown_table(["claim", *judged], rows)
+
+
 def _contact(study: StudyTables) -> list[str]:
     return [
         "## Contact",
@@ -185,7 +192,7 @@ def _contact(study: StudyTables) -> list[str]:
         "A driving pair carries the torque with its drive flanks. Two-flank contact braces the wheels: the forces of",
         "both flanks oppose each other, and their sum exceeds what the torque needs.",
         "",
-        *_contact_table(study),
+        _contact_table(study),
         "",
     ]
 
@@ -193,23 +200,20 @@ def _contact(study: StudyTables) -> list[str]:
 def _harmonics(study: StudyTables) -> list[str]:
     parts = ["## RMS of the GMF harmonics", ""]
     for component in study.records.component.values:
-        parts += [f"### {_spaced(component)}", "", *_table(study, str(component)), ""]
+        parts += [f"### {_spaced(component)}", "", _table(study, str(component)), ""]
     how = "Band: zero-phase band-pass about each harmonic. Orders: amplitudes over whole mesh periods. Scaled, m/s^2."
     return [*parts, how, ""]
 
 
 def _choices(study: StudyTables) -> list[str]:
-    parts = [
+    rows = [
+        [c.what, f"**{c.chosen}** (preset: {c.preset})" if c.changed else c.chosen, c.why]
+        for c in choices(study.cases, study.component)
+    ]
+    return [
         "## What the paper left open, and what was chosen",
         "",
-        "| what the paper leaves open | chosen here | why |",
-        "|---|---|---|",
-    ]
-    for c in choices(study.cases, study.component):
-        chosen = f"**{c.chosen}** (preset: {c.preset})" if c.changed else c.chosen
-        parts.append(f"| {c.what} | {chosen} | {c.why} |")
-    return [
-        *parts,
+        markdown_table(["what the paper leaves open", "chosen here", "why"], rows),
         "",
         "The claims depend on these choices, most of all on backlash (two-flank contact under misalignment), on the",
         "penetration depth, the speed and the force component. `gearmbs paper` takes each as an option; the",
@@ -219,59 +223,51 @@ def _choices(study: StudyTables) -> list[str]:
 
 
 def _settings(study: StudyTables) -> list[str]:
-    parts = ["## Settings", "", "| parameter | value |", "|---|---|"]
     skip = ("solver_healthy", "solver_misaligned", "solver_distance", "case_", "title", "scaling")
     attrs = study.records.attrs
-    for key, value in attrs.items():
-        if not key.startswith(skip) and not key.endswith("_units"):
-            parts.append(f"| {key} | {_value(value)} {attrs.get(f'{key}_units', '')}".rstrip() + " |")
-    return [*parts, ""]
+    rows = [
+        [key, f"{_value(value)} {attrs.get(f'{key}_units', '')}".rstrip()]
+        for key, value in attrs.items()
+        if not key.startswith(skip) and not key.endswith("_units")
+    ]
+    return ["## Settings", "", markdown_table(["parameter", "value"], rows), ""]
 
 
 def _integration(study: StudyTables) -> list[str]:
-    parts = [
-        "## Integration",
-        "",
-        "| case | steps | residuals | Jacobians | wall time s | times real time | ms a mesh cycle |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for case in study.cases:
         key = f"solver_{case.name.replace(', ', '_').replace(' ', '_')}"
         numbers = [study.records.attrs[f"{key}_{item}"] for item in ("steps", "residuals", "jacobians", "wall_time")]
         speed = study.records.attrs[f"{key}_real_time_factor"]
         cycle = 1e3 * study.records.attrs[f"{key}_time_per_mesh_cycle"]
-        row = " | ".join(_value(v) for v in numbers)
-        parts.append(f"| {case.name} | {row} | {speed:.3g} | {cycle:.3g} |")
-    return parts
+        rows.append([case.name, *map(_value, numbers), f"{speed:.3g}", f"{cycle:.3g}"])
+    header = ["case", "steps", "residuals", "Jacobians", "wall time s", "times real time", "ms a mesh cycle"]
+    return ["## Integration", "", markdown_table(header, rows)]
 
 
-def _table(study: StudyTables, component: str) -> list[str]:
-    lines = ["| load | state | 1 x band | 2 x band | 3 x band | 1 x orders | 2 x orders | 3 x orders |"]
-    lines.append("|---|---|---|---|---|---|---|---|")
+def _table(study: StudyTables, component: str) -> str:
+    rows = []
     band, orders = study.table(component, "band"), study.table(component, "orders")
     for load in band["load"].values:
         for state in band.state.values:
             values = [*band.sel(load=load, state=state).values, *orders.sel(load=load, state=state).values]
-            lines.append(f"| {load} | {state} | " + " | ".join(f"{v:.4g}" for v in values) + " |")
-    return lines
+            rows.append([load, state, *(f"{v:.4g}" for v in values)])
+    header = ["load", "state", *(f"{h} x {way}" for way in ("band", "orders") for h in (1, 2, 3))]
+    return markdown_table(header, rows)
 
 
-def _contact_table(study: StudyTables) -> list[str]:
+def _contact_table(study: StudyTables) -> str:
     """Mean sum of normal forces against torque over base radius, shares of the record in each kind of contact."""
-    lines = [
-        "| load | state | mean normal force, N | torque / base radius, N | both flanks, % of time | no contact, % |",
-        "|---|---|---|---|---|---|",
-    ]
+    header = ["load", "state", "mean normal force, N", "torque / base radius, N", "both flanks, % of time",
+              "no contact, %"]  # fmt: skip
+    rows = []
     radius = study.cases[0].pair().wheels[1].base_radius
     for load in study.records["load"].values:
         for state in study.records["state"].values:
             one = study.records.sel(load=load, state=state)
-            drive, back = one["pairs_drive"].values > 0, one["pairs_back"].values > 0
-            lines.append(
-                f"| {load} | {state} | {float(one['normal_force'].mean()):.5g} | {float(one.torque) / radius:.5g} "
-                f"| {100.0 * (drive & back).mean():.3g} | {100.0 * (~drive & ~back).mean():.3g} |"
-            )
-    return lines
+            forces = float(one["normal_force"].mean()), float(one.torque) / radius
+            rows.append([load, state, *(f"{v:.5g}" for v in forces), *flank_shares(one)])
+    return markdown_table(header, rows)
 
 
 def _largest(records: xr.Dataset, name: str) -> float:

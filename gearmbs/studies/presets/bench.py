@@ -9,6 +9,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,34 +17,19 @@ import numpy as np
 import xarray as xr
 
 from gearmbs._shown import Written
-from gearmbs.drivetrain import (
-    Accelerometer,
-    Drivetrain,
-    ElasticBearing,
-    ElasticClutch,
-    GearMesh,
-    Housing,
-    IdealBearing,
-    InductionMotor,
-    Laser,
-    Mount,
-    Pump,
-    RunSettings,
-    Shaft,
-    SpeedDrive,
-    SpeedSensor,
-    TorqueSensor,
-    TorsionalShaft,
-    Wheel,
-)
-from gearmbs.gears import ContactLaw, GearSpec
+from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, SpeedDrive
+from gearmbs.gears import ContactLaw
 from gearmbs.progress import told_of_span
 from gearmbs.signals import convert
+from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
 from gearmbs.signals.rotation.orders import harmonic_amplitudes
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.paper.paper import PaperStudy, run_paper
 from gearmbs.studies.paper.preset import Claim, judge
+from gearmbs.studies.paper.report import verdict_table
+from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
+from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.run.store import write_dataset, write_text
 from gearmbs.studies.trains.trains import run_train, train_signal
 from gearmbs.units import Quantity, to_si
@@ -57,6 +43,8 @@ STATES = {
 }
 """The three states of the first pair."""
 SEATS = ("one", "two", "three", "four")
+BOX = (0.3, 0.3, 0.6)
+"""The housing, a box about the shafts, m."""
 
 DISPLACEMENT = 2.0 * math.pi * (200.0 - 100.0) / (5e6 - 1e6)
 IDLE = 75.0
@@ -143,97 +131,60 @@ def bench_train(
     if s.bearings not in ("elastic", "ideal"):
         raise ValueError(f"bearings is {s.bearings!r}; choose 'elastic' or 'ideal'")
     speed = to_si(s.speed, "angular speed", "speed")
-    rigid = s.bearings == "ideal"
     # the paper's law, whatever the wheels are
-    pair = {"backlash": s.backlash, "contact": ContactLaw.impact()}
+    law = {"backlash": s.backlash, "contact": ContactLaw.impact()}
     motor: Any = SpeedDrive(name="drive", shaft="motor", speed=speed)
     if s.motor == "induction":
         # 22 kW on an inverter that holds 1.026 of the speed as synchronous speed
-        motor = InductionMotor(
-            name="drive", shaft="motor", speed=speed, power=22e3 * speed / to_si("1000 rpm", "angular speed", ""),
-            poles=4, frequency=1.026 * speed / math.pi, breakdown=2.8,
-        )  # fmt: skip
-    return Drivetrain(
-        f"bench, {state}",
-        shafts=[
-            Shaft(name="motor", length=0.15, inertia=s.motor_inertia),
-            *_shafts(s),
-        ],
-        wheels=[_wheel(f"z{k}", *place) for k, place in enumerate(JOINED if rigid else APART, 1)],
-        meshes=[
-            GearMesh(name="pair 1", driver="z1", driven="z2", settings={**pair, **STATES[state]}),
-            GearMesh(name="pair 2", driver="z3", driven="z4", direction=math.pi, phase=s.phase, settings=pair),
-        ],
-        couplings=[
-            ElasticClutch(name="clutch", first="motor", second="one", stiffness=s.clutch,
-                          relative_damping=s.clutch_damping, damping_frequency=100.0),
-            *([] if rigid else [
-                TorsionalShaft(name="middle", first="two", second="three", stiffness=s.shafts, damping_ratio=1e-5),
-                TorsionalShaft(name="end", first="four", second="pump", stiffness=s.shafts, damping_ratio=1e-5),
-            ]),
-        ],
+        motor = {"speed": speed, "power": 22e3 * speed / to_si("1000 rpm", "angular speed", ""),
+                 "frequency": 1.026 * speed / math.pi}  # fmt: skip
+    values: dict[str, Any] = {
+        "motor": {"inertia": s.motor_inertia},
+        "pair 1": {"settings": {**law, **STATES[state]}},
+        "pair 2": {"settings": law, "phase": s.phase},
+        "clutch": {"stiffness": s.clutch, "relative_damping": s.clutch_damping},
+        "drive": motor,
+        "pump load": {"displacement": s.displacement, "pressure": pressure, "idle": s.idle, "teeth": s.pump_teeth},
+    }
+    train = preset_train("bench")
+    if s.bearings == "ideal":
+        train = _on_joints(train, s.pump_inertia)
+    else:
+        k = s.bearing_stiffness
+        values |= {
+            "pump": {"inertia": s.pump_inertia},
+            "middle": {"stiffness": s.shafts},
+            "end": {"stiffness": s.shafts},
+            **{f"{shaft} {side}": {"stiffness": (k, k, 0.5 * k)} for shaft in SEATS for side in "ab"},
+            "housing": on_mounts(train.housings[0], s.housing_mass, s.mount_stiffness, BOX),
+        }
+    return replace(with_values(train, values), name=f"bench, {state}")
+
+
+def _on_joints(train: Drivetrain, pump: float) -> Drivetrain:
+    """Return the bench in joints on the ground, with wheels of both meshes on one shaft and no housing: four bodies.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    pump : float
+        Moment of inertia of the pump, which the last shaft takes on, kg m^2.
+    """
+    one, two, four = (train.part(name, Shaft) for name in ("one", "two", "four"))
+    z1, z2, z3, z4 = train.wheels
+    return replace(
+        train,
+        shafts=[train.part("motor"), one, replace(two, length=0.40), replace(four, inertia=four.body()[2] + pump)],
+        wheels=[z1, z2, replace(z3, shaft="two", station=0.3), z4],
+        couplings=[train.part("clutch")],
         bearings=[
-            IdealBearing(name="motor bearing", shaft="motor", on="ground"),
-            *(bearing for name in ("one", "two", "four") for bearing in _bearings(name, s)),
-            *([] if rigid else [*_bearings("three", s), IdealBearing(name="pump bearing", shaft="pump", on="ground")]),
+            train.part("motor bearing"),
+            *(IdealBearing(name=f"{s.name} a", shaft=s.name, station=0.02, on="ground") for s in (one, two, four)),
         ],
-        housings=[] if rigid else [_housing(s)],
-        drives=[motor],
-        loads=[Pump(name="pump load", shaft="four" if rigid else "pump", displacement=s.displacement,
-                    pressure=pressure, idle=s.idle, teeth=s.pump_teeth)],
-        sensors=[
-            *([] if rigid else [
-                Laser(name="laser", shaft="two", station=0.05, direction=(0.0, 1.0, 0.0)),
-                Accelerometer(name="support", bearing="two a", direction=(0.0, 1.0, 0.0)),
-            ]),
-            SpeedSensor(name="speed", shaft="two"),
-            TorqueSensor(name="torque", of="clutch"),
-        ],
-        run_up=0.02,
-        running=True,
-    )  # fmt: skip
-
-
-APART = (("one", 0.1), ("two", 0.1), ("three", 0.1), ("four", 0.1))
-JOINED = (("one", 0.1), ("two", 0.1), ("two", 0.3), ("four", 0.1))
-"""Shaft and station of each wheel."""
-
-
-def _shafts(s: BenchSettings) -> list[Shaft]:
-    if s.bearings == "ideal":
-        last = Shaft(name="four", length=0.20, radius=0.015)
-        joined = replace(last, inertia=last.body()[2] + s.pump_inertia)
-        return [Shaft(name="one", length=0.20, radius=0.015), Shaft(name="two", length=0.40, radius=0.015), joined]
-    four = [Shaft(name=name, length=0.20, radius=0.015) for name in SEATS]
-    return [*four, Shaft(name="pump", length=0.10, inertia=s.pump_inertia)]
-
-
-def _wheel(name: str, shaft: str, station: float) -> Wheel:
-    return Wheel(name=name, shaft=shaft, station=station, gear=GearSpec(29, 95e-3 / 31, face_width=0.020, name=name))
-
-
-def _bearings(shaft: str, s: BenchSettings) -> list[Any]:
-    if s.bearings == "ideal":
-        return [IdealBearing(name=f"{shaft} a", shaft=shaft, station=0.02, on="ground")]
-    k = s.bearing_stiffness
-    return [
-        ElasticBearing(name=f"{shaft} {side}", shaft=shaft, station=z, stiffness=(k, k, 0.5 * k), damping_time=1e-5)
-        for side, z in (("a", 0.02), ("b", 0.18))
-    ]
-
-
-def _housing(s: BenchSettings) -> Housing:
-    # a box of 0.3 x 0.3 x 0.6 m about the shafts
-    m = s.housing_mass
-    inertia = (m * (0.3**2 + 0.6**2) / 12.0, m * (0.3**2 + 0.6**2) / 12.0, m * (0.3**2 + 0.3**2) / 12.0)
-    corners = [(x, -0.15, z) for x in (-0.1, 0.2) for z in (0.15, 0.65)]
-    k = s.mount_stiffness
-    # 5 % of critical damping of the housing on its mounts
-    c = 2.0 * 0.05 * math.sqrt(4.0 * k * m) / 4.0
-    mounts = [
-        Mount(name=f"mount {n}", at=at, stiffness=(k, k, k), damping=(c, c, c)) for n, at in enumerate(corners, 1)
-    ]
-    return Housing(name="housing", mass=m, inertia=inertia, at=(0.045, 0.0, 0.4), mounts=tuple(mounts))
+        housings=[],
+        loads=[replace(train.part("pump load"), shaft="four")],
+        sensors=[train.part("speed"), train.part("torque")],
+    )
 
 
 class BenchChoice(NamedTuple):
@@ -328,30 +279,24 @@ class BenchStudy:
     def report(self) -> str:
         """Return the report in Markdown: verdicts of bench and pair side by side, tables, choices."""
         judged = self.judged()
-        lines = ["# The test bench of Fig. 2", "", "## The three claims", "",
-                 "| claim | " + " | ".join(judged) + " |", "|---|" + "---|" * len(judged)]  # fmt: skip
-        for k, claim in enumerate(next(iter(judged.values()))):
-            row = " | ".join("held" if claims[k].held else "**not held**" for claims in judged.values())
-            lines.append(f"| {claim.name} | {row} |")
+        lines = ["# The test bench of Fig. 2", "", "## The three claims", "", verdict_table(judged)]
         for name, claims in judged.items():
             lines += ["", f"{name}:", ""]
             lines += [f"* {c.name}: **{'held' if c.held else 'not held'}** ({c.rule}). {c.numbers}." for c in claims]
-        lines += ["", "## RMS of the mesh harmonics, m/s^2", "", "| sensor | load | state | 1 x | 2 x | 3 x |",
-                  "|---|---|---|---|---|---|"]  # fmt: skip
-        for sensor in SENSORS:
-            for load in PRESSURES:
-                for state in STATES:
-                    levels_of = self.table.sel(sensor=sensor, load=load, state=state).values
-                    lines.append(f"| {sensor} | {load} | {state} | " + " | ".join(f"{v:.4g}" for v in levels_of) + " |")
-        lines += ["", "## Meshes", "", "| load | state | mesh | mean normal force, N | both flanks, % of time |",
-                  "|---|---|---|---|---|"]  # fmt: skip
-        for (load, state), record in self.records.items():
+        rows = [
+            [*place, *(f"{v:.4g}" for v in self.table.sel(dict(zip(("sensor", "load", "state"), place))).values)]
+            for place in product(SENSORS, PRESSURES, STATES)
+        ]
+        header = ["sensor", "load", "state", "1 x", "2 x", "3 x"]
+        lines += ["", "## RMS of the mesh harmonics, m/s^2", "", markdown_table(header, rows)]
+        rows = []
+        for at, record in self.records.items():
             for mesh in record.mesh.values:
                 one = record.sel(mesh=mesh)
-                both = 100 * np.mean((one.pairs_drive.values > 0) & (one.pairs_back.values > 0))
-                lines.append(f"| {load} | {state} | {mesh} | {float(one.normal_force.mean()):.5g} | {both:.3g} |")
-        lines += ["", "## Choices", "", "| what | chosen | why |", "|---|---|---|"]
-        lines += [f"| {c.what} | {c.chosen} | {c.why} |" for c in bench_choices(self.settings)]
+                rows.append([*at, mesh, f"{float(one.normal_force.mean()):.5g}", flank_shares(one)[0]])
+        header = ["load", "state", "mesh", "mean normal force, N", "both flanks, % of time"]
+        lines += ["", "## Meshes", "", markdown_table(header, rows)]
+        lines += ["", "## Choices", "", markdown_table(BenchChoice._fields, bench_choices(self.settings))]
         return "\n".join(lines) + "\n"
 
     def figure(self, load: str):

@@ -17,27 +17,17 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.drivetrain import (
-    Accelerometer,
     Drivetrain,
-    ElasticBearing,
-    ElasticClutch,
-    Fan,
     GearMesh,
-    Housing,
     HousingMode,
-    IdealBearing,
     InductionMotor,
-    Mount,
     RunSettings,
-    Shaft,
-    SpeedDrive,
-    SpeedSensor,
-    TorqueSensor,
-    Wheel,
 )
 from gearmbs.gears import ContactLaw, GearPair, GearSpec
 from gearmbs.progress import told_of_span
+from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.presets.bench import BenchChoice
+from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
 from gearmbs.studies.run.store import write_dataset, write_text
 from gearmbs.studies.trains.modes import mesh_orders, train_modes
 from gearmbs.studies.trains.report import train_report
@@ -47,10 +37,13 @@ from gearmbs.units import Quantity, to_si
 if TYPE_CHECKING:
     from gearmbs.dae.analyses.eigenvalues import Modes
 
-STAGES = {"high": (22, 88, 5e-3, 0.110), "low": (23, 82, 8.25e-3, 0.170)}
-"""Teeth of pinion and wheel, normal module (m) and face width (m) of each stage."""
 HELIX = math.radians(14.0)
-SHAFTS = ("high", "lay", "low")
+SHAFTS = {"high": 1.0, "lay": 2.0, "low": 4.0}
+"""Stiffness of each shaft's bearings over that of the high-speed shaft's."""
+BOX = (1.0, 0.9, 0.7)
+"""The housing, a box about the shafts, m."""
+WALLS = {"front wall": 310.0, "rear wall": 420.0}
+"""Frequencies of the housing's modes, Hz; in each the seats of one side move together."""
 
 
 @dataclass(frozen=True)
@@ -114,115 +107,55 @@ def industrial_gearbox(settings: GearboxSettings | None = None) -> Drivetrain:
     speed, power = to_si(s.speed, "angular speed", "speed"), to_si(s.power, "power", "power")
     if s.motor not in ("speed", "induction"):
         raise ValueError(f"motor is {s.motor!r}; choose 'induction' or 'speed'")
-    ratio = math.prod(z2 / z1 for z1, z2, _, _ in STAGES.values())
-    wheels = _wheels(to_si(s.helix_angle, "angle", "helix_angle"))
-    drive: Any = SpeedDrive(name="drive", shaft="motor", speed=speed, curve=s.curve)
+    train = preset_train("gearbox")
+    helix = to_si(s.helix_angle, "angle", "helix_angle")
+    # the fillet that fits is that of the helix angle
+    wheels = [replace(w, gear=replace(w.gear, helix_angle=helix, fillet_radius=None)) for w in train.wheels]
+    drive: Any = {"speed": speed, "curve": s.curve}
     if s.motor == "induction":
         drive = InductionMotor(name="drive", shaft="motor", speed=speed, power=power, poles=4,
                                frequency=1.006 * speed / math.pi, breakdown=2.5)  # fmt: skip
-    torque = power / speed * ratio
-    return Drivetrain(
-        "industrial gearbox",
-        shafts=[
-            Shaft(name="motor", length=0.4, inertia=16.0),
-            Shaft(name="high", length=0.65, radius=0.045),
-            Shaft(name="lay", length=0.65, radius=0.075),
-            Shaft(name="low", length=0.65, radius=0.14),
-            Shaft(name="machine", length=0.4, inertia=60.0),
-        ],
-        wheels=wheels,
-        meshes=[_mesh("high stage", "z1", "z2", 0.0, (wheels[0].gear, wheels[1].gear), s),
-                _mesh("low stage", "z3", "z4", math.radians(-30.0), (wheels[2].gear, wheels[3].gear), s)],
-        couplings=[
-            ElasticClutch(name="motor clutch", first="motor", second="high", stiffness=1.5e5, relative_damping=0.6,
-                          damping_frequency=70.0),
-            ElasticClutch(name="machine clutch", first="low", second="machine", stiffness=2e7, relative_damping=0.6,
-                          damping_frequency=90.0),
-        ],
-        bearings=[
-            IdealBearing(name="motor bearing", shaft="motor", on="ground"),
-            *(bearing for k, shaft in enumerate(SHAFTS) for bearing in _bearings(shaft, 2.0**k * s.bearing_stiffness)),
-            IdealBearing(name="machine bearing", shaft="machine", on="ground"),
-        ],
-        housings=[_housing(s)],
-        drives=[drive],
-        loads=[Fan(name="machine load", shaft="machine", torque=torque, at_speed=speed / ratio)],
-        sensors=[
-            *(Accelerometer(name=f"housing at {shaft} {side}", bearing=f"{shaft} {side}", direction=(0.0, 1.0, 0.0))
-              for shaft in SHAFTS for side in "ab"),
-            SpeedSensor(name="speed", shaft="high"),
-            TorqueSensor(name="torque", of="motor clutch"),
-        ],
-        running=True,
-        run_up=0.05,
-    )  # fmt: skip
+    ratio = math.prod(wheels[k + 1].gear.teeth / wheels[k].gear.teeth for k in (0, 2))
+    housing = on_mounts(train.housings[0], s.housing_mass, s.mount_stiffness, BOX)
+    values: dict[str, Any] = {wheel.name: wheel for wheel in wheels}
+    values |= {
+        mesh.name: {"settings": _mesh(mesh, wheels[2 * k].gear, wheels[2 * k + 1].gear, s)}
+        for k, mesh in enumerate(train.meshes)
+    }
+    for shaft, times in SHAFTS.items():
+        k = times * s.bearing_stiffness
+        # the left one also locates the shaft
+        values |= {f"{shaft} {side}": {"stiffness": (k, k, axial * k)} for side, axial in (("a", 0.4), ("b", 0.1))}
+    values |= {
+        "housing": replace(housing, modes=tuple(_panel(mode, 0.1 * s.housing_mass) for mode in housing.modes)),
+        "drive": drive,
+        "machine load": {"torque": power / speed * ratio, "at_speed": speed / ratio},
+    }
+    return with_values(train, values)
 
 
-def _wheels(helix: float) -> list[Wheel]:
-    """Return the four wheels: pinions on the high-speed and lay shaft, whose axial forces oppose on the lay shaft."""
-    stations = {"high": 0.18, "low": 0.44}
-    out = []
-    for k, (stage, (z1, z2, module, width)) in enumerate(STAGES.items()):
-        for n, (teeth, shaft) in enumerate(zip((z1, z2), SHAFTS[k : k + 2], strict=True), 1):
-            # both wheels of the lay shaft have one hand: one is driven, the other drives
-            right = n == 2 if k == 0 else n == 1
-            name = f"z{2 * k + n}"
-            gear = GearSpec(teeth, module, face_width=width, helix_angle=helix, hand="right" if right else "left",
-                            name=name)  # fmt: skip
-            out.append(Wheel(name=name, shaft=shaft, station=stations[stage], gear=gear))
-    return out
-
-
-def _mesh(
-    name: str, driver: str, driven: str, direction: float, wheels: tuple[GearSpec, GearSpec], s: GearboxSettings
-) -> GearMesh:
-    bare = GearPair(*wheels).with_iso_stiffness()
-    k = bare.contact.stiffness
-    mass = 1.0 / sum(wheel.base_radius**2 / wheel.inertia[2] for wheel in wheels)
+def _mesh(mesh: GearMesh, driver: GearSpec, driven: GearSpec, s: GearboxSettings) -> dict[str, Any]:
+    """Return the settings of a mesh: the stiffness of ISO 6336-1, damped as its two wheels on it, and its faults."""
+    k = GearPair(driver, driven).with_iso_stiffness().contact.stiffness
+    mass = 1.0 / sum(wheel.base_radius**2 / wheel.inertia[2] for wheel in (driver, driven))
     contact = ContactLaw.linear(k, damping=2.0 * s.damping_ratio * math.sqrt(k * mass), depth="2 um")
-    settings: dict[str, Any] = {"backlash": "0.2 mm", "contact": contact}
-    if s.faults and name in s.faults:
-        settings["faults"] = tuple(s.faults[name])
-    return GearMesh(name=name, driver=driver, driven=driven, direction=direction, settings=settings)
+    faults = {"faults": tuple(s.faults[mesh.name])} if s.faults and mesh.name in s.faults else {}
+    return {**mesh.settings, "contact": contact, **faults}
 
 
-def _bearings(shaft: str, k: float) -> list[ElasticBearing]:
-    # the left one also locates the shaft
-    return [
-        ElasticBearing(name=f"{shaft} {side}", shaft=shaft, station=z, stiffness=(k, k, axial * k), damping_time=1e-5)
-        for side, z, axial in (("a", 0.05, 0.4), ("b", 0.60, 0.1))
-    ]
-
-
-def _housing(s: GearboxSettings) -> Housing:
-    # a box of 0.9 x 1.0 x 0.7 m about the shafts
-    m = s.housing_mass
-    inertia = (m * (0.9**2 + 0.7**2) / 12.0, m * (1.0**2 + 0.7**2) / 12.0, m * (1.0**2 + 0.9**2) / 12.0)
-    corners = [(x, -0.6, z) for x in (-0.2, 0.9) for z in (0.0, 0.65)]
-    k = s.mount_stiffness
-    # 5 % of critical damping of the housing on its mounts
-    c = 2.0 * 0.05 * math.sqrt(4.0 * k * m) / 4.0
-    mounts = [
-        Mount(name=f"mount {n}", at=at, stiffness=(k, k, k), damping=(c, c, c)) for n, at in enumerate(corners, 1)
-    ]
-    modes = [_panel("front wall", 310.0, "a", (0.0, 0.6, 0.8), m), _panel("rear wall", 420.0, "b", (0.0, 0.6, -0.8), m)]
-    return Housing(name="housing", mass=m, inertia=inertia, at=(0.38, -0.15, 0.325), mounts=tuple(mounts),
-                   modes=tuple(modes))  # fmt: skip
-
-
-def _panel(name: str, frequency: float, side: str, shape: tuple[float, float, float], mass: float) -> HousingMode:
-    """Return the mode of a wall, in which the seats of one side move together."""
-    own = 0.1 * mass
-    seats = {f"{shaft} {side}": shape for shaft in SHAFTS}
-    return HousingMode(name=name, mass=own, stiffness=own * (2.0 * math.pi * frequency) ** 2, shape=seats,
-                       damping_ratio=0.02)  # fmt: skip
+def _panel(mode: HousingMode, mass: float) -> HousingMode:
+    """Return the mode of a wall of another modal mass (kg) at the same frequency."""
+    name = mode.name.removeprefix("housing ")
+    return replace(mode, name=name, mass=mass, stiffness=mass * (2.0 * math.pi * WALLS[name]) ** 2)
 
 
 def gearbox_choices(settings: GearboxSettings | None = None) -> list[BenchChoice]:
     """Return what is published of the gearbox, and every choice with its reason."""
     s = settings or GearboxSettings()
-    teeth = ", ".join(f"{z1}/{z2}, m {1e3 * m:g} mm" for z1, z2, m, _ in STAGES.values())
-    widths = " and ".join(f"{1e3 * b:g} mm" for *_, b in STAGES.values())
+    gears = [wheel.gear for wheel in preset_train("gearbox").wheels]
+    pairs = list(zip(gears[::2], gears[1::2], strict=True))
+    teeth = ", ".join(f"{one.teeth}/{two.teeth}, m {1e3 * one.module:g} mm" for one, two in pairs)
+    widths = " and ".join(f"{1e3 * one.face_width:g} mm" for one, _ in pairs)
     rows = [
         ("stages", f"{teeth}, helix 14 degrees", "published: the parallel stages of a wind turbine of 750 kW"),
         ("sense", "the motor drives the high-speed shaft", "an industrial reducer; the turbine drives the other end"),
@@ -286,27 +219,24 @@ class GearboxStudy:
         """Return the report in Markdown: modes, critical speeds, the steady state, the run-up, choices."""
         from gearmbs.signals.analysis.campbell import critical_speeds
 
-        lines = [
-            "# Industrial gearbox",
-            "",
-            "## Modes under load",
-            "",
-            "| mode | Hz | damping ratio |",
-            "|---|---|---|",
-        ]
         modes = self.modes.oscillating
         told = zip(self.modes.frequencies[modes], self.modes.damping_ratios[modes], strict=True)
-        for k, (f, zeta) in enumerate((pair for pair in told if 0.1 < pair[0] < HIGHEST), 1):
-            lines.append(f"| {k} | {f:.5g} | {zeta:.3g} |")
-        lines += ["", "## Critical speeds of the motor, from half of the operating speed on", "",
-                  "| rpm | Hz | mode | mesh harmonic |", "|---|---|---|---|"]  # fmt: skip
+        rows = [
+            [k, f"{f:.5g}", f"{zeta:.3g}"]
+            for k, (f, zeta) in enumerate((pair for pair in told if 0.1 < pair[0] < HIGHEST), 1)
+        ]
+        lines = ["# Industrial gearbox", "", "## Modes under load", ""]
+        lines += [markdown_table(["mode", "Hz", "damping ratio"], rows), ""]
         found = critical_speeds(self.campbell())
-        for row in found[found.speed_rpm > 0.5 * self.train.drives[0].speed * 30.0 / np.pi].itertuples():
-            lines.append(f"| {row.speed_rpm:.5g} | {row.frequency_hz:.5g} | {row.mode} | {row.order} |")
+        rows = [
+            [f"{row.speed_rpm:.5g}", f"{row.frequency_hz:.5g}", row.mode, row.order]
+            for row in found[found.speed_rpm > 0.5 * self.train.drives[0].speed * 30.0 / np.pi].itertuples()
+        ]
+        lines += ["## Critical speeds of the motor, from half of the operating speed on", ""]
+        lines += [markdown_table(["rpm", "Hz", "mode", "mesh harmonic"], rows)]
         lines += ["", train_report(self.train, self.steady).replace("# industrial gearbox", "# Steady state", 1)]
         lines += [train_report(self.train, self.run_up).replace("# industrial gearbox", "# Run-up", 1)]
-        lines += ["# Choices", "", "| what | chosen | why |", "|---|---|---|"]
-        lines += [f"| {c.what} | {c.chosen} | {c.why} |" for c in gearbox_choices(self.settings)]
+        lines += ["# Choices", "", markdown_table(BenchChoice._fields, gearbox_choices(self.settings))]
         return "\n".join(lines) + "\n"
 
     def figures(self) -> dict[str, Any]:

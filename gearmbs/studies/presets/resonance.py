@@ -34,6 +34,7 @@ from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.transmission import TransmissionError, loaded_transmission_error
 from gearmbs.mechanism import Mechanism
 from gearmbs.progress import told_of_span
+from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.units import Quantity, to_si
 
 Direction = Literal["up", "down"]
@@ -427,15 +428,15 @@ class ResonanceStudy:
             "# Mesh resonance", "",
             f"{s.teeth}/{s.teeth} teeth, contact ratio {s.pair.contact_ratio:.4g}, {s.torque:g} N m, damping ratio "
             f"{s.damping_ratio:g}, natural frequency {s.frequency:.5g} Hz.", "",
-            "| sweep | multibody, Hz | one degree, Hz | difference, % | lowest lag, um |", "|---|---|---|---|---|",
         ]  # fmt: skip
+        rows = []
         for d in DIRECTIONS:
             whole, classical = (jumps[m][d] for m in MODELS)
             lowest = 1e6 * float(self.sweeps[MODELS[0], d]["lowest"].min())
             cells = [f"{whole:.5g}", f"{classical:.5g}", f"{100.0 * (whole / classical - 1.0):+.2f}", f"{lowest:.3g}"]
-            lines.append(
-                f"| {d} | " + " | ".join(cell.replace("+nan", "-").replace("nan", "no jump") for cell in cells) + " |"
-            )
+            rows.append([d, *(cell.replace("+nan", "-").replace("nan", "no jump") for cell in cells)])
+        header = ["sweep", "multibody, Hz", "one degree, Hz", "difference, %", "lowest lag, um"]
+        lines.append(markdown_table(header, rows))
         return "\n".join(lines) + "\n" + self.thresholds_text()
 
     def thresholds_text(self) -> str:

@@ -485,3 +485,9 @@ def bearing_attributes(mechanism: Mechanism | None, title: str = "") -> dict[str
         or "none",
         "bearings_json": json.dumps(told),
     }
+
+
+def flank_shares(record: xr.Dataset) -> tuple[str, str]:
+    """Return for how many per cent of the time the record teeth touch with both flanks, and with none, as texts."""
+    drive, back = record["pairs_drive"].values > 0, record["pairs_back"].values > 0
+    return f"{100 * np.mean(drive & back):.3g}", f"{100 * np.mean(~drive & ~back):.3g}"

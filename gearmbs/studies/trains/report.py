@@ -10,7 +10,9 @@ import xarray as xr
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
 from gearmbs.drivetrain.parts import turn_z
 from gearmbs.signals import spectrum
+from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import held_speed, holds_speed
+from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.trains.speed import STRAY
 from gearmbs.studies.trains.trains import train_signal
 
@@ -35,70 +37,63 @@ def train_report(train: Drivetrain, record: xr.Dataset) -> str:
 
 
 def _frequencies(train: Drivetrain, record: xr.Dataset) -> list[str]:
-    lines = ["## Speeds and frequencies", "", "| shaft | nominal, rpm | mean of the record, rpm |", "|---|---|---|"]
-    for shaft in train.shafts:
-        mean = float(record["speed"].sel(shaft=shaft.name).mean())
-        lines.append(f"| {shaft.name} | {train.speeds[shaft.name] * RPM:.6g} | {mean * RPM:.6g} |")
+    rows = []
+    for name in (shaft.name for shaft in train.shafts):
+        mean = float(record["speed"].sel(shaft=name).mean())
+        rows.append([name, f"{train.speeds[name] * RPM:.6g}", f"{mean * RPM:.6g}"])
+    lines = ["## Speeds and frequencies", ""]
+    lines.append(markdown_table(["shaft", "nominal, rpm", "mean of the record, rpm"], rows))
     said = record.attrs.get("remarks", "none")
     remarks = [] if said == "none" else ["", f"**{said}**"]
     return [*lines, *remarks, "", "Frequencies at the nominal speeds:", "", train.kinematics.to_markdown()]
 
 
 def _meshes(train: Drivetrain, record: xr.Dataset) -> list[str]:
-    lines = ["## Meshes", "",
-             "| mesh | torque on the driven wheel, N m | torque over base radius, N | mean normal force, N | both "
-             "flanks, % of time | no contact, % | transmission error p-p, um |", _rule(6)]  # fmt: skip
+    header = ["mesh", "torque on the driven wheel, N m", "torque over base radius, N", "mean normal force, N",
+              "both flanks, % of time", "no contact, %", "transmission error p-p, um"]  # fmt: skip
+    rows = []
     for mesh in train.meshes:
         one = record.sel(mesh=mesh.name)
-        drive, back = one["pairs_drive"].values > 0, one["pairs_back"].values > 0
         torque = train.power.on_driven(mesh.name)
         radius = train.pairs[mesh.name].geometry.driven.base_radius
-        lines.append(
-            f"| {mesh.name} | {torque:.5g} | {torque / radius:.5g} | {float(one['normal_force'].mean()):.5g} "
-            f"| {100 * np.mean(drive & back):.3g} | {100 * np.mean(~drive & ~back):.3g} "
-            f"| {1e6 * np.ptp(one['transmission_error'].values):.4g} |"
+        force, error = float(one["normal_force"].mean()), 1e6 * np.ptp(one["transmission_error"].values)
+        rows.append(
+            [mesh.name, *(f"{v:.5g}" for v in (torque, torque / radius, force)), *flank_shares(one), f"{error:.4g}"]
         )
-    return [*lines, "", *_laws(train)]
+    return ["## Meshes", "", markdown_table(header, rows), "", _laws(train)]
 
 
-def _laws(train: Drivetrain) -> list[str]:
+def _laws(train: Drivetrain) -> str:
     """Return the contact laws, and what they make of both shafts of each mesh."""
-    lines = ["| mesh | contact law | mean stiffness of the mesh, N/um | damping, N s/mm | natural frequency, Hz | of "
-             "critical damping |", _rule(5)]  # fmt: skip
+    header = ["mesh", "contact law", "mean stiffness of the mesh, N/um", "damping, N s/mm", "natural frequency, Hz",
+              "of critical damping"]  # fmt: skip
+    rows = []
     for name, m in train.mesh_dynamics.items():
         over = ", **over-damped**" if m.damping_ratio > 1.0 else ""
-        lines.append(
-            f"| {name} | {m.law} | {1e-6 * m.stiffness:.4g} | {1e-3 * m.damping:.4g} | {m.frequency:.5g} "
-            f"| {m.damping_ratio:.3g}{over} |"
-        )
-    return lines
+        rows.append([name, m.law, f"{1e-6 * m.stiffness:.4g}", f"{1e-3 * m.damping:.4g}", f"{m.frequency:.5g}",
+                     f"{m.damping_ratio:.3g}{over}"])  # fmt: skip
+    return markdown_table(header, rows)
 
 
 def _bearings(train: Drivetrain, record: xr.Dataset) -> list[str]:
-    lines = [
-        "## Bearings",
-        "",
-        "| bearing | mean x, y, z, N | RMS about the mean x, y, z, N | largest, N |",
-        "|---|---|---|---|",
-    ]
+    rows = []
     for bearing in train.bearings:
         force = record["bearing_force"].sel(bearing=bearing.name).values
         mean = ", ".join(f"{v:.4g}" for v in force.mean(axis=0))
         rms = ", ".join(f"{v:.4g}" for v in force.std(axis=0))
-        lines.append(f"| {bearing.name} | {mean} | {rms} | {np.linalg.norm(force, axis=1).max():.5g} |")
-    return lines
+        rows.append([bearing.name, mean, rms, f"{np.linalg.norm(force, axis=1).max():.5g}"])
+    header = ["bearing", "mean x, y, z, N", "RMS about the mean x, y, z, N", "largest, N"]
+    return ["## Bearings", "", markdown_table(header, rows)]
 
 
 def _sensors(train: Drivetrain, record: xr.Dataset) -> list[str]:
     if not train.sensors:
         return []
-    lines = ["## Sensors", "", "| sensor | unit | mean | RMS about the mean | peak to peak |", "|---|---|---|---|---|"]
+    rows = []
     for sensor in train.sensors:
         values = record["measured"].sel(sensor=sensor.name).values
-        lines.append(
-            f"| {sensor.name} | {sensor.unit} | {values.mean():.5g} | {values.std():.5g} | {np.ptp(values):.5g} |"
-        )
-    return lines
+        rows.append([sensor.name, sensor.unit, *(f"{v:.5g}" for v in (values.mean(), values.std(), np.ptp(values)))])
+    return ["## Sensors", "", markdown_table(["sensor", "unit", "mean", "RMS about the mean", "peak to peak"], rows)]
 
 
 def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
@@ -108,12 +103,9 @@ def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
     harmonics = record.harmonic.values
     for mesh in train.meshes:
         levels = record["mesh_rms"].sel(mesh=mesh.name)
-        lines += [f"### {mesh.name}, {_at(levels)}", "",
-                  "| signal | " + " | ".join(f"{h} x" for h in harmonics) + " |", _rule(harmonics.size)]  # fmt: skip
-        for signal in record.signal.values:
-            row = levels.sel(signal=signal).values
-            lines.append(f"| {signal} | " + " | ".join(f"{v:.4g}" for v in row) + " |")
-        lines.append("")
+        rows = [[signal, *(f"{v:.4g}" for v in levels.sel(signal=signal).values)] for signal in record.signal.values]
+        table = markdown_table(["signal", *(f"{h} x" for h in harmonics)], rows)
+        lines += [f"### {mesh.name}, {_at(levels)}", "", table, ""]
     return lines
 
 
@@ -131,30 +123,24 @@ def _highest(train: Drivetrain, record: xr.Dataset) -> list[str]:
     tracks = record["mesh_track"]
     speed = tracks["track_speed"].values * RPM
     for mesh in train.meshes:
-        lines += [f"### {mesh.name}", "", "| signal | harmonic | RMS | rpm | Hz |", _rule(4)]
+        rows = []
         for signal in tracks.signal.values:
             for h in tracks.harmonic.values:
                 row = tracks.sel(signal=signal, mesh=mesh.name, harmonic=h)
                 if np.isfinite(row.values).any():
                     k = int(np.nanargmax(row.values))
                     at = h * float(row["track_frequency"].values[k])
-                    lines.append(f"| {signal} | {h} | {row.values[k]:.4g} | {speed[k]:.5g} | {at:.5g} |")
-        lines.append("")
+                    rows.append([signal, h, f"{row.values[k]:.4g}", f"{speed[k]:.5g}", f"{at:.5g}"])
+        table = markdown_table(["signal", "harmonic", "RMS", "rpm", "Hz"], rows)
+        lines += [f"### {mesh.name}", "", table, ""]
     return lines
-
-
-def _rule(columns: int) -> str:
-    return "|---|" + "---|" * columns
 
 
 def _cost(train: Drivetrain, record: xr.Dataset) -> list[str]:
     kept = ("steps", "residuals", "jacobians", "wall_time", "time_per_mesh_cycle")
-    lines = ["## Integration", "", "| quantity | value |", "|---|---|"]
-    for key in kept:
-        value = record.attrs.get(f"solver_{key}")
-        if value is not None:
-            lines.append(f"| {key.replace('_', ' ')} | {value:.6g} |")
-    return lines
+    told = {key.replace("_", " "): record.attrs.get(f"solver_{key}") for key in kept}
+    rows = [[key, f"{value:.6g}"] for key, value in told.items() if value is not None]
+    return ["## Integration", "", markdown_table(["quantity", "value"], rows)]
 
 
 def train_shapes(train: Drivetrain) -> dict[str, Mesh]:

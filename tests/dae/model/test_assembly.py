@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, diags_array
 
+from benchmarks.iftomm import models
 from gearmbs.dae.model import initial
 from gearmbs.mechanism import Mechanism, ModelError, static_equilibrium
-from gearmbs.studies.iftomm import models
 
 
 def scaled_jacobian(mechanism: Mechanism) -> csc_array:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks import iftomm
+from benchmarks.iftomm import references
 from gearmbs.mechanism import ModelError
-from gearmbs.studies import iftomm
-from gearmbs.studies.iftomm import references
 
 BOUNDS = {"A01": 1e-6, "A02": 1e-6, "A04": 1e-6, "A05": 1e-6, "slider crank": 1e-6}
 ENERGY = {"A01": 1e-6, "A02": 1e-5, "A03": 1e-6, "A04": 1e-6, "A05": 1e-3, "slider crank": 1e-6}

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.iftomm import models, references
+from benchmarks.iftomm.references import Published
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism import Mechanism, ModelError
-from gearmbs.studies.iftomm import models, references
-from gearmbs.studies.iftomm.references import Published
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.polynomial.chebyshev import Chebyshev
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from gearmbs.studies.iftomm import models
+from benchmarks.iftomm import models
 
 G = models.GRAVITY
 
