@@ -56,9 +56,12 @@ def columns(values):
 
 
 def deck_load(bar):
-    """A force and a torque at the far end, as a load case in N and N mm."""
+    """A force and a torque at the far end, as a load case in N and N mm; as text the same to the last digit.
+
+    A number of 15 digits survives writing and reading with any number of digits from there on.
+    """
     load = bar.selected(np.arange(MODES)).modal_load({5: ((0.3, -0.2, 0.5), (0.0, 0.01, 0.004))})
-    return load * np.r_[1.0, 1.0, 1.0, np.full(3 + MODES, 1e3)]
+    return np.array([float(f"{v:.14E}") for v in load * np.r_[1.0, 1.0, 1.0, np.full(3 + MODES, 1e3)]])
 
 
 def deck(folder, forces, loads="MATRIX/2,FILE=bar.mtx,NAME=MODLOAD", extra=""):

@@ -57,14 +57,29 @@ def agree(lump, full, tolerance: float) -> None:
         assert float(np.abs(a[name] - b[name]).max()) <= tolerance * size, name
 
 
+def turned_by_rounding(pose: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Return the pose with each body turned by a few last digits: its matrix comes of angles that are rounded."""
+    near = pose.copy()
+    for body in near:
+        turn = Rotation.from_rotvec(4.0 * np.finfo(float).eps * random.choice([-1.0, 1.0], 3))
+        body[3:12] = (turn.as_matrix() @ body[3:12].reshape(3, 3)).ravel()
+    return near
+
+
 def exact_reactions(solution, k: int) -> None:
-    """Compare accelerations and multipliers at an output with the whole system solved at the same pose."""
-    whole = solution.system
-    pose = solution._pose[k].copy()
-    acceleration, multipliers, *_ = whole.accelerations(pose, float(solution.t[k]))
-    size = np.abs(multipliers).max()
-    np.testing.assert_allclose(solution._acc[k], acceleration, atol=1e-9 * np.abs(acceleration).max())
-    np.testing.assert_allclose(solution.multipliers[k], multipliers, atol=1e-9 * size)
+    """Compare accelerations and multipliers at an output with the whole system solved at the same pose.
+
+    Where stiff flanks bear a torque, or just touch, the last digits of the angles make a torque of their own, however
+    small the accelerations are: what they move comes on top of 1e-9.
+    """
+    whole, t = solution.system, float(solution.t[k])
+    pose, random = solution._pose[k].copy(), np.random.default_rng(7)
+    exact = whole.accelerations(pose, t)[:2]
+    # of eight, since flanks that just touch bear where they are turned one way only
+    near = [whole.accelerations(turned_by_rounding(pose, random), t)[:2] for _ in range(8)]
+    for found, expected, *others in zip((solution._acc[k], solution.multipliers[k]), exact, *near, strict=True):
+        moved = max(np.abs(other - expected).max() for other in others)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max() + moved)
 
 
 @pytest.mark.parametrize("seed", [0, 10, 20])

@@ -5,6 +5,7 @@ import pytest
 
 from benchmarks.problems.chain import four_bar_chain
 from benchmarks.problems.reference import chain_problem, reference_problems
+from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.run_state import DONE, RUNNING
 from gearmbs.dae.integrators.wstiff import solve_wstiff
 from tests.dae.integrators.stepping import moved_by_rounding, started, take_step
@@ -12,6 +13,8 @@ from tests.dae.integrators.stepping import moved_by_rounding, started, take_step
 PROBLEMS = reference_problems()
 START_UP = 0.05
 """Time after which steps have grown: shorter ones divide rounding by more, and what they leave is forgotten."""
+SINGULAR_POSITIONS = 2
+"""That the chain passes within two seconds: all its links are in line near t = 0.72 and 1.24 s."""
 CASES = [(name, form) for name in PROBLEMS for form in ("I3", "SI2", "SI1")]
 
 
@@ -108,7 +111,7 @@ def test_index_three_reaches_the_positions(name):
 @pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-7])
 @pytest.mark.parametrize("loops", [2, 13, 40])
 def test_chain_passes_its_singular_positions(loops, tol, corrector):
-    """All links in line near t = 0.72 and 1.24 s: rank drops by one for each loop; the motion goes on."""
+    """With all links in line rank drops by one for each loop; the motion goes on."""
     reference = chain_problem(loops, 2.0)
     result = solve_wstiff(reference.make("SI2"), reference.times, tol=tol, corrector=corrector)
     assert result.success, result.message
@@ -119,7 +122,11 @@ def test_chain_passes_its_singular_positions(loops, tol, corrector):
 @pytest.mark.parametrize("loops", [10, 40, 80, 160])
 @pytest.mark.parametrize("tol", [1e-8, 1e-9, 1e-10, 1e-11])
 def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
-    """An angle d from a singular position rounding moves the velocities by about 1e-14 / d^2: 1e-10 at 1e-2."""
+    """An angle d from a singular position rounding moves the velocities by about 1e-14 / d^2: 1e-10 at 1e-2.
+
+    At 1e-8 it moves them by more than the tolerance within 1e-3 (10 loops) to 7e-3 (160) of either of two positions. A
+    step is 0.036 long: by chance one at most ends in there, and is counted until it has left the history.
+    """
     reference = chain_problem(loops, 2.0)
     result = solve_wstiff(reference.make(formulation), reference.times, tol=tol)
     assert result.success, result.message
@@ -127,7 +134,7 @@ def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
     assert reference.error(result.t, result.y) < 400 * tol + 5e-9
     assert result.stats.newton_rejections <= 2
     if tol >= 1e-8:
-        assert result.stats.noise_limited == 0
+        assert result.stats.noise_limited <= SINGULAR_POSITIONS * HISTORY
 
 
 @pytest.mark.parametrize("loops", [10, 40, 80, 160])
