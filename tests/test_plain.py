@@ -53,6 +53,10 @@ KERNELS = """
         pair.count += 1
         return pair.values[1] + out[7]
 
+    @njit(float64(types.FunctionType(float64(float64, types.int64)), float64), cache=True)
+    def applied(function, x):
+        return function(x, 1)
+
     @njit(cache=True)
     def helper(x):
         return x[-1] + x[x.size - 2]
@@ -81,7 +85,8 @@ PROGRAM = """
     whole = kernels.scaled(2, 2)
     kinds = sorted({type(value).__module__ for value in (kernels.add, kernels.scaled)})
     print(json.dumps([told, list(out), pair.count, np.isnan(wrong).item(), whole, type(whole).__name__,
-                      kernels.helper(np.arange(4.0)), kinds]))
+                      kernels.helper(np.arange(4.0)), kinds,
+                      kernels.applied(kernels.scaled, 5.0)]))
 """
 
 
@@ -122,7 +127,7 @@ def test_kernels_of_every_kind(package):
     """Late kernels, addresses, structs and lanes; a C function that raises spoils its numbers."""
     done = package.run(PROGRAM)
     assert done.returncode == 0, done.stderr
-    told, out, count, spoiled, whole, kind, helper, kinds = json.loads(done.stdout)
+    told, out, count, spoiled, whole, kind, helper, kinds, applied = json.loads(done.stdout)
     # 2 (3 2^2 + 3 1^2) in each place, and 10 of the struct
     assert out == [30.0] * 8
     assert told == 40.0
@@ -130,6 +135,7 @@ def test_kernels_of_every_kind(package):
     assert spoiled
     assert (whole, kind) == (12.0, "float")
     assert helper == 5.0
+    assert applied == 15.0
     assert kinds == ["gearmbs.kernels.plain.jit"]
     assert "raising raised an exception" in done.stderr
     assert "in the plain mode" in done.stderr

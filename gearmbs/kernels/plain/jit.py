@@ -91,6 +91,11 @@ class Kernel:
         with keeping(self.__module__):
             return numba.njit(cache=True, **self.options)(self.py_func)
 
+    @property
+    def compiled(self) -> Any:
+        """Numba's dispatcher with the declared signature there; of a late kernel it compiles when it is called."""
+        return (self if self.late else self.ready()).dispatcher
+
     @functools.cached_property
     def signature(self) -> Any:
         """The declared signature as numba's type, None if there is none."""
@@ -120,7 +125,7 @@ class Kernel:
 
     def __call__(self, *args: Any, **kws: Any) -> Any:
         """Call the compiled function."""
-        return (self if self.late else self.ready()).dispatcher(*args, **kws)
+        return checked(self.compiled)(*args, **kws)
 
     @functools.cached_property
     def caller(self) -> Any:
@@ -255,15 +260,41 @@ def _text(module: ir.Module, text: str) -> Any:
     return told
 
 
-def _handed_on(function: Any, signature: Any) -> Callable:
-    """Return a plain function that hands its arguments on."""
-    arguments = ", ".join(f"a{k}" for k in range(len(signature.args)))
-    space: dict[str, Any] = {"function": function}
-    exec(f"def handed_on({arguments}):\n    return function({arguments})", space)
-    return space["handed_on"]
+def caller(signature: Any) -> Any:
+    """Return what turns an address, in compiled code, into a function of ``signature`` that can be called."""
+    function = types.ExternalFunctionPointer(signature, None)
+
+    @intrinsic
+    def function_at(typingctx, address):
+        def codegen(context, builder, sig, args):
+            return builder.inttoptr(args[0], context.get_value_type(function))
+
+        return function(types.int64), codegen
+
+    return function_at
 
 
 # late kernels
+
+
+_failures: list[str] = []
+"""Why late kernels could not be compiled; whatever is computed from then on is not to be believed."""
+
+
+def checked(function: Callable) -> Callable:
+    """Return a compiled function that takes kernels as arguments, and that raises if a late kernel is missing.
+
+    C functions on the way hide the exception of a missing kernel.
+    """
+
+    @functools.wraps(function)
+    def call(*args: Any, **kws: Any) -> Any:
+        out = function(*(arg.compiled if isinstance(arg, Kernel) else arg for arg in args), **kws)
+        if _failures:
+            raise RuntimeError(_failures[0])
+        return out
+
+    return call
 
 
 def _late(kernel: Kernel) -> Any:
@@ -271,55 +302,50 @@ def _late(kernel: Kernel) -> Any:
 
     So what most models never need is not compiled for them.
     """
-    declared = kernel.signature
+    signature = kernel.signature
     name = f"{kernel.__module__}:{kernel.py_func.__name__}"
 
-    def typing_of(*args: Any) -> tuple:
-        def codegen(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            return _call(context, builder, declared, values, name)
+    @intrinsic
+    def find(typingctx):
+        return types.int64(), lambda context, builder, sig, values: _found_address(builder, name)
 
-        return declared, codegen
-
-    arguments = ", ".join(f"a{k}" for k in range(len(declared.args)))
-    space: dict[str, Any] = {"typing_of": typing_of}
-    exec(f"def late(typingctx, {arguments}):\n    return typing_of({arguments})", space)
-    call = numba.njit(_handed_on(intrinsic(space["late"]), declared))
-    call.compile(declared)
+    arguments = ", ".join(f"a{k}" for k in range(len(signature.args)))
+    message = f"{name} could not be compiled; what went wrong was printed"
+    space = {"find": find, "function_at": caller(signature), "message": message}
+    exec(
+        f"def late({arguments}):\n    place = find()\n    if place == 0:\n        raise RuntimeError(message)\n"
+        f"    return function_at(place)({arguments})\n",
+        space,
+    )
+    call = numba.njit(space["late"])
+    call.compile(signature)
     call.disable_compile()
     return call
 
 
-def _call(context: Any, builder: Any, declared: Any, values: Any, name: str) -> Any:
-    """Write a call through an address that is looked up the first time."""
+def _found_address(builder: Any, name: str) -> Any:
+    """Write instructions that look an address up the first time and remember it; it is zero if there is none."""
     module = builder.module
-    kinds = [context.get_value_type(kind) for kind in declared.args]
-    function = ir.FunctionType(context.get_value_type(declared.return_type), kinds)
-    slot = ir.GlobalVariable(module, _POINTER, module.get_unique_name(f"late.{name}"))
-    slot.linkage, slot.initializer = "internal", ir.Constant(_POINTER, None)
-    finder = module.globals.get(FINDER)
-    if finder is None:
-        finder = ir.Function(module, ir.FunctionType(_POINTER, (_POINTER.as_pointer(), _POINTER)), FINDER)
-    first = builder.icmp_unsigned("==", builder.load(slot), ir.Constant(_POINTER, None))
+    word = ir.IntType(64)
+    slot = ir.GlobalVariable(module, word, module.get_unique_name("slot"))
+    slot.linkage, slot.initializer = "internal", ir.Constant(word, 0)
+    finder = ir.Function(module, ir.FunctionType(ir.VoidType(), (word.as_pointer(), _POINTER)), FINDER)
+    first = builder.icmp_signed("==", builder.load(slot), ir.Constant(word, 0))
     with builder.if_then(first, likely=False):
         builder.call(finder, (slot, builder.bitcast(_text(module, name), _POINTER)))
-    found = builder.bitcast(builder.load(slot), function.as_pointer())
-    out = builder.call(found, values)
-    return context.get_dummy_value() if declared.return_type == types.void else out
+    return builder.load(slot)
 
 
-@ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p)
-def _find(slot: int, name: bytes) -> int | None:
-    """Compile or load a late kernel, write its address to a slot and return it."""
+@ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p)
+def _find(slot: int, name: bytes) -> None:
+    """Compile or load a late kernel and write its address to a slot."""
     try:
         kernel = _found(*name.decode().split(":"))
-        found = c_function(kernel, kernel.signature).address
-        ctypes.c_void_p.from_address(slot).value = found
-        return found
+        ctypes.c_int64.from_address(slot).value = c_function(kernel, kernel.signature).address
     except BaseException:
-        # compiled code cannot go on without the kernel, and there is nobody to raise it to
+        # there is nobody to raise it to but compiled code, which raises an error of its own
         traceback.print_exc(file=sys.stderr)
-        sys.stderr.flush()
-        os._exit(1)
+        _failures.append(f"{name.decode()} could not be compiled; what went wrong was printed")
 
 
 llvm.add_symbol(FINDER, ctypes.cast(_find, ctypes.c_void_p).value)

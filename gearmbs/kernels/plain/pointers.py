@@ -10,29 +10,14 @@ from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any
 
-from numba import types
-from numba.extending import intrinsic
-
 from gearmbs.kernels import pointers
-from gearmbs.kernels.plain.jit import Kernel, c_function
+from gearmbs.kernels.plain.jit import Kernel, c_function, caller, checked
+
+__all__ = ["address", "bind", "caller", "direct"]
 
 
 def __getattr__(name: str) -> Any:
     return getattr(pointers, name)
-
-
-def caller(signature: Any) -> Any:
-    """Return what turns an address, in compiled code, into a function of ``signature`` that can be called."""
-    function = types.ExternalFunctionPointer(signature, None)
-
-    @intrinsic
-    def function_at(typingctx, address):
-        def codegen(context, builder, sig, args):
-            return builder.inttoptr(args[0], context.get_value_type(function))
-
-        return function(types.int64), codegen
-
-    return function_at
 
 
 @cache
@@ -44,10 +29,11 @@ def address(function: Any, signature: Any) -> int:
 @cache
 def direct(kernel: Any) -> Callable:
     """Return what calls a kernel with a declared signature, compiled or loaded if needed."""
-    return kernel.ready().dispatcher if isinstance(kernel, Kernel) else kernel
+    return checked(kernel.compiled) if isinstance(kernel, Kernel) else kernel
 
 
 @lru_cache(maxsize=pointers.BOUND)
 def bind(residual, jacobian, hook, events):
     """Return the four compiled functions bound together, the same object for the same functions."""
-    return pointers.bind(*(direct(function) for function in (residual, jacobian, hook, events)))
+    functions = (residual, jacobian, hook, events)
+    return pointers.bind(*(f.compiled if isinstance(f, Kernel) else f for f in functions))
