@@ -36,7 +36,7 @@ KERNELS = """
         count: int
         values: Vector
 
-    @njit("float64(float64, int64)", cache=True)
+    @njit(float64(float64, types.int64), cache=True)
     def scaled(x, power):
         return numbers.FACTOR * x**power
 
@@ -78,10 +78,11 @@ PROGRAM = """
     assert pickle.loads(pickle.dumps(FUNCTIONS_TYPE)) == FUNCTIONS_TYPE
     pair = kernels.Pair(values=np.array([1.0, 10.0]))
     out, spoiled = np.zeros(8), np.zeros(8)
+    kernels.address(kernels.scaled, kernels.scaled.signature)
     place = kernels.address(kernels.add, kernels.SIGNATURE)
     told = kernels.caller_of_all(out, place, pair)
     wrong = kernels.caller_of_all(spoiled, kernels.address(raising, kernels.SIGNATURE), pair)
-    # of the declared types, not of those of the arguments
+    # also after it was kept as a C function; of the declared types, not of those of the arguments
     whole = kernels.scaled(2, 2)
     kinds = sorted({type(value).__module__ for value in (kernels.add, kernels.scaled)})
     print(json.dumps([told, list(out), pair.count, np.isnan(wrong).item(), whole, type(whole).__name__,

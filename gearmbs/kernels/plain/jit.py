@@ -146,14 +146,14 @@ def _typeof(value: Kernel, context: Any) -> Any:
 
 
 @contextlib.contextmanager
-def keeping(module: str) -> Iterator[None]:
-    """Have numba choose, for what is decorated meanwhile, the folder of a module's package."""
+def keeping(module: str, inner: str = "") -> Iterator[None]:
+    """Have numba choose, for what is decorated meanwhile, the folder of a module's package, or one inside it."""
     with _folder_lock:
         before = numba.config.CACHE_DIR
         place = folder(module.partition(".")[0], before)
         if not place.exists():
             _say_once("compiling numerical kernels in the plain mode, which takes some minutes; they are kept")
-        numba.config.CACHE_DIR = str(place)
+        numba.config.CACHE_DIR = str(place / inner)
         try:
             yield
         finally:
@@ -204,7 +204,8 @@ def c_function(kernel: Any, signature: Any) -> Any:
     found = _functions.get((kernel, signature))
     if found is None:
         if isinstance(kernel, Kernel):
-            with keeping(kernel.__module__):
+            # numba would take a C function of the same signature, which has no wrapper for Python, for the kernel
+            with keeping(kernel.__module__, "c"):
                 found = numba.cfunc(signature, cache=True, **kernel.options)(kernel.py_func)
         else:
             found = numba.cfunc(signature)(_guarded(kernel, signature))
