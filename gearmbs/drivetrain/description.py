@@ -159,7 +159,7 @@ def read_description(path: str | Path, fault: FaultReader | None = None) -> Desc
     ----------
     path : path-like
     fault : callable, optional
-        Makes a fault of a table, see `gearmbs.studies.case.parts.tooth_fault`; without it a file cannot hold faults.
+        Makes a fault of a table, see `gearmbs.studies.case.tooth_faults`; without it a file cannot hold faults.
 
     Raises
     ------

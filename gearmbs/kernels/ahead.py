@@ -20,6 +20,8 @@ from pathlib import Path
 from threading import Condition, Thread
 from typing import TYPE_CHECKING
 
+from gearmbs.kernels import COMPILER, PLAIN
+
 if TYPE_CHECKING:
     from gearmbs.kernels.jit import Kernel
 
@@ -53,7 +55,7 @@ def compile_all(
     modules : iterable of str, optional
         Compile what these modules need; by default, all of the package.
     workers : int, optional
-        Processes at a time; by default, as many as there are cores for this process.
+        Processes at a time; by default, as many as there are cores for this process. In the plain mode there is one.
 
     Raises
     ------
@@ -67,9 +69,22 @@ def compile_all(
     if modules is None:
         # who calls a kernel may stand anywhere
         import_all()
-    found = kernels(kernel_modules() if modules is None else modules)
-    compile_entries(entries(found), report, workers)
+    wanted = entries(kernels(kernel_modules() if modules is None else modules))
+    if PLAIN:
+        _compile_in_turn(wanted, report or (lambda line: None))
+    else:
+        compile_entries(wanted, report, workers)
     return time.perf_counter() - start
+
+
+def _compile_in_turn(wanted: list[Kernel], report: Report) -> None:
+    """Compile entries in this process, for numba's cache."""
+    from gearmbs.kernels.calls import address
+
+    for number, kernel in enumerate(wanted, 1):
+        start = time.perf_counter()
+        kernel.ready()
+        report(f"{number}/{len(wanted)} {address(kernel)} {time.perf_counter() - start:.1f} s")
 
 
 _said: set[str] = set()
@@ -375,6 +390,11 @@ def main(arguments: list[str] | None = None) -> None:
         _help()
         return
     if given.prune is not None:
+        if PLAIN:
+            sys.exit(
+                f"--prune = {given.prune:g}: in the plain mode ({COMPILER}) numba keeps the kernels, in folders "
+                "plain-*; delete those that are not needed"
+            )
         try:
             files, size = prune(given.prune)
         except ValueError as error:

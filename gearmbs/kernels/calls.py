@@ -21,10 +21,12 @@ from typing import Any
 from gearmbs.kernels.jit import Kernel
 
 MAKES_KERNELS = re.compile(
-    r"^(?:from [\w.]*(?:jit|kernels\.records) import|import numba|from numba import .*\bnjit\b)", re.M
+    r"^(?:from (?:[\w.]*jit|gearmbs\.kernels\.records) import|import numba|from numba import .*\bnjit\b)", re.M
 )
 MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "late")}
 """Modules that make kernels and hold none."""
+STAND_INS = "gearmbs.kernels.plain"
+"""Package of modules that are imported in the place of others, or not at all."""
 
 NAMED = {"LOAD_NAME", "LOAD_GLOBAL", "LOAD_ATTR", "LOAD_METHOD", "LOAD_DEREF"}
 
@@ -34,8 +36,11 @@ def kernel_modules(package: str = "gearmbs") -> list[str]:
     root = Path(importlib.import_module(package).__file__ or "").parent
     found = []
     for path in sorted(root.rglob("*.py")):
-        if path.relative_to(root).as_posix() not in MAKERS and MAKES_KERNELS.search(path.read_text("utf-8")):
-            found.append(".".join((package, *path.relative_to(root).with_suffix("").parts)))
+        name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
+        if path.relative_to(root).as_posix() in MAKERS or name.startswith(STAND_INS):
+            continue
+        if MAKES_KERNELS.search(path.read_text("utf-8")):
+            found.append(name)
     return found
 
 
@@ -43,7 +48,7 @@ def import_all(package: str = "gearmbs") -> None:
     """Import all modules of a package, but those that need what is not installed."""
     root = importlib.import_module(package)
     for info in pkgutil.walk_packages(root.__path__, f"{package}."):
-        if not info.name.endswith("__main__"):
+        if not info.name.endswith("__main__") and not info.name.startswith(STAND_INS):
             with contextlib.suppress(ImportError):
                 importlib.import_module(info.name)
 

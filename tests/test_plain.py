@@ -1,0 +1,210 @@
+"""The plain mode: kernels by numba's documented interface alone."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import textwrap
+import warnings
+from pathlib import Path
+
+import pytest
+
+import gearmbs
+from gearmbs.kernels import NEWEST_KNOWN, is_plain
+
+FOLDER = Path(gearmbs.__file__).parent / "kernels"
+
+NUMBERS = "FACTOR = 3.0"
+KERNELS = """
+    from __future__ import annotations
+    import numpy as np
+    from numba import float64, types
+    from gearmbs.kernels.jit import njit
+    from gearmbs.kernels.lanes import all_lanes, lanes_at, put_lanes
+    from gearmbs.kernels.pointers import address, caller
+    from gearmbs.kernels.structs import Struct, Vector
+    from . import numbers
+
+    SIGNATURE = types.void(float64[::1], float64)
+    add_at = caller(SIGNATURE)
+
+    class Pair(Struct):
+        count: int
+        values: Vector
+
+    @njit(float64(float64, types.int64), cache=True)
+    def scaled(x, power):
+        return numbers.FACTOR * x**power
+
+    @njit(types.void(float64[::1], float64), cache=True, late=True, error_model="numpy")
+    def add(out, x):
+        for k in range(out.size):
+            out[k] += scaled(x, 2)
+
+    @njit(float64(float64[::1], types.int64, Pair.numba_type), cache=True, error_model="numpy")
+    def caller_of_all(out, place, pair):
+        add(out, 2.0)
+        add_at(place)(out, 1.0)
+        put_lanes(out, 0, lanes_at(out, 0) * all_lanes(2.0))
+        pair.count += 1
+        return pair.values[1] + out[7]
+
+    @njit(float64(types.FunctionType(float64(float64, types.int64)), float64), cache=True)
+    def applied(function, x):
+        return function(x, 1)
+
+    @njit(cache=True)
+    def helper(x):
+        return x[-1] + x[x.size - 2]
+"""
+PROGRAM = """
+    import json, pickle, sys
+    import numpy as np
+    from numba import njit
+    from plainpackage import kernels
+    from gearmbs.kernels.pointers import FUNCTIONS_TYPE
+
+    @njit
+    def raising(out, x):
+        if x > 0.0:
+            raise ValueError("positive")
+        out[0] = x
+
+    # numba's cache keeps the types of arguments
+    assert pickle.loads(pickle.dumps(FUNCTIONS_TYPE)) == FUNCTIONS_TYPE
+    pair = kernels.Pair(values=np.array([1.0, 10.0]))
+    out, spoiled = np.zeros(8), np.zeros(8)
+    kernels.address(kernels.scaled, kernels.scaled.signature)
+    place = kernels.address(kernels.add, kernels.SIGNATURE)
+    told = kernels.caller_of_all(out, place, pair)
+    wrong = kernels.caller_of_all(spoiled, kernels.address(raising, kernels.SIGNATURE), pair)
+    # also after it was kept as a C function; of the declared types, not of those of the arguments
+    whole = kernels.scaled(2, 2)
+    kinds = sorted({type(value).__module__ for value in (kernels.add, kernels.scaled)})
+    print(json.dumps([told, list(out), pair.count, np.isnan(wrong).item(), whole, type(whole).__name__,
+                      kernels.helper(np.arange(4.0)), kinds,
+                      kernels.applied(kernels.scaled, 5.0)]))
+"""
+
+
+class Package:
+    """A package of kernels in a folder, run by a Python of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "plainpackage").mkdir()
+        (folder / "plainpackage" / "__init__.py").touch()
+        self.write("numbers", NUMBERS)
+        self.write("kernels", textwrap.dedent(KERNELS))
+
+    def write(self, module: str, text: str) -> None:
+        """Write a module."""
+        (self.folder / "plainpackage" / f"{module}.py").write_text(text)
+
+    def run(self, program: str, compiler: str = "plain") -> subprocess.CompletedProcess:
+        """Run a program in the folder."""
+        paths = [str(self.folder), *(os.path.abspath(path) for path in sys.path if path)]
+        environment = {
+            **os.environ,
+            "GEARMBS_COMPILER": compiler,
+            "NUMBA_CACHE_DIR": str(self.folder / "kept"),
+            "PYTHONPATH": os.pathsep.join(paths),
+        }
+        command = [sys.executable, "-c", textwrap.dedent(program)]
+        return subprocess.run(command, env=environment, cwd=self.folder, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    """Return a package of kernels."""
+    return Package(tmp_path_factory.mktemp("plain"))
+
+
+def test_kernels_of_every_kind(package):
+    """Late kernels, addresses, structs and lanes; a C function that raises spoils its numbers."""
+    done = package.run(PROGRAM)
+    assert done.returncode == 0, done.stderr
+    told, out, count, spoiled, whole, kind, helper, kinds, applied = json.loads(done.stdout)
+    # 2 (3 2^2 + 3 1^2) in each place, and 10 of the struct
+    assert out == [30.0] * 8
+    assert told == 40.0
+    assert count == 2
+    assert spoiled
+    assert (whole, kind) == (12.0, "float")
+    assert helper == 5.0
+    assert applied == 15.0
+    assert kinds == ["gearmbs.kernels.plain.jit"]
+    assert "raising raised an exception" in done.stderr
+    assert "in the plain mode" in done.stderr
+
+
+def test_an_edit_of_what_a_kernel_uses_is_seen(package):
+    """numba's own cache looks at the file of the kernel alone; kept kernels are found again."""
+    program = """
+        from plainpackage.kernels import scaled
+        print(scaled(1.0, 1), sum(scaled.dispatcher.stats.cache_hits.values()))
+    """
+    assert package.run(program).stdout.split()[0] == "3.0"
+    package.write("numbers", "FACTOR = 4.0")
+    assert package.run(program).stdout == "4.0 0\n"
+    package.write("numbers", NUMBERS)
+    assert package.run(program).stdout == "3.0 1\n"
+
+
+def test_an_unknown_mode_is_refused(package):
+    done = package.run("import gearmbs.kernels", compiler="fast")
+    assert done.returncode != 0
+    assert 'GEARMBS_COMPILER = \'fast\': set it to "plain" or "own"' in done.stderr
+
+
+def test_the_mode_by_the_version_of_numba():
+    """Newer than known: the plain mode, with a warning; not if a mode was asked for."""
+    first, second = NEWEST_KNOWN
+    newer = f"{first}.{second + 1}.0rc1"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert not is_plain("", f"{first}.{second}.7")
+        assert not is_plain("", "")
+        assert not is_plain("own", newer)
+        assert is_plain("plain", newer)
+        assert is_plain("plain", f"{first}.{second}.0")
+    with pytest.warns(UserWarning, match=rf"numba {newer} is newer than .*GEARMBS_COMPILER=own"):
+        assert is_plain("", newer)
+    with pytest.warns(UserWarning, match="plain mode"):
+        assert is_plain("", f"{first + 1}.0")
+
+
+BEYOND_THE_REFERENCE = {
+    "llvmlite": {"ir"},
+    "llvmlite.binding": {""},  # add_symbol
+    "numba.core": {"cgutils"},
+    "numba.core.imputils": {"impl_ret_borrowed", "lower_builtin", "lower_getattr_generic", "lower_setattr_generic"},
+    "numba.core.typing.templates": {"AbstractTemplate", "AttributeTemplate", "infer_global", "signature"},
+    "numba.np.arrayobj": {"make_array", "populate_array"},
+}
+"""What the modules of the plain mode take from numba and llvmlite besides numba's documented interface."""
+
+
+def test_the_plain_mode_uses_no_other_private_part():
+    found: dict[str, set[str]] = {}
+    for path in (*sorted((FOLDER / "plain").glob("*.py")), *(FOLDER / f"{n}.py" for n in SHARED)):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                taken = [(alias.name, "") for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                taken = [(node.module or "", alias.name) for alias in node.names]
+            else:
+                continue
+            for module, name in taken:
+                if module.startswith(("numba.", "llvmlite")) and module not in DOCUMENTED:
+                    found.setdefault(module, set()).add(name)
+    assert found == BEYOND_THE_REFERENCE
+
+
+SHARED = ("pointers", "structs", "lanes", "records", "calls")
+"""Modules that compile, or find kernels, in both modes."""
+DOCUMENTED = {"numba.extending", "numba.experimental"}
