@@ -15,7 +15,7 @@ PACKAGE = ROOT / "gearmbs"
 MANY = 8
 """Number of arguments from which a kernel documents each of them, or names the contract that does."""
 LONGEST = 80
-CONTRACTS = re.compile(r"force_elements|parameters\s+are those of `\w+`")
+CONTRACTS = re.compile(r"loads\.forces|parameters\s+are those of `\w+`")
 """Of a kernel's docstring: the module that documents the arguments of force elements, or a kernel with the same."""
 SIGNATURES = re.compile(r"\bJACOBIAN_SIG\b")
 """Of a decorator: signatures whose arguments are documented where they are defined, in `gearmbs.dae.problem`."""

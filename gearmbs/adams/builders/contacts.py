@@ -62,7 +62,7 @@ def add_contact(b: Builder, s: st.Contact) -> None:
 
 def _add_gears(b: Builder, s: st.Contact) -> None:
     """Build the contact of a gear pair again, with the laws that the statement has now."""
-    from gearmbs.adams.commands import pair_of, with_laws
+    from gearmbs.adams.pairs import pair_of, with_laws
 
     pair = pair_of(s.pair)
     law, friction = law_of(b, s), friction_of(b, s)

@@ -39,7 +39,7 @@ class Statement:
     given : mapping of str to int
         Source line of every argument that was given.
     pair : str
-        A gear pair in comments in front, see `gearmbs.adams.commands`.
+        A gear pair in comments in front, see `gearmbs.adams.pairs`.
     """
 
     keyword: ClassVar[str] = ""

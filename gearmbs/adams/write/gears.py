@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.commands import friction_of, normal_law_of, pair_comments
+from gearmbs.adams.pairs import friction_of, normal_law_of, pair_comments
 from gearmbs.adams.write.contacts import external, friction_law, normal_law, touch
 from gearmbs.adams.write.text import WriterContext
 from gearmbs.dae.problem import ModelError
