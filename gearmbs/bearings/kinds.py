@@ -138,6 +138,7 @@ TAPERS = {
 ANGLES = {"C": 15.0, "AC": 25.0, "A": 30.0, "B": 40.0}
 """Contact angle of angular contact bearings by the letter behind the digits, degrees."""
 FOUR_POINTS = 35.0
+"""Contact angle of four-point contact bearings QJ, degrees."""
 
 
 def _middle(boundary: dict[str, Any]) -> float:

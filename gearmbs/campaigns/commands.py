@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gearmbs._command import fail, guarded
-from gearmbs.campaigns.datasets.make import baseline, dataset
+from gearmbs.campaigns.datasets.commands import baseline, dataset
 
 app = typer.Typer(
     name="campaign", help="Plan, run and evaluate campaigns of many cases.", no_args_is_help=True, add_completion=False
