@@ -14,7 +14,7 @@ import typer
 from gearmbs import _command
 from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
-from gearmbs.identify.study import identify
+from gearmbs.identify.commands import identify
 from gearmbs.signals.commands import analyse, compare, trend, waterfall
 from gearmbs.studies.commands import bench, campbell, gearbox, paper, resonance, run, sweep
 
