@@ -1,6 +1,6 @@
 """What halving and doubling the constants of the integrators changes: steps, residuals and errors of short problems.
 
-    python -m benchmarks.constants --write docs/data/integrator_constants.md
+    python -m benchmarks.constants --write docs/data/integrator_constants.txt
 
 Compiled code holds the values of constants, so that each value has a process of its own. It reads the module with the
 other value in place of the constant's, and compiles what depends on it; kernels that a value leaves as they are serve
@@ -309,7 +309,7 @@ def page(chosen: list[Constant], runs: Runs, tell: Callable[[str], None]) -> str
             f"* {letter}: {title}, {now['steps']} steps, {now['residuals']} residuals, error {now['error']:.1e}"
         )
     lines = [
-        "Made by `python -m benchmarks.constants --write docs/data/integrator_constants.md`. The problems:",
+        "Made by `python -m benchmarks.constants --write docs/data/integrator_constants.txt`. The problems:",
         "",
         *told,
         "",

@@ -7,7 +7,7 @@ import pytest
 from benchmarks import constants
 from tests.docs.support import DOCS
 
-STORED = (DOCS / "data" / "integrator_constants.md").read_text(encoding="utf-8")
+STORED = (DOCS / "data" / "integrator_constants.txt").read_text(encoding="utf-8")
 
 
 def test_constants_are_found_with_their_values():

@@ -23,8 +23,9 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.building.compile import starting_angles
 from gearmbs.mechanism.language.library import compile_expression
+from gearmbs.mechanism.language.series import evaluate_series
 from gearmbs.mechanism.language.syntax import Scope
-from gearmbs.mechanism.language.user_functions import evaluate_series, raised_errors
+from gearmbs.mechanism.language.user_functions import raised_errors
 
 NAMES = ("F1", "F2", "F3", "F4", "F5", "F6", "F7", "F8")
 

@@ -167,7 +167,7 @@ class Measures:
         """Return the values of an expression, in the mechanism's units, shape (m,)."""
         from gearmbs.mechanism.building.compile import scope_of, starting_angles
         from gearmbs.mechanism.language.library import compile_expression
-        from gearmbs.mechanism.language.user_functions import evaluate_series
+        from gearmbs.mechanism.language.series import evaluate_series
 
         scope, builder, marker_named = scope_of(self.mechanism)
         try:

@@ -213,6 +213,8 @@ def simulate(
     t_start = quantity(t_start, "time", "t_start")
     t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
     name = _checked(integrator, tol, options)
+    # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
+    _ = INTEGRATORS[name].solve
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with uncollected(), raised_errors(mechanism.functions.values()):
         if not continued:
