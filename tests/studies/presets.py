@@ -3,9 +3,8 @@
 import pytest
 
 from gearmbs.drivetrain import Drivetrain
-from gearmbs.files import plain
 from gearmbs.studies.presets.files import FOLDER
-from gearmbs.studies.trains.trains import _as_table, load_train
+from gearmbs.studies.trains.trains import described, load_train
 
 
 def agrees_with_its_file(name: str, train: Drivetrain) -> None:
@@ -16,12 +15,12 @@ def agrees_with_its_file(name: str, train: Drivetrain) -> None:
     for part in made.parts:
         agree(without_names(made.parts[part]), without_names(train.parts[part]), part)
     for mesh, pair in made.pairs.items():
-        agree(plain(pair, _as_table), plain(train.pairs[mesh], _as_table), mesh)
+        agree(described(pair), described(train.pairs[mesh]), mesh)
 
 
 def without_names(part):
     """Return a part as tables without its contact and the names of what it consists of."""
-    table = plain(part, _as_table)
+    table = described(part)
     table.get("settings", {}).pop("contact", None)
     for piece in (*table.get("mounts", ()), *table.get("modes", ())):
         del piece["name"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs._lazy import uncollected
+from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.gears.contact_element import contact_kernels
@@ -269,6 +270,7 @@ def _load_kernels(case: Case) -> None:
         contact_kernels()
         for name in (*KERNELS, *(LUMPED_KERNELS if case.solver.lump else ())):
             importlib.import_module(name)
+        _ = INTEGRATORS[case.solver.integrator.upper()].solve
 
 
 def _partial(case: Case, solution: Solution, recorder: Recorder, mechanism: Mechanism | None) -> xr.Dataset | None:
