@@ -48,8 +48,8 @@ ADVICE = {
 KERNELS = (
     "gearmbs.dae.model.side_by_side",
     "gearmbs.mechanism.parts.elements",
-    "gearmbs.signals.resampling",
-    "gearmbs.signals.resampling",
+    "gearmbs.signals.piecewise_cubic",
+    "gearmbs.signals.piecewise_cubic",
 )
 """Modules of kernels that are called late in a run, besides those of the contact."""
 
