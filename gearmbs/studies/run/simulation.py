@@ -49,7 +49,7 @@ KERNELS = (
     "gearmbs.dae.model.side_by_side",
     "gearmbs.mechanism.parts.elements",
     "gearmbs.signals.piecewise_cubic",
-    "gearmbs.signals.piecewise_cubic",
+    "gearmbs.signals.resampling",
 )
 """Modules of kernels that are called late in a run, besides those of the contact."""
 
