@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES, all_lanes, deal_eight, lanes_at, larger, larger_number, magnitude, put_lanes
+from gearmbs.kernels.lanes import (
+    LANES,
+    all_lanes,
+    bits_of,
+    deal_eight,
+    double_of,
+    lanes_at,
+    larger,
+    larger_number,
+    magnitude,
+    put_lanes,
+)
 
 
 @njit(error_model="numpy")
@@ -66,3 +77,19 @@ def test_lanes_are_dealt_to_rows():
     deal(lanes, out)
     np.testing.assert_array_equal(out[:, 2:10], lanes[1:9].T)
     assert (out[:, [0, 1, 10, 11]] == -1.0).all()
+
+
+@njit(error_model="numpy")
+def largest(values):
+    top = 0
+    for value in values:
+        top = max(top, bits_of(abs(value)))
+    return double_of(top)
+
+
+def test_bits_of_magnitudes_order_as_they_do():
+    """With infinity above all numbers, and NaN above infinity."""
+    numbers = np.array([0.5, -2.0, 0.0, 5e-324])
+    assert largest(numbers) == 2.0
+    assert largest(np.append(numbers, -np.inf)) == np.inf
+    assert np.isnan(largest(np.append(numbers, [np.nan, np.inf])))
