@@ -60,6 +60,9 @@ FEWEST_TOGETHER = 1000
 
 NEVER = 1 << 62
 
+LOOKED_AT = 32
+"""Entries of a matrix that are compared before the result is looked at: the processor compares several at once."""
+
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
 
@@ -67,13 +70,15 @@ REACTION_PASSES = 30
 @njit(cache=True, error_model="numpy", forceinline=True)
 def unchanged(vals, before, allowed):
     """Whether no entry differs from another matrix's by more than allowed: most matrices that change do so early on."""
-    for p in range(vals.size):
-        if not abs(vals[p] - before[p]) <= allowed[p]:
-            return False
-    return True
+    same, first = True, 0
+    while same and first < vals.size:
+        for p in range(first, min(first + LOOKED_AT, vals.size)):
+            same &= abs(vals[p] - before[p]) <= allowed[p]
+        first += LOOKED_AT
+    return same
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def project(t, at, phi, plan, factors, pair, idata, tab):
     """Move y to the nearest position and velocity, in the metric of the masses, that satisfy the constraints.
 
