@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -20,6 +21,7 @@ Stiffness = Annotated[Quantity, Measure("N*m/rad", above=0)]
 Angle = Annotated[Quantity, Measure("angle", 0)]
 PositiveAngle = Annotated[Quantity, Measure("angle", above=0)]
 Length = Annotated[Quantity, Measure("length", above=0)]
+Damping = Annotated[Quantity, Measure("time", 0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,8 +154,10 @@ class TorsionalShaft(Coupling):
         m.
     shear_modulus : float or str
         Pa.
-    damping_ratio : float or str
-        Damping over stiffness, s.
+    damping_time : float or str
+        Damping over stiffness, s: the damping ratio of a mode of f Hz that the shaft alone holds is pi f times it.
+    damping_ratio : float or str, optional
+        Former name of ``damping_time``, which is no ratio.
     """
 
     kind: ClassVar[str] = "shaft"
@@ -163,10 +167,25 @@ class TorsionalShaft(Coupling):
     diameter: Length = None
     bore: Annotated[Quantity, Measure("length", 0)] = 0.0
     shear_modulus: Annotated[Quantity, Measure("pressure", above=0)] = 8.02e10
-    damping_ratio: Annotated[Quantity, Measure("time", 0)] = 0.0
+    damping_time: Damping = 0.0
+    damping_ratio: Damping = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.damping_ratio is not None:
+            require(
+                not self.damping_time,
+                f"{self.label}: damping_ratio is the former name of damping_time; give damping_time alone",
+            )
+            warnings.warn(
+                f"{self.label}: damping_ratio is deprecated, for it is damping over stiffness in seconds "
+                f"({self.damping_ratio:g} s) and no ratio: write damping_time; of a mode of f Hz the ratio is pi f "
+                "times that",
+                FutureWarning,
+                stacklevel=4,
+            )
+            object.__setattr__(self, "damping_time", self.damping_ratio)
+            object.__setattr__(self, "damping_ratio", None)
         sized = self.length is not None and self.diameter is not None
         require((self.stiffness is None) == sized, f"{self.label}: give stiffness, or length and diameter")
 
@@ -178,7 +197,7 @@ class TorsionalShaft(Coupling):
 
     @property
     def tangent_damping(self) -> float:
-        return self.damping_ratio * self.tangent
+        return self.damping_time * self.tangent
 
     def add(self, at: Attached) -> None:
         parameters = (0.0, self.tangent, 0.0, self.tangent_damping, 0.0, 1.0, 0.0, 0.0, 1.0)
