@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
-
-import numpy as np
+from typing import Annotated, ClassVar
 
 from gearmbs.drivetrain.errors import require
 from gearmbs.drivetrain.part import Part
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
 
 
@@ -22,16 +20,19 @@ class Sensor(Part):
     unit: ClassVar[str] = "1"
 
 
-def _check_direction(sensor: Sensor, direction: tuple[float, float, float]) -> None:
-    size = float(np.linalg.norm(np.asarray(direction, dtype=float)))
-    require(
-        len(direction) == 3 and size > 0.0,
-        f"{sensor.label}: direction is {direction}; give three numbers that are not all zero",
-    )
+@dataclass(frozen=True, kw_only=True)
+class Directed(Sensor):
+    """A sensor that measures along a direction."""
+
+    direction: Annotated[tuple[float, float, float], Measure(several=3)] = (1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(any(self.direction), f"{self.label}: direction is {self.direction}; give one that is not all zero")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Laser(Sensor):
+class Laser(Directed):
     """A laser vibrometer on a shaft: the velocity (v + w x r) . d of the surface under a spot fixed in space.
 
     Parameters
@@ -47,20 +48,14 @@ class Laser(Sensor):
 
     kind: ClassVar[str] = "laser"
     unit: ClassVar[str] = "m/s"
-    units: ClassVar[Mapping[str, str]] = {"station": "length", "offset": "length"}
 
     shaft: str
-    station: Quantity = None
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    offset: Quantity = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_direction(self, self.direction)
+    station: Annotated[Quantity, Measure("length")] = None
+    offset: Annotated[Quantity, Measure("length")] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Accelerometer(Sensor):
+class Accelerometer(Directed):
     """Acceleration of the housing at the seat of a bearing, along a direction.
 
     Parameters
@@ -75,11 +70,6 @@ class Accelerometer(Sensor):
     unit: ClassVar[str] = "m/s^2"
 
     bearing: str
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_direction(self, self.direction)
 
 
 @dataclass(frozen=True, kw_only=True)

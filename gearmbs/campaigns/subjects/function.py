@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import tomllib
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
@@ -23,6 +22,7 @@ from gearmbs.campaigns.subjects.base import (
     kept_by_functions,
     tooth_fault_unit,
 )
+from gearmbs.schema.files import read_toml
 from gearmbs.units import DIMENSIONS, si_unit, to_si
 
 # What a file of nested tables describes, as the subject of a campaign: drivetrains and planetary sets.
@@ -45,10 +45,7 @@ class TablesSubject(Subject):
     @classmethod
     def from_file(cls, path: str | Path) -> TablesSubject:
         """Return the subject of a TOML file."""
-        try:
-            return cls(tomllib.loads(Path(path).read_text(encoding="utf-8-sig")))
-        except (OSError, ValueError) as error:
-            raise CampaignError(f"{path}: {error}") from error
+        return cls(read_toml(path, CampaignError))
 
     def settings(self) -> dict[str, Any]:
         """Return the tables."""
