@@ -31,8 +31,8 @@ def bench(
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
+        from gearmbs.files import check_place
         from gearmbs.studies.presets.bench import PRESSURES, STATES, BenchSettings, bench_train
-        from gearmbs.studies.run.store import check_place
         from gearmbs.studies.trains.trains import RunSettings, check_record
 
         settings = BenchSettings(
@@ -70,8 +70,8 @@ def resonance(
 ) -> None:
     """Sweep a spur pair up and down through its mesh resonance: jumps, hysteresis, loads at which teeth part."""
     with guarded():
+        from gearmbs.files import check_place
         from gearmbs.studies.presets.resonance import DIRECTIONS, ResonanceSettings
-        from gearmbs.studies.run.store import check_place
 
         settings = ResonanceSettings(torque=torque, damping_ratio=damping, addendum=addendum, span=span, cycles=cycles)
         check_place(out, 0)
@@ -95,8 +95,8 @@ def gearbox(
 ) -> None:
     """Study an industrial gearbox of two helical stages: modes, Campbell diagram, steady state, run-up, housing."""
     with guarded():
+        from gearmbs.files import check_place
         from gearmbs.studies.presets.gearbox import GearboxSettings, industrial_gearbox
-        from gearmbs.studies.run.store import check_place
 
         settings = GearboxSettings(speed=speed, power=power, helix_angle=helix)
         industrial_gearbox(settings)
@@ -116,8 +116,9 @@ def gearbox(
 
 def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
     """Write what a run has computed before it stopped, and end: with status 130 if the user interrupted it."""
+    from gearmbs.files import KeptElsewhere
     from gearmbs.studies.run.simulation import SimulationInterrupted
-    from gearmbs.studies.run.store import KeptElsewhere, keep_dataset
+    from gearmbs.studies.run.store import keep_dataset
 
     partial = failure.partial()
     if partial is None:
@@ -182,10 +183,11 @@ def paper(
         tilt = to_si(angle, "angle", "--angle")
         check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
 
+        from gearmbs.files import check_place, keep
         from gearmbs.studies.paper.paper import run_paper
         from gearmbs.studies.paper.preset import paper_cases
         from gearmbs.studies.run.simulation import SimulationFailed
-        from gearmbs.studies.run.store import check_place, file_stem, keep, record_size, stored_record
+        from gearmbs.studies.run.store import file_stem, record_size, stored_record
 
         settings: dict[str, Any] = {"torques": (low, 2.0 * low), "misalignment": tilt}
         cases = paper_cases(base=base, **settings)
@@ -241,8 +243,9 @@ def run(
             case = case.changed(solver={"lump": True})
         check_record(case, str(case_file))
 
+        from gearmbs.files import check_place
         from gearmbs.studies.run.simulation import SimulationFailed, run_case
-        from gearmbs.studies.run.store import check_place, keep_dataset, record_size
+        from gearmbs.studies.run.store import keep_dataset, record_size
 
         target = out or case_file.with_suffix(".nc")
         check_place(target.parent, record_size(case), "its record")
@@ -265,8 +268,9 @@ def run(
 def run_planetary_set(file: Path, out: Path | None) -> None:
     """Simulate a planetary set; write its record and say how the load is shared."""
     with guarded():
+        from gearmbs.files import check_place
         from gearmbs.studies.case.section import CaseError
-        from gearmbs.studies.run.store import check_place, keep_dataset
+        from gearmbs.studies.run.store import keep_dataset
         from gearmbs.studies.trains.planetary import load_planetary, run_planetary
 
         found = load_planetary(file)
@@ -299,9 +303,10 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         train, settings = found.train, found.run
         check_record(train, settings)
 
+        from gearmbs.files import check_place, write_whole
         from gearmbs.signals.files.simulated import holds_speed
         from gearmbs.studies.run.simulation import SimulationFailed
-        from gearmbs.studies.run.store import check_place, keep_dataset, write_text
+        from gearmbs.studies.run.store import keep_dataset
         from gearmbs.studies.trains.report import train_report, train_scene, train_spectrum
         from gearmbs.studies.trains.trains import run_train
         from gearmbs.view import save_figure
@@ -316,7 +321,7 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
                 keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
         keep_dataset(target, data)
         report, scene = target.with_suffix(".md"), target.with_suffix(".html")
-        write_text(report, train_report(train, data))
+        write_whole(report, train_report(train, data))
         train_scene(train).save_html(scene)
         written = [target, report, scene]
         if "mesh_rms" in data and train.meshes and holds_speed(data):
@@ -371,9 +376,10 @@ def sweep(
     """
     with guarded():
         check_kind(case_file, "case")
+        from gearmbs.files import check_place
         from gearmbs.studies.case.case import load_case
         from gearmbs.studies.case.limits import check_record
-        from gearmbs.studies.run.store import check_place, record_size
+        from gearmbs.studies.run.store import record_size
         from gearmbs.studies.run.sweep import between, cases_of_sweep
         from gearmbs.studies.run.sweep import sweep as run_sweep
 

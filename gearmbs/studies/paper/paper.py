@@ -13,6 +13,7 @@ import xarray as xr
 
 from gearmbs._shown import Shown, html_table
 from gearmbs.dae.result import SolverStats
+from gearmbs.files import write_whole
 from gearmbs.signals import COMPONENTS, rms_factor
 from gearmbs.studies.case.case import Case, CaseError, make_case
 from gearmbs.studies.paper.preset import (
@@ -27,7 +28,7 @@ from gearmbs.studies.paper.preset import (
 )
 from gearmbs.studies.paper.report import paper_report
 from gearmbs.studies.run.parallel import run_cases
-from gearmbs.studies.run.store import write_dataset, write_text
+from gearmbs.studies.run.store import write_dataset
 
 TARGET_RMS = 1.0
 """RMS, m/s^2, to which the healthy signal at low load is scaled; the paper's own value is not published."""
@@ -95,7 +96,7 @@ class PaperStudy(Shown):
         folder = Path(folder)
         paths = [folder / "paper.nc", folder / "gmf_rms.csv"]
         write_dataset(paths[0], self.records)
-        write_text(paths[1], self.to_csv())
+        write_whole(paths[1], self.to_csv())
         titles = {"low": ("figure_5", "low load"), "high": ("figure_7", "high load")}
         for load, (stem, label) in titles.items():
             torque = float(self.records.torque.sel(load=load))
@@ -104,7 +105,7 @@ class PaperStudy(Shown):
                 title=f"Model, {label} ({torque:g} N m): RMS of the GMF harmonics, {self.component.replace('_', ' ')}",
             )
             paths += save_figure(figure, folder / stem)
-        write_text(folder / "report.md", paper_report(self))
+        write_whole(folder / "report.md", paper_report(self))
         return [*paths, folder / "report.md"]
 
 
@@ -223,4 +224,4 @@ if __name__ == "__main__":
         "unit": "m/s^2",
         "levels": gmf_levels(),
     }
-    write_text(sys.argv[1], json.dumps(text, indent=1) + "\n")
+    write_whole(sys.argv[1], json.dumps(text, indent=1) + "\n")

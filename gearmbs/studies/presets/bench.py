@@ -18,6 +18,7 @@ import xarray as xr
 
 from gearmbs._shown import Written
 from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, SpeedDrive
+from gearmbs.files import write_whole
 from gearmbs.gears import ContactLaw
 from gearmbs.progress import told_of_span
 from gearmbs.signals import convert
@@ -30,7 +31,7 @@ from gearmbs.studies.paper.preset import Claim, judge
 from gearmbs.studies.paper.report import verdict_table
 from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
 from gearmbs.studies.run.record import flank_shares
-from gearmbs.studies.run.store import write_dataset, write_text
+from gearmbs.studies.run.store import write_dataset
 from gearmbs.studies.trains.trains import run_train, train_signal
 from gearmbs.units import Quantity, to_si
 
@@ -356,7 +357,7 @@ class BenchStudy:
             write_dataset(path, record)
             paths.append(path)
         write_dataset(folder / "bench.nc", self.table.to_dataset(name="gmf_rms"))
-        write_text(folder / "report.md", self.report())
+        write_whole(folder / "report.md", self.report())
         paths += [folder / "bench.nc", folder / "report.md"]
         for load in PRESSURES:
             paths += save_figure(self.figure(load), folder / f"{load}_load")

@@ -23,12 +23,13 @@ from gearmbs.drivetrain import (
     InductionMotor,
     RunSettings,
 )
+from gearmbs.files import write_whole
 from gearmbs.gears import ContactLaw, GearPair, GearSpec
 from gearmbs.progress import told_of_span
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.presets.bench import BenchChoice
 from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
-from gearmbs.studies.run.store import write_dataset, write_text
+from gearmbs.studies.run.store import write_dataset
 from gearmbs.studies.trains.modes import mesh_orders, train_modes
 from gearmbs.studies.trains.report import train_report
 from gearmbs.studies.trains.trains import run_train
@@ -268,7 +269,7 @@ class GearboxStudy:
         paths = [folder / "steady.nc", folder / "run_up.nc", folder / "report.md"]
         for path, record in zip(paths, (self.steady, self.run_up), strict=False):
             write_dataset(path, record)
-        write_text(paths[2], self.report())
+        write_whole(paths[2], self.report())
         for name, figure in self.figures().items():
             paths += save_figure(figure, folder / name)
         return paths

@@ -465,14 +465,15 @@ class ResonanceStudy:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write the sweeps, the report and the figure to a folder; return the paths."""
-        from gearmbs.studies.run.store import write_dataset, write_text
+        from gearmbs.files import write_whole
+        from gearmbs.studies.run.store import write_dataset
         from gearmbs.view import save_figure
 
         folder = Path(folder)
         paths = [folder / f"{model.replace(' ', '_')}_{direction}.nc" for model, direction in self.sweeps]
         for path, sweep in zip(paths, self.sweeps.values(), strict=True):
             write_dataset(path, sweep)
-        write_text(folder / "report.md", self.report())
+        write_whole(folder / "report.md", self.report())
         return [*paths, folder / "report.md", *save_figure(self.figure(), folder / "resonance")]
 
 

@@ -6,27 +6,14 @@ full. Where a file cannot be written, the record is kept elsewhere, and the mess
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import xarray as xr
 
 import gearmbs
-from gearmbs.files import KeptElsewhere, check_place, keep, whole_file
-from gearmbs.files import write_whole as write_text
+from gearmbs.files import keep, whole_file
 from gearmbs.studies.case.case import Case
-
-__all__ = [
-    "KeptElsewhere",
-    "check_place",
-    "file_stem",
-    "keep",
-    "keep_dataset",
-    "record_size",
-    "stored_record",
-    "whole_file",
-    "write_dataset",
-    "write_text",
-]
 
 BYTES, COLUMNS, PACKED = 8, 13, 0.6
 """Of a number, numbers an output time holds, and what compression leaves of them at best."""
@@ -81,3 +68,27 @@ def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
     except (OSError, ValueError, KeyError):
         # damaged, or not one of ours: the case is computed again
         return None
+
+
+@dataclass(frozen=True)
+class RecordFolder:
+    """Records of cases in a folder, as the ledger of a run: a case is done if its record is there."""
+
+    path: Path
+
+    def result(self, case: Case) -> tuple[xr.Dataset, str] | None:
+        """Return the record of a case that is done, as `enter` left it."""
+        record = stored_record(self.path, case)
+        return None if record is None else (record, "")
+
+    def claim(self, case: Case) -> Path:
+        """Return the path of a case's claim."""
+        return self.path / f".{file_stem(case.name)}.claim"
+
+    def enter(self, case: Case, record: xr.Dataset) -> str:
+        """Write the record of a case; return what is to be said if it had to be kept elsewhere, or nowhere."""
+        try:
+            keep_dataset(self.path / f"{file_stem(case.name)}.nc", record)
+        except OSError as error:
+            return str(error)
+        return ""
