@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -13,9 +15,34 @@ from gearmbs.signals.commands import check_targets, hand_over, save_figures
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
+    from gearmbs.studies.paper.preset import Claim
+    from gearmbs.studies.presets.gearbox import GearboxStudy
     from gearmbs.studies.run.simulation import SimulationFailed
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
+
+
+def carry_out(out: Path, names: list[str], run: Callable[..., Any], told: Callable[[Any], str]) -> None:
+    """Carry out a study whose runs have these names, save it, and print what is told of it and its files."""
+    from gearmbs.files import check_place
+
+    check_place(out, 0)
+    with case_bars(names) as move:
+        study = run(progress=move)
+    paths = study.save(out)
+    typer.echo(told(study))
+    typer.echo("\n".join(f"wrote {path}" for path in paths))
+
+
+def claim_lines(claims: list[Claim], where: str = "") -> str:
+    """Return which claims are held, with their numbers."""
+    marks = {True: "held    ", False: "NOT HELD"}
+    return "\n".join(f"{marks[c.held]}  {where}{c.name}\n          {c.numbers}" for c in claims)
+
+
+def mode_line(study: GearboxStudy) -> str:
+    """Return the natural frequencies of a gearbox."""
+    return "modes, Hz: " + ", ".join(f"{f:.4g}" for f in study.campbell()["frequency"].values[0])
 
 
 def bench(
@@ -31,8 +58,8 @@ def bench(
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
-        from gearmbs.files import check_place
-        from gearmbs.studies.presets.bench import PRESSURES, STATES, BenchSettings, bench_train
+        from gearmbs.studies.paper.preset import paper_cases
+        from gearmbs.studies.presets.bench import PRESSURES, SENSORS, STATES, BenchSettings, bench_train, run_bench
         from gearmbs.studies.trains.trains import RunSettings, check_record
 
         settings = BenchSettings(
@@ -40,22 +67,11 @@ def bench(
         )
         run = RunSettings(settling=0.2, duration=duration)
         check_record(bench_train(settings=settings), run)
-        check_place(out, 0)
-
-        from gearmbs.studies.paper.preset import paper_cases
-        from gearmbs.studies.presets.bench import run_bench
-
         names = [f"bench, {state}, {load} load" for load in PRESSURES for state in STATES]
         if pair:
             names += [case.name for case in paper_cases()]
-        with case_bars(names) as move:
-            study = run_bench(settings, run, pair=pair, workers=workers, progress=move)
-        paths = study.save(out)
-        for sensor in ("laser", "support"):
-            for claim in study.claims(sensor):
-                mark = "held    " if claim.held else "NOT HELD"
-                typer.echo(f"{mark}  {sensor}: {claim.name}\n          {claim.numbers}")
-        typer.echo("\n".join(f"wrote {path}" for path in paths))
+        study = partial(run_bench, settings, run, pair=pair, workers=workers)
+        carry_out(out, names, study, lambda s: "\n".join(claim_lines(s.claims(name), f"{name}: ") for name in SENSORS))
 
 
 def resonance(
@@ -70,19 +86,10 @@ def resonance(
 ) -> None:
     """Sweep a spur pair up and down through its mesh resonance: jumps, hysteresis, loads at which teeth part."""
     with guarded():
-        from gearmbs.files import check_place
-        from gearmbs.studies.presets.resonance import DIRECTIONS, ResonanceSettings
+        from gearmbs.studies.presets.resonance import DIRECTIONS, ResonanceSettings, run_resonance
 
         settings = ResonanceSettings(torque=torque, damping_ratio=damping, addendum=addendum, span=span, cycles=cycles)
-        check_place(out, 0)
-
-        from gearmbs.studies.presets.resonance import run_resonance
-
-        with case_bars(list(DIRECTIONS)) as move:
-            study = run_resonance(settings, progress=move)
-        paths = study.save(out)
-        typer.echo(study.report())
-        typer.echo("\n".join(f"wrote {path}" for path in paths))
+        carry_out(out, list(DIRECTIONS), partial(run_resonance, settings), lambda study: study.report())
 
 
 def gearbox(
@@ -95,20 +102,12 @@ def gearbox(
 ) -> None:
     """Study an industrial gearbox of two helical stages: modes, Campbell diagram, steady state, run-up, housing."""
     with guarded():
-        from gearmbs.files import check_place
-        from gearmbs.studies.presets.gearbox import GearboxSettings, industrial_gearbox
+        from gearmbs.studies.presets.gearbox import GearboxSettings, industrial_gearbox, run_gearbox
 
         settings = GearboxSettings(speed=speed, power=power, helix_angle=helix)
         industrial_gearbox(settings)
-        check_place(out, 0)
-
-        from gearmbs.studies.presets.gearbox import run_gearbox
-
-        with case_bars(["steady", "run-up"]) as move:
-            study = run_gearbox(settings, duration=duration, run_up=run_up, progress=move)
-        paths = study.save(out)
-        typer.echo("modes, Hz: " + ", ".join(f"{f:.4g}" for f in study.campbell()["frequency"].values[0]))
-        typer.echo("\n".join(f"wrote {path}" for path in paths))
+        study = partial(run_gearbox, settings, duration=duration, run_up=run_up)
+        carry_out(out, ["steady", "run-up"], study, mode_line)
 
 
 # ``gearmbs paper`` and ``gearmbs run``: the study, and single cases, planetary sets and drivetrains from files.
@@ -120,17 +119,17 @@ def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
     from gearmbs.studies.run.simulation import SimulationInterrupted
     from gearmbs.studies.run.store import keep_dataset
 
-    partial = failure.partial()
-    if partial is None:
+    computed = failure.partial()
+    if computed is None:
         raise failure
     try:
-        path = keep_dataset(path, partial)
+        path = keep_dataset(path, computed)
     except KeptElsewhere as error:
         path = error.path
     except OSError as error:
         raise RuntimeError(f"{failure}\n{error}") from failure
     if isinstance(failure, SimulationInterrupted):
-        end = float(partial.time[-1])
+        end = float(computed.time[-1])
         typer.secho(f"gearmbs: interrupted at t = {end:.6g} s; what was computed until then is in {path}", err=True)
         raise typer.Exit(130) from None
     raise RuntimeError(f"{failure}\nWhat was computed until then is in {path}") from failure
@@ -212,9 +211,7 @@ def paper(
                 name = file_stem(failure.case.name) if failure.case is not None else "failed"
                 keep_partial(failure, single / f"{name}.partial.nc")
         paths = keep(study.save, out)
-        for claim in study.claims():
-            mark = "held    " if claim.held else "NOT HELD"
-            typer.echo(f"{mark}  {claim.name}\n          {claim.numbers}")
+        typer.echo(claim_lines(study.claims()))
         typer.echo("\n".join(f"wrote {path}" for path in paths))
 
 

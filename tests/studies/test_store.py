@@ -203,7 +203,7 @@ def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     assert len(list((tmp_path / "out" / "cases").glob("*load.nc"))) == 3
     with monkeypatch.context() as patch:
         patch.chdir(tmp_path)
-        patch.setattr("gearmbs.studies.paper.paper.write_dataset", _refuse_in(tmp_path / "out"))
+        patch.setattr("gearmbs.studies.run.store.write_dataset", _refuse_in(tmp_path / "out"))
         result = CliRunner().invoke(cli.app, words)
     assert "taking up 3 finished of 6 cases" in result.output
     assert result.exit_code == 1
