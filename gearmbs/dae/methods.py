@@ -49,9 +49,8 @@ class Integrator:
     largest_tolerance: float
     adams: tuple[str, ...] = ()
 
-    @property
-    def solve(self) -> Callable:
-        """The function that integrates."""
+    def load(self) -> Callable:
+        """Load its module, and with it its kernels, and return the function that integrates."""
         module, _, name = self.solver.partition(":")
         return getattr(importlib.import_module(module), name)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -160,27 +161,44 @@ class TorsionalShaft(Coupling):
         m.
     shear_modulus : float or str
         Pa.
-    damping_ratio : float or str
-        Damping over stiffness, s.
+    damping_time : float or str
+        Damping over stiffness, s: the damping ratio of a mode of f Hz that the shaft alone holds is pi f times it.
+    damping_ratio : float or str, optional
+        Former name of ``damping_time``, which is no ratio.
     """
 
     kind: ClassVar[str] = "shaft"
     units: ClassVar[Mapping[str, str]] = {
         **Coupling.units, "stiffness": ROTATIONAL_STIFFNESS, "length": "length", "diameter": "length", "bore": "length",
-        "shear_modulus": "pressure", "damping_ratio": "time",
+        "shear_modulus": "pressure", "damping_time": "time", "damping_ratio": "time",
     }  # fmt: skip
     positive: ClassVar[tuple[str, ...]] = ("stiffness", "length", "diameter", "shear_modulus")
-    not_negative: ClassVar[tuple[str, ...]] = ("bore", "damping_ratio")
+    not_negative: ClassVar[tuple[str, ...]] = ("bore", "damping_time", "damping_ratio")
 
     stiffness: Quantity = None
     length: Quantity = None
     diameter: Quantity = None
     bore: Quantity = 0.0
     shear_modulus: Quantity = 8.02e10
-    damping_ratio: Quantity = 0.0
+    damping_time: Quantity = 0.0
+    damping_ratio: Quantity = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.damping_ratio is not None:
+            require(
+                not self.damping_time,
+                f"{self.label}: damping_ratio is the former name of damping_time; give damping_time alone",
+            )
+            warnings.warn(
+                f"{self.label}: damping_ratio is deprecated, for it is damping over stiffness in seconds "
+                f"({self.damping_ratio:g} s) and no ratio: write damping_time; of a mode of f Hz the ratio is pi f "
+                "times that",
+                FutureWarning,
+                stacklevel=4,
+            )
+            object.__setattr__(self, "damping_time", self.damping_ratio)
+            object.__setattr__(self, "damping_ratio", None)
         sized = self.length is not None and self.diameter is not None
         require((self.stiffness is None) == sized, f"{self.label}: give stiffness, or length and diameter")
 
@@ -192,7 +210,7 @@ class TorsionalShaft(Coupling):
 
     @property
     def tangent_damping(self) -> float:
-        return self.damping_ratio * self.tangent
+        return self.damping_time * self.tangent
 
     def add(self, at: Attached) -> None:
         parameters = (0.0, self.tangent, 0.0, self.tangent_damping, 0.0, 1.0, 0.0, 0.0, 1.0)

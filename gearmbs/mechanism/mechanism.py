@@ -12,7 +12,8 @@ from gearmbs._shown import Shown
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.building.methods import Expression, JointMethods, LoadMethods
+from gearmbs.mechanism.building.joint_methods import JointMethods
+from gearmbs.mechanism.building.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.forces.friction import FrictionForce, add_friction, friction_of
 from gearmbs.mechanism.forces.functions import FunctionForce, function_force
 from gearmbs.mechanism.language.syntax import Units

@@ -165,6 +165,18 @@ def test_torsional_shaft_has_the_stiffness_of_a_circle():
     assert np.arctan2(turned[1, 0], turned[0, 0]) == pytest.approx(200.0 / shaft.tangent, rel=1e-9)
 
 
+def test_damping_of_a_torsional_shaft_is_a_time():
+    """Its field was called a ratio: that name still works, and says what it is."""
+    given = dict(name="s", first="a", second="b", stiffness=5e4)
+    shaft = TorsionalShaft(**given, damping_time="0.1 ms")
+    assert shaft.tangent_damping == pytest.approx(5.0)
+    with pytest.warns(FutureWarning, match=r"coupling 's': damping_ratio .* write damping_time"):
+        former = TorsionalShaft(**given, damping_ratio="0.1 ms")
+    assert former == shaft
+    with pytest.raises(DrivetrainError, match=r"coupling 's': damping_ratio .* give damping_time alone"):
+        TorsionalShaft(**given, damping_time=1e-4, damping_ratio=1e-4)
+
+
 @pytest.mark.parametrize(("teeth", "nonuniformity", "first", "second"), [
     (10, 0.2121, 0.0851, 0.0206), (12, 0.1775, 0.0710, 0.0171), (14, 0.1526, 0.0609, 0.0146),
 ])  # fmt: skip

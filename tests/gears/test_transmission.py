@@ -194,3 +194,20 @@ def test_error_of_a_crowned_pair_falls_to_that_without_load():
     unloaded = kinematic_transmission_error(pair, 4).error
     assert unloaded == pytest.approx(0.0, abs=1e-9)
     assert np.all(loaded_transmission_error(pair, 0.01, 4).error < 0.5e-6)
+
+
+@pytest.mark.parametrize("shift", ["8 mm", "-8 mm"])
+@pytest.mark.parametrize("hand", ["right", "left"])
+@pytest.mark.parametrize("rotation", [1, -1])
+@pytest.mark.parametrize("ring", [False, True])
+def test_an_axial_shift_of_helical_wheels_is_no_error(ring, rotation, hand, shift):
+    """The driven wheel turns by its twist with the shift, some 2 mm at the base circle; what is left is the load's."""
+    driver = GearSpec(23, "2 mm", face_width="20 mm", helix_angle="20 deg", hand=hand)
+    other = {"right": "left", "left": "right"}[hand]
+    mate = GearSpec.ring(67, "2 mm", hand=hand, face_width="20 mm", helix_angle="20 deg") if ring else GearSpec(
+        37, "2 mm", hand=other, face_width="20 mm", helix_angle="20 deg")  # fmt: skip
+    pair = GearPair(driver, mate, rotation=rotation, axial_shift=shift, torque=100.0)
+    assert np.abs(kinematic_transmission_error(pair, points=12).error).max() < 1e-12
+    opposite = loaded_transmission_error(pair.with_changes(axial_shift=0.0), points=12).mean
+    # 12 mm of the 20 mm carry
+    assert opposite < loaded_transmission_error(pair, points=12).mean < 20 / 12 * opposite

@@ -13,7 +13,7 @@ from gearmbs.adams.builders.curve_data import LOADS, flexible_body
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.mechanism.building.methods import beam_stiffness
+from gearmbs.mechanism.building.load_methods import beam_stiffness
 from gearmbs.mechanism.forces.friction import INPUTS, KINDS
 from gearmbs.mechanism.forces.modal_force import add_modal_force
 from gearmbs.mechanism.forces.springs import Beam, Bushing, Field, MatrixForce

@@ -24,7 +24,7 @@ from gearmbs.adams.results.remarks import (
     track_table,
 )
 from gearmbs.adams.results.requests import RequestSeries
-from gearmbs.dae.analyses.eigenvalues import Modes
+from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.result import Status

@@ -38,8 +38,8 @@ from gearmbs.adams.run.sensors import (
     up_to,
 )
 from gearmbs.adams.run.session import Session, active_sensors, change, kept_until, output_times, segment_of, switch
-from gearmbs.dae.analyses.eigenvalues import Modes
 from gearmbs.dae.analyses.kinematics import kinematic
+from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult, initial_conditions, quasi_static, static_equilibrium
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS

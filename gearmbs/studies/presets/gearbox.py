@@ -34,7 +34,7 @@ from gearmbs.studies.trains.trains import run_train
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
-    from gearmbs.dae.analyses.eigenvalues import Modes
+    from gearmbs.dae.analyses.modes import Modes
 
 HELIX = math.radians(14.0)
 SHAFTS = {"high": 1.0, "lay": 2.0, "low": 4.0}

@@ -270,7 +270,7 @@ def _load_kernels(case: Case) -> None:
         contact_kernels()
         for name in (*KERNELS, *(LUMPED_KERNELS if case.solver.lump else ())):
             importlib.import_module(name)
-        _ = INTEGRATORS[case.solver.integrator.upper()].solve
+        INTEGRATORS[case.solver.integrator.upper()].load()
 
 
 def _partial(case: Case, solution: Solution, recorder: Recorder, mechanism: Mechanism | None) -> xr.Dataset | None:

@@ -110,7 +110,7 @@ def test_cases_and_the_command_line_take_the_table():
 def test_rows_say_what_integrators_do():
     fields = set(Options.__dataclass_fields__)
     for name, known in INTEGRATORS.items():
-        assert callable(known.solve), name
+        assert callable(known.load()), name
         assert known.takes is None or set(known.takes) <= fields, name
         assert Options.names(name)
     assert {known.highest_order for known in INTEGRATORS.values() if known.solver == BDF} == {MAX_ORDER}
