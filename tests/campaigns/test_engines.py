@@ -14,8 +14,8 @@ import time
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError
+from gearmbs.campaigns.cluster import batch_cluster, job_script
 from gearmbs.campaigns.limits import TimeLimitReached, limited
-from gearmbs.campaigns.runners.dask import batch_cluster, job_script
 from tests.campaigns.support import digest, small
 
 DRIVER = (

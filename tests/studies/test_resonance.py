@@ -14,10 +14,13 @@ from gearmbs.studies.presets.resonance import (
     ResonanceStudy,
     jump_frequency,
     lowest_lag,
+    resonance_train,
     separation_load,
     separation_loads,
     sweep_resonance,
 )
+from gearmbs.studies.trains.trains import load_train
+from tests.studies.presets import agrees_with_its_file
 
 WINDOW = 20
 
@@ -150,6 +153,12 @@ def test_wrong_settings(changes, words):
 def test_no_jump_where_amplitudes_only_slope():
     quiet = sweep_resonance(ResonanceSettings(span=(0.4, 0.45), cycles=1000), "up", "one degree")
     assert np.isnan(jump_frequency(quiet))
+
+
+def test_the_file_is_the_rig_before_its_sweep():
+    train = resonance_train().changed("drive", function=None)
+    assert train.run_up == pytest.approx(load_train("resonance").train.run_up)
+    agrees_with_its_file("resonance", replace(train, run_up=load_train("resonance").train.run_up))
 
 
 def test_wrong_model():

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -13,17 +14,11 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from gearmbs import cli, files
+from gearmbs.files import KeptElsewhere, check_place
 from gearmbs.studies import Case, CaseError, SimulationFailed, case_mechanism, run_case, run_cases, simulate_case
-from gearmbs.studies.run import simulation
+from gearmbs.studies.run import engine, simulation
 from gearmbs.studies.run.parallel import StorageWarning
-from gearmbs.studies.run.store import (
-    KeptElsewhere,
-    check_place,
-    keep_dataset,
-    record_size,
-    stored_record,
-    write_dataset,
-)
+from gearmbs.studies.run.store import RecordFolder, keep_dataset, record_size, stored_record, write_dataset
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
 
@@ -136,6 +131,37 @@ def test_finished_cases_are_taken_up(tmp_path, monkeypatch):
     assert stored_record(tmp_path, cases[0]) is None
 
 
+def test_two_calls_share_the_cases(tmp_path, monkeypatch):
+    """The case that another call is at work on comes from there; that of one that was killed is computed here."""
+    monkeypatch.setattr(engine, "POLL", 0.0)
+    cases = [Case(name=name, operation=SHORT) for name in ("mine", "theirs", "of the dead")]
+    ledger = RecordFolder(tmp_path)
+    claim = engine.take(ledger.claim(cases[1]))
+    ledger.claim(cases[2]).write_text(json.dumps({"host": socket.gethostname(), "pid": 2**22 + 1, "started": "1"}))
+    record, computed = run_case(cases[1]), []
+
+    def counted(case, progress=None):
+        computed.append(case.name)
+        return record.assign_attrs(case=case.name, case_json=case.model_dump_json())
+
+    def done(case, _record):
+        if case.name == "mine":
+            ledger.enter(cases[1], record.assign_attrs(title="theirs"))
+            claim.release()
+
+    monkeypatch.setattr("gearmbs.studies.run.parallel.run_case", counted)
+    records = run_cases(cases, workers=1, folder=tmp_path, done=done)
+    assert computed == ["mine", "of the dead"]
+    assert [r.attrs["case"] for r in records] == ["mine", "theirs", "of the dead"]
+    assert records[1].attrs["title"] == "theirs"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.nc", "of the dead.nc", "theirs.nc"]
+    # a claim only saves work: where none can be written, cases run all the same
+    (tmp_path / "mine.nc").unlink()
+    monkeypatch.setattr(engine, "take", lambda path: os.open(tmp_path / "no" / "folder", os.O_CREAT))
+    assert len(run_cases(cases, workers=1, folder=tmp_path)) == 3
+    assert computed[2:] == ["mine"]
+
+
 def test_errors_can_be_kept(tmp_path, monkeypatch):
     """The case whose record is too short, the one that fails, and the sound one, each in its place."""
     monkeypatch.setattr(
@@ -177,7 +203,7 @@ def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     assert len(list((tmp_path / "out" / "cases").glob("*load.nc"))) == 3
     with monkeypatch.context() as patch:
         patch.chdir(tmp_path)
-        patch.setattr("gearmbs.studies.paper.paper.write_dataset", _refuse_in(tmp_path / "out"))
+        patch.setattr("gearmbs.studies.run.store.write_dataset", _refuse_in(tmp_path / "out"))
         result = CliRunner().invoke(cli.app, words)
     assert "taking up 3 finished of 6 cases" in result.output
     assert result.exit_code == 1

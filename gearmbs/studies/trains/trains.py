@@ -26,6 +26,7 @@ from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.signals.resampling import MARGIN
 from gearmbs.signals.rotation.orders import MIN_PERIODS, harmonic_amplitudes
 from gearmbs.studies.case.tooth_faults import tooth_fault
+from gearmbs.studies.presets.files import FOLDER, PRESETS
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
 from gearmbs.studies.trains.recorder import CONTACT, TrainColumns, TrainRecorder
 from gearmbs.studies.trains.speed import TURN, HeldSpeed, by_angle, held_speeds, speed_attributes, warn_of_speeds
@@ -40,11 +41,23 @@ TRACK_CYCLES = 16.0
 def load_train(path: str | Path) -> Description:
     """Read a drivetrain and its run settings from a TOML file, faults of teeth included.
 
+    Parameters
+    ----------
+    path : path-like
+        A file, or the name of a preset: bench, crank_slider, gearbox, rattle or resonance.
+
     Raises
     ------
     DrivetrainError
         One line that names the file, the part, the key, the value and the remedy.
+
+    Examples
+    --------
+    >>> load_train("gearbox").train.kinematics.ratio("high", "lay")
+    -4.0
     """
+    if path in PRESETS and not Path(path).exists():
+        path = FOLDER / f"{path}.toml"
     return read_description(path, tooth_fault)
 
 

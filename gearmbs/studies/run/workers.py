@@ -1,7 +1,13 @@
-"""Jobs side by side in processes: progress while they run, and an end at once when one fails or the user interrupts.
+"""Where jobs are worked on: here, in threads of this process, or in processes of this machine.
 
-Only picklable jobs and results. A worker is a fresh interpreter that ignores Ctrl-C, which a terminal sends to all of
-a command's processes; its parent ends it.
+Each is a generator ``(work, jobs, workers)`` of *messages* ``(number, job, kind, value)``: the job's number from 0 in
+the order in which jobs were taken, the job, and `PROGRESS` with a number, `RESULT` with what ``work(job, report)``
+returned, `CLAIMED` with None if somebody else is at work on the job, `FAILURE` with an exception, or `DEATH` with None
+if what worked on it ended without a word. A job is taken when a worker is free for it; closing the generator ends all
+workers.
+
+A worker process is a fresh interpreter that ignores Ctrl-C, which a terminal sends to all of a command's processes; its
+parent ends it. Its work, jobs and results are picklable.
 """
 
 from __future__ import annotations
@@ -9,104 +15,111 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import queue
 import signal
 import sys
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
 from typing import Any
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-GRACE = 2.0
-"""Seconds a worker is given to end before it is killed."""
+GRACE = 5.0
+"""Seconds a worker process is given to end before it is killed."""
 
-PROGRESS, RESULT, FAILURE, DEATH = "progress", "result", "failure", "death"
+PROGRESS, RESULT, CLAIMED, FAILURE, DEATH = "progress", "result", "claimed", "failure", "death"
 END = object()
 
 Work = Callable[[Any, Callable[[float], None]], Any]
+Message = tuple[int, Any, str, Any]
 
 
-class WorkerDied(RuntimeError):
-    """A worker ended without a word: killed, or out of memory."""
+class Claimed(Exception):
+    """Somebody else is at work on the job."""
 
 
-def run_jobs(
-    work: Work,
-    jobs: Sequence[Any],
-    workers: int,
-    *,
-    progress: Callable[[Any, float], None] | None = None,
-    done: Callable[[Any, Any], None] | None = None,
-) -> list[Any]:
-    """Return ``work(job, report)`` of all jobs in order.
+class Cancelled(RuntimeError):
+    """The run was stopped because another one failed or the user interrupted."""
+
+
+def outcome(work: Work, job: Any, report: Callable[[float], None]) -> tuple[str, Any]:
+    """Work on a job; return the kind and the value of the message about its end."""
+    try:
+        return RESULT, work(job, report)
+    except Claimed:
+        return CLAIMED, None
+    except Exception as error:
+        return FAILURE, error
+
+
+def silent(_fraction: float) -> None:
+    """Report no progress."""
+
+
+def here(work: Work, jobs: Iterable[Any], workers: int = 1) -> Iterator[Message]:
+    """Yield the messages of jobs that are worked on one after the other, here, without progress."""
+    for number, job in enumerate(jobs):
+        yield number, job, *outcome(work, job, silent)
+
+
+def threads(work: Work, jobs: Iterable[Any], workers: int) -> Iterator[Message]:
+    """Yield the messages of jobs in threads; a job that reports progress is stopped at its next report by the end."""
+    told: queue.SimpleQueue[Message] = queue.SimpleQueue()
+    stop = threading.Event()
+
+    def one(number: int, job: Any) -> None:
+        def report(fraction: float) -> None:
+            if stop.is_set():
+                raise Cancelled("the job was stopped")
+            told.put((number, job, PROGRESS, fraction))
+
+        found: tuple[str, Any] = (DEATH, None)
+        try:
+            found = outcome(work, job, report)
+        finally:
+            told.put((number, job, *found))
+
+    source = enumerate(jobs)
+    at_work = 0
+    pool = ThreadPoolExecutor(workers)
+    try:
+        while True:
+            while at_work < workers and (taken := next(source, END)) is not END:
+                pool.submit(one, *taken)  # type: ignore[misc]
+                at_work += 1
+            if not at_work:
+                return
+            try:
+                # without an end it would be deaf to Ctrl-C on some systems
+                message = told.get(timeout=1.0)
+            except queue.Empty:
+                continue
+            at_work -= message[2] != PROGRESS
+            yield message
+    finally:
+        stop.set()
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool = True) -> Iterator[Message]:
+    """Yield the messages of jobs in processes that live for many jobs; one that dies is replaced for the next job.
 
     Parameters
     ----------
     work : callable
-        A function of a module; it may call ``report(number)`` as often as it likes.
-    jobs : sequence
-    workers : int
-    progress : callable, optional
-        ``progress(job, number)`` for each report.
-    done : callable, optional
-        ``done(job, result)`` as soon as a job is finished.
-
-    Raises
-    ------
-    WorkerDied
-        If a process ended before its job.
-    Exception
-        The first that a job raised; the other jobs are ended.
-    """
-    results: dict[int, Any] = {}
-    with closing(messages(work, jobs, workers)) as told:
-        for number, job, kind, value in told:
-            if kind == DEATH:
-                raise WorkerDied(
-                    "a worker process ended before its job was done. Is there enough memory? In a script of your own, "
-                    "is the call under if __name__ == '__main__'?"
-                )
-            if kind == FAILURE:
-                raise value
-            if kind == RESULT:
-                results[number] = value
-            tell = progress if kind == PROGRESS else done
-            if tell is not None:
-                tell(job, value)
-    return [results[k] for k in range(len(jobs))]
-
-
-def messages(
-    work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool = True, grace: float = GRACE
-) -> Generator[tuple[int, Any, str, Any], None, None]:
-    """Yield what becomes of jobs in processes that live for many jobs.
-
-    A job is taken when a worker is free for it. A worker that dies is replaced by another one when the next job is
-    taken. Closing the iterator ends all workers.
-
-    Parameters
-    ----------
-    work : callable
-        As for `run_jobs`.
+        A function of a module.
     jobs : iterable
     workers : int
         At most so many processes.
     own_main : bool
         Whether a worker imports the user's script, as it must if ``work`` or the jobs are from there.
-    grace : float
-        Seconds a worker is given to end.
-
-    Yields
-    ------
-    number, job, kind, value
-        The job's number from 0, the job, and `PROGRESS` with a number, `RESULT` with what the work returned, `FAILURE`
-        with an exception, or `DEATH` with None if the process ended without a word.
     """
     context = multiprocessing.get_context("spawn")
     source = enumerate(jobs)
-    processes: dict[Connection, Any] = {}
+    started: dict[Connection, Any] = {}
     at_work: dict[Connection, tuple[int, Any]] = {}
     idle: list[Connection] = []
     try:
@@ -118,7 +131,7 @@ def messages(
                     with deaf(), one_thread(), _with_main(own_main):
                         process.start()
                     theirs.close()
-                    processes[ours] = process
+                    started[ours] = process
                     idle.append(ours)
                 connection = idle.pop()
                 at_work[connection] = taken  # type: ignore[assignment]
@@ -138,12 +151,12 @@ def messages(
                     del at_work[ready]
                 if kind == DEATH:
                     ready.close()
-                    processes.pop(ready).join(grace)
+                    started.pop(ready).join(GRACE)
                 elif kind != PROGRESS:
                     idle.append(ready)
                 yield number, job, kind, value
     finally:
-        _end(processes, bool(at_work), grace)
+        _end(started, bool(at_work))
 
 
 def _serve(work: Work, connection: Connection) -> None:
@@ -155,12 +168,9 @@ def _serve(work: Work, connection: Connection) -> None:
             job = connection.recv()
         except (EOFError, ConnectionError):
             return
+        kind, value = outcome(work, job, lambda number: connection.send((PROGRESS, number)))
         try:
-            message = (RESULT, work(job, lambda number: connection.send((PROGRESS, number))))
-        except Exception as error:
-            message = (FAILURE, _portable(error))
-        try:
-            connection.send(message)
+            connection.send((kind, _portable(value) if kind == FAILURE else value))
         except ConnectionError:
             return
 
@@ -173,14 +183,14 @@ def _portable(error: Exception) -> Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
 
 
-def _end(processes: dict[Connection, Any], at_work: bool, grace: float) -> None:
+def _end(started: dict[Connection, Any], at_work: bool) -> None:
     """Close the pipes and see every worker off; with some still at work all are terminated."""
-    for ours, process in processes.items():
+    for ours, process in started.items():
         ours.close()
         if at_work:
             process.terminate()
-    for process in processes.values():
-        process.join(grace)
+    for process in started.values():
+        process.join(GRACE)
         if process.is_alive():
             process.kill()
             process.join()
