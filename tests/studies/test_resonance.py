@@ -18,6 +18,7 @@ from gearmbs.studies.presets.resonance import (
     separation_loads,
     sweep_resonance,
 )
+from tests.make_records import read
 
 WINDOW = 20
 
@@ -67,8 +68,10 @@ def classical_jump(settings, direction, cycles=8000, settling=400):
 
 @pytest.fixture(scope="module")
 def study():
-    settings = ResonanceSettings()
-    return ResonanceStudy(settings, {(m, d): sweep_resonance(settings, d, m) for m in MODELS for d in DIRECTIONS})
+    sweeps = read("resonance.nc")
+    return ResonanceStudy(
+        ResonanceSettings(), {(m, d): sweeps.sel(model=m, direction=d) for m in MODELS for d in DIRECTIONS}
+    )
 
 
 def test_jumps_of_both_models(study):
@@ -103,6 +106,7 @@ def test_slower_sweeps_jump_at_the_same_place(study):
         assert found == pytest.approx(study.jumps()["one degree"][direction], rel=3e-3)
 
 
+@pytest.mark.slow
 def test_no_separation_below_a_load():
     """With a contact ratio of two only the deflection excites: teeth stay together below the load that is told."""
     settings = ResonanceSettings(addendum=1.157, damping_ratio=0.03, cycles=2000)
@@ -119,6 +123,7 @@ def test_no_separation_below_a_load():
     assert separation_load(settings, (5.0, 10.0)) is None
 
 
+@pytest.mark.slow
 def test_loads_of_both_models_are_printed():
     settings = ResonanceSettings(addendum=1.157, damping_ratio=0.03, cycles=400)
     found = separation_loads(settings)
