@@ -16,9 +16,9 @@ from gearmbs.identify import (
     rank_experiments,
 )
 from gearmbs.signals import make_signal
-from gearmbs.studies import Case, run_case
+from gearmbs.studies import Case
+from tests.identify.levels import CASES, SHORT, run_stored
 
-SHORT = {"duration": 0.08, "run_up": 0.02, "settling": 0.02}
 COMPONENTS = ("line_of_action", "line_of_centres")
 
 
@@ -49,10 +49,10 @@ def test_what_would_tell_them_apart_comes_first():
 @pytest.fixture(scope="module")
 def measured():
     """Two loads of the healthy pair, without noise."""
-    cases = {name: Case(operation={**SHORT, "torque": torque}) for name, torque in (("low", 100.0), ("high", 200.0))}
+    cases = {"low": CASES["100 N m"], "high": CASES["200 N m"]}
     rows = []
     for name, case in cases.items():
-        levels = run_case(case.changed(solver={"tolerance": 1e-8}), False)["gmf_rms"].sel(way="orders")
+        levels = run_stored(case)["gmf_rms"].sel(way="orders")
         for component in COMPONENTS:
             for k in (1, 2, 3):
                 rows.append((name, component, k, float(levels.sel(component=component, harmonic=k)), 0.02))
@@ -65,8 +65,11 @@ def test_backlash_of_a_healthy_pair_cannot_be_told(measured):
         identify(table, cases, ["friction.dynamic", "fault.backlash"], way="orders")
 
 
-def test_friction_is_found_again(measured):
+@pytest.mark.parametrize("run", [run_stored, pytest.param(None, marks=pytest.mark.slow, id="simulated")])
+def test_friction_is_found_again(measured, run, monkeypatch):
     """From numbers with a gain of three that the fit does not know."""
+    if run is not None:
+        monkeypatch.setattr("gearmbs.studies.run_case", run)
     table, cases = measured
     table = table.assign(value=3.0 * table["value"])
     free = [Free("friction.dynamic", 0.035, 0.01, 0.2, also={"friction.static": 2.0})]

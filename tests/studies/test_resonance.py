@@ -20,6 +20,7 @@ from gearmbs.studies.presets.resonance import (
     sweep_resonance,
 )
 from gearmbs.studies.trains.trains import load_train
+from tests.make_records import read
 from tests.studies.presets import agrees_with_its_file
 
 WINDOW = 20
@@ -70,8 +71,10 @@ def classical_jump(settings, direction, cycles=8000, settling=400):
 
 @pytest.fixture(scope="module")
 def study():
-    settings = ResonanceSettings()
-    return ResonanceStudy(settings, {(m, d): sweep_resonance(settings, d, m) for m in MODELS for d in DIRECTIONS})
+    sweeps = read("resonance.nc")
+    return ResonanceStudy(
+        ResonanceSettings(), {(m, d): sweeps.sel(model=m, direction=d) for m in MODELS for d in DIRECTIONS}
+    )
 
 
 def test_jumps_of_both_models(study):
@@ -106,6 +109,7 @@ def test_slower_sweeps_jump_at_the_same_place(study):
         assert found == pytest.approx(study.jumps()["one degree"][direction], rel=3e-3)
 
 
+@pytest.mark.slow
 def test_no_separation_below_a_load():
     """With a contact ratio of two only the deflection excites: teeth stay together below the load that is told."""
     settings = ResonanceSettings(addendum=1.157, damping_ratio=0.03, cycles=2000)
@@ -122,6 +126,7 @@ def test_no_separation_below_a_load():
     assert separation_load(settings, (5.0, 10.0)) is None
 
 
+@pytest.mark.slow
 def test_loads_of_both_models_are_printed():
     settings = ResonanceSettings(addendum=1.157, damping_ratio=0.03, cycles=400)
     found = separation_loads(settings)

@@ -193,6 +193,7 @@ def test_a_full_disk_stops_no_case(full_disk):
     assert all(record.gmf_rms.size for record in records)
 
 
+@pytest.mark.slow
 def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     """Three cases are there from before; three are computed, and a full disk at the end costs nothing."""
     words = ["paper", "--out", str(tmp_path / "out"), "--duration", "80 ms", "--workers", "1"]
