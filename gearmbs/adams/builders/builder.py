@@ -18,7 +18,6 @@ from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.frames import add_point_mass, hold, inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.functions import FUNCTIONS, Accelerations, Present, translated
 from gearmbs.adams.builders.scopes import (
-    KINDS,
     AdamsModel,
     BodyState,
     acts,
@@ -182,7 +181,7 @@ class Builder:
 
     def name_elements(self) -> None:
         """Name everything that transmits a force before any expression refers to it."""
-        for cls, kind in KINDS.items():
+        for cls, kind in st.KINDS.items():
             for statement in self.active(cls):
                 self.claim(statement, kind)
             for statement in self.deck.of(cls).values():
@@ -297,9 +296,8 @@ class Builder:
                 m.variables[variable.id] = variable.function or "0"
         for array in self.deck.of(st.Array).values():
             m.arrays[array.id] = array.numbers
-        for kind, group in (("pinput", st.PlantInput), ("poutput", st.PlantOutput)):
-            for plant in self.deck.of(group).values():
-                m.plants[kind, plant.id] = plant.variables
+        for plant in self.deck.each(st.Plant):
+            m.plants[plant.keyword.lower(), plant.id] = plant.variables
         for spline in self.deck.of(st.Spline).values():
             if spline.data_file is None:
                 m.splines[spline.id] = spline_data(spline)
@@ -308,8 +306,9 @@ class Builder:
                 self.attempt(curve, self.add_curve)
         for diff in self.active(st.Diff):
             self.attempt(diff, self.add_diff)
-        for system in (*self.active(st.Lse), *self.active(st.Tfsiso), *self.active(st.Gse)):
-            self.attempt(system, self.add_state_system)
+        for system in self.deck.each(st.System):
+            if acts(system, self.inactive):
+                self.attempt(system, self.add_state_system)
         for sensor in self.active(st.Sensor):
             m.algebraic_state(sensor_state(sensor.id), self.text(sensor.function or "0"))
 
@@ -329,7 +328,7 @@ class Builder:
         else:
             states[diff.id] = State(diff_name(diff), f"({text})/{self.units.time!r}", diff.ic[0])
 
-    def add_state_system(self, statement: st.Lse | st.Tfsiso | st.Gse) -> None:
+    def add_state_system(self, statement: st.System) -> None:
         """Add the states of an LSE, TFSISO or GSE."""
         system, states = state_system(self.deck, statement), self.mechanism.states
         for name, rate, start in zip(system.names, system.rates(), system.start):

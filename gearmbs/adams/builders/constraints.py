@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.functions import expression
@@ -256,7 +253,7 @@ def _scaled(text: str, factor: float) -> str:
     return text if factor == 1.0 else f"{factor!r}*({text})"
 
 
-CONSTRAINTS: dict[type, Callable[[Builder, Any], None]] = {
+CONSTRAINTS: dict[type, Maker] = {
     st.Joint: add_joint,
     st.Jprim: add_jprim,
     st.Coupler: add_coupler,

@@ -224,7 +224,7 @@ class LinearSystem(NamedTuple):
 
 def state_systems(deck: Deck) -> Iterator[tuple[st.Statement, LinearSystem | StateEquations]]:
     """Yield the LSE, TFSISO and GSE statements of a deck that hold together, each with what it stands for."""
-    for statement in (*deck.of(st.Lse).values(), *deck.of(st.Tfsiso).values(), *deck.of(st.Gse).values()):
+    for statement in deck.each(st.System):
         try:
             system = state_system(deck, statement)
         except ValueError:

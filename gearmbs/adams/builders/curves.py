@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism.parts.bodies import Marker
@@ -73,4 +72,4 @@ def add_cvcv(b: Builder, s: st.Cvcv) -> None:
     _note_runner(b, s, f"{name}.runner J", second)
 
 
-CURVES: dict[type, Callable[[Builder, Any], None]] = {st.Ptcv: add_ptcv, st.Cvcv: add_cvcv}
+CURVES: dict[type, Maker] = {st.Ptcv: add_ptcv, st.Cvcv: add_cvcv}

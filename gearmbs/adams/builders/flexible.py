@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder, LeftOutError
+from gearmbs.adams.builders.builder import Builder, LeftOutError, Maker
 from gearmbs.adams.builders.curve_data import flexible_body
 from gearmbs.adams.builders.frames import hold, marker_orientation, part_orientation
 from gearmbs.adams.builders.scopes import BodyState
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.data_statements import NODES
 from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Call, Scope, parse, walk
@@ -267,7 +266,7 @@ def _node(
     where: tuple[np.ndarray, np.ndarray],
 ) -> Body:
     """Add the body of a node, where an earlier analysis left it."""
-    source = st.FeNode(id=s.id * NODES + k + 1, file=s.file, line=s.line, part=s.label())
+    source = st.FeNode(id=s.id * st.NODES + k + 1, file=s.file, line=s.line, part=s.label())
     start = b.state.get((source.keyword, source.id))
     if start is None:
         start = BodyState(*where, np.zeros(3), np.zeros(3))
@@ -418,3 +417,10 @@ def add_fe_load(b: Builder, s: st.FeLoad) -> None:
         rm = b.markers[s.rm] if s.rm is not None else ground
         marker = body.marker(name=f"{name}.{k + 1}")
         b.mechanism.load(f"{name}.{k + 1}", marker, ground, rm=rm, kind="fe_load", **parts)  # type: ignore[arg-type]
+
+
+DEFORMING: dict[type, Maker] = {st.FlexBody: add_flex_body, st.FePart: add_fe_part}
+"""What adds bodies that deform."""
+ON_NODES: dict[str, Maker] = {"FLEX_BODY": add_flexible_marker, "FE_PART": add_node_marker}
+"""What adds their markers."""
+LINE_LOADS: dict[type, Maker] = {st.FeLoad: add_fe_load}

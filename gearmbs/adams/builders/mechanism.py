@@ -11,14 +11,8 @@ from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.builders.constraints import CONSTRAINTS
 from gearmbs.adams.builders.contacts import CONTACTS
 from gearmbs.adams.builders.curves import CURVES
-from gearmbs.adams.builders.flexible import (
-    add_fe_load,
-    add_fe_part,
-    add_flex_body,
-    add_flexible_marker,
-    add_node_marker,
-)
-from gearmbs.adams.builders.forces import FORCES, add_mforce
+from gearmbs.adams.builders.flexible import DEFORMING, LINE_LOADS, ON_NODES
+from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.functions import IN_DYNAMICS, Present
 from gearmbs.adams.builders.scopes import AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
@@ -127,10 +121,8 @@ def part_states(
     return found
 
 
-DEFORMING: dict[type, Maker] = {st.FlexBody: add_flex_body, st.FePart: add_fe_part}
-"""What adds bodies that deform."""
-ON_NODES: dict[str, Maker] = {"FLEX_BODY": add_flexible_marker, "FE_PART": add_node_marker}
-"""What adds their markers."""
+MAKERS: dict[type, Maker] = CONSTRAINTS | CURVES | FORCES | LINE_LOADS | CONTACTS
+"""What adds a statement to the mechanism, in the order in which that is done; a row stands beside its function."""
 
 
 def build_mechanism(
@@ -183,9 +175,7 @@ def build_model(
     if builder.add_bodies(DEFORMING, ON_NODES):
         builder.name_elements()
         builder.add_data()
-        for kind, make in (
-            CONSTRAINTS | CURVES | FORCES | {st.Mforce: add_mforce, st.FeLoad: add_fe_load} | CONTACTS
-        ).items():
+        for kind, make in MAKERS.items():
             for statement in builder.active(kind):
                 builder.attempt(statement, partial(make, builder))
     model = builder.model

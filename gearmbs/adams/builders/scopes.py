@@ -24,21 +24,11 @@ from gearmbs.mechanism.parts.joints import Joint
 # Between which markers the elements of a deck act, and what they need to act.
 
 
-KINDS: dict[type, str] = {
-    st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
-    st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
-    st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
-    st.Beam: "beam", st.Friction: "friction", st.Contact: "contact",
-    st.Ptcv: "ptcv", st.Cvcv: "cvcv",
-}  # fmt: skip
-"""Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
-
-
 def joints_of(s: st.Statement) -> tuple[int, ...]:
     """Return the joints without which an element cannot act."""
-    if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
-        return (s.joint,)
-    return s.joints if isinstance(s, (st.Coupler, st.Gear)) else ()
+    one: int | None = getattr(s, "joint", None)
+    several: tuple[int, ...] = getattr(s, "joints", ())
+    return several if one is None else (one,)
 
 
 def resting_joint(s: st.Statement, inactive: frozenset[tuple[str, int]]) -> int | None:
@@ -65,7 +55,7 @@ def marker_pair(deck: Deck, s: Any) -> tuple[int, int | None]:
     if isinstance(s, st.Contact):
         i, j = (deck.of(st.Graphics)[refs[0]].marker for refs in (s.igeom, s.jgeom))
         return i or 0, j
-    if isinstance(s, (st.Vforce, st.Vtorque, st.Gforce)):
+    if isinstance(s, st.Acting):
         return s.i or 0, s.jfloat
     if isinstance(s, st.Sforce) and s.action_only:
         return s.i or 0, None
@@ -98,11 +88,7 @@ def data_scope(deck: Deck, present: Present) -> Scope:
         splines={s.id: spline_data(s) for s in deck.of(st.Spline).values() if s.data_file is None},
         arrays={a.id: a.numbers for a in deck.of(st.Array).values()},
         functions=deck.functions,
-        plants={
-            (kind, plant.id): plant.variables
-            for kind, group in (("pinput", st.PlantInput), ("poutput", st.PlantOutput))
-            for plant in deck.of(group).values()
-        },
+        plants={(plant.keyword.lower(), plant.id): plant.variables for plant in deck.each(st.Plant)},
         units=deck.units,
     )
 
@@ -120,7 +106,7 @@ def deck_scope(deck: Deck, present: Present, inactive: frozenset[tuple[str, int]
         markers[marker.id] = markers[(marker.name or f"MARKER_{marker.id}").replace('"', "'").upper()] = k
         owner = marker.owner()
         rows.append(0 if owner in grounds else bodies.setdefault(owner, 1 + len(bodies)))
-    of_kind: dict[str, dict[int, Any]] = {kind: deck.of(cls) for cls, kind in KINDS.items()}
+    of_kind: dict[str, dict[int, Any]] = {kind: deck.of(cls) for cls, kind in st.KINDS.items()}
     elements = [(kind, s) for kind, group in of_kind.items() for s in group.values()]
     data = data_scope(deck, present)
     return replace(

@@ -7,50 +7,24 @@ from collections.abc import Callable, Sequence
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic, labels_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
-from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, specs_of
+from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, Spec, specs_of
 from gearmbs.adams.parse.remedies import refused_message
 from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
-REQUIRED: dict[type, tuple[str, ...]] = {
-    st.Marker: ("part",),
-    st.Joint: ("type", "i", "j"),
-    st.Jprim: ("type", "i", "j"),
-    st.Coupler: ("joints",),
-    st.Gear: ("joints", "cv"),
-    st.Gcon: ("function",),
-    st.Motion: ("function",),
-    st.Sforce: ("type", "i", "j", "function"),
-    st.Vforce: ("i", "rm"),
-    st.Vtorque: ("i", "rm"),
-    st.Gforce: ("i", "rm"),
-    st.SpringDamper: ("type", "i", "j"),
-    st.Bushing: ("i", "j"),
-    st.Field: ("i", "j"),
-    st.Variable: ("function",),
-    st.Diff: ("function",),
-    st.Beam: ("i", "j", "length", "ixx", "iyy", "izz", "area", "emodulus", "gmodulus"),
-    st.Friction: ("joint", "mu_static", "mu_dynamic"),
-    st.Contact: ("igeom", "jgeom", "law"),
-    st.Graphics: ("type",),
-    st.Matrix: ("rows", "columns", "values"),
-    st.CurveStatement: ("matrix",),
-    st.Ptcv: ("i", "curve", "rm"),
-    st.Cvcv: ("icurve", "jcurve", "irm", "jrm"),
-    st.Sensor: ("function",),
-    st.Gse: ("function",),
-    st.Mforce: ("flex_body",),
-    st.FePart: ("type", "node_labels", "coordinates", "section", "material"),
-    st.FeLoad: ("fe_part",),
-}
-POSITIVE: dict[type, tuple[str, ...]] = {
-    st.Beam: ("length", "area", "emodulus", "gmodulus"),
-    st.Integrator: ("error", "hinit", "hmax", "hmin"),
-    st.PointMass: ("mass",),
-    st.Sensor: ("dt", "stepsize"),
-}
+
+def _with(fact: Callable[[Spec], bool]) -> dict[type, tuple[str, ...]]:
+    """Return of each statement the arguments of which something holds."""
+    found = {cls: tuple(name for name, spec in specs_of(cls).items() if fact(spec)) for cls in st.STATEMENTS.values()}
+    return {cls: names for cls, names in found.items() if names}
+
+
+REQUIRED = _with(lambda spec: spec.required)
+POSITIVE = _with(lambda spec: spec.positive)
 """Arguments that must be positive where they are given."""
+UNSUPPORTED_ARGUMENTS = _with(lambda spec: spec.instead is not None)
+WITHOUT_EFFECT = _with(lambda spec: bool(spec.idle))
+"""Arguments that are read and change nothing: each is remarked on."""
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
     WDTX WDTY WDTZ WDTM""".split()
@@ -58,61 +32,6 @@ MEASURES = frozenset(
 """Functions of the places and motions of markers."""
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
-UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
-    st.Marker: ("curve",),
-    st.FePart: ("cratiom", "preload"),
-    st.FeLoad: ("function",),
-    st.FlexBody: ("db_file", "bdf_file", "index_in_database"),
-    st.Joint: ("friction",),
-    st.Coupler: ("function",),
-    st.Field: ("function",),
-    st.Spline: ("data_file",),
-    st.Request: ("function",),
-    st.CurveStatement: ("function",),
-    st.Contact: ("normal_function", "friction_function", "iflex", "jflex"),
-}
-
-WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
-    st.Integrator: ("hratio", "pattern", "fixit", "adaptivity", "beta", "gamma", "alpha", "scale"),
-    st.InitialConditions: tuple(specs_of(st.InitialConditions)),
-    st.Kinematics: tuple(specs_of(st.Kinematics)),
-    st.Equilibrium: tuple(specs_of(st.Equilibrium)),
-    st.Output: ("dscale", "vscale", "ascale", "fscale", "dzero", "vzero", "azero", "fzero", "chart"),
-    st.Results: tuple(n for n in specs_of(st.Results) if n.startswith("no")),
-    st.Part: ("exact",),
-    st.PointMass: ("exact",),
-    st.FlexBody: ("exact", "char_len"),
-    st.Friction: ("formulation",),
-    st.Variable: ("ic",),
-    st.Contact: ("augmented", "stiction_law", "max_deformation", "flip_i", "flip_j"),
-    st.Graphics: ("xmin", "xmax", "ymin", "ymax", "faceting"),
-    st.Joint: tuple(
-        """delta_v max_deformation max_friction max_fric_rot max_fric_trans mu_dyn_rot mu_dyn_trans mu_stat_rot
-        mu_stat_trans preload_axial preload_radial preload_x preload_y inner_radius outer_radius pin_radius height
-        width""".split()
-    ),
-    st.CurveStatement: ("minpar", "maxpar"),
-    st.Cvcv: ("ivel", "jvel"),
-    st.Gse: ("xxflag", "xuflag", "yxflag", "yuflag"),
-    st.Sensor: ("angular", "bisection", "codgen"),
-}
-"""Arguments that are read and change nothing: each is remarked on."""
-WHY = {
-    st.Output: "values are written as they are",
-    st.Results: "everything is written",
-    st.FlexBody: "bodies are moved as little as the joints allow, and deform linearly",
-    st.PointMass: "the parts are moved as little as the joints allow",
-    st.Part: "the parts are moved as little as the joints allow",
-    st.Friction: "friction follows one law, see the documentation",
-    st.Variable: "variables need no starting value",
-    st.Contact: "solids press by depth and rub by speed alone",
-    st.Joint: "a joint rubs by them only where it says FRICTION = ON; for friction write a FRICTION statement",
-    st.Gse: "derivatives are made by differences",
-    st.CurveStatement: "the points alone say how far the curve goes",
-    st.Cvcv: "the speeds follow from those of the parts",
-    st.Sensor: "the time is found to the last digits",
-}
-CODGEN = "every analysis chooses its pivots anew"
 MESH_FILES = (".stl", ".obj", ".shl", ".slp")
 
 
@@ -190,9 +109,7 @@ def _by_routine(statement: st.Statement) -> bool:
     """Whether a statement takes from a routine of the user what others give by arguments."""
     if isinstance(statement, st.CurveStatement):
         return "function" in statement.given
-    return isinstance(statement, (st.Gse, st.Coupler, st.Field)) and (
-        "function" in statement.given and statement.function is None
-    )
+    return bool(statement.subroutine) and "function" in statement.given and getattr(statement, "function", "") is None
 
 
 def refused_arguments(statement: st.Statement) -> list[str]:
@@ -234,14 +151,13 @@ def _remark_idle(deck: Deck) -> None:
 
 def _why(statement: st.Statement, name: str) -> str:
     """Return why an argument of a statement has no effect."""
-    if isinstance(statement, st.Sensor) and name == "codgen":
-        return CODGEN
+    why = specs_of(type(statement))[name].idle
     if not isinstance(statement, st.Graphics):
-        return WHY.get(type(statement), "the program's own settings are tight enough")
+        return why
     if name != "faceting":
-        return "a plane that bodies touch has no edges" if statement.type == "PLANE" else "they are limits of a PLANE"
+        return "a plane that bodies touch has no edges" if statement.type == "PLANE" else why
     if statement.type != "EXTERNAL":
-        return "the kind of the solid says into how many facets it is cut, if any"
+        return why
     if (statement.data_file or "").lower().endswith(MESH_FILES):
         return "a mesh is as fine as its file"
     return "a body of a Parasolid file is exact, or is cut within 0.001 of its diagonal"
@@ -340,10 +256,9 @@ def _check_constraints(deck: Deck, fail: Fail) -> None:
 
 
 def _check_forces(deck: Deck, fail: Fail) -> None:
-    for kind, names in ((st.Vforce, "fx fy fz"), (st.Vtorque, "tx ty tz"), (st.Gforce, "fx fy fz tx ty tz")):
-        for force in deck.of(kind).values():
-            if force.function is None and all(getattr(force, name) is None for name in names.split()):
-                fail(force, f"give at least one of {', '.join(names.upper().split())}")
+    for force in deck.each(st.Acting):
+        if force.function is None and all(getattr(force, name) is None for name in force.results):
+            fail(force, f"give at least one of {', '.join(force.results).upper()}")
     for friction in deck.of(st.Friction).values():
         if friction.joint is not None and friction.joint not in deck.of(st.Joint):
             fail(friction, f"there is no JOINT/{friction.joint}", "joint")
@@ -398,14 +313,13 @@ def _check_data(deck: Deck, fail: Fail) -> None:
                 spline_data(spline)
             except ValueError as error:
                 fail(spline, str(error), "x")
-    for kind in (st.PlantInput, st.PlantOutput):
-        for plant in deck.of(kind).values():
-            for ref in plant.variables:
-                if ref not in deck.of(st.Variable):
-                    fail(plant, f"there is no VARIABLE/{ref}", "variables")
+    for plant in deck.each(st.Plant):
+        for ref in plant.variables:
+            if ref not in deck.of(st.Variable):
+                fail(plant, f"there is no VARIABLE/{ref}", "variables")
     for request in deck.of(st.Request).values():
         if request.type is None and not any(request.functions()) and request.function is None:
-            *others, last = REQUEST_TYPES
+            *others, last = st.REQUEST_TYPES
             fail(request, f"give {', '.join(others)} or {last}, or F1 to F8")
         if request.type is not None and request.i is None:
             fail(request, "I is missing")

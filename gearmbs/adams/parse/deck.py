@@ -56,6 +56,12 @@ class Deck:
         """Return the statements of one class by id."""
         return self.items.get(kind, {})
 
+    def each(self, base: type[S]) -> Iterator[S]:
+        """Yield the statements of all classes that have a base in common, class by class in the order of the table."""
+        for cls in st.STATEMENTS.values():
+            if issubclass(cls, base):
+                yield from self.of(cls).values()
+
     def only(self, kind: type[S]) -> S | None:
         """Return the single statement of a class without id, or None."""
         return next(iter(self.of(kind).values()), None)

@@ -13,7 +13,7 @@ from gearmbs.adams.parse.remedies import instead_of_function
 from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
 from gearmbs.mechanism.language.syntax import Call, parse, walk
 
-READ_IN_DECKS = {"SENVAL", "CURVE"}
+READ_IN_DECKS = REFUSED_FUNCTIONS & st.READ_BY.keys()
 """Functions that a mechanism refuses and a deck has, where there is a statement with their id."""
 
 

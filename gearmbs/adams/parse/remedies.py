@@ -4,40 +4,7 @@ from __future__ import annotations
 
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
-
-INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
-    ("CONTACT", "NORMAL_FUNCTION"): "IMPACT or POISSON",
-    ("CONTACT", "FRICTION_FUNCTION"): "COULOMB_FRICTION",
-    ("CONTACT", "IFLEX"): "a solid on a rigid PART",
-    ("CONTACT", "JFLEX"): "a solid on a rigid PART",
-    ("CURVE", "FUNCTION"): "USER with a routine, or points in a MATRIX",
-    ("COUPLER", "FUNCTION"): "USER with a routine, or SCALES",
-    ("FE_LOAD", "FUNCTION"): "FX to TZ with expressions, which may contain S",
-    ("FE_PART", "CRATIOM"): "CRATIOK, or forces against the velocity at markers on nodes",
-    ("FE_PART", "PRELOAD"): "a GFORCE at its ends",
-    ("FIELD", "FUNCTION"): "USER with a routine, or KMATRIX and CMATRIX",
-    ("FLEX_BODY", "DB_FILE"): "MNF_FILE, a modal neutral file",
-    ("FLEX_BODY", "BDF_FILE"): "MNF_FILE; beams of large motion in Python (`gearmbs.flexible.add_beam`)",
-    ("FLEX_BODY", "INDEX_IN_DATABASE"): "MNF_FILE, a modal neutral file",
-    ("REQUEST", "FUNCTION"): "USER with a routine, or F1 to F8",
-    ("SPLINE", "FILE"): "X and Y in the deck",
-    ("JOINT", "FRICTION"): "a FRICTION statement; the law of this one is not known",
-}
-"""What to do instead of arguments that are refused."""
-
-INSTEAD: dict[str, str] = {
-    "CLEARANCE": "a REQUEST with DM between two markers; CONTACT tells how deep solids press",
-    "EXTERNAL_SYSTEM": "a GSE with routines in Python",
-    "MREQUEST": "a REQUEST for each marker",
-    "NFORCE": "BEAM or FIELD between neighbouring PARTs",
-    "NODE": "it belongs to a FLEX_BODY",
-    "NORMAL_MODE_ANALYSIS": "LINEAR/EIGENSOL in the script",
-    "PSTATE": "none needed: LINEAR chooses the coordinates",
-    "SURFACE": "a mesh in an EXTERNAL solid of GRAPHICS",
-    "TIRE": "a GFORCE with a routine in Python",
-    "UCON": "a GCON with an expression, or a COUPLER with a routine",
-}
-"""What to do instead of statements that are refused."""
+from gearmbs.mechanism.forces.friction import KINDS
 
 INSTEAD_OF_FUNCTIONS: dict[str, str] = {
     "ARYSUM": "the sum of ARYVALs",
@@ -70,13 +37,11 @@ FRICTION_OF_JOINTS = (
     (("max_deformation",), "MAX_STICTION_DEFORMATION"),
 )
 """Arguments of a JOINT with friction, the first given one of each counts, and those of a FRICTION statement."""
-SIZES = {"SPHERICAL": "BALL_RADIUS", "TRANSLATIONAL": ""}
-"""Argument of FRICTION for the radius of a joint, where it is not PIN_RADIUS."""
 
 
 def instead_of_statement(name: str) -> str:
-    """Return a clause on what to do instead of a statement that is refused, "" where there is nothing."""
-    return f"; instead: {INSTEAD[name]}" if name in INSTEAD else ""
+    """Return a clause on what to do instead of a statement that is refused."""
+    return f"; instead: {st.INSTEAD[name]}"
 
 
 def instead_of_function(name: str) -> str:
@@ -91,9 +56,9 @@ def refused_message(statement: st.Statement, name: str) -> str:
             f"{statement.label()}: {name.upper()} = {getattr(statement, name)} is not supported, as its law is not "
             f"known; write {_friction(statement)} instead"
         )
-    keyword = specs_of(type(statement))[name].keyword
-    instead = INSTEAD_OF_ARGUMENTS.get((st.KEYWORD_OF[type(statement)], keyword))
-    return f"{statement.label()}: {keyword} is not supported" + (f"; instead, use {instead}" if instead else "")
+    spec = specs_of(type(statement))[name]
+    way = f"; instead, use {spec.instead}" if spec.instead else ""
+    return f"{statement.label()}: {spec.keyword} is not supported{way}"
 
 
 def _friction(joint: st.Joint) -> str:
@@ -104,10 +69,11 @@ def _friction(joint: st.Joint) -> str:
         if given or word.startswith("MU"):
             words.append(f"{word} = {f'{given[0]:g}' if given else '...'}")
     radius = joint.pin_radius if joint.pin_radius is not None else joint.outer_radius
-    word = SIZES.get(joint.type or "", "PIN_RADIUS")
-    if word:
+    kind = KINDS.get((joint.type or "").lower())
+    if kind is None or kind.lever:
+        word = specs_of(st.Friction)[kind.lever if kind is not None else "pin_radius"].keyword
         words.append(f"{word} = {'...' if radius is None else f'{radius:g}'}")
     if joint.friction == "PRELOAD_ONLY":
-        force = "FORCE" if joint.type == "TRANSLATIONAL" else "TORQUE"
+        force = "FORCE" if kind is not None and not kind.torque else "TORQUE"
         words += ["INPUTS = PRELOAD", f"FRICTION_{force}_PRELOAD = ..."]
     return ", ".join(words)

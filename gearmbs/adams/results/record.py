@@ -12,7 +12,6 @@ from gearmbs.adams.builders.scopes import AdamsModel
 from gearmbs.adams.errors import Diagnostic, folded
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Script, Simulate
-from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
 from gearmbs.adams.results.remarks import (
@@ -310,7 +309,7 @@ class RunRecord:
         if request.type is None:
             given = request.cunits
             return tuple(given[k] if k < len(given) and given[k] else "no_units" for k in range(8))
-        first, second = REQUEST_TYPES[request.type].dimensions
+        first, second = st.REQUEST_TYPES[request.type].dimensions
         return (self.unit(first),) * 4 + (self.unit(second),) * 4
 
     def unit(self, dimension: str) -> str:

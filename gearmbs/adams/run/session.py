@@ -14,6 +14,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, refused_arguments
 from gearmbs.adams.parse.commands import Change, Simulate, Switch, apply_change
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.grammar import specs_of
 from gearmbs.adams.parse.refused import refused_functions
 from gearmbs.adams.results.record import Segment
 from gearmbs.adams.results.remarks import assembly_of, tracks_of
@@ -23,15 +24,6 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.solution import Solution
 
-AT_START: dict[type, frozenset[str]] = {
-    st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
-    st.PointMass: frozenset("qg reuler zg xg vx vy vz exact".split()),
-    st.FlexBody: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
-    st.Joint: frozenset(["ic", "ictran", "icrot"]),
-    st.Motion: frozenset(["icdisp", "icvel"]),
-    st.Diff: frozenset(["ic"]),
-}
-"""Arguments that say how the first analysis starts."""
 MOST_OUTPUTS = 10_000_000
 """Output steps of an analysis: more would not fit into memory."""
 
@@ -139,7 +131,7 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
         for message in functions:
             _remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
         return
-    late = AT_START.get(type(new), frozenset()) & set(new.given)
+    late = {name for name in new.given if specs_of(type(new))[name].start}
     if late and session.state is not None and not allow_unsupported:
         what = ", ".join(sorted(name.upper() for name in late))
         raise unsupported(

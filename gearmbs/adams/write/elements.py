@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.grammar import specs_of
 from gearmbs.adams.write.text import WriterContext, listed, number, upper
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.forces.friction import INPUTS, FrictionForce, JointFriction
+from gearmbs.mechanism.forces.friction import INPUTS, KINDS, FrictionForce, JointFriction
 from gearmbs.mechanism.forces.springs import LineSpring
 from gearmbs.mechanism.parts.elements import Load, State
 from gearmbs.mechanism.parts.joints import Joint
@@ -60,25 +62,6 @@ def _times(text: str, factor: float) -> str:
 KEYWORDS = {
     "springdamper": "SPRINGDAMPER", "bushing": "BUSHING", "field": "FIELD", "beam": "BEAM", "friction": "FRICTION",
 }  # fmt: skip
-MATTERS: dict[str, dict[str, str | None]] = {
-    "revolute": {"reaction_force": None, "bending_moment": "bending_arm"},
-    "universal": {"reaction_force": None, "bending_moment": "bending_arm"},
-    "translational": {"reaction_force": None, "bending_moment": "overlap", "torsional_moment": "reaction_arm"},
-    "cylindrical": {"reaction_force": None, "bending_moment": "overlap"},
-    "spherical": {"reaction_force": None},
-}
-"""What presses the surfaces of a joint together, with the length that must not be zero for it."""
-LENGTHS = {
-    "pin_radius": "PIN_RADIUS", "friction_arm": "FRICTION_ARM", "bending_arm": "BENDING_REACTION_ARM",
-    "reaction_arm": "REACTION_ARM", "overlap": "INITIAL_OVERLAP", "ball_radius": "BALL_RADIUS",
-}  # fmt: skip
-LENGTHS_OF = {
-    "revolute": ("pin_radius", "friction_arm", "bending_arm"),
-    "universal": ("pin_radius", "friction_arm", "bending_arm"),
-    "translational": ("reaction_arm", "overlap"),
-    "cylindrical": ("pin_radius", "overlap"),
-    "spherical": ("ball_radius",),
-}
 
 
 def kept(mechanism: Mechanism) -> dict[str, str]:
@@ -193,17 +176,18 @@ def _friction(writer: WriterContext, joint: Joint, f: JointFriction) -> list[str
         f"EFFECT = {f.effect.upper()}",
         f"INPUTS = {':'.join(i.upper() for i in inputs) or 'NONE'}",
     ]
-    if joint.kind in ("translational", "cylindrical"):
+    kind, specs = KINDS[joint.kind], specs_of(st.Friction)
+    if kind.force:
         out.append(f"FRICTION_FORCE_PRELOAD = {number(f.preload_force)}")
-    if joint.kind != "translational":
+    if kind.torque:
         out.append(f"FRICTION_TORQUE_PRELOAD = {number(f.preload_torque)}")
-    for field in LENGTHS_OF[joint.kind]:
+    for field in kind.lengths:
         value = getattr(f, field)
         if value > 0.0 or field == "friction_arm":
-            out.append(f"{LENGTHS[field]} = {number(value)}")
-    if joint.kind in ("translational", "cylindrical"):
+            out.append(f"{specs[field].keyword} = {number(value)}")
+    if "overlap" in kind.lengths:
         out.append(f"OVERLAP_DELTA = {f.overlap_change.upper()}")
-    if joint.kind == "universal":
+    if kind.yoke:
         out.append(f"YOKE = {f.yoke.upper()}_YOKE")
     for word, most in (("MAX_FRICTION_FORCE", f.max_force), ("MAX_FRICTION_TORQUE", f.max_torque)):
         if most is not None:
@@ -215,7 +199,8 @@ def _matters(joint: Joint, f: JointFriction, item: str) -> bool:
     """Whether an input has an effect on the joint: a length of zero switches a moment off."""
     if item == "preload":
         return True
-    if item not in MATTERS[joint.kind]:
+    pressing = KINDS[joint.kind].pressing
+    if item not in pressing:
         return False
-    length = MATTERS[joint.kind][item]
+    length = pressing[item]
     return length is None or getattr(f, length) > 0.0
