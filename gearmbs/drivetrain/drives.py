@@ -370,8 +370,8 @@ class ControlledDrive(Drive):
 
     kind: ClassVar[str] = "controlled"
 
-    proportional: Annotated[Quantity, Measure("N*m*s/rad", above=0)]
-    integral: Annotated[Quantity, Measure("N*m/rad", above=0)]
+    proportional: Positive
+    integral: Positive
     largest: Annotated[Quantity, Measure("torque", above=0)]
     reference: Any = None
 

@@ -177,7 +177,10 @@ class Measure:
         return tuple(points)
 
     def _one(self, value: Any) -> Any:
-        number = value if self.whole else in_si(value, self.dimension)
+        number = in_si(value, self.dimension)
+        if self.unit == "1" and isinstance(value, Real):
+            # a whole number stays one
+            number = value
         shown = self.shown or self.unit
         factor = SHOWN.get(shown, 1.0)
         if self._allows(number, factor):
