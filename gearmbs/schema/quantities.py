@@ -187,11 +187,12 @@ class Measure:
             return number
         if shown == "1":
             raise OutOfRange(self._range, f"{number:.6g}; {self._range}")
-        said = f"{number / factor:.6g} {shown}; {self._range}"
+        said, note = f"{number / factor:.6g} {shown}", ""
         if isinstance(value, Real) and not self._sign:
             hint = f"; write '{value} {shown}' if that is meant" if self._allows(float(value) * factor, factor) else ""
-            said += f" (a plain number is in {self.unit}{hint if shown != self.unit else ''})"
-        raise OutOfRange(f"this is {said}", said)
+            note = f" (a plain number is in {self.unit}{hint if shown != self.unit else ''})"
+        as_given = f"{value} {shown}" if isinstance(value, Real) and factor == 1.0 else said
+        raise OutOfRange(f"this is {said}; {self._range}{note}", f"{as_given}; {self._range}{note}")
 
     def _allows(self, number: float, factor: float) -> bool:
         # a limit that is not given is no number, of which no comparison holds
