@@ -106,11 +106,13 @@ class Measure:
         """
         if self.several is None:
             return self._finite(value)
+        count = f"{abs(self.several)}{' or more' if self.several < 0 else ''}"
+        asked = f"give a list of {count} values" if self.several else "give a list"
         if isinstance(value, str) or not isinstance(value, Iterable):
-            raise ValueError("give a list")
-        found = tuple(self._finite(item) for item in value)
+            raise ValueError(asked)
+        found = tuple(map(self._finite, value))
         if len(found) != self.several > 0 or len(found) < -self.several:
-            raise ValueError(f"give {abs(self.several)} {'values' if self.several > 0 else 'or more'}")
+            raise ValueError(asked)
         return found
 
     def _finite(self, value: Any) -> Any:
@@ -128,7 +130,7 @@ class Measure:
                 return self._one(int(value))
             raise NoQuantity
         except NoQuantity:
-            if self.whole or self.remedy:
+            if self.whole or self.remedy or self.unit == "1":
                 raise OutOfRange(self._range, f"{value!r}; {self._range}") from None
             raise
 
@@ -219,7 +221,7 @@ class Measure:
         bounds += [f"up to {high}" if high else "", f"less than {below}" if below else ""]
         span = f"{low} to {high}" if low and high else " and ".join(filter(None, bounds))
         unit = self.shown or self.unit
-        kind = "a whole number, " if self.whole else ""
+        kind = "a whole number, " if self.whole else "" if span else "a number"
         return f"give {kind}{span}{'' if unit == '1' else f' {unit}'}"
 
 
