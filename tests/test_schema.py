@@ -38,6 +38,7 @@ class Machine(Described):
     length: Annotated[Quantity, Measure("length", above=0)] = "20 mm"
     tilt: Annotated[Quantity, Measure("angle", -10, 10, "deg")] = 0.0
     share: Annotated[Quantity, Measure(low=0, below=1, remedy="give a share such as 0.1")] = 0.0
+    factor: Annotated[Quantity, Measure()] = 1.0
     count: Annotated[int, Measure(low=1, high=9, whole=True)] = 1
     gap: Annotated[Quantity, Measure("length", 0)] = None
     at: Annotated[tuple, Measure("length", several=3)] = (0.0, 0.0, 0.0)
@@ -93,6 +94,8 @@ def test_fields_are_read_by_what_they_say():
     assert replace(machine) == machine
     assert replace(machine, wheel=None, gap=None).gap is None
     assert measures_of(Machine)["tilt"].unit == "rad"
+    # a plain number without a unit is stored as it was given, so that keys of stored cases stay
+    assert type(Measure(low=0).as_given(3)) is int
 
 
 WRONG = [
@@ -109,9 +112,10 @@ WRONG = [
     ({"count": 2.5}, r"count is 2\.5; give a whole number, 1 to 9"),
     ({"count": True}, r"count is True; give a whole number"),
     ({"count": 10}, r"count is 10; give a whole number, 1 to 9"),
-    ({"at": [1, 2]}, r"at is \[1, 2\]; give 3 values"),
-    ({"at": "1 mm"}, r"at is '1 mm'; give a list"),
-    ({"levels": ["1 N"]}, r"levels is \['1 N'\]; give 2 or more"),
+    ({"at": [1, 2]}, r"at is \[1, 2\]; give a list of 3 values"),
+    ({"at": "1 mm"}, r"at is '1 mm'; give a list of 3 values"),
+    ({"levels": ["1 N"]}, r"levels is \['1 N'\]; give a list of 2 or more values"),
+    ({"factor": "3 mm"}, r"factor is '3 mm'; give a number"),
     ({"grease": "lard"}, r"grease is 'lard'; choose mineral$"),
     ({"side": "up"}, r"side is 'up'; choose 'left' or 'right'"),
     ({"torque": math.nan}, r"torque is nan; give a finite number, a quantity or an expression of time"),

@@ -296,7 +296,7 @@ class LooseFit(Defect):
     clearance: Length = "20 um"
     stiffness: Annotated[Quantity, Measure("stiffness", above=0)] = 5e8
     damping: Annotated[Quantity, Measure("time", 0)] = 1e-5
-    creep: Annotated[Quantity, Measure("N*m*s/rad", 0)] = 0.05
+    creep: Annotated[Quantity, Measure(low=0)] = 0.05
 
     def check(self, bearing: Bearing) -> None:
         require(self.part != ELEMENT, "LooseFit.part is 'element'; choose outer or inner")

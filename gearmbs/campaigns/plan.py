@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -279,16 +279,7 @@ class Plan:
         return {
             "subject": {"kind": self.subject.kind, "settings": self.subject.settings()},
             "factors": [factor_table(f) for f in self.factors],
-            "design": self.design,
-            "seed": self.seed,
-            "keep": list(self.keep),
-            "constraints": list(self.constraints),
-            "options": self.options,
-            "unit": self.unit,
-            "time_limit": self.time_limit,
-            "memory_limit": self.memory_limit,
-            "on_failure": self.on_failure,
-            "reuse": list(self.reuse),
+            **{f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("subject", "factors", "n")},
         }
 
     @classmethod
@@ -376,7 +367,7 @@ def make_plan(
         if not isinstance(factor, AnyFactor):
             raise CampaignError(f"factors: {factor!r} is none; give Factor, Choice or Specimens")
     own = tuple(factor.in_si(subject) for factor in given)
-    chosen(dict.fromkeys(designs.DESIGNS), design, "", CampaignError, "design")
+    chosen(designs.DESIGNS, design, "", CampaignError, "design")
     counted = (*designs.SEQUENCES, *designs.ANALYSES, "latin hypercube")
     n = whole(n, "n", 0)
     if design in counted and n < 1:
@@ -425,7 +416,7 @@ def _consistent(plan: Plan) -> None:
         raise CampaignError(
             f"constraints: points left out would break the {plan.design} design; narrow the ranges instead"
         )
-    chosen(dict.fromkeys(FAILURE_POLICIES), plan.on_failure, "", CampaignError, "on_failure")
+    chosen(FAILURE_POLICIES, plan.on_failure, "", CampaignError, "on_failure")
 
 
 def _variant(factor: AnyFactor) -> tuple:

@@ -25,6 +25,7 @@ from gearmbs.units import Quantity
 
 SLIP = (Diagnostic("slip", "1"),)
 
+EVEN = "give an even number of 2 or more"
 Power = Annotated[Quantity, Measure("power", above=0)]
 Positive = Annotated[Quantity, Measure(above=0)]
 
@@ -175,17 +176,14 @@ class InductionMotor(Drive):
     kind: ClassVar[str] = "induction motor"
 
     power: Power
-    poles: int = 4
+    poles: Annotated[int, Measure(low=2, whole=True, remedy=EVEN)] = 4
     frequency: Annotated[Quantity, Measure("frequency", above=0)] = 50.0
     breakdown: Annotated[Quantity, Measure(above=1, remedy="give more than 1 (rated torques)")] = 2.5
     lag: Any = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(
-            self.poles >= 2 and self.poles % 2 == 0,
-            f"{self.label}: poles is {self.poles!r}; give an even number of 2 or more",
-        )
+        require(self.poles % 2 == 0, f"{self.label}: poles is {self.poles}; {EVEN}")
         require(
             0.0 < self.rated_slip < 1.0,
             f"{self.label}: speed is {abs(self.speed) * 30 / math.pi:.6g} rpm; the synchronous speed is "
@@ -370,8 +368,8 @@ class ControlledDrive(Drive):
 
     kind: ClassVar[str] = "controlled"
 
-    proportional: Annotated[Quantity, Measure("N*m*s/rad", above=0)]
-    integral: Annotated[Quantity, Measure("N*m/rad", above=0)]
+    proportional: Positive
+    integral: Positive
     largest: Annotated[Quantity, Measure("torque", above=0)]
     reference: Any = None
 

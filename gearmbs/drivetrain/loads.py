@@ -148,7 +148,7 @@ class Pump(Load):
     harmonics: Annotated[int, Measure(low=0, whole=True)] = 4
     lag: Annotated[Quantity, Measure("time", 0)] = 0.0
     start: Annotated[Quantity, Measure("angle")] = 0.0
-    smoothing: Annotated[Quantity, Measure("angular speed")] = 1.0
+    smoothing: Annotated[Quantity, Measure()] = 1.0
 
     @property
     def per_pressure(self) -> float:

@@ -282,22 +282,31 @@ def _ideal(
     return kind.with_damping_ratio(pair, law.mean_mesh_stiffness, ratio, backlash=parting, **curves)
 
 
-def contact_law(value: Any) -> ContactLaw:
+LAWS: dict[str, Any] = {
+    "impact": ContactLaw.impact, "hunt-crossley": ContactLaw.hunt_crossley, "linear": ContactLaw.linear,
+    "hertz": ContactLaw.hertz_line,
+}  # fmt: skip
+
+
+def contact_law(value: Any, key: str = "kind") -> ContactLaw:
     """Return the law that a table such as ``{"kind": "linear", "stiffness": "3e8 N/m"}`` stands for, or a law itself.
+
+    Parameters
+    ----------
+    value : ContactLaw or mapping
+    key : str
+        What names the law in the table.
 
     Raises
     ------
     ValueError
-        For an unknown kind.
+        For an unknown law.
     """
     if isinstance(value, ContactLaw):
         return value
     table = dict(value)
-    kinds: dict[str, Any] = {
-        "impact": ContactLaw.impact, "hunt-crossley": ContactLaw.hunt_crossley, "linear": ContactLaw.linear,
-        "hertz": ContactLaw.hertz_line,
-    }  # fmt: skip
-    return chosen(kinds, table.pop("kind", "impact"), "contact: ", DrivetrainError)(**table)
+    name = str(table.pop(key, "impact")).replace("_", "-")
+    return chosen(LAWS, name, "contact: ", DrivetrainError, key)(**table)
 
 
 def flank_friction(value: Any) -> FlankFriction:

@@ -10,6 +10,8 @@ from gearmbs.drivetrain.part import Part
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
 
+Direction = Annotated[tuple[float, float, float], Measure(several=3)]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor(Part):
@@ -20,19 +22,12 @@ class Sensor(Part):
     unit: ClassVar[str] = "1"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Directed(Sensor):
-    """A sensor that measures along a direction."""
-
-    direction: Annotated[tuple[float, float, float], Measure(several=3)] = (1.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(any(self.direction), f"{self.label}: direction is {self.direction}; give one that is not all zero")
+def _check_direction(sensor: Laser | Accelerometer) -> None:
+    require(any(sensor.direction), f"{sensor.label}: direction is {sensor.direction}; give one that is not all zero")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Laser(Directed):
+class Laser(Sensor):
     """A laser vibrometer on a shaft: the velocity (v + w x r) . d of the surface under a spot fixed in space.
 
     Parameters
@@ -51,11 +46,16 @@ class Laser(Directed):
 
     shaft: str
     station: Annotated[Quantity, Measure("length")] = None
+    direction: Direction = (1.0, 0.0, 0.0)
     offset: Annotated[Quantity, Measure("length")] = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_direction(self)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Accelerometer(Directed):
+class Accelerometer(Sensor):
     """Acceleration of the housing at the seat of a bearing, along a direction.
 
     Parameters
@@ -70,6 +70,11 @@ class Accelerometer(Directed):
     unit: ClassVar[str] = "m/s^2"
 
     bearing: str
+    direction: Direction = (1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_direction(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -75,7 +75,7 @@ def _readers(kind: Any) -> dict[str, Any]:
 
     def taken(hint: Any) -> Any:
         """Let objects be taken as they are."""
-        if get_origin(hint) is UnionType:
+        if get_origin(hint) in (Union, UnionType):
             return Union[tuple(map(taken, get_args(hint)))]  # noqa: UP007
         return InstanceOf[hint] if is_dataclass(hint) else hint  # type: ignore[misc, valid-type]
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from gearmbs.schema.quantities import NoQuantity, OutOfRange
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
-
-T = TypeVar("T")
 
 WORDS = {
     **dict.fromkeys(("int_type", "int_from_float", "int_parsing"), "give a whole number"),
@@ -113,10 +111,10 @@ def check_keys(
 
 
 def chosen(
-    kinds: Mapping[str, T], name: str, where: str, error: type[ValueError], what: str = "kind", otherwise: str = ""
-) -> T:
-    """Return what stands under a name in a table of kinds, or say which there are."""
+    kinds: Collection[str], name: str, where: str, error: type[ValueError], what: str = "kind", otherwise: str = ""
+) -> Any:
+    """Return what stands under a name in a table of kinds, of a list the name, or say which there are."""
     if name not in kinds:
         hint = did_you_mean(name, kinds, before="; ")
         raise error(f"{where}{what} {name!r} is unknown; choose one of {', '.join(kinds)}{otherwise}{hint}")
-    return kinds[name]
+    return kinds[name] if isinstance(kinds, Mapping) else name

@@ -106,11 +106,13 @@ class Measure:
         """
         if self.several is None:
             return self._finite(value)
+        count = f"{abs(self.several)}{' or more' if self.several < 0 else ''}"
+        asked = f"give a list of {count} values" if self.several else "give a list"
         if isinstance(value, str) or not isinstance(value, Iterable):
-            raise ValueError("give a list")
-        found = tuple(self._finite(item) for item in value)
+            raise ValueError(asked)
+        found = tuple(map(self._finite, value))
         if len(found) != self.several > 0 or len(found) < -self.several:
-            raise ValueError(f"give {abs(self.several)} {'values' if self.several > 0 else 'or more'}")
+            raise ValueError(asked)
         return found
 
     def _finite(self, value: Any) -> Any:
@@ -128,7 +130,7 @@ class Measure:
                 return self._one(int(value))
             raise NoQuantity
         except NoQuantity:
-            if self.whole or self.remedy:
+            if self.whole or self.remedy or self.unit == "1":
                 raise OutOfRange(self._range, f"{value!r}; {self._range}") from None
             raise
 
@@ -177,18 +179,22 @@ class Measure:
         return tuple(points)
 
     def _one(self, value: Any) -> Any:
-        number = value if self.whole else in_si(value, self.dimension)
+        number = in_si(value, self.dimension)
+        if self.unit == "1" and isinstance(value, Real):
+            # a whole number stays one
+            number = value
         shown = self.shown or self.unit
         factor = SHOWN.get(shown, 1.0)
         if self._allows(number, factor):
             return number
         if shown == "1":
             raise OutOfRange(self._range, f"{number:.6g}; {self._range}")
-        said = f"{number / factor:.6g} {shown}; {self._range}"
+        said, note = f"{number / factor:.6g} {shown}", ""
         if isinstance(value, Real) and not self._sign:
             hint = f"; write '{value} {shown}' if that is meant" if self._allows(float(value) * factor, factor) else ""
-            said += f" (a plain number is in {self.unit}{hint if shown != self.unit else ''})"
-        raise OutOfRange(f"this is {said}", said)
+            note = f" (a plain number is in {self.unit}{hint if shown != self.unit else ''})"
+        as_given = f"{value} {shown}" if isinstance(value, Real) and factor == 1.0 else said
+        raise OutOfRange(f"this is {said}; {self._range}{note}", f"{as_given}; {self._range}{note}")
 
     def _allows(self, number: float, factor: float) -> bool:
         # a limit that is not given is no number, of which no comparison holds
@@ -215,7 +221,7 @@ class Measure:
         bounds += [f"up to {high}" if high else "", f"less than {below}" if below else ""]
         span = f"{low} to {high}" if low and high else " and ".join(filter(None, bounds))
         unit = self.shown or self.unit
-        kind = "a whole number, " if self.whole else ""
+        kind = "a whole number, " if self.whole else "" if span else "a number"
         return f"give {kind}{span}{'' if unit == '1' else f' {unit}'}"
 
 

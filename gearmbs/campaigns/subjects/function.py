@@ -23,6 +23,7 @@ from gearmbs.campaigns.subjects.base import (
     tooth_fault_unit,
 )
 from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import chosen
 from gearmbs.units import DIMENSIONS, si_unit, to_si
 
 # What a file of nested tables describes, as the subject of a campaign: drivetrains and planetary sets.
@@ -105,8 +106,7 @@ class TablesSubject(Subject):
                 continue
             name = item.removeprefix("signal:")
             known = self.channels(things[0])
-            if name not in known:
-                raise CampaignError(f"keep: signal {name!r} is unknown; choose one of {', '.join(known)}")
+            chosen(known, name, "keep: ", CampaignError, "signal")
             spans, rates = zip(*(self.span_and_rate(thing) for thing in things))
             if len(set(rates)) > 1:
                 several = ", ".join(f"{rate:g}" for rate in sorted(set(rates)))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -79,10 +81,8 @@ class _OneError(ModelMetaclass):
     def __call__(cls: Any, *args: Any, **data: Any) -> Any:
         if args:
             raise CaseError(f"{cls.label(data)}: give its fields by name, not by place")
-        try:
+        with told_by(cls, cls.label(data)):
             return super().__call__(**data)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, cls.label(data))) from None
 
 
 class Section(BaseModel, metaclass=_OneError):
@@ -106,26 +106,20 @@ class Section(BaseModel, metaclass=_OneError):
         CaseError
             Naming every wrong field with its value, each in a line.
         """
-        try:
+        with told_by(cls, source):
             return cls.__pydantic_validator__.validate_python(data)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, source)) from None
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Any:
         """Return the section made of a mapping, as pydantic does but with the package's own error."""
-        try:
+        with told_by(cls, cls.label(obj)):
             return super().model_validate(obj, **options)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, cls.label(obj))) from None
 
     @classmethod
     def model_validate_json(cls, json_data: Any, **options: Any) -> Any:
         """Return the section made of JSON, as pydantic does but with the package's own error."""
-        try:
+        with told_by(cls, cls.label({})):
             return super().model_validate_json(json_data, **options)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, cls.label({}))) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to set a field, in the package's own words.
@@ -210,9 +204,13 @@ def _remark(field: str, value: Any, measure: Measure) -> None:
         )
 
 
-def explained(error: ValidationError, kind: Any, source: str) -> str:
-    """Return what is wrong, each fault in a line of its own that begins with ``source``."""
-    return "\n".join(f"{source}: {_line(items, kind)}" for items in faults(error))
+@contextmanager
+def told_by(kind: Any, source: str) -> Iterator[None]:
+    """Turn what pydantic says into a CaseError, each fault in a line of its own that begins with ``source``."""
+    try:
+        yield
+    except ValidationError as error:
+        raise CaseError("\n".join(f"{source}: {_line(items, kind)}" for items in faults(error))) from None
 
 
 def _line(items: list[Any], kind: Any) -> str:

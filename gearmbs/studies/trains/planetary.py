@@ -14,12 +14,13 @@ import xarray as xr
 from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.dae import Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.gears import ContactLaw, ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.drivetrain.parts import contact_law
+from gearmbs.gears import ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
 from gearmbs.gears.planetary.rig import PinBearing
 from gearmbs.mechanism import Mechanism
 from gearmbs.schema.described import Described
 from gearmbs.schema.files import read_toml
-from gearmbs.schema.messages import check_keys, chosen
+from gearmbs.schema.messages import check_keys
 from gearmbs.schema.quantities import Measure
 from gearmbs.signals import fixed_sensor
 from gearmbs.studies.case.section import CaseError
@@ -127,7 +128,7 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
         if name in table:
             table[name] = tuple(table[name])
     if "contact" in data:
-        table["contact"] = _law(dict(data["contact"]))
+        table["contact"] = contact_law(data["contact"], "law")
     if "friction" in data:
         table["friction"] = FlankFriction(**data["friction"])
     places = []
@@ -173,16 +174,6 @@ def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
 def _pins(table: dict[str, Any]) -> Support | PinBearing:
     rolling = table.pop("rolling", None)
     return Support(**table) if rolling is None else rolling_pins(rolling, **table)
-
-
-def _law(table: dict[str, Any]) -> ContactLaw:
-    kind = str(table.pop("law", "impact")).replace("-", "_")
-    makers: dict[str, Callable[..., ContactLaw]] = {
-        "impact": ContactLaw.impact,
-        "hunt_crossley": ContactLaw.hunt_crossley,
-        "linear": ContactLaw.linear,
-    }
-    return chosen(makers, kind, "contact: ", CaseError, "law")(**table)
 
 
 def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = None) -> xr.Dataset:
