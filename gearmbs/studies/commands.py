@@ -54,7 +54,7 @@ def bench(
     phase: Annotated[float, typer.Option(help="Phase of the second mesh, pitches.")] = 0.0,
     pump_teeth: Annotated[int, typer.Option(help="Teeth of the pump; 0: no ripple.")] = 12,
     pair: Annotated[bool, typer.Option(help="Run the pair's study beside it.")] = True,
-    workers: Annotated[int | None, typer.Option(help="Cases of the pair at a time; default: the cores.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Runs at a time; default: the cores.")] = None,
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
