@@ -54,7 +54,7 @@ def bench(
     phase: Annotated[float, typer.Option(help="Phase of the second mesh, pitches.")] = 0.0,
     pump_teeth: Annotated[int, typer.Option(help="Teeth of the pump; 0: no ripple.")] = 12,
     pair: Annotated[bool, typer.Option(help="Run the pair's study beside it.")] = True,
-    workers: Annotated[int | None, typer.Option(help="Cases of the pair at a time; default: the cores.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Runs at a time; default: the cores.")] = None,
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
@@ -133,6 +133,22 @@ def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
         typer.secho(f"gearmbs: interrupted at t = {end:.6g} s; what was computed until then is in {path}", err=True)
         raise typer.Exit(130) from None
     raise RuntimeError(f"{failure}\nWhat was computed until then is in {path}") from failure
+
+
+def simulated(name: str, span: float, target: Path, run: Callable[..., Any], size: float = 0.0) -> Any:
+    """Simulate with a bar over the time of a run (s) and write the record; of a run that fails what it computed."""
+    from gearmbs.files import check_place
+    from gearmbs.studies.run.simulation import SimulationFailed
+    from gearmbs.studies.run.store import keep_dataset
+
+    check_place(target.parent, size, "its record")
+    with case_bars([name]) as move:
+        try:
+            data = run(progress=lambda t: move(name, min(t / span, 1.0)))
+        except SimulationFailed as failure:
+            keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
+    keep_dataset(target, data)
+    return data
 
 
 def paper(
@@ -240,20 +256,12 @@ def run(
             case = case.changed(solver={"lump": True})
         check_record(case, str(case_file))
 
-        from gearmbs.files import check_place
-        from gearmbs.studies.run.simulation import SimulationFailed, run_case
-        from gearmbs.studies.run.store import keep_dataset, record_size
+        from gearmbs.studies.run.simulation import run_case
+        from gearmbs.studies.run.store import record_size
 
-        target = out or case_file.with_suffix(".nc")
-        check_place(target.parent, record_size(case), "its record")
-        operation = case.operation
+        target, operation = out or case_file.with_suffix(".nc"), case.operation
         span = operation.run_up + operation.settling + operation.duration
-        with case_bars([case.name]) as move:
-            try:
-                data = run_case(case, lambda t: move(case.name, min(t / span, 1.0)))
-            except SimulationFailed as failure:
-                keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
-        keep_dataset(target, data)
+        data = simulated(case.name, span, target, partial(run_case, case), record_size(case))
         typer.echo(_level_table(data))
         for remark in remarks(case):
             typer.echo(f"note: {remark}", err=True)
@@ -265,9 +273,7 @@ def run(
 def run_planetary_set(file: Path, out: Path | None) -> None:
     """Simulate a planetary set; write its record and say how the load is shared."""
     with guarded():
-        from gearmbs.files import check_place
         from gearmbs.studies.case.section import CaseError
-        from gearmbs.studies.run.store import keep_dataset
         from gearmbs.studies.trains.planetary import load_planetary, run_planetary
 
         found = load_planetary(file)
@@ -277,11 +283,8 @@ def run_planetary_set(file: Path, out: Path | None) -> None:
         except ValueError as error:
             raise CaseError(f"{file.name}: {error}") from None
         target = out or file.with_suffix(".nc")
-        check_place(target.parent, 0, "its record")
         span = found.run_up + found.settling + found.duration
-        with case_bars([found.gears.name]) as move:
-            data = run_planetary(found, lambda t: move(found.gears.name, min(t / span, 1.0)))
-        keep_dataset(target, data)
+        data = simulated(found.gears.name, span, target, partial(run_planetary, found))
         for planet in data.planet.values:
             one = data.sel(planet=planet)
             loads = "".join(f"{float(one['force'].sel(mesh=m).mean()):12.5g} N ({m})" for m in ("sun", "ring"))
@@ -300,23 +303,15 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         train, settings = found.train, found.run
         check_record(train, settings)
 
-        from gearmbs.files import check_place, write_whole
+        from gearmbs.files import write_whole
         from gearmbs.signals.files.simulated import holds_speed
-        from gearmbs.studies.run.simulation import SimulationFailed
-        from gearmbs.studies.run.store import keep_dataset
         from gearmbs.studies.trains.report import train_report, train_scene, train_spectrum
         from gearmbs.studies.trains.trains import run_train
         from gearmbs.view import save_figure
 
         target = out or file.with_suffix(".nc")
-        check_place(target.parent, 0, "its record")
         span = train.run_up + settings.settling + settings.duration
-        with case_bars([train.name]) as move:
-            try:
-                data = run_train(train, settings, progress=lambda t: move(train.name, min(t / span, 1.0)))
-            except SimulationFailed as failure:
-                keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
-        keep_dataset(target, data)
+        data = simulated(train.name, span, target, partial(run_train, train, settings))
         report, scene = target.with_suffix(".md"), target.with_suffix(".html")
         write_whole(report, train_report(train, data))
         train_scene(train).save_html(scene)

@@ -15,6 +15,7 @@ from gearmbs.studies.presets.resonance import (
     jump_frequency,
     lowest_lag,
     resonance_train,
+    run_resonance,
     separation_load,
     separation_loads,
     sweep_resonance,
@@ -153,6 +154,16 @@ def test_report_and_figure(study, tmp_path):
 def test_wrong_settings(changes, words):
     with pytest.raises(ValueError, match=words):
         ResonanceSettings(**changes)
+
+
+def test_both_directions_side_by_side(monkeypatch):
+    monkeypatch.setattr("gearmbs.studies.presets.resonance.separation_loads", lambda settings: {})
+    settings, told = ResonanceSettings(cycles=300), {}
+    found = run_resonance(settings, progress=lambda name, fraction: told.update({name: fraction}))
+    assert list(found.sweeps) == [(model, direction) for direction in DIRECTIONS for model in MODELS]
+    assert told == {"up": 1.0, "down": 1.0}
+    assert found.sweeps["multibody", "down"].equals(sweep_resonance(settings, "down"))
+    assert found.sweeps["one degree", "up"].equals(sweep_resonance(settings, "up", "one degree"))
 
 
 def test_no_jump_where_amplitudes_only_slope():

@@ -19,7 +19,6 @@ import xarray as xr
 from gearmbs._shown import Written
 from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, SpeedDrive
 from gearmbs.gears import ContactLaw
-from gearmbs.progress import told_of_span
 from gearmbs.signals import convert
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
@@ -31,7 +30,7 @@ from gearmbs.studies.paper.report import verdict_table
 from gearmbs.studies.presets.files import BenchChoice, choices, on_mounts, preset_train, with_values
 from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.run.store import save_study
-from gearmbs.studies.trains.trains import run_train, train_signal
+from gearmbs.studies.trains.trains import run_trains, train_signal
 from gearmbs.units import Quantity, to_si
 
 PRESSURES = {"low": 1e6, "high": 5e6}
@@ -329,7 +328,7 @@ def run_bench(
     *,
     pair: bool = True,
     workers: int | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
 ) -> BenchStudy:
     """Simulate the bench in its three states at 1 and 5 MPa, and the pair of the paper's model beside it.
 
@@ -341,9 +340,9 @@ def run_bench(
     pair : bool
         Whether to run the pair's study, too, with a record of the same length.
     workers : int, optional
-        Of the pair's study.
-    progress : callable, optional
-        Called with the name of a run and the part of it that is done.
+        Runs at a time; default the cores.
+    progress : bool or callable, optional
+        See `gearmbs.studies.run_trains`.
 
     Raises
     ------
@@ -354,16 +353,14 @@ def run_bench(
     if settings.bearings == "ideal":
         raise ValueError("bearings is 'ideal': a laser sees nothing move in rigid bearings; give 'elastic'")
     run = run or RunSettings(settling=0.2, duration=1.0)
-    records: dict[tuple[str, str], xr.Dataset] = {}
-    for load, pressure in PRESSURES.items():
-        for state in STATES:
-            train = bench_train(pressure, state, settings)
-            name = f"bench, {state}, {load} load"
-            told = told_of_span(progress, name, train.run_up + run.settling + run.duration)
-            with warnings.catch_warnings():
-                # the paper's law over-damps the meshes; the choices and the report say so
-                warnings.filterwarnings("ignore", r"mesh '.*' is damped .* times critically")
-                records[load, state] = run_train(train, run, progress=told)
+    places = list(product(PRESSURES, STATES))
+    runs = {
+        f"bench, {state}, {load} load": (bench_train(PRESSURES[load], state, settings), run) for load, state in places
+    }
+    with warnings.catch_warnings():
+        # the paper's law over-damps the meshes; the choices and the report say so
+        warnings.filterwarnings("ignore", r"mesh '.*' is damped .* times critically")
+        records = dict(zip(places, run_trains(runs, workers=workers, progress=progress).values(), strict=True))
     rows = [[[levels(records[load, state], sensor) for state in STATES] for load in PRESSURES] for sensor in SENSORS]
     table = xr.DataArray(
         np.array(rows), dims=("sensor", "load", "state", "harmonic"),

@@ -24,13 +24,12 @@ from gearmbs.drivetrain import (
     RunSettings,
 )
 from gearmbs.gears import ContactLaw, GearPair, GearSpec
-from gearmbs.progress import told_of_span
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.presets.files import BenchChoice, choices, on_mounts, preset_train, with_values
 from gearmbs.studies.run.store import save_study
 from gearmbs.studies.trains.modes import mesh_orders, train_modes
 from gearmbs.studies.trains.report import train_report
-from gearmbs.studies.trains.trains import run_train
+from gearmbs.studies.trains.trains import run_trains
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
@@ -258,7 +257,7 @@ def run_gearbox(
     duration: float = 1.0,
     run_up: float = 4.0,
     tolerance: float = 1e-6,
-    progress: Callable[[str, float], None] | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
 ) -> GearboxStudy:
     """Compute modes, steady state and a run-up of the industrial gearbox.
 
@@ -271,8 +270,8 @@ def run_gearbox(
     run_up : float
         Time from a quarter of the operating speed to it, of which the last tenth holds it, s.
     tolerance : float
-    progress : callable, optional
-        Called with "steady" or "run-up" and the part of it that is done.
+    progress : bool or callable, optional
+        See `gearmbs.studies.run_trains`; the runs are "steady" and "run-up".
 
     Raises
     ------
@@ -290,9 +289,9 @@ def run_gearbox(
     points = ((SETTLING, SLOWEST * speed), (reached, speed), (SETTLING + run_up, speed))
     faster = industrial_gearbox(replace(s, curve=points))
     modes = train_modes(train)
-    records = []
-    for name, one, length in (("steady", train, duration), ("run-up", faster, run_up)):
-        run = RunSettings(settling=SETTLING, duration=length, tolerance=tolerance)
-        told = told_of_span(progress, name, one.run_up + run.settling + length)
-        records.append(run_train(one, run, progress=told))
-    return GearboxStudy(train, modes, records[0], records[1], s)
+    runs = {
+        name: (one, RunSettings(settling=SETTLING, duration=length, tolerance=tolerance))
+        for name, one, length in (("steady", train, duration), ("run-up", faster, run_up))
+    }
+    records = run_trains(runs, progress=progress)
+    return GearboxStudy(train, modes, records["steady"], records["run-up"], s)

@@ -33,11 +33,12 @@ from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.transmission import TransmissionError, loaded_transmission_error
 from gearmbs.mechanism import Mechanism
-from gearmbs.progress import told_of_span
 from gearmbs.schema.described import Described
 from gearmbs.schema.quantities import Measure
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.presets.files import preset_train, with_values
+from gearmbs.studies.run.parallel import run_named
+from gearmbs.studies.run.store import save_study
 from gearmbs.units import Quantity, to_si
 
 Direction = Literal["up", "down"]
@@ -454,27 +455,30 @@ class ResonanceStudy:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write the sweeps, the report and the figure to a folder; return the paths."""
-        from gearmbs.studies.run.store import save_study
-
         sweeps = {f"{model.replace(' ', '_')}_{way}.nc": sweep for (model, way), sweep in self.sweeps.items()}
         return save_study(folder, sweeps, {"report.md": self.report}, lambda: {"resonance": self.figure()})
 
 
 def run_resonance(
-    settings: ResonanceSettings | None = None, *, progress: Callable[[str, float], None] | None = None
+    settings: ResonanceSettings | None = None, *, progress: bool | Callable[[str, float], None] | None = None
 ) -> ResonanceStudy:
     """Sweep a pair up and down through its mesh resonance, by the multibody and by the classical model.
 
     Parameters
     ----------
     settings : ResonanceSettings, optional
-    progress : callable, optional
-        Called with "up" or "down" and the part of that multibody sweep that is done.
+    progress : bool or callable, optional
+        Bars, see `gearmbs.progress`; a callable is told "up" or "down" and the part of that multibody sweep that is
+        done.
     """
     s = settings or ResonanceSettings()
+
+    def work(direction: Any, report: Callable[[float], None]) -> xr.Dataset:
+        span = chirp(s, direction).duration
+        return sweep_resonance(s, direction, MODELS[0], progress=lambda t: report(min(t / span, 1.0)))
+
     sweeps: dict[tuple[str, str], xr.Dataset] = {}
-    for direction in DIRECTIONS:
-        told = told_of_span(progress, direction, chirp(s, direction).duration)
-        sweeps[MODELS[0], direction] = sweep_resonance(s, direction, MODELS[0], progress=told)
-        sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])
+    for direction, whole in run_named(work, DIRECTIONS, progress=progress).items():
+        sweeps[MODELS[0], direction] = whole
+        sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])  # type: ignore[arg-type]
     return ResonanceStudy(s, sweeps, separation_loads(s))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -22,9 +21,6 @@ from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupt
 from gearmbs.studies.run.store import RecordFolder, record_size
 from gearmbs.studies.run.workers import processes, threads
 
-REPORT_SECONDS = 0.2
-"""Shortest time between two reports of a case."""
-
 
 class StorageWarning(UserWarning):
     """A record could not be written where it was wanted; the message says where it is."""
@@ -33,6 +29,20 @@ class StorageWarning(UserWarning):
 def available_cores() -> int:
     """Return the number of cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+def run_named(
+    work: Callable[[str, Callable[[float], None]], Any],
+    names: Sequence[str],
+    *,
+    workers: int | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
+) -> dict[str, Any]:
+    """Return what ``work(name, report)`` gives by name, in threads, with bars; as many at a time as there are cores."""
+    with bars(progress, names) as move:
+        done = None if move is None else lambda name, _result: move(name, 1.0)
+        results = run_jobs(work, names, workers or available_cores(), where=threads, progress=move, done=done)
+    return dict(zip(names, results, strict=True))
 
 
 def run_cases(
@@ -148,18 +158,10 @@ def _carried_out(
     ledger: RecordFolder | None, keep: bool, case: Case, report: Callable[[float], None]
 ) -> tuple[Any, str]:
     """Return the record of a case, or the failure if it is to be kept, and why it is not where it should be."""
-    last = -REPORT_SECONDS
-
-    def seldom(t: float) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - last >= REPORT_SECONDS:
-            last = now
-            report(min(t / _span(case), 1.0))
 
     def work(_claim: object = None) -> tuple[Any, str]:
         try:
-            record = run_case(case, seldom)
+            record = run_case(case, lambda t: report(min(t / _span(case), 1.0)))
         except SimulationFailed as failure:
             if not keep or isinstance(failure, SimulationInterrupted):
                 raise

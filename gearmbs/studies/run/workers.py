@@ -19,6 +19,7 @@ import queue
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -29,6 +30,9 @@ from typing import Any
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 GRACE = 5.0
 """Seconds a worker process is given to end before it is killed."""
+
+REPORT_SECONDS = 0.2
+"""Shortest time between two reports of a job."""
 
 PROGRESS, RESULT, CLAIMED, FAILURE, DEATH = "progress", "result", "claimed", "failure", "death"
 END = object()
@@ -46,9 +50,18 @@ class Cancelled(RuntimeError):
 
 
 def outcome(work: Work, job: Any, report: Callable[[float], None]) -> tuple[str, Any]:
-    """Work on a job; return the kind and the value of the message about its end."""
+    """Work on a job, whose reports go on now and then; return the kind and the value of the message about its end."""
+    last = -REPORT_SECONDS
+
+    def seldom(fraction: float) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= REPORT_SECONDS:
+            last = now
+            report(fraction)
+
     try:
-        return RESULT, work(job, report)
+        return RESULT, work(job, seldom)
     except Claimed:
         return CLAIMED, None
     except Exception as error:
