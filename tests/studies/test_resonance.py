@@ -19,6 +19,7 @@ from gearmbs.studies.presets.resonance import (
     sweep_resonance,
 )
 from tests.make_records import read
+from tests.says import says
 
 WINDOW = 20
 
@@ -142,10 +143,10 @@ def test_report_and_figure(study, tmp_path):
 
 
 @pytest.mark.parametrize(("changes", "words"), [
-    ({"torque": "-3 N m"}, "torque is -3 N m; it must be positive"),
+    ({"torque": "-3 N m"}, says("torque", "-3 N m")),
     ({"span": (1.0, 0.5)}, "span is"),
     ({"damping_ratio": 0.0}, "damping_ratio is 0"),
-    ({"cycles": 10}, "cycles is 10; give 300 or more"),
+    ({"cycles": 10}, says("cycles", "10", "give 300")),
 ])  # fmt: skip
 def test_wrong_settings(changes, words):
     with pytest.raises(ValueError, match=words):

@@ -12,6 +12,7 @@ from gearmbs.signals import analyse, write_signal
 from gearmbs.view import analysis_figures, changing_speed_figures
 from gearmbs.view.figures.changing_speed import strongest_orders
 from tests.drivetrain.test_description import TEXT
+from tests.says import says
 from tests.view.looking import assert_readable
 
 RATE = 6400.0
@@ -166,7 +167,7 @@ def test_campbell_of_a_drivetrain(tmp_path):
 def test_one_speed_makes_no_waterfall(tmp_path):
     signal = gm.make_signal({"housing": np.cos(2 * np.pi * 575 * TIME)}, RATE, units="m/s^2", speed=50 * np.pi)
     record = write_signal(signal, tmp_path / "x.csv") or tmp_path / "x.csv"
-    wanted = r"stays at 1500 rpm; a waterfall needs a run-up, or several records at different speeds"
+    wanted = says("1500 rpm", "waterfall")
     for what in (signal, [signal, signal]):
         with pytest.raises(gm.signals.SignalError, match=wanted):
             gm.waterfall(what)
