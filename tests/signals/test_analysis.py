@@ -23,6 +23,7 @@ from gearmbs.signals import (
 )
 from gearmbs.signals.rotation.shaft import Known, mesh_shaft
 from tests.says import says
+from tests.signals.test_measured_lines import LEVELS
 
 RATE = 12800.0
 TEETH = 32
@@ -269,3 +270,8 @@ class TestMeasuredRecords:
             state="healthy", load="0 %"
         )
         assert float(ratio.min()) > 1.0
+        # as in the repository
+        for name, levels in LEVELS.items():
+            case = {"state": "healthy" if name[0] == "h" else "broken", "load": f"{name[5:]} %"}
+            found = report.data["experiment"].sel(case).transpose("harmonic", "channel")
+            np.testing.assert_allclose(found, levels, atol=6e-5)
