@@ -97,6 +97,7 @@ def lines(x, orders, turns):
     return np.array([2 * abs(np.mean((x - x.mean()) * np.exp(-2j * np.pi * order * t))) for order in orders])
 
 
+@pytest.mark.slow
 def test_sidebands_of_the_carrier_at_a_fixed_sensor():
     """The rim's sensor hears orders 96 and 104, those of a rigid ring's seat nothing; energy is kept in both."""
     turns, points, begin = 1, 4096, 0.04

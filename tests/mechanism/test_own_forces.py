@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numba import njit
@@ -11,9 +13,18 @@ from scipy.sparse import csc_array
 
 from gearmbs.adams import write_deck
 from gearmbs.mechanism import Diagnostic, Mechanism, ModelError, linear_modes, quasi_static, static_equilibrium
+from gearmbs.mechanism.forces import functions
 from tests.says import says
 
 UNIT = (0.1, 0.1, 0.1)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def each_function_is_compiled_once():
+    """And not for each of the models that are made with it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(functions, "_compiled", cache(functions._compiled))
+        yield
 
 
 def magnet(t, frames, states, parameters, wrench, rates, diagnostics):

@@ -89,6 +89,7 @@ series(sys.argv[1], store=sys.argv[2], speed="1500 rpm", progress=tell)
 """
 
 
+@pytest.mark.slow
 def test_killed_and_taken_up_again_it_is_the_same_table(folder, tmp_path):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     whole, other = tmp_path / "whole.csv", tmp_path / "killed.csv"
