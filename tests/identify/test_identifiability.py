@@ -126,6 +126,7 @@ def test_a_parameter_of_one_case_and_gains_of_lines():
         CaseProblem(table, cases, ["middle:operation.torque"], **settings)
 
 
+@pytest.mark.slow
 def test_the_experiment_that_would_tell():
     """Backlash does not show in a healthy pair, and does where both flanks are in contact."""
     cases = {"healthy": Case(operation=SHORT)}
@@ -141,6 +142,7 @@ def test_the_experiment_that_would_tell():
         rank_experiments(problem, {"x": {"operation.heat": 2.0}})
 
 
+@pytest.mark.slow
 def test_what_is_unknown_of_a_case_is_unknown_of_experiments_with_it():
     cases = {name: Case(operation={**SHORT, "torque": torque}) for name, torque in (("low", 50.0), ("high", 100.0))}
     rows = [(case, c, k, 1.0, 0.02) for case in cases for c in COMPONENTS for k in (1, 2, 3)]

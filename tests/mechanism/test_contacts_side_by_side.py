@@ -58,7 +58,9 @@ def touching(pair: tuple[str, str], draw: np.random.Generator) -> Mechanism:
     return m
 
 
-@pytest.mark.parametrize("pair", PAIRS, ids="-".join)
+@pytest.mark.parametrize(
+    "pair", [p if p[0] == p[1] else pytest.param(p, marks=pytest.mark.slow) for p in PAIRS], ids="-".join
+)
 def test_loads_of_contacts_are_the_same_side_by_side(pair):
     draw = np.random.default_rng(PAIRS.index(pair))
     solution = touching(pair, draw).simulate(0.03, t_eval=np.linspace(0.0, 0.03, OUTPUTS), tol=1e-5)

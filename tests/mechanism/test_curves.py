@@ -91,6 +91,7 @@ def test_wrong_points(t, f, words):
         curve(t, f)
 
 
+@pytest.mark.slow
 def test_lines_are_the_lines_but_for_their_corners():
     """Of random points: exactly linear between the corners, near them at them, smooth, with a continuous integral."""
     rng = np.random.default_rng(seed())

@@ -37,6 +37,7 @@ def families(names: set[str]) -> set[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_pendulum_loads_no_kernel_of_a_force():
     assert families(loaded()) == set()
 

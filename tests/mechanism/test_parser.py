@@ -100,6 +100,7 @@ WORDS = """DX STEP ( ) , : TIME 1 2.5E3 90D ** * - / + ' .m.p
            IF IMPACT CUBSPL VARVAL ORIENT JOINT 1E5 \\ é 0 FX D E""".split()
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None, derandomize=True)
 @given(st.one_of(st.lists(st.sampled_from(WORDS), max_size=25).map("".join), st.text(max_size=40)))
 def test_any_text_gives_a_tape_or_an_expression_error(text):

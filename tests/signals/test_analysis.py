@@ -215,6 +215,7 @@ def test_analyse_file_and_its_progress(tmp_path):
         analyse_file(tmp_path / "none.csv", teeth=32)
 
 
+@pytest.mark.slow
 def test_scratch_memory_stays_below_twice_the_record():
     t = np.arange(10 * 51200) / 51200.0
     angle = 2 * np.pi * 29.75 * t

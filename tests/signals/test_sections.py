@@ -106,6 +106,7 @@ def test_what_is_missing_or_damaged_is_named(tmp_path):
         list(sections(tmp_path / "x.csv", 1.0, rate=100.0))
 
 
+@pytest.mark.slow
 def test_trend_follows_what_changes(tmp_path):
     whole = record()
     path = write_signal(whole, tmp_path / "x.csv.gz")

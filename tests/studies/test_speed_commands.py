@@ -52,6 +52,7 @@ def test_strongest_orders_are_those_of_the_record(run_up):
     assert set(changing_speed_figures(kept, phase=phase)) == NAMES
 
 
+@pytest.mark.slow
 def test_analyse_and_waterfall_draw_a_run_up(run_up, tmp_path):
     record = write_signal(run_up, tmp_path / "up.csv") or tmp_path / "up.csv"
     result = invoked("analyse", record, "--speed-channel", "n", "--figures", tmp_path / "one")
@@ -118,6 +119,7 @@ def test_waterfall_of_records_that_hold_their_speed(tmp_path, told):
     assert [float(text) for text in found.groups()] == pytest.approx([600.0, 1200.0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_sweep_writes_records_table_and_figure_and_is_taken_up(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text('name = "one"\n[operation]\nduration = "0.1 s"\nrun_up = "0.02 s"\nsettling = "0 s"\n')
