@@ -11,6 +11,7 @@ from gearmbs.signals.analysis.campbell import critical_speeds
 from gearmbs.studies import GearboxSettings, gearbox_choices, industrial_gearbox, run_gearbox, train_modes, train_report
 from gearmbs.studies.trains.trains import run_train
 from tests.drivetrain.support import stage
+from tests.says import says
 from tests.studies.presets import agrees_with_its_file
 
 
@@ -163,9 +164,9 @@ tolerance = 1e-6
 
 
 @pytest.mark.parametrize(("curve", "words"), [
-    ([("0 s", "100 rpm")], "give two or more, increasing"),
-    ([("0 s", "100 rpm"), ("1 s", "2000 rpm")], "give the fastest speed as speed"),
-    ([("0 s", "-100 rpm"), ("1 s", "1500 rpm")], "give the fastest speed as speed"),
+    ([("0 s", "100 rpm")], says("give two")),
+    ([("0 s", "100 rpm"), ("1 s", "2000 rpm")], says("speed", "give the fastest")),
+    ([("0 s", "-100 rpm"), ("1 s", "1500 rpm")], says("speed", "give the fastest")),
     (3.0, "give points"),
 ])  # fmt: skip
 def test_wrong_curves(curve, words):

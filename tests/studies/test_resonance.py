@@ -22,6 +22,7 @@ from gearmbs.studies.presets.resonance import (
 )
 from gearmbs.studies.trains.trains import load_train
 from tests.make_records import read
+from tests.says import says
 from tests.studies.presets import agrees_with_its_file
 
 WINDOW = 20
@@ -146,10 +147,10 @@ def test_report_and_figure(study, tmp_path):
 
 
 @pytest.mark.parametrize(("changes", "words"), [
-    ({"torque": "-3 N m"}, "torque is -3 N m; it must be positive"),
+    ({"torque": "-3 N m"}, says("torque", "-3 N m")),
     ({"span": (1.0, 0.5)}, "span is"),
     ({"damping_ratio": 0.0}, "damping_ratio is 0"),
-    ({"cycles": 10}, "cycles is 10; give 300 or more"),
+    ({"cycles": 10}, says("cycles", "10", "give 300")),
 ])  # fmt: skip
 def test_wrong_settings(changes, words):
     with pytest.raises(ValueError, match=words):
