@@ -53,10 +53,9 @@ def lists() -> str:
         f"ACTIVATE and DEACTIVATE switch **these elements**: {names(commands.ELEMENTS.split())}.",
         f"What is not modelled can be switched without effect; {most(kept)} stay on.",
     ]
-    wrap = textwrap.TextWrapper(WIDTH, break_long_words=False, break_on_hyphens=False)
-    text = "\n\n".join(wrap.fill(one) for one in paragraphs)
-    wrap.initial_indent, wrap.subsequent_indent = "* ", "  "
-    return f"{text}\n\n" + "\n".join(wrap.fill(one) for one in points)
+    plain = textwrap.TextWrapper(WIDTH, break_long_words=False, break_on_hyphens=False)
+    listed = textwrap.TextWrapper(WIDTH, initial_indent="* ", subsequent_indent="  ", break_long_words=False)
+    return "\n\n".join([*map(plain.fill, paragraphs), "\n".join(map(listed.fill, points))])
 
 
 def page() -> str:

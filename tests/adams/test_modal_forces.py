@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, run_deck
-from gearmbs.adams.parse.matrix_files import read_matrices
+from gearmbs.adams.parse.data import read_matrices
 from gearmbs.flexible import Shaft, ShaftSection, mnf_of, read_mnf, reduce_model, write_mnf
 from gearmbs.mechanism import Mechanism, add_modal_force
 from tests.says import says

@@ -15,10 +15,11 @@ import numpy as np
 
 from gearmbs.adams.builders.control import diff_name, implicit_states, state_system
 from gearmbs.adams.builders.curve_data import curve_points
-from gearmbs.adams.builders.frames import add_point_mass, hold, inertia_about_cm, marker_orientation, part_orientation
+from gearmbs.adams.builders.frames import hold, inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.functions import FUNCTIONS, Accelerations, Present, translated
 from gearmbs.adams.builders.scopes import (
     AdamsModel,
+    Beam,
     BodyState,
     acts,
     joints_of,
@@ -45,7 +46,6 @@ from gearmbs.mechanism.parts.joints import Joint
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from gearmbs.adams.builders.flexible import Beam
     from gearmbs.flexible import ModalModel
     from gearmbs.mechanism.contacts.shapes import Shape
     from gearmbs.solids.bodies import Body as SolidBody
@@ -88,8 +88,8 @@ class Builder:
         self.mechanism.reads_units = False
         self.mechanism.redundancy = "adams"
         self.model = AdamsModel(self.mechanism, deck, present=present)
-        self.accelerations = Accelerations(self)
         self.markers = Markers()
+        self.accelerations = Accelerations(self.mechanism, self.markers)
         self.joints: dict[int, Joint] = {}
         self.flexible: dict[int, ModalModel] = {}
         self.solid_files: dict[Path, list[SolidBody]] = {}
@@ -116,7 +116,7 @@ class Builder:
         for part in self.deck.of(st.Part).values():
             self.attempt(part, self.add_part)
         for point in self.deck.of(st.PointMass).values():
-            self.attempt(point, partial(add_point_mass, self))
+            self.attempt(point, self.add_point_mass)
         for kind, make in bodies.items():
             deforming: Mapping[int, st.Statement] = self.deck.of(kind)
             for statement in deforming.values():
@@ -247,6 +247,29 @@ class Builder:
         self.model.sources[body.name] = part
         if part.planar:
             hold(self.mechanism, body, "planar")
+
+    def add_point_mass(self, s: st.PointMass) -> None:
+        """POINT_MASS: a body of any inertia that does not turn."""
+        name = self.claim(s, "point_mass")
+        units = self.units
+        cm = self.deck.of(st.Marker).get(s.cm or 0)
+        com = np.zeros(3) if cm is None else units.length * np.array(cm.qp)
+        start = self.state.get(("POINT_MASS", s.id))
+        if start is None:
+            velocity = units.factor("velocity") * np.array([s.vx, s.vy, s.vz])
+            start = BodyState(units.length * np.array(s.qg), part_orientation(s), velocity, np.zeros(3))
+        mass = units.mass * s.mass
+        body = self.mechanism.body(
+            name,
+            mass,
+            (mass, mass, mass),
+            com=com,
+            position=start.position,
+            orientation=start.orientation,
+            velocity=start.velocity,
+        )
+        self.model.sources[body.name] = s
+        hold(self.mechanism, body, "orientation")
 
     def direction(
         self, ref: int | None, part: st.Part | st.FlexBody, axes: np.ndarray, cm: st.Marker | None

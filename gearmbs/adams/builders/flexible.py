@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from gearmbs.adams.builders.builder import Builder, LeftOutError, Maker
 from gearmbs.adams.builders.curve_data import flexible_body
 from gearmbs.adams.builders.frames import hold, marker_orientation, part_orientation
-from gearmbs.adams.builders.scopes import BodyState
+from gearmbs.adams.builders.scopes import Beam, BodyState
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
@@ -168,32 +167,6 @@ FLAT = 1e-6
 """Share of the length by which nodes of a plane beam may be out of their plane, and sine of their x axes."""
 OF_POINTS = frozenset(["SD", "SV", "SA"])
 """Position, velocity and acceleration at S."""
-
-
-@dataclass(frozen=True, eq=False)
-class Beam:
-    """An FE_PART as it was built.
-
-    Attributes
-    ----------
-    bodies : list of Body
-        At all nodes along the beam, those in between, too.
-    labels : dict of int to int
-        Number of a node in the deck -> place in ``bodies``.
-    share, reach : ndarray
-        Share of the length at each body, and the length that it stands for, m.
-    axes : ndarray, shape (3, 3)
-        Of the part's frame.
-    places : ndarray, shape (bodies, 3)
-        In the part's frame, m.
-    """
-
-    bodies: list[Body]
-    labels: dict[int, int]
-    share: np.ndarray
-    reach: np.ndarray
-    axes: np.ndarray
-    places: np.ndarray
 
 
 def add_fe_part(b: Builder, s: st.FePart) -> None:

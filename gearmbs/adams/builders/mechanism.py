@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder, Maker
-from gearmbs.adams.builders.constraints import CONSTRAINTS
+from gearmbs.adams.builders.constraints import CONSTRAINTS, CURVES
 from gearmbs.adams.builders.contacts import CONTACTS
-from gearmbs.adams.builders.curves import CURVES
 from gearmbs.adams.builders.flexible import DEFORMING, LINE_LOADS, ON_NODES
 from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.functions import IN_DYNAMICS, Present
+from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.builders.scopes import AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -126,12 +126,29 @@ MAKERS: dict[type, Maker] = CONSTRAINTS | CURVES | FORCES | LINE_LOADS | CONTACT
 
 
 def build_mechanism(
-    deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple[str, int]] = frozenset()
+    deck: Deck, allow_unsupported: bool = False, routines: Mapping[str, Callable] | None = None
 ) -> Mechanism:
-    """Return the mechanism a deck describes, its joints with the initial conditions given; see :func:`build_model`."""
-    model = build_model(deck, allow_unsupported, inactive)
+    """Return the mechanism a deck describes, its joints with the initial conditions given.
+
+    Parameters
+    ----------
+    deck : Deck
+        Gets the remarks on what is left out.
+    allow_unsupported : bool
+        Build it without what is not supported instead of refusing.
+    routines : mapping, optional
+        Functions of the user, as in :func:`gearmbs.adams.run_deck`.
+
+    Raises
+    ------
+    DeckError
+        Naming the line of what is not supported or cannot be built.
+    """
+    made = bound(deck, routines, allow_unsupported)
+    model = build_model(made, allow_unsupported)
     if model.initial_motions:
-        model = build_model(deck, allow_unsupported, inactive, with_initial_motions(model))
+        model = build_model(made, allow_unsupported, state=with_initial_motions(model))
+    deck.diagnostics.extend(d for d in made.diagnostics if d not in deck.diagnostics)
     return model.mechanism
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.adams.builders.control import implicit_states, state_systems
+from gearmbs.adams.builders.control import diff_name, implicit_states, rate_name, state_systems
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.functions import IN_DYNAMICS, Present, translated
 from gearmbs.adams.parse import statements as st
@@ -17,7 +17,7 @@ from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.language.syntax import Scope
-from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.curves import AXES
 from gearmbs.mechanism.parts.joints import Joint
 
@@ -176,6 +176,32 @@ class BodyState(NamedTuple):
     v_f: np.ndarray = np.zeros(0)
 
 
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """An FE_PART as it was built.
+
+    Attributes
+    ----------
+    bodies : list of Body
+        At all nodes along the beam, those in between, too.
+    labels : dict of int to int
+        Number of a node in the deck -> place in ``bodies``.
+    share, reach : ndarray
+        Share of the length at each body, and the length that it stands for, m.
+    axes : ndarray, shape (3, 3)
+        Of the part's frame.
+    places : ndarray, shape (bodies, 3)
+        In the part's frame, m.
+    """
+
+    bodies: list[Body]
+    labels: dict[int, int]
+    share: np.ndarray
+    reach: np.ndarray
+    axes: np.ndarray
+    places: np.ndarray
+
+
 @dataclass
 class AdamsModel:
     """A mechanism built from a deck, with the way back from names to ids.
@@ -238,3 +264,18 @@ def _curves_of_model(mechanism: Mechanism) -> dict[Any, Any]:
 def markers_of(mechanism: Mechanism) -> list[Marker]:
     """Return all markers of a mechanism."""
     return [m for body in (mechanism.ground, *mechanism.bodies.values()) for m in body.markers]
+
+
+def hold_states(model: AdamsModel) -> None:
+    """Make the states of statements with STATIC_HOLD keep their values, as in static analyses."""
+    deck, states = model.deck, model.mechanism.states
+    held: list[int | str] = []
+    for diff in deck.of(st.Diff).values():
+        if diff.static_hold:
+            held += [diff.id, diff_name(diff), rate_name(diff_name(diff))]
+    for s, system in state_systems(deck):
+        if getattr(s, "static_hold", False):
+            held += [*system.names, *(state.name for state in system.algebraic)]
+    for name in held:
+        if name in states:
+            states[name].expression = repr(states[name].start) if states[name].algebraic else "0"

@@ -9,7 +9,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, Spec, specs_of
-from gearmbs.adams.parse.remedies import refused_message
+from gearmbs.mechanism.forces.friction import KINDS
 from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
 
@@ -350,3 +350,68 @@ def measured_markers(text: str) -> list[int]:
                 if isinstance(a, Number) and a.integer and a.integer not in found:
                     found.append(a.integer)
     return found
+
+
+# What to write instead of arguments that are refused.
+
+
+FRICTION_OF_JOINTS = (
+    (("mu_stat_rot", "mu_stat_trans"), "MU_STATIC"),
+    (("mu_dyn_rot", "mu_dyn_trans"), "MU_DYNAMIC"),
+    (("delta_v",), "STICTION_TRANSITION_VELOCITY"),
+    (("max_deformation",), "MAX_STICTION_DEFORMATION"),
+)
+"""Arguments of a JOINT with friction, the first given one of each counts, and those of a FRICTION statement."""
+
+
+def refused_message(statement: st.Statement, name: str) -> str:
+    """Return that an argument is not supported, and what to write instead."""
+    if isinstance(statement, st.Joint):
+        return (
+            f"{statement.label()}: {name.upper()} = {getattr(statement, name)} is not supported, as its law is not "
+            f"known; write {_friction(statement)} instead"
+        )
+    spec = specs_of(type(statement))[name]
+    way = f"; instead, use {spec.instead}" if spec.instead else ""
+    return f"{statement.label()}: {spec.keyword} is not supported{way}"
+
+
+def _friction(joint: st.Joint) -> str:
+    """Return the FRICTION statement that comes nearest to a joint's own friction."""
+    words = [f"FRICTION/{joint.id}", f"JOINT = {joint.id}"]
+    for names, word in FRICTION_OF_JOINTS:
+        given = [getattr(joint, name) for name in names if getattr(joint, name) is not None]
+        if given or word.startswith("MU"):
+            words.append(f"{word} = {f'{given[0]:g}' if given else '...'}")
+    radius = joint.pin_radius if joint.pin_radius is not None else joint.outer_radius
+    kind = KINDS.get((joint.type or "").lower())
+    if kind is None or kind.lever:
+        word = specs_of(st.Friction)[kind.lever if kind is not None else "pin_radius"].keyword
+        words.append(f"{word} = {'...' if radius is None else f'{radius:g}'}")
+    if joint.friction == "PRELOAD_ONLY":
+        force = "FORCE" if kind is not None and not kind.torque else "TORQUE"
+        words += ["INPUTS = PRELOAD", f"FRICTION_{force}_PRELOAD = ..."]
+    return ", ".join(words)
+
+
+# Remarks on defaults of ADAMS that depend on the deck's units.
+
+
+VISIBLE = 1e-3
+"""Displacement of a joint that sticks, m, from which on a default is remarked."""
+
+
+def remark_defaults(deck: Deck) -> None:
+    """Remark on FRICTION whose stiction yields visibly, since MAX_STICTION_DEFORMATION is a number of length units."""
+    found = [
+        f
+        for f in deck.of(st.Friction).values()
+        if "deformation" not in f.given and f.effect != "SLIDING" and f.deformation * deck.units.length >= VISIBLE
+    ]
+    if found:
+        yields = f"{found[0].deformation:g} units of length, here {1e3 * found[0].deformation * deck.units.length:g} mm"
+        message = (
+            f"{labels_of([f.label() for f in found])}: MAX_STICTION_DEFORMATION is not given; its default is {yields}, "
+            "by which surfaces that stick still yield until the friction is whole: give a smaller one"
+        )
+        deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, found[0].line))

@@ -24,6 +24,7 @@ from gearmbs.adams.parse.grammar import (
     arg,
 )
 from gearmbs.adams.parse.model_statements import Turning, Vector
+from gearmbs.dae.methods import FORMULATIONS
 
 # `arg` returns a dataclass field; the linter takes it for a default value
 # ruff: noqa: RUF009
@@ -184,7 +185,7 @@ class Integrator(Statement, once=True):
         CHOICE,
         choices="GSTIFF WSTIFF CONSTANT_BDF HHT NEWMARK HASTIFF ABAM RKF45 SI2_GSTIFF DSTIFF",
     )
-    formulation: str | None = arg("formulation", CHOICE, choices="I3 SI2 SI1")
+    formulation: str | None = arg("formulation", CHOICE, choices=" ".join(FORMULATIONS))
     error: float | None = arg("ERROR", REAL, positive=True)
     hinit: float | None = arg("HINIT", REAL, dimension="time", positive=True)
     hmax: float | None = arg("HMAX", REAL, dimension="time", positive=True)

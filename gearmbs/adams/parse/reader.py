@@ -8,11 +8,9 @@ from pathlib import Path
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import check
+from gearmbs.adams.parse.check import check, remark_defaults
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.defaults import remark_defaults
 from gearmbs.adams.parse.grammar import ArgumentReader, Grammar, StatementError
-from gearmbs.adams.parse.remedies import instead_of_statement
 from gearmbs.adams.parse.source import RawStatement, read_file, statements
 from gearmbs.progress import waiting
 from gearmbs.wording import did_you_mean
@@ -115,7 +113,7 @@ def _take(deck: Deck, raw: RawStatement, errors: list[Diagnostic]) -> bool:
         return False
     number = int(match.group(3)) if match.group(3) else 0
     if name in st.UNSUPPORTED:
-        message = f"{name}/{number} is not supported; it changes the motion{instead_of_statement(name)}"
+        message = f"{name}/{number} is not supported; it changes the motion{st.instead_of_statement(name)}"
         deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, raw.line))
         return False
     if name in st.STATEMENTS and st.STATEMENTS[name].user:

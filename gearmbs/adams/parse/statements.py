@@ -66,6 +66,29 @@ INSTEAD_OF_ARGUMENTS = {
     if spec.instead
 }
 """What to do instead of arguments that are refused, by the names of the statement and the argument."""
+INSTEAD_OF_FUNCTIONS: dict[str, str] = {
+    "ARYSUM": "the sum of ARYVALs",
+    "CURVE": "read where a CURVE has its id",
+    "DELAY": "a TFSISO that approximates the delay",
+    "DXYZ": "DX, DY and DZ",
+    "FXFREQ": "read in CRATIO of a FLEX_BODY",
+    "FXMODE": "read in CRATIO of a FLEX_BODY",
+    "FXYZ": "FX, FY and FZ",
+    "INTERP": "CUBSPL or AKISPL of a SPLINE",
+    "INVPSD": "a SPLINE of the signal",
+    "MODE": "MODE without brackets",
+    "NFORCE": "the forces of BEAM or FIELD",
+    "RANDOM": "a SPLINE of the signal",
+    "SENVAL": "read where a SENSOR has its id",
+    "TXYZ": "TX, TY and TZ",
+    "USER": "the routine in Python alone in the FUNCTION",
+    "UVX": "DX, DY and DZ from the marker to one at 1 of its x axis",
+    "UVY": "DX, DY and DZ from the marker to one at 1 of its y axis",
+    "UVZ": "DX, DY and DZ from the marker to one at 1 of its z axis",
+    "VXYZ": "VX, VY and VZ",
+    "WXYZ": "WX, WY and WZ",
+}
+"""What to do instead of functions that are refused."""
 MERELY_READ = frozenset(
     [name for name, cls in STATEMENTS.items() if not cls.moves]
     + [name for name, row in REFUSED.items() if not row.moves]
@@ -78,3 +101,13 @@ def switched(how: str) -> list[str]:
     if not how:
         return [name for name, row in REFUSED.items() if row.switch]
     return sorted(name for name, cls in STATEMENTS.items() if cls.switch == how)
+
+
+def instead_of_statement(name: str) -> str:
+    """Return a clause on what to do instead of a statement that is refused."""
+    return f"; instead: {INSTEAD[name]}"
+
+
+def instead_of_function(name: str) -> str:
+    """Return a clause on what to write instead of a function that is refused, "" where there is nothing."""
+    return f"; instead: {INSTEAD_OF_FUNCTIONS[name]}" if name in INSTEAD_OF_FUNCTIONS else ""

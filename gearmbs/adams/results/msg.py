@@ -13,6 +13,7 @@ from gearmbs.adams.parse.units import unit_names
 from gearmbs.adams.results.record import NEWTON, RunRecord, Segment
 from gearmbs.adams.results.remarks import row_text
 from gearmbs.dae.analyses.plant import LinearPlant
+from gearmbs.dae.methods import FORMULATIONS
 
 RULE = "-" * 79
 TITLES = {"KINEMATICS": "Kinematic", "STATICS": "Static", "INITIAL_CONDITIONS": "Initial Conditions"}
@@ -20,9 +21,6 @@ TABLE_HEAD = """\
    Simulation      Step        Function    Cumulative   Integration     CPU
       Time         Size       Evaluations  Steps Taken    Order        time
    ___________  ___________   ___________  ___________   _________    ________"""
-
-
-INDEX = {"I3": "INDEX-3", "SI2": "stabilized INDEX-2", "SI1": "stabilized INDEX-1"}
 
 
 def message_text(result: RunRecord) -> str:
@@ -102,7 +100,7 @@ def _integrated(segment: Segment, title: str, t: np.ndarray, stats: dict) -> lis
     seconds = float(stats.get("cpu_time", stats.get("time", 0.0)) or 0.0)
     return [
         f"  ****** Performing {title} Simulation using {name} {form} Integrator ******",
-        f"   The system is modelled with {INDEX[form]} DAEs.",
+        f"   The system is modelled with {FORMULATIONS[form].adams} DAEs.",
         f"   The integrator is {name.upper()}, CORRECTOR = {options.get('corrector', 'original')}",
         f"   Integration error =    {options['tol']:.6E}",
         "",

@@ -124,6 +124,11 @@ class RunRecord:
     interrupted: str = ""
 
     @property
+    def command(self) -> Command:
+        """The command that is, or was last, carried out."""
+        return self.log[-1][0] if self.log else Command(self.script.file)
+
+    @property
     def segments(self) -> list[Segment]:
         """The analyses by SIMULATE, in order."""
         return [outcome for _, outcome in self.log if isinstance(outcome, Segment)]

@@ -18,8 +18,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.adams.parse.readers import left_out, needed_by, read_variables
-from gearmbs.adams.parse.refused import READ_IN_DECKS
+from gearmbs.adams.parse.readers import READ_IN_DECKS, left_out, needed_by, read_variables
 from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch, unsupported
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME, ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import Tape

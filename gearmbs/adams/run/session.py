@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,7 +16,7 @@ from gearmbs.adams.parse.check import check, refused_arguments
 from gearmbs.adams.parse.commands import Change, Simulate, Switch, apply_change
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import specs_of
-from gearmbs.adams.parse.refused import refused_functions
+from gearmbs.adams.parse.readers import refused_functions
 from gearmbs.adams.results.record import Segment
 from gearmbs.adams.results.remarks import assembly_of, tracks_of
 from gearmbs.adams.results.requests import RequestEvaluator
@@ -48,6 +49,12 @@ class Session:
         What sensors have evaluated, by id.
     pending : dict
         Of GSEs by id: number of the next sample and the discrete states from then on.
+    tol : float or None
+        Local error instead of INTEGRATOR's ERROR.
+    allow_unsupported : bool
+        Whether what is not supported is left out.
+    progress : bool, callable or None
+        As in :func:`gearmbs.mechanism.simulate`.
     redundancy : str
         Which redundant rows are kept, see `gearmbs.mechanism.checks`.
     check : bool or None
@@ -67,6 +74,9 @@ class Session:
     places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
     sensed: dict[int, float] = field(default_factory=dict)
     pending: dict[int, tuple[int, tuple[float, ...]]] = field(default_factory=dict)
+    tol: float | None = None
+    allow_unsupported: bool = False
+    progress: bool | Callable[[float], None] | None = None
     redundancy: str = "adams"
     check: bool | None = None
     interrupted: bool = False

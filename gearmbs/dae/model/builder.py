@@ -94,13 +94,11 @@ class TableBuilder:
         self.function_r.extend(float(p) for p in parameters)
         return len(self.functions) - 1
 
-    def add_row(
-        self, terms: list[tuple[int, int, int, int, int, float]], function: int = -1, extras: list[int] | None = None
-    ) -> int:
+    def add_row(self, terms: list[tuple[int, int, int, int, int, float]], function: int = -1) -> int:
         """Add a constraint row: terms of (type, I, J, axes, function, coefficient)."""
         self.rows.append((len(self.terms), function, -1))
-        for k, (kind, i, j, axes, fun, coefficient) in enumerate(terms):
-            self.terms.append((kind, i, j, axes, fun, extras[k] if extras else -1))
+        for *term, coefficient in terms:
+            self.terms.append(tuple(term))
             self.coef.append(coefficient)
             self.reference.append(0.0)
         return len(self.rows) - 1
