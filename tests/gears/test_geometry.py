@@ -230,3 +230,20 @@ def test_pair_shows_itself():
         "wheel, skew 1 deg, impact, 2.9852e+05 N/mm^1.3 a tooth pair, damping 298.5 N s/mm, fully on at 100 um)"
     )
     assert "<td>contact ratio</td><td>1.6" in pair._repr_html_()
+
+
+@pytest.mark.parametrize("teeth", [24, 80, 150])
+def test_what_is_kept_of_a_wheel_is_that_of_its_final_root_arc(teeth):
+    """Default arcs are fitted step by step; what follows from them is that of a wheel given the last one."""
+    fitted = GearSpec(teeth, "2 mm")
+    given = GearSpec(teeth, "2 mm", fillet_radius=fitted.fillet_radius)
+    for name in ("fillet_centre_radius", "form_radius", "form_roll_length", "fillet_half_angle"):
+        assert getattr(fitted, name) == getattr(given, name)
+
+
+def test_geometry_is_kept_and_not_handed_on_to_copies():
+    pair = GearPair.paper()
+    assert pair.centre_distance is pair.centre_distance
+    wider = pair.with_changes(centre_distance_error="1 mm")
+    assert wider.centre_distance == pytest.approx(pair.centre_distance + 1e-3, abs=1e-15)
+    assert wider.contact_ratio < pair.contact_ratio
