@@ -129,7 +129,7 @@ def solve_dae(
         chosen = replace(chosen, progress=told)
         if not chosen.integrator.compiled:
             return _run_at_outputs(problem, chosen, (t0, t_end), t_eval)
-        return chosen.integrator.solve(problem, t_eval, chosen, t_end=t_end)
+        return chosen.integrator.load()(problem, t_eval, chosen, t_end=t_end)
 
 
 def _checked_problem(
@@ -188,7 +188,7 @@ def _run_at_outputs(
     if times[0] < t_span[0] or times[-1] > t_span[1]:
         raise ValueError(f"t_eval {times[0]:g} .. {times[-1]:g} leaves t_span")
     padded = times if times[0] == t_span[0] else np.concatenate((t_span[:1], times))
-    result = options.integrator.solve(problem, padded, options)
+    result = options.integrator.load()(problem, padded, options)
     if padded is not times:
         result.t, result.y, result.yp = result.t[1:], result.y[1:], result.yp[1:]
     error = options.error_probe() if options.error_probe is not None else None

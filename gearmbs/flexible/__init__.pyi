@@ -11,10 +11,10 @@ from .files.matrices import from_matrices as from_matrices
 from .files.matrices import read_abaqus as read_abaqus
 from .files.matrices import read_calculix as read_calculix
 from .files.matrices import read_nodes as read_nodes
-from .files.mnf import ModalNeutralFile as ModalNeutralFile
 from .files.mnf import mnf_of as mnf_of
 from .files.mnf import read_mnf as read_mnf
 from .files.mnf import write_mnf as write_mnf
+from .files.mnf_content import ModalNeutralFile as ModalNeutralFile
 from .files.nastran import read_op2 as read_op2
 from .files.nastran import read_op4 as read_op4
 from .files.nastran_modes import read_op2_modes as read_op2_modes

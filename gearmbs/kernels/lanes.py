@@ -152,51 +152,13 @@ def magnitude(typingctx, lanes):
 
 
 @intrinsic
-def larger(typingctx, first, second):
-    """Return the larger number in each lane, NaN if one is."""
-
-    def codegen(context, builder, sig, args):
-        return _call(builder, "maximum", args)
-
-    return LANES_TYPE(LANES_TYPE, LANES_TYPE), codegen
-
-
-@intrinsic
 def larger_number(typingctx, first, second):
-    """Return the larger number in each lane, the second where one is none: one instruction, `larger` takes seven."""
+    """Return the larger number in each lane, the second where one is none: one instruction, ``maximum`` takes seven."""
 
     def codegen(context, builder, sig, args):
         return builder.select(builder.fcmp_ordered(">", *args), *args)
 
     return LANES_TYPE(LANES_TYPE, LANES_TYPE), codegen
-
-
-def _turned(builder: Any, rows: list[Any]) -> list[Any]:
-    """Return eight vectors as the columns of others: the bits of a number's row and place are swapped one by one."""
-    for step in (1, 2, 4):
-        for i in (i for i in range(LANES) if not i & step):
-            pair = rows[i], rows[i + step]
-            low = [e if not e & step else LANES + e - step for e in range(LANES)]
-            high = [e + step if not e & step else LANES + e for e in range(LANES)]
-            rows[i], rows[i + step] = (builder.shuffle_vector(*pair, ir.Constant(_PLACES, m)) for m in (low, high))
-    return rows
-
-
-@intrinsic
-def deal_eight(typingctx, lanes, place, out, at, step):
-    """Write what is in the eight places of lanes from ``place`` on: of lane l to ``out[at + step l :][:8]``."""
-
-    def codegen(context, builder, sig, args):
-        source, first, target, begin, step = args
-        places = [builder.add(first, ir.Constant(first.type, k)) for k in range(LANES)]
-        rows = [builder.load(_address(context, builder, lanes, source, k), align=8) for k in places]
-        data = make_array(out)(context, builder, target).data
-        for row in _turned(builder, rows):
-            builder.store(row, builder.bitcast(cgutils.gep(builder, data, begin), _VECTOR.as_pointer()), align=8)
-            begin = builder.add(begin, step)
-        return context.get_dummy_value()
-
-    return types.void(lanes, types.intp, out, types.intp, types.intp), codegen
 
 
 # Magnitudes compared as integers, so that the compiler vectorises a maximum and no NaN is lost in it.

@@ -24,14 +24,24 @@ References
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numba import float64, int64, types
 
+from gearmbs.dae.integrators.algebraic_structure import (
+    MOST_RANKED,
+    MOST_TOGETHER,
+    Graph,
+    Structure,
+    chosen,
+    dependences,
+    has_hidden_constraints,
+    structure,
+)
 from gearmbs.dae.integrators.messages import list_names
-from gearmbs.dae.problem import EPS, RESIDUAL_SIG, DAEProblem
+from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import combine, lagrange_weights
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, no_events, no_hook
@@ -66,20 +76,6 @@ RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
 MAX_POINTS = 8
 """Points of a polynomial of the highest order, and one to spare."""
-KNOWN = 64
-"""Structures kept."""
-MOST_TOGETHER = 300
-"""Equations that are solved together at an instant: their full matrix is factored in some 10 ms."""
-MOST_RANKED = 200
-"""Unknowns up to which the rank of dG/dx' is looked at, in some milliseconds."""
-RANK = 1e-8
-"""Singular value of the equilibrated dG/dx' below which it counts as zero, as rounding."""
-PROBE = 1e-6
-"""Part of an unknown by which it is moved to see in which equations it stands. Any change tells: it only has to be far
-above rounding, and to leave the unknown where its equations are defined."""
-PROBE_OF_RATE = 1e-3
-"""The same of a rate, and of one where the rate is smaller, as most are zero at a start. Equations are linear in their
-rates as a rule: a larger move then has less rounding and no error of its own."""
 
 
 class AlgebraicPart(Struct):
@@ -141,7 +137,6 @@ PART_TYPE = AlgebraicPart.numba_type
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
 _IVEC = int64[::1]
-_BOOLS = types.boolean[:, ::1]
 
 
 # --- the iteration ---------------------------------------------------------------------------------------
@@ -512,212 +507,6 @@ def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work
     note_failure(part, t)
 
 
-# --- which unknowns, which equations ---------------------------------------------------------------------
-
-
-@njit(
-    types.void(types.FunctionType(RESIDUAL_SIG), float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
-    cache=True,
-)
-def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
-    """Mark which rows each unknown and each rate changes at one point.
-
-    Parameters
-    ----------
-    residual : function
-        G(t, y, y').
-    t : float
-    y, yp : ndarray, shape (n,)
-        The point.
-    sizes : ndarray, shape (n,)
-        Least sizes that unknowns are changed by a part of.
-    by_y, by_rate : ndarray of bool, shape (n, n)
-        Marked where row i changes with unknown, or rate, j; marks that are there stay.
-    idata, rdata, work : ndarray
-        Tables and scratch of the problem.
-    """
-    n = y.shape[0]
-    base, moved = np.empty(n), np.empty(n)
-    residual(t, y, yp, base, idata, rdata, work)
-    y_moved, yp_moved = y.copy(), yp.copy()
-    for j in range(n):
-        y_moved[j] = y[j] + PROBE * max(abs(y[j]), sizes[j])
-        residual(t, y_moved, yp, moved, idata, rdata, work)
-        y_moved[j] = y[j]
-        for i in range(n):
-            by_y[i, j] |= moved[i] != base[i]
-        yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
-        residual(t, y, yp_moved, moved, idata, rdata, work)
-        yp_moved[j] = yp[j]
-        for i in range(n):
-            by_rate[i, j] |= moved[i] != base[i]
-
-
-def _dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Return which rows depend on which unknowns, and on which rates, two tables of shape (n, n).
-
-    They are tried at the start, and where all that is zero there is not: products of zeros hide a dependence.
-    """
-    n = problem.n
-    by_y, by_rate = np.zeros((n, n), dtype=bool), np.zeros((n, n), dtype=bool)
-    idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
-    sizes = np.minimum(np.abs(problem.scale), problem.atol_scale / PROBE)
-    generic = 1.0 + np.arange(n) / (2.0 * n)
-    y = np.where(problem.y0 == 0.0, PROBE * sizes * generic, problem.y0)
-    yp = np.where(problem.yp0 == 0.0, PROBE_OF_RATE * generic, problem.yp0)
-    for place in ((problem.y0.astype(float), problem.yp0.astype(float)), (y, yp)):
-        _probe(problem.residual, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
-    return by_y, by_rate
-
-
-def _determined(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each column its matched row, -1 without one, and whether the rows determine it.
-
-    Parameters
-    ----------
-    edges : ndarray of bool, shape (rows, columns)
-    """
-    match = np.full(edges.shape[1], -1)
-    if edges.any():
-        # takes longer to load than many a run, which has no algebraic unknowns
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import maximum_bipartite_matching
-
-        match = maximum_bipartite_matching(csr_array(edges.astype(np.int8)), perm_type="row")
-    column_of = {int(row): c for c, row in enumerate(match) if row >= 0}
-    open_ones = [int(c) for c in np.flatnonzero(match < 0)]
-    free = set(open_ones)
-    while open_ones:
-        for row in np.flatnonzero(edges[:, open_ones.pop()]):
-            c = column_of.get(int(row))
-            if c is not None and c not in free:
-                free.add(c)
-                open_ones.append(c)
-    determined = np.ones(edges.shape[1], dtype=bool)
-    determined[list(free)] = False
-    return match, determined
-
-
-def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns that the matched rows of ``wanted`` hold, those that theirs hold, and so on.
-
-    Returns
-    -------
-    needed : ndarray of int
-    coupled : ndarray of int
-        Those of ``wanted`` that would need more than `MOST_TOGETHER`, and are left.
-    """
-    needed: set[int] = set()
-    coupled: set[int] = set()
-    for first in wanted.tolist():
-        found, open_ones = {first}, [first]
-        while open_ones and len(found | needed) <= MOST_TOGETHER and not found & coupled:
-            for c in np.flatnonzero(edges[match[open_ones.pop()]]).tolist():
-                if c not in found and c not in needed:
-                    found.add(c)
-                    open_ones.append(c)
-        if open_ones:
-            coupled.add(first)
-        else:
-            needed |= found
-    return np.array(sorted(needed), dtype=np.int64), np.array(sorted(coupled), dtype=np.int64)
-
-
-class _Graph:
-    """Which unknowns and rates stand in which equations, and what is asked: all that a structure follows from.
-
-    Parameters
-    ----------
-    *lists : ndarray
-        Dependences on unknowns and on rates; wanted, solved for and differential unknowns; pattern of the matrix.
-    """
-
-    def __init__(self, *lists: np.ndarray) -> None:
-        self.lists = lists
-        self._content = tuple(items.tobytes() for items in lists)
-
-    def __hash__(self) -> int:
-        return hash(self._content)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Graph) and self._content == other._content
-
-
-class _Structure(NamedTuple):
-    """Unknowns left, unknowns that hang on too many others; equations, unknowns and entries of an `AlgebraicPart`."""
-
-    left: np.ndarray
-    coupled: np.ndarray
-    rows: np.ndarray
-    cols: np.ndarray
-    lifted: np.ndarray
-    rates: np.ndarray
-    entries: np.ndarray
-
-
-@lru_cache(maxsize=KNOWN)
-def _structure(graph: _Graph) -> _Structure:
-    """Return what is solved for and by which equations; runs of alike problems find it once."""
-    by_y, by_rate, wanted, solved, differential, indptr, indices = graph.lists
-    n = len(wanted)
-    unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & differential))
-    edges = np.concatenate((by_y, by_rate), axis=1) & unknown
-    constraints = ~edges.any(axis=1) & ~by_y[:, ~differential].any(axis=1)
-    edges[constraints, n:] = by_y[constraints] & unknown[n:]
-    match, determined = _determined(edges)
-    determined &= unknown
-    asked = np.flatnonzero(wanted)
-    found, coupled = _needed(edges, match, asked[determined[asked]])
-    rows, cols, rates = match[found].astype(np.int64), found % n, found >= n
-    lifted = constraints[rows]
-    place = {int(row): k for k, row in enumerate(rows)}
-    entries: list[tuple[int, int, int, int]] = []
-    for c, (j, is_rate) in enumerate(zip(cols, rates)):
-        for p in range(int(indptr[j]), int(indptr[j + 1])):
-            k = place.get(int(indices[p]))
-            if k is not None and (by_rate if is_rate and not lifted[k] else by_y)[rows[k], j]:
-                entries.append((k, c, p, int(is_rate and not lifted[k])))
-    table = np.array(entries, dtype=np.int64).reshape(-1, 4)
-    return _Structure(asked[~determined[asked]], coupled, rows, cols, lifted, rates, table)
-
-
-def _chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Return which unknowns are wanted at outputs, and which are solved for if an equation needs them."""
-    algebraic = ~np.asarray(problem.differential, dtype=bool)
-    if problem.solved_at_outputs is not None:
-        wanted = algebraic & problem.solved_at_outputs
-        return wanted, wanted
-    wanted = algebraic & ~np.asarray(problem.error_mask, dtype=bool)
-    return wanted, algebraic
-
-
-def _has_hidden_constraints(problem: DAEProblem) -> bool:
-    """Return whether the rates of the differential unknowns depend on each other at the start: dG/dx' has a null space.
-
-    Sums of equations are free of rates then, as in circuits of capacities without a path to the ground.
-    """
-    y, yp = problem.y0.astype(float), problem.yp0.astype(float)
-    tables = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
-    base, moved = np.empty(problem.n), np.empty(problem.n)
-    problem.residual(float(problem.t0), y, yp, base, *tables)
-    columns = []
-    for j in np.flatnonzero(problem.differential):
-        d = PROBE_OF_RATE * max(1.0, abs(yp[j]))
-        kept, yp[j] = yp[j], yp[j] + d
-        problem.residual(float(problem.t0), y, yp, moved, *tables)
-        yp[j] = kept
-        columns.append((moved - base) / d)
-    if not columns:
-        return False
-    matrix = np.array(columns).T
-    if not np.isfinite(matrix).all():
-        return True
-    for axis in (1, 0):
-        largest = np.abs(matrix).max(axis=axis, keepdims=True)
-        matrix = matrix / np.where(largest > 0.0, largest, 1.0)
-    return bool(np.linalg.matrix_rank(matrix, RANK) < matrix.shape[1])
-
-
 def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
     """Return room for m equations among those of n unknowns, with ``nnz`` entries, ``entries`` of them in these."""
     return AlgebraicPart(
@@ -752,23 +541,23 @@ class AlgebraicOutputs:
 
     def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float) -> None:
         self.problem = problem
-        wanted, solved = _chosen(problem)
+        wanted, solved = chosen(problem)
         self.left = np.empty(0, dtype=np.int64)
         self.coupled = self.left
         # scratch of polynomials is not shared between threads
         self.part = _nothing().with_members(value=np.zeros(MAX_POINTS), slope=np.zeros(MAX_POINTS))
         if not wanted.any():
             return
-        by_y, by_rate = _dependences(problem)
+        by_y, by_rate = dependences(problem)
         differential = np.asarray(problem.differential, dtype=bool)
-        found = _structure(
-            _Graph(by_y, by_rate, wanted, solved, differential, np.asarray(problem.indptr), np.asarray(problem.indices))
+        found = structure(
+            Graph(by_y, by_rate, wanted, solved, differential, np.asarray(problem.indptr), np.asarray(problem.indices))
         )
         self.left, self.coupled = found.left, found.coupled
         if len(found.rows):
             self.part = self._made(found, atol, rtol)
 
-    def _made(self, found: _Structure, atol: np.ndarray, rtol: float) -> AlgebraicPart:
+    def _made(self, found: Structure, atol: np.ndarray, rtol: float) -> AlgebraicPart:
         """Return the compiled loop's part of it."""
         part = _new_part(len(found.rows), self.problem.n, len(self.problem.indices), len(found.entries))
         part.rtol = rtol
@@ -791,7 +580,7 @@ class AlgebraicOutputs:
         integrated = bool((problem.differential & ~np.asarray(problem.error_mask, dtype=bool)).any())
         if of_mechanism or integrated or bool(self.part.any_lifted) or len(self.left) or len(self.coupled):
             return True
-        return problem.n > MOST_RANKED or _has_hidden_constraints(problem)
+        return problem.n > MOST_RANKED or has_hidden_constraints(problem)
 
     @property
     def functions(self) -> Any:

@@ -7,7 +7,7 @@ of the integrator's noise.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -28,7 +28,8 @@ from gearmbs.progress import waiting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.dae.model.lane_members import Members
+    from gearmbs.dae.model.member_tables import Members
+
 
 # A solution as a table for notebooks.
 
@@ -56,9 +57,6 @@ def solution_html(solution: Solution) -> str:
 
 PART_SIZE = 2048
 """Output times whose records stay in the processor's cache, and outweigh what Python does for each part."""
-
-AXIS_PART_SIZE = 1024
-"""The same where nothing has to be prepared for a part, since all bodies turn about fixed axes."""
 
 CONFLICT_SAMPLES = 50
 """Outputs at which constraints removed as redundant are looked at."""
@@ -198,10 +196,8 @@ class Solution(Shown):
     def _new_records(self, m: int) -> outputs.Records:
         system = self.system
         diagnostics = max((len(d) for d in system.model.diagnostics), default=0)
-        return outputs.new_records(
-            m, len(system.body_names), len(system.row_names), len(system.force_names), diagnostics,
-            sum(system.model.modes),
-        )  # fmt: skip
+        names, modes = system.model.names, sum(system.model.modes)
+        return outputs.new_records(m, len(names.bodies), len(names.rows), len(names.forces), diagnostics, modes)
 
     @property
     def evaluated(self) -> Evaluated:
@@ -267,7 +263,7 @@ class Solution(Shown):
 
     def find_conflict(self, rows: np.ndarray) -> str | None:
         """Return what is wrong if a row removed as redundant is violated at one of the output times ``rows``."""
-        if not self.system.has_dropped_rows or rows.size == 0:
+        if rows.size == 0 or not self.system.has_dropped_rows:
             return None
         for part in self.parts(rows, size=1):
             found = self.system.conflict(part._configuration(0), float(part.t[0]))
@@ -289,10 +285,11 @@ class Solution(Shown):
     # --- access by name -----------------------------------------------------------------------------
 
     def _body(self, name: str) -> int:
+        names = self.system.model.names.bodies
         try:
-            return self.system.body_names.index(name)
+            return names.index(name)
         except ValueError:
-            raise KeyError(f"body {name!r}; the bodies are {', '.join(self.system.body_names)}") from None
+            raise KeyError(f"body {name!r}; the bodies are {', '.join(names)}") from None
 
     def com_position(self, body: str) -> np.ndarray:
         """Return the position of the centre of mass over time, shape (m, 3), m, global.
@@ -382,10 +379,11 @@ class Solution(Shown):
         return self.evaluated.modal(number)
 
     def _element(self, name: str) -> int:
+        names = self.system.model.names.forces
         try:
-            return self.system.force_names.index(name)
+            return names.index(name)
         except ValueError:
-            known = ", ".join(self.system.force_names) or "none in this mechanism"
+            known = ", ".join(names) or "none in this mechanism"
             raise KeyError(f"force element {name!r}; the force elements are {known}") from None
 
     def _diagnostics_by_name(self) -> Iterator[tuple[str, str, np.ndarray]]:
@@ -554,65 +552,3 @@ class Solution(Shown):
         out.attrs["message"] = self.message
         out.attrs.update({f"solver_{k}": v for k, v in self.stats.as_dict().items()})
         return out
-
-
-# A solution handed on piece by piece while the integration goes, so that a long run needs no memory for its steps.
-
-
-class Stream:
-    """Consumer of an integrator's steps that hands them on as solutions.
-
-    Parameters
-    ----------
-    system : System
-    problem : DAEProblem
-    t_end : float
-        End of the run, s.
-    consumer : callable
-        Called as ``consumer(part)`` with a `Solution` of some accepted steps, in the order of time. It is valid until
-        the next call: parts share their memory. Forces and accelerations are evaluated when first asked for.
-
-    members : Members, optional
-        Of bodies that are integrated as one.
-
-    Attributes
-    ----------
-    part_size : int
-        About how many steps a part has.
-    conflict : str or None
-        The first violation found of a constraint row removed as redundant.
-    """
-
-    def __init__(
-        self,
-        system: System,
-        problem: DAEProblem,
-        t_end: float,
-        consumer: Callable[[Solution], None],
-        members: Members | None = None,
-    ) -> None:
-        nothing = np.empty((0, problem.n))
-        result = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "")
-        self.whole = Solution(system, problem, result, members)
-        self.part_size = PART_SIZE if members is None or not len(members.turn) else AXIS_PART_SIZE
-        self.whole.share(2 * self.part_size)
-        self.consumer = consumer
-        self.conflict: str | None = None
-        self.interval = (t_end - problem.t0) / CONFLICT_SAMPLES
-        self.next_look = problem.t0
-
-    def __call__(self, t: np.ndarray, y: np.ndarray, idata: np.ndarray) -> None:
-        """Hand on accepted steps and the integer table that is valid for them."""
-        # in equal parts: a small rest would cost as much beside its evaluation as a full part
-        size = -(-t.size // max(1, round(t.size / self.part_size)))
-        for k in range(0, t.size, size):
-            part = self.whole.over(t[k : k + size], y[k : k + size], [(0, idata)])
-            if self.conflict is None and part.t[-1] >= self.next_look:
-                self.next_look = float(part.t[-1]) + self.interval
-                self.conflict = part.find_conflict(np.array([part.t.size - 1]))
-            self.consumer(part)
-
-    def close(self, solution: Solution) -> Solution:
-        """Give what was found on the way to the solution that the run ended with, and return it."""
-        solution.note_conflict(self.conflict)
-        return solution

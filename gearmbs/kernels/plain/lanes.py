@@ -99,22 +99,6 @@ def magnitude(lanes):
 
 
 @njit(cache=True, error_model="numpy")
-def _larger(a, b):
-    return a if a > b or a != a else b
-
-
-@njit(cache=True, error_model="numpy")
-def larger(first, second):
-    """Return the larger number in each lane, NaN if one is."""
-    a, b, c, d, e, f, g, h = first
-    i, j, k, l, m, n, o, p = second
-    return Lanes(
-        _larger(a, i), _larger(b, j), _larger(c, k), _larger(d, l),
-        _larger(e, m), _larger(f, n), _larger(g, o), _larger(h, p),
-    )  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
 def larger_number(first, second):
     """Return the larger number in each lane, the second where one is none."""
     a, b, c, d, e, f, g, h = first
@@ -123,16 +107,6 @@ def larger_number(first, second):
         a if a > i else i, b if b > j else j, c if c > k else k, d if d > l else l,
         e if e > m else m, f if f > n else n, g if g > o else o, h if h > p else p,
     )  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
-def deal_eight(lanes, place, out, at, step):
-    """Write what is in the eight places of lanes from ``place`` on: of lane l to ``out[at + step l :][:8]``."""
-    source = vector_at(lanes, LANES * place, LANES * LANES)
-    for l in range(LANES):
-        target = vector_at(out, at + step * l, LANES)
-        for k in range(LANES):
-            target[k] = source[LANES * k + l]
 
 
 @intrinsic

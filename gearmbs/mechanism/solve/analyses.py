@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.dae.analyses import eigenvalues as _modes
 from gearmbs.dae.analyses import kinematics as _kinematic
+from gearmbs.dae.analyses import modes as _modes
 from gearmbs.dae.analyses import statics as _sequence
 from gearmbs.dae.analyses import statics as _statics
-from gearmbs.dae.analyses.eigenvalues import Modes
+from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.problem import ModelError

@@ -18,7 +18,8 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
-from gearmbs.dae.results.solution import Solution, Stream
+from gearmbs.dae.results.solution import Solution
+from gearmbs.dae.results.stream import Stream
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import locking_remark, refuse_overlaps, warn_of_spin, warn_of_stiff_seats
 from gearmbs.mechanism.language.user_functions import raised_errors
@@ -28,7 +29,7 @@ from gearmbs.progress import time_bar
 from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.lane_members import Members
+    from gearmbs.dae.model.member_tables import Members
     from gearmbs.dae.model.system import System
 
 # Ends of a simulation where an expression passes a value.
@@ -180,7 +181,7 @@ def simulate(
     consumer : callable, optional
         With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
         and each valid during the call only, instead of keeping all steps in memory; see
-        `gearmbs.dae.results.solution.Stream`. The solution returned then holds nothing but the last step.
+        `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
     lump : bool, optional
         Integrate bodies that fixed joints connect, or fix to the ground, as one, and if all that is left turns about
         fixed axes, its angles alone; default the mechanism's ``lump``, which only some presets set, and not with
@@ -214,7 +215,7 @@ def simulate(
     t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
     name = _checked(integrator, tol, options)
     # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
-    _ = INTEGRATORS[name].solve
+    INTEGRATORS[name].load()
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with uncollected(), raised_errors(mechanism.functions.values()):
         if not continued:
@@ -320,7 +321,7 @@ def _integrated(
     # errors are controlled on positions and velocities, and so is the corrector
     wanted = {"corrector": "modified", "slopes": times is not None, "consumer": stream}
     settings = {option: value for option, value in wanted.items() if INTEGRATORS[name].can(option)} | options
-    return INTEGRATORS[name].solve(problem, times, Options.gather(name, None, settings), t_end=last)
+    return INTEGRATORS[name].load()(problem, times, Options.gather(name, None, settings), t_end=last)
 
 
 def _sampled(start: float, end: float, rate: float) -> np.ndarray:

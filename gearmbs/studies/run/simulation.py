@@ -46,14 +46,13 @@ ADVICE = {
 
 
 KERNELS = (
-    "gearmbs.dae.model.side_by_side",
     "gearmbs.mechanism.parts.elements",
     "gearmbs.signals.piecewise_cubic",
     "gearmbs.signals.resampling",
 )
 """Modules of kernels that are called late in a run, besides those of the contact."""
 
-LUMPED_KERNELS = ("gearmbs.dae.model.fixed_axes", "gearmbs.dae.model.fixed_axes")
+LUMPED_KERNELS = ("gearmbs.dae.model.fixed_axes",)
 """The same of a run in which gear and shaft turn as one."""
 
 
@@ -270,7 +269,7 @@ def _load_kernels(case: Case) -> None:
         contact_kernels()
         for name in (*KERNELS, *(LUMPED_KERNELS if case.solver.lump else ())):
             importlib.import_module(name)
-        _ = INTEGRATORS[case.solver.integrator.upper()].solve
+        INTEGRATORS[case.solver.integrator.upper()].load()
 
 
 def _partial(case: Case, solution: Solution, recorder: Recorder, mechanism: Mechanism | None) -> xr.Dataset | None:

@@ -15,7 +15,7 @@ from gearmbs.mechanism import linear_modes, static_equilibrium
 from gearmbs.mechanism.parts.functions import constant
 
 if TYPE_CHECKING:
-    from gearmbs.dae.analyses.eigenvalues import Modes
+    from gearmbs.dae.analyses.modes import Modes
 
 
 def resting(train: Drivetrain) -> Drivetrain:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.integrals import external, integral
 from gearmbs.dae.equations.expressions.marker_motion import KIN_V, KIN_W
-from gearmbs.dae.equations.expressions.measure_derivatives import (
+from gearmbs.dae.equations.expressions.measure_gradients import (
     cosine_gradient,
     euler_parameter_gradient,
     force_gradient,

@@ -11,7 +11,7 @@ import math
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.evaluate import STATE, TABLES, backward, forward, selected
 from gearmbs.dae.equations.expressions.integrals import external, integral
-from gearmbs.dae.equations.expressions.measure_derivatives import leaf_gradient, leaf_hessian, leaf_jacobians
+from gearmbs.dae.equations.expressions.measure_hessians import leaf_gradient, leaf_hessian, leaf_jacobians
 from gearmbs.dae.equations.expressions.measures import LEAF_WORK
 from gearmbs.dae.equations.expressions.scalar import binary, unary
 from gearmbs.dae.equations.expressions.splines import spline_value

@@ -1,0 +1,233 @@
+"""Which unknowns of a DAE are algebraic, and which equations determine them: the graph of both, and its matching."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, types
+
+from gearmbs.dae.problem import RESIDUAL_SIG, DAEProblem
+from gearmbs.kernels.jit import njit
+
+KNOWN = 64
+"""Structures kept."""
+MOST_TOGETHER = 300
+"""Equations that are solved together at an instant: their full matrix is factored in some 10 ms."""
+MOST_RANKED = 200
+"""Unknowns up to which the rank of dG/dx' is looked at, in some milliseconds."""
+RANK = 1e-8
+"""Singular value of the equilibrated dG/dx' below which it counts as zero, as rounding."""
+PROBE = 1e-6
+"""Part of an unknown by which it is moved to see in which equations it stands. Any change tells: it only has to be far
+above rounding, and to leave the unknown where its equations are defined."""
+PROBE_OF_RATE = 1e-3
+"""The same of a rate, and of one where the rate is smaller, as most are zero at a start. Equations are linear in their
+rates as a rule: a larger move then has less rounding and no error of its own."""
+_VEC = float64[::1]
+_IVEC = int64[::1]
+_BOOLS = types.boolean[:, ::1]
+
+
+@njit(
+    types.void(types.FunctionType(RESIDUAL_SIG), float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
+    cache=True,
+)
+def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
+    """Mark which rows each unknown and each rate changes at one point.
+
+    Parameters
+    ----------
+    residual : function
+        G(t, y, y').
+    t : float
+    y, yp : ndarray, shape (n,)
+        The point.
+    sizes : ndarray, shape (n,)
+        Least sizes that unknowns are changed by a part of.
+    by_y, by_rate : ndarray of bool, shape (n, n)
+        Marked where row i changes with unknown, or rate, j; marks that are there stay.
+    idata, rdata, work : ndarray
+        Tables and scratch of the problem.
+    """
+    n = y.shape[0]
+    base, moved = np.empty(n), np.empty(n)
+    residual(t, y, yp, base, idata, rdata, work)
+    y_moved, yp_moved = y.copy(), yp.copy()
+    for j in range(n):
+        y_moved[j] = y[j] + PROBE * max(abs(y[j]), sizes[j])
+        residual(t, y_moved, yp, moved, idata, rdata, work)
+        y_moved[j] = y[j]
+        for i in range(n):
+            by_y[i, j] |= moved[i] != base[i]
+        yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
+        residual(t, y, yp_moved, moved, idata, rdata, work)
+        yp_moved[j] = yp[j]
+        for i in range(n):
+            by_rate[i, j] |= moved[i] != base[i]
+
+
+def dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Return which rows depend on which unknowns, and on which rates, two tables of shape (n, n).
+
+    They are tried at the start, and where all that is zero there is not: products of zeros hide a dependence.
+    """
+    n = problem.n
+    by_y, by_rate = np.zeros((n, n), dtype=bool), np.zeros((n, n), dtype=bool)
+    idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    sizes = np.minimum(np.abs(problem.scale), problem.atol_scale / PROBE)
+    generic = 1.0 + np.arange(n) / (2.0 * n)
+    y = np.where(problem.y0 == 0.0, PROBE * sizes * generic, problem.y0)
+    yp = np.where(problem.yp0 == 0.0, PROBE_OF_RATE * generic, problem.yp0)
+    for place in ((problem.y0.astype(float), problem.yp0.astype(float)), (y, yp)):
+        _probe(problem.residual, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
+    return by_y, by_rate
+
+
+def _determined(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each column its matched row, -1 without one, and whether the rows determine it.
+
+    Parameters
+    ----------
+    edges : ndarray of bool, shape (rows, columns)
+    """
+    match = np.full(edges.shape[1], -1)
+    if edges.any():
+        # takes longer to load than many a run, which has no algebraic unknowns
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import maximum_bipartite_matching
+
+        match = maximum_bipartite_matching(csr_array(edges.astype(np.int8)), perm_type="row")
+    column_of = {int(row): c for c, row in enumerate(match) if row >= 0}
+    open_ones = [int(c) for c in np.flatnonzero(match < 0)]
+    free = set(open_ones)
+    while open_ones:
+        for row in np.flatnonzero(edges[:, open_ones.pop()]):
+            c = column_of.get(int(row))
+            if c is not None and c not in free:
+                free.add(c)
+                open_ones.append(c)
+    determined = np.ones(edges.shape[1], dtype=bool)
+    determined[list(free)] = False
+    return match, determined
+
+
+def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns that the matched rows of ``wanted`` hold, those that theirs hold, and so on.
+
+    Returns
+    -------
+    needed : ndarray of int
+    coupled : ndarray of int
+        Those of ``wanted`` that would need more than `MOST_TOGETHER`, and are left.
+    """
+    needed: set[int] = set()
+    coupled: set[int] = set()
+    for first in wanted.tolist():
+        found, open_ones = {first}, [first]
+        while open_ones and len(found | needed) <= MOST_TOGETHER and not found & coupled:
+            for c in np.flatnonzero(edges[match[open_ones.pop()]]).tolist():
+                if c not in found and c not in needed:
+                    found.add(c)
+                    open_ones.append(c)
+        if open_ones:
+            coupled.add(first)
+        else:
+            needed |= found
+    return np.array(sorted(needed), dtype=np.int64), np.array(sorted(coupled), dtype=np.int64)
+
+
+class Graph:
+    """Which unknowns and rates stand in which equations, and what is asked: all that a structure follows from.
+
+    Parameters
+    ----------
+    *lists : ndarray
+        Dependences on unknowns and on rates; wanted, solved for and differential unknowns; pattern of the matrix.
+    """
+
+    def __init__(self, *lists: np.ndarray) -> None:
+        self.lists = lists
+        self._content = tuple(items.tobytes() for items in lists)
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Graph) and self._content == other._content
+
+
+class Structure(NamedTuple):
+    """Unknowns left, unknowns that hang on too many others; equations, unknowns and entries of an `AlgebraicPart`."""
+
+    left: np.ndarray
+    coupled: np.ndarray
+    rows: np.ndarray
+    cols: np.ndarray
+    lifted: np.ndarray
+    rates: np.ndarray
+    entries: np.ndarray
+
+
+@lru_cache(maxsize=KNOWN)
+def structure(graph: Graph) -> Structure:
+    """Return what is solved for and by which equations; runs of alike problems find it once."""
+    by_y, by_rate, wanted, solved, differential, indptr, indices = graph.lists
+    n = len(wanted)
+    unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & differential))
+    edges = np.concatenate((by_y, by_rate), axis=1) & unknown
+    constraints = ~edges.any(axis=1) & ~by_y[:, ~differential].any(axis=1)
+    edges[constraints, n:] = by_y[constraints] & unknown[n:]
+    match, determined = _determined(edges)
+    determined &= unknown
+    asked = np.flatnonzero(wanted)
+    found, coupled = _needed(edges, match, asked[determined[asked]])
+    rows, cols, rates = match[found].astype(np.int64), found % n, found >= n
+    lifted = constraints[rows]
+    place = {int(row): k for k, row in enumerate(rows)}
+    entries: list[tuple[int, int, int, int]] = []
+    for c, (j, is_rate) in enumerate(zip(cols, rates)):
+        for p in range(int(indptr[j]), int(indptr[j + 1])):
+            k = place.get(int(indices[p]))
+            if k is not None and (by_rate if is_rate and not lifted[k] else by_y)[rows[k], j]:
+                entries.append((k, c, p, int(is_rate and not lifted[k])))
+    table = np.array(entries, dtype=np.int64).reshape(-1, 4)
+    return Structure(asked[~determined[asked]], coupled, rows, cols, lifted, rates, table)
+
+
+def chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Return which unknowns are wanted at outputs, and which are solved for if an equation needs them."""
+    algebraic = ~np.asarray(problem.differential, dtype=bool)
+    if problem.solved_at_outputs is not None:
+        wanted = algebraic & problem.solved_at_outputs
+        return wanted, wanted
+    wanted = algebraic & ~np.asarray(problem.error_mask, dtype=bool)
+    return wanted, algebraic
+
+
+def has_hidden_constraints(problem: DAEProblem) -> bool:
+    """Return whether the rates of the differential unknowns depend on each other at the start: dG/dx' has a null space.
+
+    Sums of equations are free of rates then, as in circuits of capacities without a path to the ground.
+    """
+    y, yp = problem.y0.astype(float), problem.yp0.astype(float)
+    tables = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    base, moved = np.empty(problem.n), np.empty(problem.n)
+    problem.residual(float(problem.t0), y, yp, base, *tables)
+    columns = []
+    for j in np.flatnonzero(problem.differential):
+        d = PROBE_OF_RATE * max(1.0, abs(yp[j]))
+        kept, yp[j] = yp[j], yp[j] + d
+        problem.residual(float(problem.t0), y, yp, moved, *tables)
+        yp[j] = kept
+        columns.append((moved - base) / d)
+    if not columns:
+        return False
+    matrix = np.array(columns).T
+    if not np.isfinite(matrix).all():
+        return True
+    for axis in (1, 0):
+        largest = np.abs(matrix).max(axis=axis, keepdims=True)
+        matrix = matrix / np.where(largest > 0.0, largest, 1.0)
+    return bool(np.linalg.matrix_rank(matrix, RANK) < matrix.shape[1])
