@@ -3,7 +3,7 @@
 import numpy as np
 
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, larger_number, magnitude, put_lanes
+from gearmbs.kernels.lanes import LANES, all_lanes, bits_of, double_of, lanes_at, larger_number, magnitude, put_lanes
 
 
 @njit(error_model="numpy")
@@ -43,3 +43,19 @@ def test_the_larger_number_is_the_second_beside_nan():
     compare(np.array([first, second]), out)
     numbers = ~np.isnan(first) & ~np.isnan(second)
     np.testing.assert_array_equal(out[0], np.where(numbers, np.maximum(first, second), second))
+
+
+@njit(error_model="numpy")
+def largest(values):
+    top = 0
+    for value in values:
+        top = max(top, bits_of(abs(value)))
+    return double_of(top)
+
+
+def test_bits_of_magnitudes_order_as_they_do():
+    """With infinity above all numbers, and NaN above infinity."""
+    numbers = np.array([0.5, -2.0, 0.0, 5e-324])
+    assert largest(numbers) == 2.0
+    assert largest(np.append(numbers, -np.inf)) == np.inf
+    assert np.isnan(largest(np.append(numbers, [np.nan, np.inf])))
