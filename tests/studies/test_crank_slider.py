@@ -61,6 +61,7 @@ def test_broken_tooth_shows_once_a_turn_of_its_wheel():
     np.testing.assert_allclose(np.diff(first) * slider.speed / (2 * np.pi), 1.0, atol=0.01)
 
 
+@pytest.mark.slow
 def test_eccentric_wheel_has_its_first_sidebands():
     """By `analyse` on the recorded speed: the lines one crank order beside each mesh harmonic rise, no others."""
     beside = []

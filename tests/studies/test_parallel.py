@@ -166,6 +166,7 @@ def test_ctrl_c_ends_all_processes(everyone):
     assert all(gone(pid) for pid in pids)
 
 
+@pytest.mark.slow
 def test_processes_and_threads_give_the_same_records():
     """IDA runs in processes when there is more than one worker; bars move before a case ends."""
     cases = [

@@ -175,6 +175,7 @@ def test_only_lines_at_multiples_of_the_mesh_frequency():
     assert between.max() < 1e-4 * spectrum[periods]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [{}, {"centre_distance_error": "3 mm"}, {"misalignment": "1 deg"}])
 def test_floor_between_the_lines_at_the_study_settings(fault):
     """1000 rpm, friction, a sampling rate that is no multiple of the mesh frequency: what lies between the lines below

@@ -15,6 +15,7 @@ import xarray as xr
 from gearmbs._shown import Shown, html_table
 from gearmbs.dae.result import SolverStats
 from gearmbs.files import write_whole
+from gearmbs.schema.messages import chosen
 from gearmbs.signals import COMPONENTS, rms_factor
 from gearmbs.studies.case.case import Case, CaseError, make_case
 from gearmbs.studies.paper.preset import (
@@ -140,8 +141,7 @@ def run_paper(
     >>> study = run_paper(Case(operation={"duration": 0.2}))  # doctest: +SKIP
     >>> study.table()  # doctest: +SKIP
     """
-    if component not in COMPONENTS:
-        raise CaseError(f"component: {component!r} is unknown; choose one of {', '.join(COMPONENTS)}")
+    chosen(COMPONENTS, component, "", CaseError, "component:")
     cases = paper_cases(base=base, torques=torques, misalignment=misalignment)
     records = run_cases(cases, workers=workers, progress=progress, done=done, folder=folder)
     return PaperStudy(combine(cases, records, component), component, cases)

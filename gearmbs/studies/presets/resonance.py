@@ -23,7 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -33,6 +33,8 @@ from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.transmission import TransmissionError, loaded_transmission_error
 from gearmbs.mechanism import Mechanism
+from gearmbs.schema.described import Described
+from gearmbs.schema.quantities import Measure
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.presets.files import preset_train, with_values
 from gearmbs.studies.run.parallel import run_named
@@ -54,8 +56,11 @@ SETTLING = 100
 """Mesh cycles at the first frequency that are left out."""
 
 
+Length = Annotated[Quantity, Measure("length", above=0)]
+
+
 @dataclass(frozen=True)
-class ResonanceSettings:
+class ResonanceSettings(Described):
     """Two equal spur wheels, their load and damping, and how the mesh frequency is swept.
 
     Parameters
@@ -84,31 +89,22 @@ class ResonanceSettings:
     """
 
     teeth: int = 50
-    module: Quantity = 3e-3
-    face_width: Quantity = 20e-3
+    module: Length = 3e-3
+    face_width: Length = 20e-3
     addendum: float = 0.85
-    torque: Quantity = 30.0
-    damping_ratio: float = 0.11
-    backlash: Quantity = 1e-4
-    stiffness: Quantity = None
-    span: tuple[float, float] = (0.68, 0.88)
+    torque: Annotated[Quantity, Measure("torque", above=0)] = 30.0
+    damping_ratio: Annotated[Quantity, Measure(above=0)] = 0.11
+    backlash: Length = 1e-4
+    stiffness: Annotated[Quantity, Measure("stiffness", above=0)] = None
+    span: Annotated[tuple[float, float], Measure(above=0, several=2)] = (0.68, 0.88)
     cycles: int = 4000
     window: int = 20
     tolerance: float = 1e-8
 
     def __post_init__(self) -> None:
-        units = {"module": "length", "face_width": "length", "torque": "torque", "backlash": "length",
-                 "stiffness": "stiffness"}  # fmt: skip
-        for name, unit in units.items():
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, to_si(value, unit, name))
-                if not getattr(self, name) > 0.0:
-                    raise ValueError(f"{name} is {value}; it must be positive")
-        if not 0.0 < self.span[0] < self.span[1]:
+        super().__post_init__()
+        if not self.span[0] < self.span[1]:
             raise ValueError(f"span is {self.span}; give a lower and a higher ratio, both positive")
-        if not self.damping_ratio > 0.0:
-            raise ValueError(f"damping_ratio is {self.damping_ratio:g}; it must be positive")
         if not (self.window >= 1 and self.cycles >= SETTLING + 10 * self.window):
             raise ValueError(f"cycles is {self.cycles}; give {SETTLING + 10 * self.window} or more")
 

@@ -13,9 +13,10 @@ import xarray as xr
 
 from gearmbs._shown import Shown, html_table
 from gearmbs.files import python_scalar
+from gearmbs.schema.quantities import SHOWN
 from gearmbs.signals.files.simulated import record_signal
 from gearmbs.studies.case.case import Case, CaseError, readable
-from gearmbs.studies.case.section import SHOWN, Section, measures_of
+from gearmbs.studies.case.section import Section, measures_of
 from gearmbs.studies.paper.preset import DEFAULT_COMPONENT
 from gearmbs.studies.run.parallel import run_cases
 from gearmbs.studies.run.store import file_stem, save_study
