@@ -95,6 +95,17 @@ def measures_of(kind: Any) -> dict[str, Measure]:
 def make(kind: type[T], table: Mapping[str, Any], where: str, error: type[ValueError], **others: Any) -> T:
     """Return an object of a class of descriptions from a table of a file and what else is known of it.
 
+    Parameters
+    ----------
+    kind : type
+    table : mapping
+        Fields by name.
+    where : str
+        What messages about its keys begin with, such as "[run]".
+    error : type
+    **others
+        Fields that the table does not hold.
+
     Raises
     ------
     ValueError
