@@ -94,12 +94,6 @@ CIRCLES = {
     ("mechanism.building.compile", "mechanism.building.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",
-    ("adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts", "adams.builders.control",
-     "adams.builders.curve_data", "adams.builders.curves", "adams.builders.flexible", "adams.builders.forces",
-     "adams.builders.frames", "adams.builders.functions", "adams.builders.mechanism", "adams.builders.routine_calls",
-     "adams.builders.routines", "adams.builders.scopes", "adams.parse.check", "adams.parse.deck",
-     "adams.parse.readers", "adams.parse.refused"):
-        "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.report", "campaigns.results", "campaigns.sensitivity.indices",
      "campaigns.sensitivity.surrogates"):
         "methods of Campaign, and the functions that carry them out",

@@ -14,8 +14,9 @@ from gearmbs.bearings.geometry import Bearing
 from gearmbs.bearings.settings import bearing_settings
 from gearmbs.bearings.tables import pack
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
-from gearmbs.mechanism.parts.bodies import Body, Vector, frame_along
+from gearmbs.mechanism.parts.bodies import Body
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
+from gearmbs.mechanism.parts.quantities import Vector, frame_along
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism

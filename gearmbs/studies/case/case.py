@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from gearmbs._shown import Shown
-from gearmbs.dae.methods import DEFAULT, INTEGRATORS
+from gearmbs.dae.methods import DEFAULT, FORMULATIONS, INTEGRATORS
 from gearmbs.schema.files import read_toml, toml_table
 from gearmbs.schema.quantities import SHOWN, Measure, two
 from gearmbs.studies.case import section as q
@@ -38,8 +38,10 @@ if TYPE_CHECKING:
     from gearmbs.gears import GearPair
 
     IntegratorName = str
+    FormulationName = str
 else:
     IntegratorName = Literal[tuple(INTEGRATORS)]
+    FormulationName = Literal[tuple(FORMULATIONS)]
 
 LEAST_TOLERANCE = 1e-12
 """Lower limit of ``solver.tolerance``; upper ones and defaults are in the table of integrators, see `Solver`."""
@@ -268,7 +270,7 @@ class Solver(Section):
     section: ClassVar[str] = "solver"
 
     integrator: Annotated[IntegratorName, BeforeValidator(_upper)] = DEFAULT
-    formulation: Annotated[Literal["SI2", "SI1", "I3"], BeforeValidator(_upper)] = "SI2"
+    formulation: Annotated[FormulationName, BeforeValidator(_upper)] = "SI2"
     tolerance: float | None = None
     output_rate: q.SamplingRate = None
     signal_rate: q.SamplingRate = None

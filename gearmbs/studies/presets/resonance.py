@@ -28,15 +28,17 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 import xarray as xr
 
-from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
+from gearmbs.drivetrain import Drivetrain
 from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.transmission import TransmissionError, loaded_transmission_error
 from gearmbs.mechanism import Mechanism
-from gearmbs.progress import told_of_span
 from gearmbs.schema.described import Described
 from gearmbs.schema.quantities import Measure
 from gearmbs.signals.analysis.report import markdown_table
+from gearmbs.studies.presets.files import preset_train, with_values
+from gearmbs.studies.run.parallel import run_named
+from gearmbs.studies.run.store import save_study
 from gearmbs.units import Quantity, to_si
 
 Direction = Literal["up", "down"]
@@ -177,24 +179,16 @@ def resonance_train(settings: ResonanceSettings | None = None, direction: Direct
     s = settings or ResonanceSettings()
     law = chirp(s, direction)
     turn = 2.0 * math.pi / s.teeth
-    # massless shafts: all inertia is that of the wheels
-    light: dict[str, Any] = {"length": 0.1, "radius": 0.01, "density": 1e-3}
     swept = f"MAX(TIME - {law.settling!r}, 0)"
     turned = f"{turn * law.first!r}*TIME + {0.5 * turn * law.rate!r}*{swept}**2"
-    pair = s.pair
-    return Drivetrain(
-        "mesh resonance",
-        shafts=[Shaft(name="in", **light), Shaft(name="out", **light)],
-        wheels=[Wheel(name="driver", shaft="in", gear=pair.driver),
-                Wheel(name="driven", shaft="out", gear=pair.driven)],
-        meshes=[GearMesh(name="mesh", driver="driver", driven="driven",
-                         settings={"backlash": s.backlash, "contact": pair.contact, "friction": False})],
-        bearings=[IdealBearing(name="left", shaft="in"), IdealBearing(name="right", shaft="out")],
-        drives=[SpeedDrive(name="drive", shaft="in", speed=turn * law.first, function=turned)],
-        loads=[TorqueLoad(name="load", shaft="out", torque=s.torque)],
-        running=True,
-        run_up=10.0 / law.first,
-    )  # fmt: skip
+    train = with_values(preset_train("resonance"), {
+        "driver": {"gear": s.pair.driver},
+        "driven": {"gear": s.pair.driven},
+        "mesh": {"settings": {"backlash": s.backlash, "contact": s.pair.contact, "friction": False}},
+        "drive": {"speed": turn * law.first, "function": turned},
+        "load": {"torque": s.torque},
+    })  # fmt: skip
+    return replace(train, run_up=10.0 / law.first)
 
 
 def resonance_rig(settings: ResonanceSettings | None = None, direction: Direction = "up") -> Mechanism:
@@ -461,32 +455,30 @@ class ResonanceStudy:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write the sweeps, the report and the figure to a folder; return the paths."""
-        from gearmbs.studies.run.store import write_dataset, write_text
-        from gearmbs.view import save_figure
-
-        folder = Path(folder)
-        paths = [folder / f"{model.replace(' ', '_')}_{direction}.nc" for model, direction in self.sweeps]
-        for path, sweep in zip(paths, self.sweeps.values(), strict=True):
-            write_dataset(path, sweep)
-        write_text(folder / "report.md", self.report())
-        return [*paths, folder / "report.md", *save_figure(self.figure(), folder / "resonance")]
+        sweeps = {f"{model.replace(' ', '_')}_{way}.nc": sweep for (model, way), sweep in self.sweeps.items()}
+        return save_study(folder, sweeps, {"report.md": self.report}, lambda: {"resonance": self.figure()})
 
 
 def run_resonance(
-    settings: ResonanceSettings | None = None, *, progress: Callable[[str, float], None] | None = None
+    settings: ResonanceSettings | None = None, *, progress: bool | Callable[[str, float], None] | None = None
 ) -> ResonanceStudy:
     """Sweep a pair up and down through its mesh resonance, by the multibody and by the classical model.
 
     Parameters
     ----------
     settings : ResonanceSettings, optional
-    progress : callable, optional
-        Called with "up" or "down" and the part of that multibody sweep that is done.
+    progress : bool or callable, optional
+        Bars, see `gearmbs.progress`; a callable is told "up" or "down" and the part of that multibody sweep that is
+        done.
     """
     s = settings or ResonanceSettings()
+
+    def work(direction: Any, report: Callable[[float], None]) -> xr.Dataset:
+        span = chirp(s, direction).duration
+        return sweep_resonance(s, direction, MODELS[0], progress=lambda t: report(min(t / span, 1.0)))
+
     sweeps: dict[tuple[str, str], xr.Dataset] = {}
-    for direction in DIRECTIONS:
-        told = told_of_span(progress, direction, chirp(s, direction).duration)
-        sweeps[MODELS[0], direction] = sweep_resonance(s, direction, MODELS[0], progress=told)
-        sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])
+    for direction, whole in run_named(work, DIRECTIONS, progress=progress).items():
+        sweeps[MODELS[0], direction] = whole
+        sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])  # type: ignore[arg-type]
     return ResonanceStudy(s, sweeps, separation_loads(s))
