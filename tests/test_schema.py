@@ -155,7 +155,7 @@ def test_tables_of_files_become_objects():
     with pytest.raises(MachineError, match=r"^a: kind 'lathee' is unknown; choose one of mill, lathe; did you mean la"):
         chosen({"mill": 1, "lathe": 2}, "lathee", "a: ", MachineError)
     with pytest.raises(MachineError, match=r"^unknown key run\.x; known ones are y$"):
-        check_keys({"x": 1}, ["y"], "", MachineError, prefix="run.")
+        check_keys({"x": 1}, ["y"], "", MachineError, form="unknown key run.{}")
 
 
 @pytest.mark.parametrize("case", range(cases(20)))
