@@ -17,9 +17,13 @@ import gearmbs
 ROOT = Path(gearmbs.__file__).parent
 PAGE = Path(__file__).parent.parent / "docs" / "architecture.md"
 
-SUPPORT = {"_command", "_deprecation", "_lazy", "_shown", "compile", "files", "progress", "saving", "units", "wording"}
+SUPPORT = {
+    "_command", "_deprecation", "_lazy", "_shown", "compile", "files", "progress", "saving", "schema", "units",
+    "wording",
+}  # fmt: skip
 """Modules of the top that any package may use: lazy imports, how objects show themselves and are saved, files that
-appear when they are whole, progress, units, parts of messages, and the command that compiles ahead."""
+appear when they are whole, progress, units, how descriptions are read and checked, parts of messages, and the command
+that compiles ahead."""
 
 MAY_KNOW = {
     "kernels": {"dae"},

@@ -22,7 +22,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.building.compile import starting_angles
 from gearmbs.mechanism.language.library import compile_expression
-from gearmbs.mechanism.language.series import evaluate_series
+from gearmbs.mechanism.language.series import expression_values
 from gearmbs.mechanism.language.syntax import Scope
 from gearmbs.mechanism.language.user_functions import raised_errors
 
@@ -143,15 +143,12 @@ class RequestEvaluator:
             y[:, q] = self._unknown(key)
         tape = tape.bind(tape.algebraic.index)
         self._note(tape)
-        angles = np.zeros((3, max(1, tape.n_angles)))
-        angles[0, : tape.n_angles] = starting_angles(tape, self._turns, self._marker_named)
-        out = np.zeros(m)
+        starts = starting_angles(tape, self._turns, self._marker_named)
         with raised_errors(self.model.mechanism.functions.values()):
-            evaluate_series(
-                tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
-                angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
+            return expression_values(
+                tape, starts, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
+                self._marker_named,
             )  # fmt: skip
-        return out
 
     def variables(self) -> dict[int, np.ndarray]:
         """Return the values of the deck's VARIABLEs over time, but for those that ask for what is not there."""

@@ -174,7 +174,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
     _state_rates(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work, (indptr, indices))
     _rates(y, yp, acc, system.t0, idata, rdata, work)
     largest = float(np.abs(found.loads[:, :3]).max(initial=0.0))
-    scale = unknowns.scales(model.counts, form, model.bodies[1:], model.modal_sizes(), min(system.length, 1.0), largest)
+    scale = unknowns.scales(model.counts, form, model.bodies[1:], model.modal_sizes, min(system.length, 1.0), largest)
     allowed = scale.copy()
     allowed[unknowns.velocities(at)] *= rate_scale
     flexible = sum(model.modes) > 0
