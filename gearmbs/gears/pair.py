@@ -103,6 +103,7 @@ class GearPair(PairGeometry, Shown):
     input_torque: InitVar[Quantity] = None
 
     _calls: ClassVar[int] = 5
+    _input_torque: ClassVar[Quantity] = None  # of an instance, where it was given
 
     # mypy may lose InitVar among modules that import each other for types
     def __post_init__(self, input_torque: Quantity) -> None:  # type: ignore[override]
@@ -114,6 +115,7 @@ class GearPair(PairGeometry, Shown):
                 )
             given = to_si(input_torque, "torque", "GearPair.input_torque")
             object.__setattr__(self, "torque", given * self.driven.teeth / self.driver.teeth)
+            object.__setattr__(self, "_input_torque", input_torque)
         elif self.torque is None:
             object.__setattr__(self, "torque", OperatingPoint.torque)
         object.__setattr__(self, "faults", tuple(self.faults))
@@ -222,14 +224,19 @@ class GearPair(PairGeometry, Shown):
         return cls(**changes)
 
     def with_changes(self, **changes: Any) -> GearPair:
-        """A copy with some fields changed, or with another ``input_torque``."""
+        """A copy with some fields changed, or with another ``input_torque``.
+
+        A pair that was given its ``input_torque`` keeps that, whatever its wheels change to.
+        """
+        if changes.get("torque") is None:
+            changes.setdefault("input_torque", self._input_torque)
         if changes.get("input_torque") is not None:
             changes.setdefault("torque", None)
         return replace(self, **changes)
 
     def with_faults(self, *faults: Fault) -> GearPair:
         """A copy with these faults added to those it has."""
-        return replace(self, faults=self.faults + faults)
+        return self.with_changes(faults=self.faults + faults)
 
     def with_potential_energy_stiffness(
         self, damping: Quantity = None, depth: Quantity = None, *, damping_ratio: float | None = None
@@ -246,7 +253,7 @@ class GearPair(PairGeometry, Shown):
         geometry = self.geometry
         largest = float(pair_stiffness(geometry, compliance_roll_lengths(geometry)).max()) / self._face_share
         made = self.with_linear_stiffness(largest, damping, depth, damping_ratio=damping_ratio)
-        return replace(made, stiffness_curve="potential-energy")
+        return made.with_changes(stiffness_curve="potential-energy")
 
     def with_iso_stiffness(
         self, kind: Literal["single", "mesh"] = "single", damping: Quantity = None, depth: Quantity = None, *,
@@ -316,7 +323,7 @@ class GearPair(PairGeometry, Shown):
             share = self._pairs_in_mesh * self._face_share
             damping = 2.0 * damping_ratio * math.sqrt(law.stiffness * self.reduced_mass / share)
             depth = RATIO_DEPTH if depth is None else depth
-        return replace(self, contact=ContactLaw.linear(stiffness, damping, depth), stiffness_curve="constant")
+        return self.with_changes(contact=ContactLaw.linear(stiffness, damping, depth), stiffness_curve="constant")
 
     def with_own_stiffness(self, stiffness: Quantity = "iso", damping_ratio: float | None = None) -> GearPair:
         """A copy with the stiffness of its own wheels and a damping ratio: the default of drivetrains.

@@ -99,7 +99,7 @@ class TableBuilder:
         for terms, function in rows:
             self.rows.append((len(self.terms), function, -1))
             for *term, coefficient, start in terms:
-                self.terms.append((*term, -1))
+                self.terms.append(tuple(term))
                 self.coef.append(coefficient)
                 self.reference.append(start)
 

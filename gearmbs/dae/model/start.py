@@ -13,7 +13,7 @@ from gearmbs.dae.equations.constraints.terms import ANGLE
 from gearmbs.dae.equations.kinematics.rotation import KIN_ADOT, euler_rates
 from gearmbs.dae.equations.kinematics.update import hook
 from gearmbs.dae.equations.loads.reactions import reactions_from
-from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, SI1
+from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, multipliers_are_rates
 from gearmbs.dae.model import diagnosis
 from gearmbs.dae.model.configuration import Assembled, euler_references
 from gearmbs.dae.problem import DAEProblem, ModelError, SingularModelError
@@ -166,7 +166,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
     first = int(found.idata[T.H_F])
     y[: at["lambda"]] = found.y[: at["lambda"]]
     y[at["F"] : at["mu"]] = found.y[first:]
-    (yp if form == SI1 else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
+    (yp if multipliers_are_rates.py_func(form) else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
     indptr, indices, slots = jacobian.pattern(idata, rdata, size, system.t0, y)
     idata, rdata, size = model.pack(form, slots, codes)
     work = np.zeros(size)

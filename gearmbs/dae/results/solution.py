@@ -28,7 +28,7 @@ from gearmbs.progress import waiting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.dae.model.lane_members import Members
+    from gearmbs.dae.model.member_tables import Members
 
 
 # A solution as a table for notebooks.
