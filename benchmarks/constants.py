@@ -38,7 +38,7 @@ LEFT_OUT = {
     "driver": {"FIRST_MOVE", "FIRST_TRIED", "CHECK_RATIO", "LEAST_DIGITS", "HOPELESS_DIGITS", "UNSATISFIED"},
     "initial_state": {"LARGE_GAMMA"},
     "newton_matrix": {"PLANNED_RANGE", "LEAP"},
-    "restart": {"FIRST_TARGET", "SETTLED", "BLOCK_ERROR"},
+    "restart": {"FIRST_TARGET", "SETTLED", "BLOCK_ERROR", "SHORT_OF_STOP"},
     "step": {"FORESEEN", "LANDED"},
 }
 """Constants of these modules that what is said of them fixes."""

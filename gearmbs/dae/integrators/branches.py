@@ -77,7 +77,7 @@ def stays_on_branch(functions, st, plan, factors):
     for i in range(y.shape[0]):
         if own[i] != 0.0:
             between[i] = old[i]
-    functions.residual(st.t_new, between, st.yp, st.res, st.idata, st.rdata, st.work)
+    functions.residual(st.t_seen, between, st.yp, st.res, st.idata, st.rdata, st.work)
     st.residuals += 1
     solve(plan, factors, st.res, secant)
     along = 0.0
@@ -117,7 +117,7 @@ def _pencil_sign(functions, st):
     Gaussian elimination with rows of unit size and pivots by columns: those of the step need not fit.
     """
     n, gamma = st.y.shape[0], st.gamma_large
-    functions.jacobian(st.t_new, st.y, st.yp, gamma, st.matrix, st.idata, st.rdata, st.work)
+    functions.jacobian(st.t_seen, st.y, st.yp, gamma, st.matrix, st.idata, st.rdata, st.work)
     st.jacobians += 1
     a = np.zeros((n, n))
     for p in range(st.matrix.shape[0]):
@@ -253,7 +253,7 @@ def _rates_hold(functions, st):
     for p in range(st.matrix.shape[0]):
         j = st.entry_col[p]
         allowed[st.entry_row[p]] += ROUNDED_TERMS * EPS * abs(st.matrix[p] * st.y[j])
-    functions.residual(st.t_new, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
+    functions.residual(st.t_seen, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
     st.residuals += 1
     for i in range(n):
         if looked_at[i] != 0.0 and not abs(st.res[i]) <= allowed[i]:
@@ -268,7 +268,7 @@ def _terms(functions, st, old, suspect, part, out):
     for i in range(y.shape[0]):
         y[i] = old[i] + part * (st.y[i] - old[i]) if suspect[i] != 0.0 else st.y[i]
         rates[i] = 0.0
-    functions.residual(st.t_new, y, rates, out, st.idata, st.rdata, st.work)
+    functions.residual(st.t_seen, y, rates, out, st.idata, st.rdata, st.work)
     st.residuals += 1
 
 

@@ -45,7 +45,7 @@ def _watch_leaps(st):
 def evaluate_matrix(functions, st):
     """Evaluate the Newton matrix at ``st.y``, and now and then its slope dG/dy' by a second evaluation."""
     jacobian = functions.jacobian
-    t, gamma = st.t_new, st.gamma
+    t, gamma = st.t_seen, st.gamma
     jac, slope = st.jac, st.jac_slope
     jacobian(t, st.y, st.yp, gamma, jac, st.idata, st.rdata, st.work)
     st.jacobians += 1

@@ -62,6 +62,8 @@ BLOCK_SIZE = 4.0
 """h^5 y^(5) of the first block tried, in tolerances: ten times the local error at order four."""
 BLOCK_SHRINK = 0.2
 """Ratio of the next h to one whose sweeps did not converge."""
+SHORT_OF_STOP = 0.99
+"""Part of the way to the next stop that a block takes: at its end the equations may have jumped."""
 LEAST_GAIN = 4.0
 """Ratio of h to the step of order one from which a block is worth its sweeps."""
 SWEEPS = 12
@@ -170,11 +172,11 @@ def take_block(functions, st, plan, factors):
     spread = 0.0
     code = RUNNING
     while st.blocks < BLOCKS:
-        h = min(st.h_block, (stop - t) / POINTS)
+        h = min(st.h_block, SHORT_OF_STOP * (stop - t) / POINTS)
         if not h > LEAST_GAIN * h_first:
             break
         st.blocks += 1
-        st.t_new = t + h
+        st.t_seen = t + h
         st.gamma = 1.0 / h
         code = form_matrix(functions, st, plan, factors)
         if code != RUNNING:
@@ -244,14 +246,14 @@ def _settle_points(functions, st, plan, factors, h):
         for i in range(n):
             moved[i] = 0.0
         for j in range(1, POINTS + 1):
-            st.t_new = times[j]
+            st.t_seen = times[j]
             bdf.step_coefficients(times[j], times, POINTS, st.value, st.slope)
             bdf.predict(st.value, st.slope, POINTS + 1, rows, y_pred, yp_pred)
             for i in range(n):
                 y[i] = y_pred[i] + moved[i]
                 yp[i] = yp_pred[i]
             # one correction each: the sweep to come corrects what it leaves, too
-            functions.residual(st.t_new, y, yp, st.res, st.idata, st.rdata, st.work)
+            functions.residual(st.t_seen, y, yp, st.res, st.idata, st.rdata, st.work)
             solve(plan, factors, st.res, st.delta)
             apply_correction(st.delta, st.gamma, st.w_newton, y, yp)
             for i in range(n):

@@ -147,6 +147,7 @@ class RunState(Struct):
     open: bool  # its row is taken
     t_old: float
     t_new: float
+    t_seen: float  # where the equations are evaluated: t_new, or just before where the step lands on a stop
     step: float  # t_new - t_old
     h_wanted: float  # size before it was fitted to a stop
     h_first: float  # size of the first attempt

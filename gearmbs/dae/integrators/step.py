@@ -162,6 +162,9 @@ def choose_end(st):
         return s.FAIL_STEP_TOO_SMALL
     st.t_old = t_old
     st.t_new = t
+    # at a stop the equations may have jumped already
+    lands = st.next_stop < st.stops.shape[0] and t >= st.stops[st.next_stop]
+    st.t_seen = np.nextafter(t, t_old) if lands else t
     st.step = h
     st.h_wanted = st.h
     st.h = h

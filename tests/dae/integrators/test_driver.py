@@ -224,19 +224,22 @@ def test_a_jump_at_a_breakpoint_restarts_at_order_one(method):
 
 @njit
 def pushed_by_turns(t, y, yp, out, p):
-    """A unit mass on a unit spring; if p is one, the push changes its sign with each period."""
-    away = p[0] == 1.0 and int(np.ceil(t / (2.0 * np.pi))) % 2 == 0
+    """A unit mass on a unit spring; if p[0] is one, the push changes its sign after each period, if p[1] is, at it."""
+    periods = t / (2.0 * np.pi)
+    away = p[0] == 1.0 and int(np.floor(periods) + 1.0 if p[1] == 1.0 else np.ceil(periods)) % 2 == 0
     out[0] = yp[0] - y[1]
     out[1] = yp[1] + y[0] - (-1.0 if away else 1.0)
 
 
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 @pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8, 1e-10])
-def test_a_restart_at_a_jump_costs_ten_steps_at_most_and_no_digits(tol, method):
+@pytest.mark.parametrize("beyond", [False, True])
+def test_a_restart_at_a_jump_costs_ten_steps_at_most_and_no_digits(beyond, tol, method):
+    """Whether the instant of the jump belongs to what is before it or to what is beyond."""
     periods = 2.0 * np.pi * np.arange(1, 12)
     steady, jumping = (
         solve_dae(pushed_by_turns, (0.0, periods[-1]), [0.0, 1.0], rtol=tol, atol=tol, method=method,
-                  p=[float(jumps)], breakpoints=periods if jumps else ())
+                  p=[float(jumps), float(beyond)], breakpoints=periods if jumps else ())
         for jumps in (False, True)
     )  # fmt: skip
     assert jumping.success, jumping.message
