@@ -13,6 +13,7 @@ from typing import NoReturn
 import typer
 
 from gearmbs.progress import alone
+from gearmbs.schema.files import read_toml
 
 UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 """What is wrong with the place and not with the file."""
@@ -44,11 +45,9 @@ COMMANDS = {
 
 def kind_of(path: Path) -> str | None:
     """Return which of `COMMANDS` a file describes, None if none; what else is wrong is found by who reads it."""
-    import tomllib
-
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
+        data = read_toml(path)
+    except ValueError:
         return None
     if "planetary" in data:
         return "planetary set"

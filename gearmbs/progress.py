@@ -252,12 +252,3 @@ def time_bar(
         return
     with bars(progress, [name]) as move:
         yield None if move is None else lambda t: move(name, (t - start) / (end - start))
-
-
-def told_of_span(
-    progress: Callable[[str, float], None] | None, name: str, span: float
-) -> Callable[[float], None] | None:
-    """Return what tells the progress of a named run that it has reached a time of its span (s); None: its own bar."""
-    if progress is None:
-        return None
-    return lambda t: progress(name, min(t / span, 1.0))

@@ -4,8 +4,14 @@ import os
 import re
 from pathlib import Path
 
+from tests import private_parts
+
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+if os.environ.get("GEARMBS_COMPILER") == "plain":
+    # before any module of the package is imported
+    private_parts.refuse()
 
 PAGE = Path(__file__).parent.parent / "docs" / "development.md"
 SKIPPED: dict[str, str] = {}

@@ -17,9 +17,13 @@ import gearmbs
 ROOT = Path(gearmbs.__file__).parent
 PAGE = Path(__file__).parent.parent / "docs" / "architecture.md"
 
-SUPPORT = {"_command", "_deprecation", "_lazy", "_shown", "compile", "files", "progress", "saving", "units", "wording"}
+SUPPORT = {
+    "_command", "_deprecation", "_lazy", "_shown", "compile", "files", "progress", "saving", "schema", "units",
+    "wording",
+}  # fmt: skip
 """Modules of the top that any package may use: lazy imports, how objects show themselves and are saved, files that
-appear when they are whole, progress, units, parts of messages, and the command that compiles ahead."""
+appear when they are whole, progress, units, how descriptions are read and checked, parts of messages, and the command
+that compiles ahead."""
 
 MAY_KNOW = {
     "kernels": {"dae"},
@@ -90,12 +94,6 @@ CIRCLES = {
     ("mechanism.building.compile", "mechanism.building.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",
-    ("adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts", "adams.builders.control",
-     "adams.builders.curve_data", "adams.builders.curves", "adams.builders.flexible", "adams.builders.forces",
-     "adams.builders.frames", "adams.builders.functions", "adams.builders.mechanism", "adams.builders.routine_calls",
-     "adams.builders.routines", "adams.builders.scopes", "adams.parse.check", "adams.parse.deck",
-     "adams.parse.readers", "adams.parse.refused"):
-        "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.report", "campaigns.results", "campaigns.sensitivity.indices",
      "campaigns.sensitivity.surrogates"):
         "methods of Campaign, and the functions that carry them out",

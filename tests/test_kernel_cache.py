@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from gearmbs.kernels import cache
+from gearmbs.kernels import cache, locks
 
 CALLEES = """
     from typing import NamedTuple
@@ -290,11 +290,11 @@ def test_lock_after_it_was_removed(tmp_path):
     seen = []
 
     def second():
-        with cache._lock(path):
+        with locks.held(path):
             seen.append(path.exists())
 
     thread = threading.Thread(target=second)
-    with cache._lock(path):
+    with locks.held(path):
         thread.start()
         time.sleep(0.2)
         assert seen == []

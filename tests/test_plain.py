@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import os
 import subprocess
@@ -15,6 +14,7 @@ import pytest
 
 import gearmbs
 from gearmbs.kernels import NEWEST_KNOWN, is_plain
+from tests.private_parts import named_by
 
 FOLDER = Path(gearmbs.__file__).parent / "kernels"
 
@@ -63,6 +63,8 @@ KERNELS = """
 """
 PROGRAM = """
     import json, pickle, sys
+    from tests import private_parts
+    private_parts.refuse(("gearmbs", "plainpackage"))
     import numpy as np
     from numba import njit
     from plainpackage import kernels
@@ -155,10 +157,84 @@ def test_an_edit_of_what_a_kernel_uses_is_seen(package):
     assert package.run(program).stdout == "3.0 1\n"
 
 
+def test_kernels_are_compiled_ahead(package):
+    """What Python calls, and what is called by its address, each as it will be asked for; a run finds them."""
+    package.write("numbers", "FACTOR = 3.0  # in a folder of its own")
+    before = set(package.folder.rglob("*.nbc"))
+    done = package.run("from gearmbs.kernels.ahead import compile_all; compile_all(print, ['plainpackage.kernels'])")
+    assert done.returncode == 0, done.stderr
+    assert "plainpackage.kernels:caller_of_all" in done.stdout
+    ahead = set(package.folder.rglob("*.nbc")) - before
+    assert package.run(PROGRAM).returncode == 0
+    # no program can know that this helper will be called, or this kernel through an address
+    left = {path.name.partition("-")[0] for path in set(package.folder.rglob("*.nbc")) - before - ahead}
+    assert left == {"kernels.helper", "kernels.scaled"}
+    package.write("numbers", NUMBERS)
+
+
+def test_one_process_compiles_at_a_time(package):
+    """numba's cache mixes up what two processes write of one function; a kernel that compiles another may go on."""
+    program = """
+        import fcntl
+        from gearmbs.kernels.plain.jit import alone
+        with alone("plainpackage") as place:
+            with alone("plainpackage.kernels"):
+                pass
+            with open(place / "lock") as other:
+                try:
+                    fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    print("held")
+        print((place / "lock").exists())
+    """
+    assert package.run(program).stdout.split() == ["held", "False"]
+
+
 def test_an_unknown_mode_is_refused(package):
     done = package.run("import gearmbs.kernels", compiler="fast")
     assert done.returncode != 0
     assert 'GEARMBS_COMPILER = \'fast\': set it to "plain" or "own"' in done.stderr
+
+
+FOUND = """
+    {before}
+    import os, sys, warnings
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        from gearmbs import kernels
+        from gearmbs.kernels.structs import Struct
+    print(kernels.PLAIN, os.environ.get("GEARMBS_COMPILER"), "gearmbs.kernels.library" in sys.modules)
+    print(*(w.message for w in told), sep="\\n")
+"""
+NEWER = f"import importlib.metadata as m; m.version = lambda name: '{NEWEST_KNOWN[0]}.{NEWEST_KNOWN[1] + 1}.0'"
+MOVED = "import numba.core.codegen as moved; del moved.JITCodeLibrary"
+
+
+@pytest.mark.parametrize(
+    ("before", "says"),
+    [
+        (NEWER, "is newer than"),
+        (MOVED, "has not what the usual mode of gearmbs uses (cannot import name 'JITCodeLibrary'"),
+    ],
+    ids=["newer", "moved"],
+)
+def test_the_plain_mode_is_taken_where_the_own_does_not_fit(package, before, says):
+    """With one remark, not repeated by processes it starts; whoever asks for the own mode gets it, or why not."""
+    done = package.run(FOUND.format(before=before), compiler="")
+    assert done.returncode == 0, done.stderr
+    mode, *told = done.stdout.splitlines()
+    assert mode == "True plain False"
+    (told,) = told
+    assert told.startswith("numba ")
+    assert says in told
+    assert "compiled in the plain mode" in told
+    assert "GEARMBS_COMPILER=own" in told
+
+    asked = package.run(FOUND.format(before=before), compiler="own")
+    if before is MOVED:
+        assert "leave out GEARMBS_COMPILER=own, or set it to plain" in asked.stderr
+    else:
+        assert asked.stdout.strip() == "False own True"
 
 
 def test_the_mode_by_the_version_of_numba():
@@ -178,33 +254,23 @@ def test_the_mode_by_the_version_of_numba():
         assert is_plain("", f"{first + 1}.0")
 
 
-BEYOND_THE_REFERENCE = {
-    "llvmlite": {"ir"},
-    "llvmlite.binding": {""},  # add_symbol
-    "numba.core": {"cgutils"},
-    "numba.core.imputils": {"impl_ret_borrowed", "lower_builtin", "lower_getattr_generic", "lower_setattr_generic"},
-    "numba.core.typing.templates": {"AbstractTemplate", "AttributeTemplate", "infer_global", "signature"},
-    "numba.np.arrayobj": {"make_array", "populate_array"},
-}
-"""What the modules of the plain mode take from numba and llvmlite besides numba's documented interface."""
+OWN_STAGES = {"cache", "jit", "lanes", "late", "library", "pointers", "views"}
+"""Modules that the plain mode does not import."""
 
 
-def test_the_plain_mode_uses_no_other_private_part():
-    found: dict[str, set[str]] = {}
-    for path in (*sorted((FOLDER / "plain").glob("*.py")), *(FOLDER / f"{n}.py" for n in SHARED)):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.Import):
-                taken = [(alias.name, "") for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
-                taken = [(node.module or "", alias.name) for alias in node.names]
-            else:
-                continue
-            for module, name in taken:
-                if module.startswith(("numba.", "llvmlite")) and module not in DOCUMENTED:
-                    found.setdefault(module, set()).add(name)
-    assert found == BEYOND_THE_REFERENCE
+def test_the_plain_mode_names_no_private_part():
+    own = {FOLDER / f"{name}.py" for name in OWN_STAGES}
+    named = {path: parts for path in FOLDER.parent.rglob("*.py") if (parts := named_by(path))}
+    assert set(named) == own
 
 
-SHARED = ("pointers", "structs", "lanes", "records", "calls")
-"""Modules that compile, or find kernels, in both modes."""
-DOCUMENTED = {"numba.extending", "numba.experimental"}
+def test_a_private_part_is_refused(package):
+    """The guard of `PROGRAM`, and of all tests in the plain mode, does refuse; numba's own modules may go on."""
+    package.write("private", "def ask():\n    from numba.core import types")
+    program = """
+        from tests import private_parts
+        private_parts.refuse(("plainpackage",))
+        import numba, plainpackage.private
+        plainpackage.private.ask()
+    """
+    assert "plainpackage.private imports numba.core, a private part of numba" in package.run(program).stderr

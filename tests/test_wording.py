@@ -1,5 +1,6 @@
-"""What all messages say alike is said by one function each."""
+"""What all messages say alike is said by one function each, and tests hold no sentences of them."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -9,8 +10,11 @@ import pytest
 import gearmbs
 from gearmbs.files import plain, python_scalar
 from gearmbs.wording import any_of, closest, did_you_mean
+from tests.says import prose, says
 
 PACKAGE = Path(gearmbs.__file__).parent
+LONGEST = 3
+"""Words beside names and values that a test may ask of a message: "not a rotation", "give a positive"."""
 
 
 def sources(pattern):
@@ -58,3 +62,42 @@ def test_plain_values():
     assert plain([1j], other=repr) == ["1j"]
     assert type(python_scalar(np.int64(3))) is int
     assert python_scalar((np.int64(3),)) == (np.int64(3),)
+
+
+def test_tests_ask_for_names_values_and_remedies_not_for_sentences():
+    """An edit of English must not cost tests; `says` asks for words in any order."""
+    wrong = []
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        for node, words in prose(ast.parse(path.read_text(encoding="utf-8"))):
+            if len(words) > LONGEST:
+                wrong.append(f"{path.name}:{node.lineno}: {' '.join(words)}")
+    assert not wrong
+
+
+def test_what_counts_as_prose():
+    code = """
+@pytest.mark.parametrize(("torque", "words"), [(-5, "torque is -5 N*m; give more"), (0, says("torque", "above 0"))])
+def test_torques(torque, words):
+    "A torque that is a docstring's is no name."
+    with pytest.raises(ValueError, match=words):
+        pair(torque)
+    for kind, told in {"a": "of kind 'a' only"}.items():
+        with pytest.raises(ValueError, match=told):
+            pair(kind)
+"""
+    found = {ast.unparse(node): words for node, words in prose(ast.parse(code))}
+    assert list(found.values()) == [["is", "give", "more"], ["above"], ["of", "only"]]
+
+
+@pytest.mark.parametrize(
+    ("words", "message", "found"),
+    [
+        (("torque", "-5", "give"), "give a positive torque, not -5", True),
+        (("torque", "-5"), "torque: -5.5", False),
+        (("tor",), "torque", False),
+        (("5",), "0.5", False),
+        (("'a.b'", "give"), "'a.b':\ngive", True),
+    ],
+)
+def test_messages_are_asked_for_words(words, message, found):
+    assert bool(re.search(says(*words), message)) == found

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.mechanism import Mechanism, polynomial
-from gearmbs.mechanism.parts.bodies import frame_along
+from gearmbs.mechanism.parts.quantities import frame_along
 
 GRAVITY = 9.81
 """m/s^2, as the problems of the IFToMM library state it."""

@@ -124,11 +124,11 @@ MORE = {
             "Solver",
         ],
         "gearmbs.studies.run.simulation": ["record"],
-        "gearmbs.studies.run.store": ["write_dataset", "write_text", "whole_file"],
+        "gearmbs.studies.run.store": ["write_dataset"],
     },
     "gearmbs.campaigns": {
         "gearmbs.campaigns.factors": EVERYTHING,
-        "gearmbs.campaigns.runners": EXPORTED,
+        "gearmbs.campaigns.cluster": ["DaskRunner", "batch_cluster", "job_script"],
         "gearmbs.campaigns.results": ["export"],
         "gearmbs.campaigns.sensitivity.bounds": EVERYTHING,
         "gearmbs.campaigns.subjects.claims": EVERYTHING,
@@ -144,6 +144,7 @@ MORE = {
     "gearmbs.units": {
         "gearmbs.units": ["to_si"],
         "gearmbs.kernels.ahead": ["compile_all"],
+        "gearmbs.files": ["whole_file", "write_whole"],
         "gearmbs.saving": ["save"],
         "gearmbs.progress": EVERYTHING,
     },

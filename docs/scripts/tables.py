@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearmbs.dae.methods import integrators_table
+from gearmbs.dae.methods import formulations_table, integrators_table
 from gearmbs.signals.files.table import formats_table
 
 
@@ -24,3 +24,8 @@ def formats() -> Table:
 def integrators() -> Table:
     """Return the integrators."""
     return Table(integrators_table())
+
+
+def formulations() -> Table:
+    """Return the formulations."""
+    return Table(formulations_table())

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from gearmbs.adams.parse import commands as acf
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS, WITHOUT_EFFECT
 from gearmbs.adams.parse.grammar import CHOICE, specs_of
-from gearmbs.adams.parse.remedies import INSTEAD, INSTEAD_OF_ARGUMENTS, INSTEAD_OF_FUNCTIONS
+from gearmbs.adams.parse.readers import READ_IN_DECKS
+from gearmbs.adams.parse.statements import INSTEAD, INSTEAD_OF_ARGUMENTS, INSTEAD_OF_FUNCTIONS
 from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, FUNCTIONS, UNARY
 from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
 
 READ, OVER, REFUSED = "read", "read over", "refused"
 READ_THERE = "read, see the last column"
-OF_DECKS = frozenset("CURVE FXFREQ FXMODE MODE SENVAL USER".split())
+OF_DECKS = READ_IN_DECKS | frozenset("FXFREQ FXMODE MODE USER".split())
 """Functions that decks have in some places or forms."""
 
 INSTEAD_OF_COMMANDS: dict[str, str] = {
@@ -33,8 +33,8 @@ def statement_rows() -> list[tuple[str, str, str, str, str]]:
     rows = []
     for name, cls in st.STATEMENTS.items():
         keyword = {field: "/".join(s.choices) if s.kind == CHOICE else s.keyword for field, s in specs_of(cls).items()}
-        idle = [keyword[field] for field in WITHOUT_EFFECT.get(cls, ())]
-        refused = [keyword[field] for field in UNSUPPORTED_ARGUMENTS.get(cls, ())]
+        idle = [keyword[field] for field, spec in specs_of(cls).items() if spec.idle]
+        refused = [keyword[field] for field, spec in specs_of(cls).items() if spec.instead is not None]
         ways = dict.fromkeys(INSTEAD_OF_ARGUMENTS.get((name, one), "") for one in refused)
         rows.append((name, READ, ", ".join(idle), ", ".join(refused), "; ".join(way for way in ways if way)))
     rows += [(name, OVER, "", "", "") for name in st.IGNORED]

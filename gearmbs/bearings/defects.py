@@ -6,18 +6,19 @@ draw from their own seed.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from gearmbs._shown import Written
-from gearmbs.bearings.errors import BearingError, require, require_fields
+from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.layout import angles, drop, node_count, rounded
-from gearmbs.units import Quantity, to_si
+from gearmbs.schema.described import Described, make, measures_of
+from gearmbs.schema.messages import chosen
+from gearmbs.schema.quantities import Measure, OneOf
+from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
     from gearmbs.bearings.geometry import Bearing
@@ -26,34 +27,24 @@ OUTER, INNER, ELEMENT = "outer", "inner", "element"
 PARTS = (OUTER, INNER, ELEMENT)
 
 
+Part = Annotated[str, OneOf(PARTS)]
+Whole = Annotated[int, Measure(low=0, whole=True)]
+Length = Annotated[Quantity, Measure("length")]
+PositiveLength = Annotated[Quantity, Measure("length", above=0)]
+Angle = Annotated[Quantity, Measure("angle")]
+
+
 @dataclass(frozen=True, kw_only=True)
-class Defect(Written):
+class Defect(Described):
     """What all defects share: a label, a severity, checked settings in SI."""
 
     label: ClassVar[str] = "defect"
-    units: ClassVar[dict[str, str]] = {}
-
-    def __post_init__(self) -> None:
-        name = type(self).__name__
-        for item in fields(self):
-            value, place = getattr(self, item.name), f"{name}.{item.name}"
-            if item.name in self.units:
-                if value is not None:
-                    try:
-                        object.__setattr__(self, item.name, to_si(value, self.units[item.name], place))
-                    except (TypeError, ValueError) as error:
-                        raise BearingError(str(error)) from None
-                    require(math.isfinite(getattr(self, item.name)), f"{place} is {value}; give a finite number")
-            elif item.name == "part":
-                require(value in PARTS, f"{place} is {value!r}; choose {', '.join(PARTS)}")
-            elif item.name in ("element", "seed"):
-                good = isinstance(value, int) and not isinstance(value, bool) and value >= 0
-                require(good, f"{place} is {value!r}; give a whole number from 0 up")
+    error: ClassVar[type[ValueError]] = BearingError
 
     @property
     def severity(self) -> float:
         """Size of the defect, by its own main parameter."""
-        return float(getattr(self, next(iter(self.units))))
+        return float(getattr(self, next(name for name, one in measures_of(type(self)).items() if not one.whole)))
 
     @property
     def description(self) -> dict[str, Any]:
@@ -68,8 +59,8 @@ class Defect(Written):
 class SurfaceDefect(Defect, ABC):
     """Missing material over the angle of a ring or an element."""
 
-    part: str = OUTER
-    element: int = 0
+    part: Part = OUTER
+    element: Whole = 0
 
     def check(self, bearing: Bearing) -> None:
         if self.part == ELEMENT:
@@ -121,24 +112,18 @@ class Spall(SurfaceDefect):
     """
 
     label: ClassVar[str] = "spall"
-    units: ClassVar[dict[str, str]] = {"width": "length", "depth": "length", "angle": "angle", "edge": "length",
-                                       "roughness": "length"}  # fmt: skip
-    width: Quantity = "1 mm"
-    depth: Quantity = "0.1 mm"
-    angle: Quantity = 0.0
-    edge: Quantity = None
-    roughness: Quantity = 0.0
-    seed: int = 0
+    width: PositiveLength = "1 mm"
+    depth: PositiveLength = "0.1 mm"
+    angle: Angle = 0.0
+    edge: Length = None
+    roughness: Annotated[Quantity, Measure("length", 0)] = 0.0
+    seed: Whole = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        name = type(self).__name__
-        for field in ("width", "depth"):
-            require(getattr(self, field) > 0.0, f"{name}.{field} is {getattr(self, field):g} m; it must be positive")
-        require(self.roughness >= 0.0, f"{name}.roughness is {self.roughness:g} m; it must not be negative")
         if self.edge is None:
             object.__setattr__(self, "edge", min(0.1 * self.width, 1e-4))
-        require(0.0 < self.edge <= self.width, f"{name}.edge is {self.edge:g} m; give a part of the width")
+        require(0.0 < self.edge <= self.width, f"{self.place}edge is {self.edge:g} m; give a part of the width")
 
     def check(self, bearing: Bearing) -> None:
         super().check(bearing)
@@ -171,8 +156,8 @@ class Line(Spall):
     """A fine groove across the whole path, such as an indentation at standstill or a cut by spark erosion."""
 
     label: ClassVar[str] = "line"
-    width: Quantity = "0.2 mm"
-    depth: Quantity = "0.2 mm"
+    width: PositiveLength = "0.2 mm"
+    depth: PositiveLength = "0.2 mm"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,9 +173,8 @@ class Pit(Spall):
     """
 
     label: ClassVar[str] = "pit"
-    units: ClassVar[dict[str, str]] = {**Spall.units, "offset": "length"}
-    width: Quantity = "0.5 mm"
-    offset: Quantity = 0.0
+    width: PositiveLength = "0.5 mm"
+    offset: Length = 0.0
 
     def inside(self, along: np.ndarray, height: float) -> np.ndarray:
         return 0.5 * self.width - np.hypot(along, height - self.offset)
@@ -215,17 +199,15 @@ class Waviness(SurfaceDefect):
     """
 
     label: ClassVar[str] = "waviness"
-    units: ClassVar[dict[str, str]] = {"amplitude": "length", "angle": "angle"}
-    amplitude: Quantity = "1 um"
-    order: int = 2
+    amplitude: Length = "1 um"
+    order: Annotated[int, Measure(low=1, whole=True)] = 2
     highest: int | None = None
     slope: float = 1.0
-    angle: Quantity = 0.0
-    seed: int = 0
+    angle: Angle = 0.0
+    seed: Whole = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(self.order >= 1, f"Waviness.order is {self.order}; give a whole number from 1 up")
         top = self.order if self.highest is None else self.highest
         require(self.order <= top <= 500, f"Waviness.highest is {top}; give one from the order up to 500")
 
@@ -257,18 +239,9 @@ class OffSize(Defect):
     """
 
     label: ClassVar[str] = "off-size element"
-    units: ClassVar[dict[str, str]] = {"amount": "length"}
-    amount: Quantity = "2 um"
-    element: int | None = 0  # type: ignore[assignment]
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if self.element is None:
-            object.__setattr__(self, "element", 0)
-            super().__post_init__()
-            object.__setattr__(self, "element", None)
-        else:
-            super().__post_init__()
+    amount: Length = "2 um"
+    element: Whole | None = 0
+    seed: Whole = 0
 
     def check(self, bearing: Bearing) -> None:
         if self.element is not None:
@@ -291,10 +264,9 @@ class Misalignment(Defect):
     """A ring that sits askew on its seat: its axis leans by ``tilt`` towards ``angle`` from x of the ring's marker."""
 
     label: ClassVar[str] = "misaligned ring"
-    units: ClassVar[dict[str, str]] = {"tilt": "angle", "angle": "angle"}
-    part: str = OUTER
-    tilt: Quantity = "0.1 deg"
-    angle: Quantity = 0.0
+    part: Part = OUTER
+    tilt: Angle = "0.1 deg"
+    angle: Angle = 0.0
 
     def check(self, bearing: Bearing) -> None:
         require(self.part != ELEMENT, "Misalignment.part is 'element'; choose outer or inner")
@@ -320,18 +292,15 @@ class LooseFit(Defect):
     """
 
     label: ClassVar[str] = "loose fit"
-    units: ClassVar[dict[str, str]] = {"clearance": "length", "stiffness": "stiffness", "damping": "time"}
-    part: str = OUTER
-    clearance: Quantity = "20 um"
-    stiffness: Quantity = 5e8
-    damping: Quantity = 1e-5
-    creep: float = 0.05
+    part: Part = OUTER
+    clearance: Length = "20 um"
+    stiffness: Annotated[Quantity, Measure("stiffness", above=0)] = 5e8
+    damping: Annotated[Quantity, Measure("time", 0)] = 1e-5
+    creep: Annotated[Quantity, Measure(low=0)] = 0.05
 
     def check(self, bearing: Bearing) -> None:
         require(self.part != ELEMENT, "LooseFit.part is 'element'; choose outer or inner")
         require(0.0 < self.clearance < 1e-3, f"LooseFit.clearance is {self.clearance:g} m; give it in '... um'")
-        require(self.stiffness > 0.0, f"LooseFit.stiffness is {self.stiffness:g} N/m; it must be positive")
-        require(self.damping >= 0.0 and self.creep >= 0.0, "LooseFit: damping and creep must not be negative")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -348,17 +317,9 @@ class UnevenSpacing(Defect):
     """
 
     label: ClassVar[str] = "cage"
-    units: ClassVar[dict[str, str]] = {"amount": "angle"}
-    amount: Quantity = "1 deg"
-    element: int | None = None  # type: ignore[assignment]
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        element = self.element
-        if element is None:
-            object.__setattr__(self, "element", 0)
-        super().__post_init__()
-        object.__setattr__(self, "element", element)
+    amount: Angle = "1 deg"
+    element: Whole | None = None
+    seed: Whole = 0
 
     def check(self, bearing: Bearing) -> None:
         if self.element is not None:
@@ -468,12 +429,6 @@ def _one(given: Any) -> Defect:
         return given
     if not isinstance(given, Mapping):
         raise BearingError(f"defects holds {given!r}; give defects of gearmbs.bearings, or tables with their kind")
-    fields = dict(given)
-    kind = str(fields.pop("kind", ""))
-    if kind not in DEFECTS:
-        raise BearingError(f"defects: kind {kind!r} is unknown; choose one of {', '.join(DEFECTS)}")
-    require_fields(fields, DEFECTS[kind], f"defects: {kind}")
-    try:
-        return DEFECTS[kind](**fields)
-    except TypeError as error:
-        raise BearingError(f"defects: {kind}: {error}") from None
+    table = dict(given)
+    kind = str(table.pop("kind", ""))
+    return make(chosen(DEFECTS, kind, "defects: ", BearingError), table, f"defects: {kind}", BearingError)

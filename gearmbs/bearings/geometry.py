@@ -6,9 +6,8 @@ import math
 import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
-from gearmbs._shown import Written
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.kinds import KINDS
 from gearmbs.bearings.laws_kernel import (
@@ -19,17 +18,19 @@ from gearmbs.bearings.laws_kernel import (
     in_series,
     line_contact,
 )
+from gearmbs.schema.described import Described
+from gearmbs.schema.messages import check_keys
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_material, to_si
 
-UNITS = {
-    "element_diameter": "length", "pitch_diameter": "length", "contact_angle": "angle", "clearance": "length",
-    "roller_length": "length", "bore": "length", "outside_diameter": "length", "width": "length",
-    "dynamic_rating": "force", "static_rating": "force", "youngs_modulus": "Pa", "density": "density",
-}  # fmt: skip
+Length = Annotated[Quantity, Measure("length", above=0)]
+Force = Annotated[Quantity, Measure("force", above=0)]
+GROOVE = Measure(above=0.5, below=1, remedy="a groove is wider than its ball: give 0.505 to 0.6")
+ELEMENT_SIZE = Measure("length", above=0, below=1)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bearing(Written):
+class Bearing(Described):
     """A rolling bearing.
 
     Parameters
@@ -68,37 +69,29 @@ class Bearing(Written):
     (3.5848, 5.4152, 2.3567, 0.3983)
     """
 
-    elements: int
-    element_diameter: Quantity
-    pitch_diameter: Quantity
-    contact_angle: Quantity = 0.0
+    error: ClassVar[type[ValueError]] = BearingError
+
+    elements: Annotated[int, Measure(low=3, whole=True)]
+    element_diameter: Annotated[Quantity, ELEMENT_SIZE]
+    pitch_diameter: Annotated[Quantity, Measure("length")]
+    contact_angle: Annotated[Quantity, Measure("angle", low=0, below=90, shown="deg")] = 0.0
     kind: str = "deep groove"
-    inner_curvature: float = 0.515
-    outer_curvature: float = 0.525
-    clearance: Quantity = 0.0
-    roller_length: Quantity = None
-    bore: Quantity = None
-    outside_diameter: Quantity = None
-    width: Quantity = None
-    dynamic_rating: Quantity = None
-    static_rating: Quantity = None
-    youngs_modulus: Quantity = 2.07e11
-    poisson_ratio: float = 0.3
-    density: Quantity = 7800.0
+    inner_curvature: Annotated[Quantity, GROOVE] = 0.515
+    outer_curvature: Annotated[Quantity, GROOVE] = 0.525
+    clearance: Annotated[Quantity, Measure("length")] = 0.0
+    roller_length: Length = None
+    bore: Length = None
+    outside_diameter: Length = None
+    width: Length = None
+    dynamic_rating: Force = None
+    static_rating: Force = None
+    youngs_modulus: Annotated[Quantity, Measure("pressure", above=0)] = 2.07e11
+    poisson_ratio: Annotated[Quantity, Measure(low=0, below=0.5)] = 0.3
+    density: Annotated[Quantity, Measure("density", above=0)] = 7800.0
     designation: str = ""
 
     def __post_init__(self) -> None:
-        for name, unit in UNITS.items():
-            value = getattr(self, name)
-            if value is not None:
-                try:
-                    object.__setattr__(self, name, to_si(value, unit, f"Bearing.{name}"))
-                except (TypeError, ValueError) as error:
-                    raise BearingError(str(error)) from None
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, float) and not math.isfinite(value):
-                raise BearingError(f"Bearing.{item.name} is {value}; give a finite number")
+        super().__post_init__()
         self._check()
         doubt = doubt_of_material(self.youngs_modulus, self.density)
         if doubt:
@@ -107,9 +100,6 @@ class Bearing(Written):
     def _check(self) -> None:
         z, d, pitch = self.elements, self.element_diameter, self.pitch_diameter
         require(self.kind in KINDS, f"Bearing.kind is {self.kind!r}; choose {', '.join(KINDS)}")
-        whole = isinstance(z, int) and not isinstance(z, bool) and z >= 3
-        require(whole, f"Bearing.elements is {z!r}; give a whole number from 3 up")
-        require(0.0 < d < 1.0, f"Bearing.element_diameter is {d:g} m; give a length such as '7.94 mm'")
         require(
             d < pitch < 10.0,
             f"Bearing.pitch_diameter is {pitch:g} m, the elements measure {d:g} m; give the diameter of their centres",
@@ -121,18 +111,7 @@ class Bearing(Written):
             f"{1e3 * pitch:.4g} mm, where {math.floor(math.pi / math.asin(d / pitch))} do",
         )
         angle = self.contact_angle
-        require(0.0 <= angle < 0.5 * math.pi, f"Bearing.contact_angle is {angle:g} rad; give 0 up to 90 deg")
-        for name in ("inner_curvature", "outer_curvature"):
-            value = getattr(self, name)
-            require(
-                0.5 < value < 1.0, f"Bearing.{name} is {value!r}; a groove is wider than its ball: give 0.505 to 0.6"
-            )
         require(abs(self.clearance) < 0.2 * d, f"Bearing.clearance is {self.clearance:g} m; give it in '... um'")
-        require(0.0 <= self.poisson_ratio < 0.5, f"Bearing.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
-        for name in ("roller_length", "bore", "outside_diameter", "width", "dynamic_rating", "static_rating",
-                     "youngs_modulus", "density"):  # fmt: skip
-            value = getattr(self, name)
-            require(value is None or value > 0.0, f"Bearing.{name} is {value}; it must be positive")
         if self.rollers:
             require(
                 self.roller_length is not None,
@@ -178,9 +157,7 @@ class Bearing(Written):
 
     def changed(self, **changes: Any) -> Bearing:
         """Return the bearing with other values of some fields."""
-        known = {item.name for item in fields(self)}
-        for name in changes:
-            require(name in known, f"Bearing has no field {name!r}; it has {', '.join(sorted(known))}")
+        check_keys(changes, [item.name for item in fields(self)], "Bearing", BearingError)
         return replace(self, **changes)
 
     @property

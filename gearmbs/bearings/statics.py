@@ -16,11 +16,12 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 
 from gearmbs.bearings import layout as B
-from gearmbs.bearings.errors import BearingError, require, require_fields
+from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
 from gearmbs.bearings.kinds import KINDS
 from gearmbs.bearings.settings import BearingSettings
 from gearmbs.bearings.tables import BearingTables, pack
+from gearmbs.schema.described import make
 from gearmbs.units import Quantity, to_si
 
 # Where a load puts the inner ring: the minimum of a convex potential, and which loads have none.
@@ -364,9 +365,8 @@ class BearingStatics:
     """
 
     def __init__(self, bearing: Bearing, *, speed: Quantity = 0.0, **settings: Any) -> None:
-        require_fields(settings, BearingSettings, "BearingStatics")
+        self.settings = make(BearingSettings, settings, "BearingStatics", BearingError, bearing=bearing)
         try:
-            self.settings = BearingSettings(bearing=bearing, **settings)
             self.speed = to_si(speed, "angular speed", "speed")
         except TypeError as error:
             raise BearingError(f"BearingStatics: {error}") from None

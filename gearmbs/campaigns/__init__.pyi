@@ -1,4 +1,5 @@
 from .campaign import Campaign as Campaign
+from .cluster import dask_client as dask_client
 from .factors import Choice as Choice
 from .factors import Factor as Factor
 from .factors import Specimens as Specimens
@@ -6,7 +7,6 @@ from .factors import choose as choose
 from .plan import Plan as Plan
 from .plan import load_plan as load_plan
 from .plan import make_plan as make_plan
-from .runners.dask import dask_client as dask_client
 from .sensitivity.bounds import TotalBounds as TotalBounds
 from .sensitivity.bounds import total_bounds as total_bounds
 from .sensitivity.indices import SobolIndices as SobolIndices

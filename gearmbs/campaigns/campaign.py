@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import random
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,6 @@ from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
 from gearmbs.campaigns.plan import Plan
 from gearmbs.campaigns.settings import CampaignError, limit, whole
 from gearmbs.campaigns.status import CampaignStatus, read_status
-from gearmbs.campaigns.work import ALREADY, CLAIMED, DIED, STOPPED, UnitReport
 from gearmbs.progress import alone, bars, watched
 
 if TYPE_CHECKING:
@@ -27,9 +26,6 @@ if TYPE_CHECKING:
 
 MOST_TRIES = 8
 """Attempts of a unit that end with a worker's death, after which the run gives up."""
-
-POLL = 0.5
-"""Seconds between looks at units that somebody else is at work on."""
 
 
 class Campaign:
@@ -100,23 +96,21 @@ class Campaign:
         CampaignError
             If workers die again and again over the same unit, or with ``on_failure="stop"`` at the first failed case.
         """
-        from gearmbs.campaigns.runners import DaskRunner, ProcessRunner, SerialRunner
+        from gearmbs.campaigns.cluster import DaskRunner
         from gearmbs.studies.run.parallel import available_cores
+        from gearmbs.studies.run.workers import here, processes
 
-        runner: Any
+        where: Any
         if workers is not None:
             workers = whole(workers, "workers", 0)
-        minutes = _of_minutes(minutes)
-        pending = self._pending()
         if client is not None:
             if not hasattr(client, "nthreads"):
                 raise CampaignError(f"client = {client!r}; give a distributed.Client, see dask_client")
-            runner = DaskRunner(client)
-        elif workers == 0:
-            runner = SerialRunner()
+            where = DaskRunner(client)
         else:
-            runner = ProcessRunner(min(workers or available_cores(), max(1, len(pending))))
-        return self._drive(runner, pending, progress, minutes)
+            # workers need modules only, which they import by name
+            where = here if workers == 0 else partial(processes, own_main=False)
+        return self._drive(where, workers or available_cores(), self._pending(), progress, minutes)
 
     def work(self, part: int, parts: int, *, minutes: float | None = None) -> CampaignStatus:
         """Work here on one part of the units: an element of a job array, without any coordination.
@@ -128,60 +122,42 @@ class Campaign:
         minutes : float, optional
             Start no unit after so long.
         """
-        from gearmbs.campaigns.runners import SerialRunner
+        from gearmbs.studies.run.workers import here
 
         if not 1 <= whole(part, "part", 0) <= whole(parts, "parts", 1):
             raise CampaignError(f"part {part} of {parts}: give a part from 1 to {parts}")
         mine = [unit for unit in self._pending() if unit % parts == part - 1]
-        return self._drive(SerialRunner(), mine, False, _of_minutes(minutes))
+        return self._drive(here, 1, mine, False, minutes)
 
     def _pending(self) -> list[int]:
         done = set(self.folder.done())
         return [unit for unit in range(self.folder.unit_count) if unit not in done]
 
-    def _drive(self, runner: Any, units: list[int], progress: Any, minutes: float | None) -> CampaignStatus:
+    def _drive(self, where: Any, workers: int, units: list[int], progress: Any, minutes: Any) -> CampaignStatus:
+        from gearmbs.campaigns.work import work_unit
+        from gearmbs.studies.run.engine import WorkerDied, run_jobs
+
+        minutes = _of_minutes(minutes)
         # drivers side by side begin at different ends, so that they rarely want the same unit
         offset = random.Random(os.getpid()).randrange(len(units)) if _driven(self.folder, units) else 0
-        queue = deque(units[offset:] + units[:offset])
-        elsewhere: list[int] = []
-        deaths: dict[int, int] = {}
-        end = None if minutes is None else time.monotonic() + 60.0 * minutes
-
-        def ahead() -> Iterator[int]:
-            while queue and (end is None or time.monotonic() < end):
-                yield queue.popleft()
-
-        with _shown(progress, self.folder.path.name, self.status) as tell:
-            while queue or elsewhere:
-                # a runner ends when there is nothing to take; what came back meanwhile is taken up by the next round
-                for report in runner(str(self.path), ahead()):
-                    self._take_note(report, queue, elsewhere, deaths)
-                    tell()
-                if end is not None and time.monotonic() >= end:
-                    break
-                if elsewhere and not queue:
-                    time.sleep(POLL)
-                    queue.extend(unit for unit in elsewhere if not self.folder.ledger(unit).exists())
-                    elsewhere.clear()
-                    tell()
-        return self.status()
-
-    def _take_note(self, report: UnitReport, queue: deque, elsewhere: list[int], deaths: dict[int, int]) -> None:
-        if report.what == STOPPED:
-            raise CampaignError(f"stopped at the first failure, as the plan wants: {report.message}")
-        if report.what == CLAIMED:
-            elsewhere.append(report.unit)
-        elif report.what == DIED:
-            deaths[report.unit] = deaths.get(report.unit, 0) + 1
-            if deaths[report.unit] >= MOST_TRIES:
-                raise CampaignError(
-                    f"unit {report.unit}: its worker died {MOST_TRIES} times, also with its cases in "
-                    f"processes of their "
-                    f"own; is there enough memory for {self.plan.unit} results? {report.message}"
+        try:
+            with _shown(progress, self.folder.path.name, self.status) as tell:
+                run_jobs(
+                    partial(work_unit, os.path.abspath(self.path)),
+                    units[offset:] + units[:offset],
+                    workers,
+                    where=where,
+                    done=lambda _unit, _done: tell(),
+                    ledger=self.folder,
+                    tries=MOST_TRIES,
+                    seconds=None if minutes is None else 60.0 * minutes,
                 )
-            queue.append(report.unit)
-        else:
-            assert report.what in (ALREADY, "worked")
+        except WorkerDied as died:
+            raise CampaignError(
+                f"unit {died.job}: its worker died {MOST_TRIES} times, also with its cases in processes of their own; "
+                f"is there enough memory for {self.plan.unit} results?"
+            ) from died
+        return self.status()
 
     def status(self) -> CampaignStatus:
         """Return how far it is; from anywhere, at any time."""

@@ -242,7 +242,7 @@ def slurm(
 ) -> None:
     """Print a job script for Slurm or PBS that works on a campaign as a job array; nothing is submitted."""
     with guarded():
-        from gearmbs.campaigns.runners.dask import job_script
+        from gearmbs.campaigns.cluster import job_script
 
         typer.echo(job_script(folder, elements, minutes, system))
 

@@ -14,10 +14,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gearmbs.campaigns.settings import CampaignError, fields_error
+from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.settings import whole as whole_number
 from gearmbs.campaigns.subjects.base import Subject
 from gearmbs.files import python_scalar
+from gearmbs.schema.described import make
+from gearmbs.schema.messages import chosen
 from gearmbs.units import to_si
 
 Columns = dict[str, np.ndarray]
@@ -339,12 +341,8 @@ def factor_from(table: Mapping[str, Any]) -> AnyFactor:
     settings = dict(table)
     default = "choice" if "options" in settings else "specimens" if "draws" in settings else "factor"
     kind = settings.pop("type", default)
-    if kind not in FACTORS:
-        raise CampaignError(f"factor: type {kind!r} is unknown; choose one of {', '.join(FACTORS)}")
-    try:
-        return FACTORS[kind](**settings)
-    except TypeError as error:
-        raise CampaignError(f"{kind} {settings.get('path', '')}: {fields_error(FACTORS[kind], error)}") from error
+    cls = chosen(FACTORS, kind, "factor: ", CampaignError, "type")
+    return make(cls, settings, f"{kind} {settings.get('path', '')}", CampaignError)
 
 
 def choose(path: str, *, crossed: bool = False, **options: Any) -> Choice:

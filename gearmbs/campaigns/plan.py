@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,8 @@ from gearmbs.campaigns.factors import (
 from gearmbs.campaigns.settings import CampaignError, check_settings, satisfied, texts, whole
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
 from gearmbs.files import python_scalar
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import chosen
 
 FORMAT = 1
 ALL_CORNERS = 6
@@ -278,16 +279,7 @@ class Plan:
         return {
             "subject": {"kind": self.subject.kind, "settings": self.subject.settings()},
             "factors": [factor_table(f) for f in self.factors],
-            "design": self.design,
-            "seed": self.seed,
-            "keep": list(self.keep),
-            "constraints": list(self.constraints),
-            "options": self.options,
-            "unit": self.unit,
-            "time_limit": self.time_limit,
-            "memory_limit": self.memory_limit,
-            "on_failure": self.on_failure,
-            "reuse": list(self.reuse),
+            **{f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("subject", "factors", "n")},
         }
 
     @classmethod
@@ -375,8 +367,7 @@ def make_plan(
         if not isinstance(factor, AnyFactor):
             raise CampaignError(f"factors: {factor!r} is none; give Factor, Choice or Specimens")
     own = tuple(factor.in_si(subject) for factor in given)
-    if design not in designs.DESIGNS:
-        raise CampaignError(f"design {design!r} is unknown; choose one of {', '.join(designs.DESIGNS)}")
+    chosen(designs.DESIGNS, design, "", CampaignError, "design")
     counted = (*designs.SEQUENCES, *designs.ANALYSES, "latin hypercube")
     n = whole(n, "n", 0)
     if design in counted and n < 1:
@@ -425,8 +416,7 @@ def _consistent(plan: Plan) -> None:
         raise CampaignError(
             f"constraints: points left out would break the {plan.design} design; narrow the ranges instead"
         )
-    if plan.on_failure not in FAILURE_POLICIES:
-        raise CampaignError(f"on_failure = {plan.on_failure!r}; choose one of {', '.join(FAILURE_POLICIES)}")
+    chosen(FAILURE_POLICIES, plan.on_failure, "", CampaignError, "on_failure")
 
 
 def _variant(factor: AnyFactor) -> tuple:
@@ -442,12 +432,7 @@ def load_plan(path: str | Path) -> Plan:
         If it cannot be read or is wrong.
     """
     path = Path(path)
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise CampaignError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CampaignError(f"{path}: not a valid TOML file ({error})") from error
+    tree = read_toml(path, CampaignError)
     subject = tree.pop("subject", {})
     kind = subject.pop("kind", "pair")
     if "base" in tree:

@@ -9,14 +9,14 @@ import json
 import math
 import operator
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
-from gearmbs.units import to_si
-from gearmbs.wording import did_you_mean
+from gearmbs.schema.messages import check_keys
+from gearmbs.schema.quantities import Measure
 
 # The error of campaigns.
 
@@ -36,8 +36,6 @@ OPTIONS = {
 }
 """What ``options`` may hold by design, besides ``corners``."""
 
-BYTES = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "KiB": 2.0**10, "MiB": 2.0**20, "GiB": 2.0**30}
-
 
 def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str, Any]:
     """Return the settings of a plan, ``cls``, in one form.
@@ -47,10 +45,7 @@ def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str
     CampaignError
         For unknown names and values that cannot be meant.
     """
-    known = [f.name for f in dataclasses.fields(cls)]
-    for name in given:
-        if name not in known:
-            raise CampaignError(f"plan: unknown setting {name!r}{near(name, known)}")
+    check_keys(given, [f.name for f in dataclasses.fields(cls)], "plan", CampaignError, what="setting")
     found = dict(given)
     for name in ("constraints", "reuse"):
         if name in found:
@@ -73,17 +68,8 @@ def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str
         if design == "morris" and levels % 2:
             raise CampaignError(f"options: levels = {levels}; a morris design needs an even number of them")
         found["options"] = {**options, "levels": levels}
-    for name in options:
-        allowed = (*OPTIONS.get(design, ()), "corners")
-        if name not in allowed:
-            raise CampaignError(f"options: a {design} design has no {name!r}{near(name, allowed)}")
+    check_keys(options, (*OPTIONS.get(design, ()), "corners"), f"options of a {design} design", CampaignError)
     return found
-
-
-def near(name: str, known: Iterable[str]) -> str:
-    """Return the end of a message about an unknown name: what may be meant, or what there is."""
-    known = list(known)
-    return did_you_mean(name, known, before="; ", otherwise=f"; known are {', '.join(known)}")
 
 
 def texts(value: Any, name: str) -> tuple[str, ...]:
@@ -99,35 +85,17 @@ def texts(value: Any, name: str) -> tuple[str, ...]:
 def whole(value: Any, name: str, least: int) -> int:
     """Return a whole number that is not below the least."""
     try:
-        number = int(value)
-        good = not isinstance(value, (str, bool)) and number == value and number >= least
-    except (TypeError, ValueError, OverflowError):
-        good = False
-    if not good:
-        raise CampaignError(f"{name} = {value!r}; give a whole number, {least} or more")
-    return number
+        return Measure(low=least, whole=True).as_given(value)
+    except ValueError as error:
+        raise CampaignError(f"{name} = {value!r}; {error}") from None
 
 
 def limit(value: Any, name: str, example: str) -> float:
     """Return a limit of time in seconds or of memory in bytes, given as a number or as a text with its unit."""
     try:
-        if name == "memory_limit" and isinstance(value, str):
-            size, _, unit = value.strip().partition(" ")
-            number = float(size) * BYTES[unit]
-        else:
-            number = to_si(value, "time", name) if isinstance(value, str) else float(value)
-    except (KeyError, TypeError, ValueError):
-        number = math.nan
-    if not 0.0 < number < math.inf:
-        raise CampaignError(f"{name} = {value!r}; give a positive number or text such as {example!r}")
-    return number
-
-
-def fields_error(cls: type, error: TypeError) -> str:
-    """Return what is wrong with the names of arguments, in the words of a file."""
-    known = [f.name for f in dataclasses.fields(cls)]
-    word = str(error).rpartition("argument ")[2].strip("'")
-    return f"unknown key {word!r}{near(word, known)}" if "unexpected keyword" in str(error) else str(error)
+        return float(Measure("byte" if name == "memory_limit" else "time", above=0).as_given(value))
+    except ValueError:
+        raise CampaignError(f"{name} = {value!r}; give a positive number or text such as {example!r}") from None
 
 
 # Constraints of a plan: comparisons of arithmetic expressions of its columns, as texts.

@@ -11,8 +11,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from gearmbs.campaigns.folder import Folder, owner
+from gearmbs.campaigns.folder import Folder
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.studies.run.engine import owner
 
 REMEDY = "gearmbs campaign check --sweep takes out what is damaged, and run does it again"
 

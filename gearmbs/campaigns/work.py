@@ -9,17 +9,20 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearmbs.campaigns.case_runner import CaseResult, CaseRunner, GuardedRunner
-from gearmbs.campaigns.folder import Claim, Folder, surroundings, take
+from gearmbs.campaigns.folder import Folder, surroundings
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.base import DONE, Kept, Outcome
 from gearmbs.files import whole_file, write_whole
+from gearmbs.studies.run.engine import Claim, claimed
+from gearmbs.studies.run.workers import Claimed
 
 # Results of equal cases of other campaigns, found by their content.
 
@@ -104,20 +107,6 @@ class Reuse:
 GUARD_AFTER = 2
 """Attempts of a unit that came to no end, after which its cases run in a process of their own."""
 
-WORKED, ALREADY, CLAIMED, DIED, STOPPED = "worked", "already done", "claimed", "worker died", "stopped"
-
-
-@dataclass(frozen=True)
-class UnitReport:
-    """What came of a unit: a few numbers, cheap to send."""
-
-    unit: int
-    what: str
-    cases: int = 0
-    failed: int = 0
-    message: str = ""
-
-
 _folders: dict[str, tuple[float, Folder]] = {}
 
 
@@ -129,28 +118,30 @@ def open_folder(path: str | Path) -> Folder:
     return _folders[key][1]
 
 
-def work_unit(path: str, unit: int) -> UnitReport:
-    """Carry out a unit unless it is done or somebody is at work on it.
+def work_unit(path: str, unit: int, _report: Callable[[float], None] | None = None) -> bool:
+    """Carry out a unit unless it is done; it is claimed meanwhile. An error says which unit it was.
 
     Raises
     ------
+    Claimed
+        If somebody is at work on it.
     OSError
         If the disk does not take the results; the unit is not done then.
+    CampaignError
+        With ``on_failure="stop"`` if a case fails.
     """
     folder = open_folder(path)
-    if folder.ledger(unit).exists():
-        return UnitReport(unit, ALREADY)
-    claim = take(folder.claim(unit))
-    if claim is None:
-        return UnitReport(unit, CLAIMED)
     try:
-        # somebody may have finished it between the look and the claim
-        return UnitReport(unit, ALREADY) if folder.ledger(unit).exists() else _work(folder, unit, claim)
-    finally:
-        claim.release()
+        return claimed(folder, unit, partial(_work, folder, unit))
+    except (Claimed, CampaignError):
+        raise
+    except OSError as error:
+        raise OSError(error.errno, f"unit {unit}: {error.strerror or error}", error.filename) from error
+    except Exception as error:
+        raise RuntimeError(f"unit {unit}: {type(error).__name__}: {error}") from error
 
 
-def _work(folder: Folder, unit: int, claim: Claim) -> UnitReport:
+def _work(folder: Folder, unit: int, claim: Claim) -> bool:
     started, cpu = time.time(), time.process_time()
     rows = folder.cases(unit)
     guarded = claim.attempts >= GUARD_AFTER
@@ -164,17 +155,17 @@ def _work(folder: Folder, unit: int, claim: Claim) -> UnitReport:
             claim.beat()
             result = _one(runner, row, known, reuse)
             if stop and result.outcome.status != DONE:
-                return UnitReport(unit, STOPPED, message=f"case {row['index']}: {result.outcome.message}")
+                case = f"case {row['index']}: {result.outcome.message}"
+                raise CampaignError(f"stopped at the first failure, as the plan wants: {case}")
             results.append(result)
     finally:
         runner.close()
     digests = _store(folder, unit, rows, results)
     seconds = [round(r.seconds, 4) for r in results]
-    failed = sum(r.outcome.status != DONE for r in results)
     entry = {
         "unit": unit,
         "cases": len(rows),
-        "failed": failed,
+        "failed": sum(r.outcome.status != DONE for r in results),
         "reused": sum(r.reused for r in results),
         "index": [rows[0]["index"], rows[-1]["index"] + 1],
         "status": {str(row["index"]): r.outcome.status for row, r in zip(rows, results) if r.outcome.status != DONE},
@@ -189,7 +180,7 @@ def _work(folder: Folder, unit: int, claim: Claim) -> UnitReport:
         **surroundings(),
     }
     write_whole(folder.ledger(unit), json.dumps(entry))
-    return UnitReport(unit, WORKED, len(rows), failed)
+    return True
 
 
 def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], reuse: Reuse | None) -> CaseResult:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import types
 
 from gearmbs.contact import layout as L
-from gearmbs.kernels.records import behind, header, numbers, rows
+from gearmbs.kernels.views import behind, header, numbers, rows
 
 options_at = header(L.OPTIONS)
 """``options_at(gi)``: the header of a pair's integers."""

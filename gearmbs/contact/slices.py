@@ -15,7 +15,8 @@ from typing import NamedTuple
 from gearmbs.contact import layout as L
 from gearmbs.contact.laws import normal_law, power, pressure
 from gearmbs.contact.records import strip_at
-from gearmbs.kernels.records import before, inlined, kernel, summing
+from gearmbs.kernels.records import inlined, kernel, summing
+from gearmbs.kernels.views import before
 
 POINTS = (0.1127016653792583, 0.5, 0.8872983346207417)
 WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)

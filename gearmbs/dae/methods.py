@@ -1,4 +1,4 @@
-"""The table of integrators: what each is, takes and can do.
+"""The tables of integrators and of formulations: what each is, takes and can do.
 
 Checks of names and options, messages, help texts and the documentation follow from it. It is light: an integrator's
 module is loaded with its first run.
@@ -105,6 +105,38 @@ DEFAULT = "WSTIFF"
 """The integrator where none is named."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Formulation:
+    """One way of writing the constraints into the equations of motion.
+
+    Parameters
+    ----------
+    words : str
+        What it is, for the documentation.
+    number : int
+        In the tables of the kernels, which take from `gearmbs.dae.equations.unknowns` what it chooses.
+    adams : str
+        What message files of ADAMS call it.
+    """
+
+    words: str
+    number: int
+    adams: str
+
+
+FORMULATIONS: dict[str, Formulation] = {
+    "I3": Formulation(words="index 3: positions alone are constrained", number=0, adams="INDEX-3"),
+    "SI2": Formulation(
+        words="stabilised index 2: positions and velocities are constrained", number=1, adams="stabilized INDEX-2"
+    ),
+    "SI1": Formulation(
+        words="stabilised index 1: as SI2, the multipliers being derivatives of unknowns",
+        number=2,
+        adams="stabilized INDEX-1",
+    ),
+}
+
+
 def those_that(can: str) -> list[str]:
     """Return the integrators that take an option of `gearmbs.dae.Options`."""
     return [name for name, integrator in INTEGRATORS.items() if integrator.can(can)]
@@ -120,4 +152,11 @@ def integrators_table() -> str:
         bounds = f"{known.tolerance:g}, at most {known.largest_tolerance:g}"
         default = " (default)" if name == DEFAULT else ""
         rows.append(f"| `{name}`{default} | {known.words} | {known.highest_order} | {able} | {compiled} | {bounds} |")
+    return "\n".join(rows)
+
+
+def formulations_table() -> str:
+    """Return the formulations as a Markdown table."""
+    rows = ["| formulation | what it is | in message files |", "|---|---|---|"]
+    rows += [f"| `{name}` | {known.words} | {known.adams} |" for name, known in FORMULATIONS.items()]
     return "\n".join(rows)

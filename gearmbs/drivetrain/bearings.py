@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from gearmbs.drivetrain.errors import require, told_of
 from gearmbs.drivetrain.part import Part
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement
+from gearmbs.schema.described import make
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
@@ -52,13 +54,12 @@ class Bearing(Part, ABC):
     """
 
     title: ClassVar[str] = "bearing"
-    units: ClassVar[Mapping[str, str]] = {"station": "length", "on_station": "length"}
     kind: ClassVar[str] = "bearing"
 
     shaft: str
-    station: Quantity = None
+    station: Annotated[Quantity, Measure("length")] = None
     on: str | None = None
-    on_station: Quantity = None
+    on_station: Annotated[Quantity, Measure("length")] = None
     rolling: Any = None
 
     def __post_init__(self) -> None:
@@ -120,21 +121,16 @@ class ElasticBearing(Bearing):
     """
 
     kind: ClassVar[str] = "elastic"
-    units: ClassVar[Mapping[str, str]] = {**Bearing.units, "damping_time": "time"}
-    not_negative: ClassVar[tuple[str, ...]] = ("damping_time",)
 
     stiffness: Any = (1e8, 1e8, 1e8)
-    tilting: tuple[Quantity, Quantity] = (0.0, 0.0)
+    tilting: Annotated[tuple[Quantity, Quantity], Measure("N*m/rad", 0, several=2)] = (0.0, 0.0)
     damping: Any = None
-    damping_time: Quantity = 1e-5
+    damping_time: Annotated[Quantity, Measure("time", 0)] = 1e-5
 
     def __post_init__(self) -> None:
         super().__post_init__()
         k = self._matrix("stiffness", self.stiffness, "stiffness")
-        require(np.shape(self.tilting) == (2,), f"{self.label}: tilting is {self.tilting!r}; give two numbers")
-        tilting = self._in_si("tilting", tuple(self.tilting), "N*m/rad")
-        require(min(tilting) >= 0.0, f"{self.label}: tilting is {tilting} N m/rad; none may be negative")
-        k[3, 3], k[4, 4] = k[3, 3] + tilting[0], k[4, 4] + tilting[1]
+        k[3, 3], k[4, 4] = k[3, 3] + self.tilting[0], k[4, 4] + self.tilting[1]
         require(not np.any(k[5]) and not np.any(k[:, 5]), f"{self.label}: stiffness resists rotation; leave it zero")
         require(bool(np.any(k)), f"{self.label}: all stiffnesses are zero; give stiffness")
         c = self.damping_time * k if self.damping is None else self._matrix("damping", self.damping, "damping")
@@ -150,9 +146,8 @@ class ElasticBearing(Bearing):
             )
             return whole
         require(np.shape(value) == (3,), f"{self.label}: {field} has shape {np.shape(value)}; give 3 numbers or 6 x 6")
-        along = self._in_si(field, tuple(value), unit)
-        require(min(along) >= 0.0, f"{self.label}: {field} is {along}; none may be negative")
-        return np.diag([*along, 0.0, 0.0, 0.0])
+        measure = Measure(unit, 0, several=3, remedy="give three values, of which none may be negative")
+        return np.diag([*self.read(field, value, measure), 0.0, 0.0, 0.0])
 
     def holds(self, count: int) -> np.ndarray:
         return self.matrices[0][:5, :5]
@@ -187,25 +182,18 @@ class ClearanceBearing(Bearing):
     """
 
     kind: ClassVar[str] = "clearance"
-    units: ClassVar[Mapping[str, str]] = {
-        **Bearing.units, "clearance": "length", "damping": "damping", "depth": "length",
-    }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("clearance", "depth")
-    not_negative: ClassVar[tuple[str, ...]] = ("damping",)
 
-    clearance: Quantity
+    clearance: Annotated[Quantity, Measure("length", above=0)]
     stiffness: Quantity = 1e8
-    exponent: float = 1.0
-    damping: Quantity = 1e3
-    depth: Quantity = 1e-6
+    exponent: Annotated[Quantity, Measure(low=1)] = 1.0
+    damping: Annotated[Quantity, Measure("damping", 0)] = 1e3
+    depth: Annotated[Quantity, Measure("length", above=0)] = 1e-6
     axial: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(self.exponent >= 1.0, f"{self.label}: exponent is {self.exponent}; give 1 or more")
-        k = self._in_si("stiffness", self.stiffness, f"N/m^{float(self.exponent)!r}" if self.exponent != 1 else "N/m")
-        object.__setattr__(self, "stiffness", k)
-        require(k > 0.0, f"{self.label}: stiffness is {k:g}; it must be positive")
+        unit = f"N/m^{float(self.exponent)!r}" if self.exponent != 1 else "N/m"
+        object.__setattr__(self, "stiffness", self.read("stiffness", self.stiffness, Measure(unit, above=0)))
 
     def holds(self, count: int) -> np.ndarray:
         return np.eye(5)[: 3 if self.axial else 2]
@@ -260,15 +248,14 @@ class RollingContactBearing(Bearing):
     def __post_init__(self) -> None:
         super().__post_init__()
         require(self.rolling is not None, f"{self.label}: rolling is missing; give a designation such as '6205'")
-        from gearmbs.bearings import LooseFit
+        from gearmbs.bearings import BearingError, LooseFit
         from gearmbs.bearings.defects import as_defects
-        from gearmbs.bearings.errors import require_fields
         from gearmbs.bearings.settings import BearingSettings
 
         with told_of(f"{self.label}: settings"):
             on_rings = [d for d in as_defects(self.settings.get("defects", ())) if not isinstance(d, LooseFit)]
-            require_fields(self.settings, BearingSettings, "RollingBearing")
-            BearingSettings(bearing=self.rolling, **{**self.settings, "defects": on_rings})
+            checked = {**self.settings, "defects": on_rings}
+            make(BearingSettings, checked, "RollingBearing", BearingError, bearing=self.rolling)
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
         from gearmbs.bearings.element import add_bearing

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.errors import require
 from gearmbs.drivetrain.part import Attached, Part
 from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
 
 TWIST = Diagnostic("twist", "rad")
-ROTATIONAL_STIFFNESS, ROTATIONAL_DAMPING = "N*m/rad", "N*m*s/rad"
+
+Stiffness = Annotated[Quantity, Measure("N*m/rad", above=0)]
+Angle = Annotated[Quantity, Measure("angle", 0)]
+PositiveAngle = Annotated[Quantity, Measure("angle", above=0)]
+Length = Annotated[Quantity, Measure("length", above=0)]
+Damping = Annotated[Quantity, Measure("time", 0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,12 +38,11 @@ class Coupling(Part, ABC):
     """
 
     title: ClassVar[str] = "coupling"
-    units: ClassVar[Mapping[str, str]] = {"stations": "length"}
     kind: ClassVar[str] = "coupling"
 
     first: str
     second: str
-    stations: tuple[Quantity, Quantity] | None = None
+    stations: Annotated[tuple[Quantity, Quantity] | None, Measure("length", several=2)] = None
 
     @property
     def tangent(self) -> float:
@@ -90,25 +95,18 @@ class ElasticClutch(Coupling):
     """
 
     kind: ClassVar[str] = "clutch"
-    units: ClassVar[Mapping[str, str]] = {
-        **Coupling.units, "stiffness": ROTATIONAL_STIFFNESS, "cubic": "N*m/rad^3", "damping": ROTATIONAL_DAMPING,
-        "damping_frequency": "frequency", "dead_band": "angle", "depth": "angle",
-        "second_stiffness": ROTATIONAL_STIFFNESS, "second_stage": "angle", "transition": "angle", "free_angle": "angle",
-    }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("stiffness", "depth", "second_stiffness", "transition", "damping_frequency")
-    not_negative: ClassVar[tuple[str, ...]] = ("cubic", "damping", "dead_band", "second_stage")
 
-    stiffness: Quantity
-    cubic: Quantity = 0.0
-    damping: Quantity = None
-    relative_damping: float | None = None
-    damping_frequency: Quantity = None
-    dead_band: Quantity = 0.0
-    depth: Quantity = 1e-4
-    second_stiffness: Quantity = None
-    second_stage: Quantity = 0.0
-    transition: Quantity = 1e-3
-    free_angle: Quantity = 0.0
+    stiffness: Stiffness
+    cubic: Annotated[Quantity, Measure("N*m/rad^3", 0)] = 0.0
+    damping: Annotated[Quantity, Measure("N*m*s/rad", 0)] = None
+    relative_damping: Annotated[Quantity, Measure(low=0, high=6.3, remedy="it is between 0 and 2 pi")] = None
+    damping_frequency: Annotated[Quantity, Measure("frequency", above=0)] = None
+    dead_band: Angle = 0.0
+    depth: PositiveAngle = 1e-4
+    second_stiffness: Stiffness = None
+    second_stage: Angle = 0.0
+    transition: PositiveAngle = 1e-3
+    free_angle: Annotated[Quantity, Measure("angle")] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -118,10 +116,6 @@ class ElasticClutch(Coupling):
         require(
             self.damping_frequency is not None,
             f"{self.label}: relative_damping needs damping_frequency, at which it was measured (Hz)",
-        )
-        require(
-            0.0 <= self.relative_damping <= 6.3,
-            f"{self.label}: relative_damping is {self.relative_damping:g}; it is between 0 and 2 pi",
         )
 
     @property
@@ -160,27 +154,38 @@ class TorsionalShaft(Coupling):
         m.
     shear_modulus : float or str
         Pa.
-    damping_ratio : float or str
-        Damping over stiffness, s.
+    damping_time : float or str
+        Damping over stiffness, s: the damping ratio of a mode of f Hz that the shaft alone holds is pi f times it.
+    damping_ratio : float or str, optional
+        Former name of ``damping_time``, which is no ratio.
     """
 
     kind: ClassVar[str] = "shaft"
-    units: ClassVar[Mapping[str, str]] = {
-        **Coupling.units, "stiffness": ROTATIONAL_STIFFNESS, "length": "length", "diameter": "length", "bore": "length",
-        "shear_modulus": "pressure", "damping_ratio": "time",
-    }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("stiffness", "length", "diameter", "shear_modulus")
-    not_negative: ClassVar[tuple[str, ...]] = ("bore", "damping_ratio")
 
-    stiffness: Quantity = None
-    length: Quantity = None
-    diameter: Quantity = None
-    bore: Quantity = 0.0
-    shear_modulus: Quantity = 8.02e10
-    damping_ratio: Quantity = 0.0
+    stiffness: Stiffness = None
+    length: Length = None
+    diameter: Length = None
+    bore: Annotated[Quantity, Measure("length", 0)] = 0.0
+    shear_modulus: Annotated[Quantity, Measure("pressure", above=0)] = 8.02e10
+    damping_time: Damping = 0.0
+    damping_ratio: Damping = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.damping_ratio is not None:
+            require(
+                not self.damping_time,
+                f"{self.label}: damping_ratio is the former name of damping_time; give damping_time alone",
+            )
+            warnings.warn(
+                f"{self.label}: damping_ratio is deprecated, for it is damping over stiffness in seconds "
+                f"({self.damping_ratio:g} s) and no ratio: write damping_time; of a mode of f Hz the ratio is pi f "
+                "times that",
+                FutureWarning,
+                stacklevel=4,
+            )
+            object.__setattr__(self, "damping_time", self.damping_ratio)
+            object.__setattr__(self, "damping_ratio", None)
         sized = self.length is not None and self.diameter is not None
         require((self.stiffness is None) == sized, f"{self.label}: give stiffness, or length and diameter")
 
@@ -192,7 +197,7 @@ class TorsionalShaft(Coupling):
 
     @property
     def tangent_damping(self) -> float:
-        return self.damping_ratio * self.tangent
+        return self.damping_time * self.tangent
 
     def add(self, at: Attached) -> None:
         parameters = (0.0, self.tangent, 0.0, self.tangent_damping, 0.0, 1.0, 0.0, 0.0, 1.0)

@@ -48,14 +48,11 @@ Each kind of part is a table of named tables::
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from numbers import Integral
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
-from gearmbs._shown import Written
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.drivetrain.bearings import BEARINGS
 from gearmbs.drivetrain.couplings import COUPLINGS
@@ -68,8 +65,11 @@ from gearmbs.drivetrain.parts import GearMesh, Housing, HousingMode, Mount, Shaf
 from gearmbs.drivetrain.sensors import SENSORS
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
+from gearmbs.schema.described import Described, make
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import check_keys, chosen
+from gearmbs.schema.quantities import Measure, OneOf
 from gearmbs.units import Quantity, to_si
-from gearmbs.wording import any_of, did_you_mean
 
 FaultReader = Callable[[Any], Any]
 """Makes a fault of a table."""
@@ -86,11 +86,12 @@ KINDS: dict[str, tuple[Mapping[str, type[Part]], str]] = {
 PAIR_KEYS = tuple(
     f.name for f in fields(GearPair) if f.init and f.name not in ("driver", "driven", "rotation", "torque")
 )
+HARMONICS = Measure(low=1, whole=True, remedy="give a whole number of mesh harmonics from 1 up")
 GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name")
 
 
 @dataclass(frozen=True)
-class RunSettings(Written):
+class RunSettings(Described):
     """How a drivetrain is simulated and recorded.
 
     Parameters
@@ -107,28 +108,15 @@ class RunSettings(Written):
         Mesh harmonics in the record's table, 1 or more.
     """
 
-    settling: Quantity = 0.05
-    duration: Quantity = 1.0
-    tolerance: float = 1e-7
-    rate: Quantity = None
-    integrator: str = DEFAULT
-    harmonics: int = 3
+    error: ClassVar[type[ValueError]] = DrivetrainError
+    section: ClassVar[str] = "run"
 
-    def __post_init__(self) -> None:
-        for name, unit in (("settling", "time"), ("duration", "time"), ("rate", "frequency")):
-            value = getattr(self, name)
-            if value is not None:
-                with told_of(f"run.{name}"):
-                    object.__setattr__(self, name, to_si(value, unit, f"run.{name}"))
-        require(self.duration > 0.0, f"run.duration is {self.duration:g} s; it must be positive")
-        require(self.settling >= 0.0, f"run.settling is {self.settling:g} s; it must not be negative")
-        require(self.integrator in INTEGRATORS,
-                f"run.integrator is {self.integrator!r}; choose {any_of(INTEGRATORS)}")  # fmt: skip
-        require(1e-12 <= self.tolerance <= 5e-6, f"run.tolerance is {self.tolerance:g}; give 1e-12 to 5e-6")
-        require(self.rate is None or self.rate > 0.0, f"run.rate is {self.rate} Hz; it must be positive")
-        whole = isinstance(self.harmonics, Integral) and not isinstance(self.harmonics, bool)
-        require(whole and self.harmonics >= 1,
-                f"run.harmonics is {self.harmonics!r}; give a whole number of mesh harmonics from 1 up")  # fmt: skip
+    settling: Annotated[Quantity, Measure("time", 0)] = 0.05
+    duration: Annotated[Quantity, Measure("time", above=0)] = 1.0
+    tolerance: Annotated[Quantity, Measure(low=1e-12, high=5e-6)] = 1e-7
+    rate: Annotated[Quantity, Measure("frequency", above=0)] = None
+    integrator: Annotated[str, OneOf(INTEGRATORS)] = DEFAULT
+    harmonics: Annotated[int, HARMONICS] = 3
 
     def output_rate(self, train: Drivetrain) -> float:
         """Return the rate of the record, Hz."""
@@ -166,14 +154,8 @@ def read_description(path: str | Path, fault: FaultReader | None = None) -> Desc
     DrivetrainError
         One line that names the file, the part, the key, the value and the remedy.
     """
-    path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise DrivetrainError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DrivetrainError(f"{path}: not a valid TOML file ({error})") from None
-    data.setdefault("name", path.stem)
+    data = read_toml(path, DrivetrainError)
+    data.setdefault("name", Path(path).stem)
     return make_description(data, str(path), fault)
 
 
@@ -189,7 +171,7 @@ def make_description(
 
 def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
     known = ("name", "gravity", "run_up", "running", "run", *GROUPS)
-    _check_keys("the file", data, known)
+    check_keys(data, known, "the file", DrivetrainError, shown=repr)
     parts: dict[str, Any] = {}
     for group in GROUPS:
         tables = data.get(group, {})
@@ -200,16 +182,8 @@ def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
         others["gravity"] = tuple(to_si(g, "acceleration", "gravity") for g in data["gravity"])
     if "run_up" in data:
         others["run_up"] = to_si(data["run_up"], "time", "run_up")
-    run = data.get("run", {})
-    _check_keys("[run]", run, [f.name for f in fields(RunSettings)])
-    return Description(Drivetrain(**parts, **others), RunSettings(**run))
-
-
-def _check_keys(where: str, table: Mapping[str, Any], known: Any) -> None:
-    for key in table:
-        if key not in known:
-            hint = did_you_mean(key, known, shown=repr, otherwise=f"known ones are {', '.join(known)}")
-            raise DrivetrainError(f"{where}: unknown key {key!r}; {hint}")
+    run = make(RunSettings, data.get("run", {}), "[run]", DrivetrainError)
+    return Description(Drivetrain(**parts, **others), run)
 
 
 def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
@@ -225,26 +199,19 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
     if group == "shafts":
         return _of_kind(where, Shaft, name, given)
     kinds, usual = KINDS[group]
-    kind = str(given.pop("kind", usual))
-    if kind not in kinds:
-        raise DrivetrainError(f"{where}: kind {kind!r} is unknown; choose one of {', '.join(kinds)}")
-    return _of_kind(where, kinds[kind], name, given)
+    return _of_kind(where, chosen(kinds, str(given.pop("kind", usual)), f"{where}: ", DrivetrainError), name, given)
 
 
 def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
-    _check_keys(where, given, [f.name for f in fields(kind) if f.init and f.name != "name"])
     with told_of(where):
-        try:
-            return kind(name=name, **given)
-        except TypeError as error:
-            missing = str(error).partition("argument")[2].lstrip("s: ")
-            raise DrivetrainError(f"{where}: {missing} is missing") from None
+        return make(kind, given, where, DrivetrainError, name=name)
 
 
 def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
     own: dict[str, Any] = {key: given.pop(key) for key in ("shaft", "station", "angle") if key in given}
     material = {key: given.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in given}
-    _check_keys(where, given, ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"])
+    known = ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"]
+    check_keys(given, known, where, DrivetrainError, shown=repr)
     for key in ("teeth", "module"):
         require(key in given, f"{where}: {key} is missing")
     with told_of(where):
@@ -261,7 +228,8 @@ def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
 
 def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | None) -> GearMesh:
     own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
-    _check_keys(where, given, ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"])
+    known = ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"]
+    check_keys(given, known, where, DrivetrainError, shown=repr)
     if "faults" in given:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -20,9 +20,14 @@ from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term
+from gearmbs.schema.quantities import Measure, OverTime
 from gearmbs.units import Quantity
 
 SLIP = (Diagnostic("slip", "1"),)
+
+EVEN = "give an even number of 2 or more"
+Power = Annotated[Quantity, Measure("power", above=0)]
+Positive = Annotated[Quantity, Measure(above=0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,12 +46,11 @@ class Drive(Part, ABC):
     """
 
     title: ClassVar[str] = "drive"
-    units: ClassVar[Mapping[str, str]] = {"speed": "angular speed", "station": "length"}
     kind: ClassVar[str] = "drive"
 
     shaft: str
-    speed: Quantity
-    station: Quantity = None
+    speed: Annotated[Quantity, Measure("angular speed")]
+    station: Annotated[Quantity, Measure("length")] = None
     on: str | None = None
 
     @abstractmethod
@@ -93,8 +97,8 @@ class SpeedDrive(Drive):
             points = tuple((t, w) for t, w in self.curve)
         except (TypeError, ValueError):
             raise DrivetrainError(f"{self.label}: curve is {self.curve!r}; give points (time, speed)") from None
-        times = self._in_si("curve", [t for t, _ in points], "time")
-        speeds = self._in_si("curve", [w for _, w in points], "angular speed")
+        times = self.read("curve", [t for t, _ in points], Measure("time", several=-1))
+        speeds = self.read("curve", [w for _, w in points], Measure("angular speed", several=-1))
         require(
             len(points) > 1 and times[0] >= 0.0 and all(b > a for a, b in pairwise(times)),
             f"{self.label}: curve has times {times} s; give two or more, increasing, the first not negative",
@@ -136,8 +140,7 @@ class TorqueDrive(Drive):
     """
 
     kind: ClassVar[str] = "torque"
-    functions: ClassVar[tuple[str, ...]] = ("torque",)
-    torque: Any = 0.0
+    torque: Annotated[Any, OverTime()] = 0.0
 
     def largest_torque(self) -> float | None:
         return fixed_value(self.torque, "torque")
@@ -171,24 +174,16 @@ class InductionMotor(Drive):
     """
 
     kind: ClassVar[str] = "induction motor"
-    units: ClassVar[Mapping[str, str]] = {**Drive.units, "power": "power", "frequency": "frequency"}
-    positive: ClassVar[tuple[str, ...]] = ("power", "frequency")
 
-    power: Quantity
-    poles: int = 4
-    frequency: Quantity = 50.0
-    breakdown: float = 2.5
+    power: Power
+    poles: Annotated[int, Measure(low=2, whole=True, remedy=EVEN)] = 4
+    frequency: Annotated[Quantity, Measure("frequency", above=0)] = 50.0
+    breakdown: Annotated[Quantity, Measure(above=1, remedy="give more than 1 (rated torques)")] = 2.5
     lag: Any = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(
-            isinstance(self.poles, int) and self.poles >= 2 and self.poles % 2 == 0,
-            f"{self.label}: poles is {self.poles!r}; give an even number of 2 or more",
-        )
-        require(
-            self.breakdown > 1.0, f"{self.label}: breakdown is {self.breakdown:g}; give more than 1 (rated torques)"
-        )
+        require(self.poles % 2 == 0, f"{self.label}: poles is {self.poles}; {EVEN}")
         require(
             0.0 < self.rated_slip < 1.0,
             f"{self.label}: speed is {abs(self.speed) * 30 / math.pi:.6g} rpm; the synchronous speed is "
@@ -225,7 +220,7 @@ class InductionMotor(Drive):
         """Time constant of the electrical lag, s; 0 without."""
         if self.lag is True:
             return 1.0 / (self.breakdown_slip * 2.0 * math.pi * self.frequency)
-        return 0.0 if self.lag is False else self._in_si("lag", self.lag, "time")
+        return 0.0 if self.lag is False else self.read("lag", self.lag, Measure("time"))
 
     def torque(self, speed: float) -> float:
         """Return Kloss's torque at a speed (rad/s), N m."""
@@ -279,20 +274,14 @@ class CircuitMotor(InductionMotor):
 
     kind: ClassVar[str] = "circuit motor"
 
-    power: Quantity = 1.0
-    voltage: float = 230.0
+    power: Power = 1.0
+    voltage: Positive = 230.0
     phases: int = 3
     stator_resistance: float = 0.0
-    rotor_resistance: float = 1.0
+    rotor_resistance: Positive = 1.0
     stator_reactance: float = 0.0
-    rotor_reactance: float = 1.0
+    rotor_reactance: Positive = 1.0
     magnetising_reactance: float | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for field in ("voltage", "rotor_resistance", "rotor_reactance"):
-            value = getattr(self, field)
-            require(value > 0.0, f"{self.label}: {field} is {value:g}; it must be positive")
 
     @property
     def equivalent(self) -> tuple[float, float, float, float]:
@@ -345,10 +334,9 @@ class CurveMotor(Drive):
     """
 
     kind: ClassVar[str] = "curve"
-    units: ClassVar[Mapping[str, str]] = {**Drive.units, "speeds": "angular speed", "torques": "torque"}
 
-    speeds: Sequence[Quantity]
-    torques: Sequence[Quantity]
+    speeds: Annotated[Sequence[Quantity], Measure("angular speed", several=-2)]
+    torques: Annotated[Sequence[Quantity], Measure("torque", several=-2)]
 
     def largest_torque(self) -> float | None:
         return max(self.torques)
@@ -379,20 +367,11 @@ class ControlledDrive(Drive):
     """
 
     kind: ClassVar[str] = "controlled"
-    units: ClassVar[Mapping[str, str]] = {**Drive.units, "largest": "torque"}
-    positive: ClassVar[tuple[str, ...]] = ("largest",)
 
-    proportional: float
-    integral: float
-    largest: Quantity
+    proportional: Positive
+    integral: Positive
+    largest: Annotated[Quantity, Measure("torque", above=0)]
     reference: Any = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for field in ("proportional", "integral"):
-            value = getattr(self, field)
-            if not value > 0.0:
-                raise DrivetrainError(f"{self.label}: {field} is {value:g}; it must be positive")
 
     def damping(self) -> float:
         return self.proportional

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -17,7 +17,12 @@ from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, shar
 from gearmbs.drivetrain.torque_element import FROM_LOST, FROM_OWN, ShaftTorque
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
+from gearmbs.schema.quantities import Measure, OneOf, OverTime
 from gearmbs.units import Quantity
+
+Resistance = Annotated[Quantity, Measure("torque", 0)]
+Viscous = Annotated[Quantity, Measure("N*m*s/rad", 0)]
+Smoothing = Annotated[Quantity, Measure("angular speed", above=0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,11 +39,10 @@ class Load(Part, ABC):
     """
 
     title: ClassVar[str] = "load"
-    units: ClassVar[Mapping[str, str]] = {"station": "length"}
     kind: ClassVar[str] = "load"
 
     shaft: str
-    station: Quantity = None
+    station: Annotated[Quantity, Measure("length")] = None
     on: str | None = None
 
     @abstractmethod
@@ -61,8 +65,7 @@ class TorqueLoad(Load):
     """
 
     kind: ClassVar[str] = "torque"
-    functions: ClassVar[tuple[str, ...]] = ("torque",)
-    torque: Any
+    torque: Annotated[Any, OverTime()]
 
     def nominal(self, speed: float) -> float:
         return fixed_value(self.torque, "torque") or 0.0
@@ -134,32 +137,18 @@ class Pump(Load):
     """
 
     kind: ClassVar[str] = "pump"
-    units: ClassVar[Mapping[str, str]] = {
-        **Load.units, "displacement": "m^3", "idle": "torque", "viscous": "N*m*s/rad", "lag": "time", "start": "angle"
-    }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("displacement",)
-    functions: ClassVar[tuple[str, ...]] = ("pressure",)
-    not_negative: ClassVar[tuple[str, ...]] = ("idle", "viscous", "lag")
 
-    displacement: Quantity
-    pressure: Any
-    efficiency: float = 1.0
-    idle: Quantity = 0.0
-    viscous: Quantity = 0.0
-    teeth: int = 0
-    ripple: Sequence[float] | None = None
-    harmonics: int = 4
-    lag: Quantity = 0.0
-    start: Quantity = 0.0
-    smoothing: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(0.0 < self.efficiency <= 1.0, f"{self.label}: efficiency is {self.efficiency:g}; give above 0, up to 1")
-        require(
-            self.ripple is None or all(math.isfinite(share) for share in self.ripple),
-            f"{self.label}: ripple is {self.ripple}; give finite shares of the mean",
-        )
+    displacement: Annotated[Quantity, Measure("m^3", above=0)]
+    pressure: Annotated[Any, OverTime()]
+    efficiency: Annotated[Quantity, Measure(above=0, high=1)] = 1.0
+    idle: Resistance = 0.0
+    viscous: Viscous = 0.0
+    teeth: Annotated[int, Measure(low=0, whole=True)] = 0
+    ripple: Annotated[Sequence[float] | None, Measure(several=0)] = None
+    harmonics: Annotated[int, Measure(low=0, whole=True)] = 4
+    lag: Annotated[Quantity, Measure("time", 0)] = 0.0
+    start: Annotated[Quantity, Measure("angle")] = 0.0
+    smoothing: Annotated[Quantity, Measure()] = 1.0
 
     @property
     def per_pressure(self) -> float:
@@ -213,14 +202,10 @@ class Brake(Load):
     """
 
     kind: ClassVar[str] = "brake"
-    units: ClassVar[Mapping[str, str]] = {**Load.units, "torque": "torque", "smoothing": "angular speed"}
-    positive: ClassVar[tuple[str, ...]] = ("smoothing",)
-    not_negative: ClassVar[tuple[str, ...]] = ("torque",)
-    functions: ClassVar[tuple[str, ...]] = ("share",)
 
-    torque: Quantity
-    share: Any = 1.0
-    smoothing: Quantity = 0.1
+    torque: Resistance
+    share: Annotated[Any, OverTime()] = 1.0
+    smoothing: Smoothing = 0.1
 
     def nominal(self, speed: float) -> float:
         share = fixed_value(self.share, "dimensionless")
@@ -242,11 +227,9 @@ class Fan(Load):
     """
 
     kind: ClassVar[str] = "fan"
-    units: ClassVar[Mapping[str, str]] = {**Load.units, "torque": "torque", "at_speed": "angular speed"}
-    positive: ClassVar[tuple[str, ...]] = ("torque", "at_speed")
 
-    torque: Quantity
-    at_speed: Quantity
+    torque: Annotated[Quantity, Measure("torque", above=0)]
+    at_speed: Smoothing
 
     def nominal(self, speed: float) -> float:
         return self.torque * (speed / self.at_speed) ** 2
@@ -268,15 +251,10 @@ class Drag(Load):
     """
 
     kind: ClassVar[str] = "drag"
-    units: ClassVar[Mapping[str, str]] = {
-        **Load.units, "torque": "torque", "viscous": "N*m*s/rad", "smoothing": "angular speed"
-    }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("smoothing",)
-    not_negative: ClassVar[tuple[str, ...]] = ("torque", "viscous")
 
-    torque: Quantity = 0.0
-    viscous: Quantity = 0.0
-    smoothing: Quantity = 0.1
+    torque: Resistance = 0.0
+    viscous: Viscous = 0.0
+    smoothing: Smoothing = 0.1
 
     def nominal(self, speed: float) -> float:
         return self.torque * math.tanh(speed / self.smoothing) + self.viscous * speed
@@ -298,6 +276,10 @@ def _resist(
     )  # fmt: skip
 
 
+PLACES = {"speed": "angular speed", "angle": "angle", "time": "time"}
+"""What a table of torques may be over."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class TableLoad(Load):
     """A load by points over speed, angle or time.
@@ -314,16 +296,13 @@ class TableLoad(Load):
 
     kind: ClassVar[str] = "table"
 
-    over: str
-    places: Sequence[Quantity]
-    torques: Sequence[Quantity]
+    over: Annotated[str, OneOf(PLACES)]
+    places: Any
+    torques: Annotated[Sequence[Quantity], Measure("torque", several=-2)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        units = {"speed": "angular speed", "angle": "angle", "time": "time"}
-        require(self.over in units, f"{self.label}: over is {self.over!r}; choose one of {', '.join(units)}")
-        object.__setattr__(self, "places", self._in_si("places", tuple(self.places), units[self.over]))
-        object.__setattr__(self, "torques", self._in_si("torques", tuple(self.torques), "torque"))
+        object.__setattr__(self, "places", self.read("places", self.places, Measure(PLACES[self.over], several=-2)))
         least = 4 if self.over == "time" else 2
         require(
             len(self.places) == len(self.torques) >= least,

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from gearmbs._shown import Written, html_table, readable, settings_of
+from gearmbs._shown import html_table, readable, settings_of
 from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, step
+from gearmbs.schema.described import Described
 from gearmbs.units import to_si
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part(Written):
+class Part(Described):
     """A named part.
 
     Parameters
@@ -35,48 +34,18 @@ class Part(Written):
 
     title: ClassVar[str] = "part"
     """What messages call it."""
-    units: ClassVar[Mapping[str, str]] = {}
-    """Dimension or unit of each quantity."""
-    positive: ClassVar[tuple[str, ...]] = ()
-    """Fields that must be above zero."""
-    not_negative: ClassVar[tuple[str, ...]] = ()
-
-    functions: ClassVar[tuple[str, ...]] = ()
-    """Fields that may be functions of time."""
+    error: ClassVar[type[ValueError]] = DrivetrainError
 
     name: str
 
     def __post_init__(self) -> None:
-        require(isinstance(self.name, str) and bool(self.name), f"{self.title}: name {self.name!r}; give a text")
-        for field, unit in self.units.items():
-            value = getattr(self, field)
-            if value is not None:
-                object.__setattr__(self, field, self._in_si(field, value, unit))
-        for field in self.functions:
-            value = getattr(self, field)
-            require(
-                not isinstance(value, Real) or math.isfinite(value),
-                f"{self.label}: {field} is {value}; give a finite number, a quantity or an expression of time",
-            )
-        for field in (*self.positive, *self.not_negative):
-            value = getattr(self, field)
-            if value is None:
-                continue
-            low = "positive" if field in self.positive else "not negative"
-            for number in value if isinstance(value, tuple) else (value,):
-                fine = number > 0.0 if field in self.positive else number >= 0.0
-                require(fine, f"{self.label}: {field} is {number:g} {self.units[field]}; it must be {low}")
+        super().__post_init__()
+        require(bool(self.name), f"{self.title}: name is empty; give a text")
 
-    def _in_si(self, field: str, value: Any, unit: str) -> Any:
-        if isinstance(value, list | tuple):
-            require(len(value) > 0, f"{self.label}: {field} is empty; give a number in SI, or a text with a unit")
-            return tuple(self._in_si(field, item, unit) for item in value)
-        try:
-            number = to_si(value, unit, f"{self.label}: {field}")
-        except (TypeError, ValueError) as error:
-            raise DrivetrainError(str(error)) from None
-        require(math.isfinite(number), f"{self.label}: {field} is {number}; give a finite number")
-        return number
+    @property
+    def place(self) -> str:
+        """What messages put in front of a field's name."""
+        return f"{self.label}: "
 
     @property
     def label(self) -> str:

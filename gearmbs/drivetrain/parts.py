@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from numbers import Real
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from gearmbs.drivetrain.errors import require, told_of
+from gearmbs.drivetrain.errors import DrivetrainError, require, told_of
 from gearmbs.drivetrain.part import Part
 from gearmbs.gears.contact_model import ContactLaw, FlankFriction
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
+from gearmbs.schema.messages import chosen
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_density
 
 LONG = 30.0
@@ -24,6 +25,11 @@ LONG = 30.0
 
 DIAMETER = 0.030
 """Of a shaft that gives none, m: the usual one of a gearbox of this size, as in the bench of Fig. 2."""
+
+
+Length = Annotated[Quantity, Measure("length", above=0)]
+Mass = Annotated[Quantity, Measure("mass", above=0)]
+Three = tuple[Quantity, Quantity, Quantity]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,22 +65,16 @@ class Shaft(Part):
     """
 
     title: ClassVar[str] = "shaft"
-    units: ClassVar[Mapping[str, str]] = {
-        "length": "length", "radius": "length", "diameter": "length", "density": "density", "mass": "mass",
-        "inertia": "inertia",
-        "angle": "angle", "position": "length",
-    }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("length", "radius", "diameter", "density", "mass", "inertia")
 
-    length: Quantity = None
-    radius: Quantity = None
-    sections: Sequence[Any] | None = None
-    density: Quantity = 7850.0
-    mass: Quantity = None
-    inertia: Quantity = None
-    position: tuple[Quantity, Quantity, Quantity] | None = None
-    angle: Quantity = 0.0
-    diameter: Quantity = None
+    length: Length = None
+    radius: Length = None
+    sections: Any = None
+    density: Annotated[Quantity, Measure("density", above=0)] = 7850.0
+    mass: Mass = None
+    inertia: Annotated[Quantity, Measure("inertia", above=0)] = None
+    position: Annotated[Three | None, Measure("length", several=3)] = None
+    angle: Annotated[Quantity, Measure("angle")] = 0.0
+    diameter: Length = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -91,8 +91,6 @@ class Shaft(Part):
             object.__setattr__(self, "length", math.fsum(pair[0] for pair in cut))
         elif self.length is None:
             object.__setattr__(self, "length", 0.2)
-        if self.position is not None:
-            require(len(self.position) == 3, f"{self.label}: position is {self.position}; give three lengths")
         doubt = doubt_of_density(self.density)
         largest = max(max(pair) for pair in self.cylinders)
         if largest >= LONG:
@@ -111,12 +109,12 @@ class Shaft(Part):
         if isinstance(given, Mapping):
             known = set(given) in ({"length", "diameter"}, {"length", "radius"})
             require(known, f"{self.label}: sections has {dict(given)}; give length and diameter, or length and radius")
-            measured = {key: self._in_si(f"sections.{key}", value, "length") for key, value in given.items()}
+            measured = {key: self.read(f"sections.{key}", value, Measure("length")) for key, value in given.items()}
             found = measured["length"], measured.get("radius", 0.5 * measured.get("diameter", 0.0))
         else:
-            found = self._in_si("sections", tuple(given), "length")
+            found = self.read("sections", given, Measure("length", several=2))
         require(
-            len(found) == 2 and min(found) > 0.0,
+            min(found) > 0.0,
             f"{self.label}: sections has {found}; give pairs of a positive length and radius, or tables of length and "
             "diameter",
         )
@@ -173,16 +171,14 @@ class Wheel(Part):
     """
 
     title: ClassVar[str] = "wheel"
-    units: ClassVar[Mapping[str, str]] = {"station": "length", "angle": "angle"}
 
     shaft: str
     gear: GearSpec
-    station: Quantity = None
-    angle: Quantity = None
+    station: Annotated[Quantity, Measure("length")] = None
+    angle: Annotated[Quantity, Measure("angle")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(isinstance(self.gear, GearSpec), f"{self.label}: gear is {self.gear!r}; give a GearSpec")
         if self.gear.name == GearSpec.name:
             # messages about the pair then tell its wheels apart
             object.__setattr__(self, "gear", replace(self.gear, name=self.name))
@@ -219,20 +215,13 @@ class GearMesh(Part):
     """
 
     title: ClassVar[str] = "mesh"
-    units: ClassVar[Mapping[str, str]] = {"direction": "angle"}
 
     driver: str
     driven: str
-    direction: Quantity = 0.0
-    phase: float | None = None
+    direction: Annotated[Quantity, Measure("angle")] = 0.0
+    phase: Annotated[Quantity, Measure(remedy="give a number of pitches, such as 0.5")] = None
     settings: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
     pair: Any = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        phase = self.phase
-        number = isinstance(phase, Real) and not isinstance(phase, bool) and math.isfinite(phase)
-        require(phase is None or number, f"{self.label}: phase is {phase!r}; give a number of pitches, such as 0.5")
 
     def make(self, driver: GearSpec, driven: GearSpec, rotation: Any, torque: float) -> Any:
         """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""
@@ -293,24 +282,31 @@ def _ideal(
     return kind.with_damping_ratio(pair, law.mean_mesh_stiffness, ratio, backlash=parting, **curves)
 
 
-def contact_law(value: Any) -> ContactLaw:
+LAWS: dict[str, Any] = {
+    "impact": ContactLaw.impact, "hunt-crossley": ContactLaw.hunt_crossley, "linear": ContactLaw.linear,
+    "hertz": ContactLaw.hertz_line,
+}  # fmt: skip
+
+
+def contact_law(value: Any, key: str = "kind") -> ContactLaw:
     """Return the law that a table such as ``{"kind": "linear", "stiffness": "3e8 N/m"}`` stands for, or a law itself.
+
+    Parameters
+    ----------
+    value : ContactLaw or mapping
+    key : str
+        What names the law in the table.
 
     Raises
     ------
     ValueError
-        For an unknown kind.
+        For an unknown law.
     """
     if isinstance(value, ContactLaw):
         return value
     table = dict(value)
-    kinds: dict[str, Any] = {
-        "impact": ContactLaw.impact, "hunt-crossley": ContactLaw.hunt_crossley, "linear": ContactLaw.linear,
-        "hertz": ContactLaw.hertz_line,
-    }  # fmt: skip
-    kind = table.pop("kind", "impact")
-    require(kind in kinds, f"contact.kind is {kind!r}; choose one of {', '.join(kinds)}")
-    return kinds[kind](**table)
+    name = str(table.pop(key, "impact")).replace("_", "-")
+    return chosen(LAWS, name, "contact: ", DrivetrainError, key)(**table)
 
 
 def flank_friction(value: Any) -> FlankFriction:
@@ -333,12 +329,10 @@ class Mount(Part):
     """
 
     title: ClassVar[str] = "mount"
-    units: ClassVar[Mapping[str, str]] = {"at": "length", "stiffness": "stiffness", "damping": "damping"}
-    not_negative: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
 
-    at: tuple[Quantity, Quantity, Quantity]
-    stiffness: tuple[Quantity, Quantity, Quantity]
-    damping: tuple[Quantity, Quantity, Quantity] = (0.0, 0.0, 0.0)
+    at: Annotated[Three, Measure("length", several=3)]
+    stiffness: Annotated[Three, Measure("stiffness", 0, several=3)]
+    damping: Annotated[Three, Measure("damping", 0, several=3)] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -356,12 +350,10 @@ class HousingMode(Part):
     """
 
     title: ClassVar[str] = "mode"
-    units: ClassVar[Mapping[str, str]] = {"mass": "mass", "stiffness": "stiffness"}
-    positive: ClassVar[tuple[str, ...]] = ("mass", "stiffness")
 
-    mass: Quantity
-    stiffness: Quantity
-    shape: Mapping[str, tuple[float, float, float]]
+    mass: Mass
+    stiffness: Annotated[Quantity, Measure("stiffness", above=0)]
+    shape: Mapping[str, Any]
     damping_ratio: float = 0.02
 
     @property
@@ -388,12 +380,10 @@ class Housing(Part):
     """
 
     title: ClassVar[str] = "housing"
-    units: ClassVar[Mapping[str, str]] = {"mass": "mass", "inertia": "inertia", "at": "length"}
-    positive: ClassVar[tuple[str, ...]] = ("mass", "inertia")
 
-    mass: Quantity
-    inertia: tuple[Quantity, Quantity, Quantity]
-    at: tuple[Quantity, Quantity, Quantity] = (0.0, 0.0, 0.0)
+    mass: Mass
+    inertia: Annotated[Three, Measure("inertia", above=0, several=3)]
+    at: Annotated[Three, Measure("length", several=3)] = (0.0, 0.0, 0.0)
     mounts: tuple[Mount, ...] = ()
     modes: tuple[HousingMode, ...] = ()
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
-
-import numpy as np
+from typing import Annotated, ClassVar
 
 from gearmbs.drivetrain.errors import require
 from gearmbs.drivetrain.part import Part
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
+
+Direction = Annotated[tuple[float, float, float], Measure(several=3)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,12 +22,8 @@ class Sensor(Part):
     unit: ClassVar[str] = "1"
 
 
-def _check_direction(sensor: Sensor, direction: tuple[float, float, float]) -> None:
-    size = float(np.linalg.norm(np.asarray(direction, dtype=float)))
-    require(
-        len(direction) == 3 and size > 0.0,
-        f"{sensor.label}: direction is {direction}; give three numbers that are not all zero",
-    )
+def _check_direction(sensor: Laser | Accelerometer) -> None:
+    require(any(sensor.direction), f"{sensor.label}: direction is {sensor.direction}; give one that is not all zero")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,16 +43,15 @@ class Laser(Sensor):
 
     kind: ClassVar[str] = "laser"
     unit: ClassVar[str] = "m/s"
-    units: ClassVar[Mapping[str, str]] = {"station": "length", "offset": "length"}
 
     shaft: str
-    station: Quantity = None
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    offset: Quantity = 0.0
+    station: Annotated[Quantity, Measure("length")] = None
+    direction: Direction = (1.0, 0.0, 0.0)
+    offset: Annotated[Quantity, Measure("length")] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_direction(self, self.direction)
+        _check_direction(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,11 +70,11 @@ class Accelerometer(Sensor):
     unit: ClassVar[str] = "m/s^2"
 
     bearing: str
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    direction: Direction = (1.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_direction(self, self.direction)
+        _check_direction(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,8 +24,7 @@ from gearmbs.flexible.beam import BeamSection
 from gearmbs.flexible.material import FlexibleError
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism import Body, Compiled, Diagnostic, ForceElement, Marker, Mechanism
-from gearmbs.mechanism.parts.bodies import frame_along, vector
-from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.mechanism.parts.quantities import frame_along, quantity, vector
 from gearmbs.units import Quantity
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from gearmbs._shown import Written
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.schema.described import Described
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_material
 
 # The error of everything that describes, reads or reduces a body that deforms.
@@ -25,7 +26,7 @@ MOST_SHEAR = 0.52
 
 
 @dataclass(frozen=True)
-class ElasticMaterial(Written):
+class ElasticMaterial(Described):
     """An isotropic elastic material.
 
     Parameters
@@ -49,37 +50,28 @@ class ElasticMaterial(Written):
         For a modulus or density that no solid has: other units are meant (`gearmbs.units.doubt_of_material`).
     """
 
-    youngs_modulus: Quantity = 2.1e11
-    poisson_ratio: float = 0.3
-    density: Quantity = 7850.0
-    shear_modulus: Quantity = None
+    error: ClassVar[type[ValueError]] = FlexibleError
+
+    youngs_modulus: Annotated[Quantity, Measure("pressure", above=0)] = 2.1e11
+    poisson_ratio: Annotated[Quantity, Measure(low=0, below=0.5)] = 0.3
+    density: Annotated[Quantity, Measure("density", 0)] = 7850.0
+    shear_modulus: Annotated[Quantity, Measure("pressure", above=0)] = None
     name: str = "steel"
 
     def __post_init__(self) -> None:
-        e = quantity(self.youngs_modulus, "Pa", "ElasticMaterial.youngs_modulus")
-        rho = quantity(self.density, "kg/m^3", "ElasticMaterial.density")
-        if not (np.isfinite(e) and e > 0.0):
-            raise FlexibleError(f"ElasticMaterial.youngs_modulus is {e} Pa; it must be positive")
-        if not (np.isfinite(rho) and rho >= 0.0):
-            raise FlexibleError(f"ElasticMaterial.density is {rho} kg/m^3; it must not be negative")
-        ratio = quantity(self.poisson_ratio, "dimensionless", "ElasticMaterial.poisson_ratio")
-        if not 0.0 <= ratio < 0.5:
-            raise FlexibleError(f"ElasticMaterial.poisson_ratio is {ratio}; give 0 up to 0.5")
-        doubt = doubt_of_material(e, rho)
+        super().__post_init__()
+        e = self.youngs_modulus
+        doubt = doubt_of_material(e, self.density)
         if doubt:
             warnings.warn(f"ElasticMaterial '{self.name}': {doubt}", stacklevel=3)
-        g = self.shear_modulus
-        g = e / (2.0 * (1.0 + self.poisson_ratio)) if g is None else quantity(g, "Pa", "ElasticMaterial.shear_modulus")
-        if not (np.isfinite(g) and g > 0.0):
-            raise FlexibleError(f"ElasticMaterial.shear_modulus is {g} Pa; it must be positive")
-        if g > MOST_SHEAR * e:
+        if self.shear_modulus is None:
+            object.__setattr__(self, "shear_modulus", e / (2.0 * (1.0 + self.poisson_ratio)))
+        if self.shear_modulus > MOST_SHEAR * e:
             warnings.warn(
-                f"ElasticMaterial '{self.name}': shear_modulus is {g:.4g} Pa beside E = {e:.4g} Pa; of an isotropic "
-                "material it is at most E / 2",
+                f"ElasticMaterial '{self.name}': shear_modulus is {self.shear_modulus:.4g} Pa beside E = {e:.4g} Pa; "
+                "of an isotropic material it is at most E / 2",
                 stacklevel=3,
             )
-        for field, value in (("youngs_modulus", e), ("poisson_ratio", ratio), ("density", rho), ("shear_modulus", g)):
-            object.__setattr__(self, field, value)
 
 
 STEEL = ElasticMaterial()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from gearmbs.flexible.interfaces import outline_of
 from gearmbs.flexible.material import STEEL, ElasticMaterial, FlexibleError
 from gearmbs.flexible.stress import ShaftStresses
 from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.schema.described import Described
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
@@ -44,8 +46,12 @@ def _is_count(value: Any) -> bool:
     return not isinstance(value, bool) and isinstance(value, int | np.integer) and bool(value >= 1)
 
 
+Length = Annotated[Quantity, Measure("length", 0)]
+Inertia = Annotated[Quantity, Measure("inertia", 0)]
+
+
 @dataclass(frozen=True)
-class ShaftSection(Written):
+class ShaftSection(Described):
     """A length of shaft, a cylinder or a cone.
 
     Parameters
@@ -60,28 +66,27 @@ class ShaftSection(Written):
         Default: that of the shaft.
     """
 
-    length: Quantity
-    outer: Quantity
-    inner: Quantity = 0.0
-    outer_end: Quantity = None
-    inner_end: Quantity = None
+    error: ClassVar[type[ValueError]] = FlexibleError
+
+    length: Annotated[Quantity, Measure("length", above=0)]
+    outer: Length
+    inner: Length = 0.0
+    outer_end: Length = None
+    inner_end: Length = None
     material: ElasticMaterial | None = None
 
     def __post_init__(self) -> None:
-        for name in ("length", "outer", "inner", "outer_end", "inner_end"):
-            given = getattr(self, name)
-            if given is None:
-                given = getattr(self, name.removesuffix("_end"))
-            object.__setattr__(self, name, quantity(given, "length", f"ShaftSection.{name}"))
-        if not (np.isfinite(self.length) and self.length > 0.0):
-            raise FlexibleError(f"ShaftSection.length is {self.length} m; it must be positive")
+        super().__post_init__()
+        for name in ("outer", "inner"):
+            if getattr(self, f"{name}_end") is None:
+                object.__setattr__(self, f"{name}_end", getattr(self, name))
         for outer, inner in ((self.outer, self.inner), (self.outer_end, self.inner_end)):
-            if not 0.0 <= inner < outer < np.inf:
+            if not 0.0 <= inner < outer:
                 raise FlexibleError(f"ShaftSection: bore {inner} m in {outer} m; give diameters 0 <= inner < outer")
 
 
 @dataclass(frozen=True)
-class Disc(Written):
+class Disc(Described):
     """A rigid disc on a shaft: a wheel, a coupling half, a rotor.
 
     Give ``outer`` and ``width``, or ``mass``, ``polar`` and ``diametral``.
@@ -98,34 +103,30 @@ class Disc(Written):
     name : str
     """
 
-    at: Quantity
-    outer: Quantity = None
-    width: Quantity = None
-    inner: Quantity = 0.0
-    mass: Quantity = None
-    polar: Quantity = None
-    diametral: Quantity = None
+    error: ClassVar[type[ValueError]] = FlexibleError
+
+    at: Length
+    outer: Length = None
+    width: Length = None
+    inner: Length = 0.0
+    mass: Annotated[Quantity, Measure("mass", 0)] = None
+    polar: Inertia = None
+    diametral: Inertia = None
     material: ElasticMaterial | None = None
     name: str = "disc"
 
+    @property
+    def place(self) -> str:
+        """What messages put in front of a field's name."""
+        return f"Disc '{self.name}': "
+
     def __post_init__(self) -> None:
+        super().__post_init__()
         label = f"Disc '{self.name}'"
-        units = {"at": "length", "outer": "length", "width": "length", "inner": "length", "mass": "mass",
-                 "polar": "inertia", "diametral": "inertia"}  # fmt: skip
-        for name, unit in units.items():
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, quantity(getattr(self, name), unit, f"{label}: {name}"))
         by_size = self.outer is not None and self.width is not None
         by_mass = None not in (self.mass, self.polar, self.diametral)
         if by_size == by_mass:
             raise FlexibleError(f"{label}: give outer and width, or mass, polar and diametral")
-        numbers = (self.outer, self.width) if by_size else (self.mass, self.polar, self.diametral)
-        for name in ("at", "inner"):
-            value = getattr(self, name)
-            if value is None or not 0.0 <= value < np.inf:
-                raise FlexibleError(f"{label}: {name} is {value} m; give a finite length, not negative")
-        if not all(np.isfinite(value) and value >= 0.0 for value in numbers):
-            raise FlexibleError(f"{label}: sizes {numbers} must be finite and not negative")
         if by_size and not (self.inner < self.outer and self.width > 0.0):
             raise FlexibleError(
                 f"{label}: a bore of {self.inner} m in {self.outer} m, {self.width} m wide; give diameters "

@@ -94,15 +94,14 @@ class GearContact(ForceElement):
         geometry = self.pair.geometry
         gi, gr, size = pack(self.pair)
         wrench, jac, diag, zero = np.zeros(6), np.zeros((6, 24)), np.zeros(layout.DIAGNOSTICS), np.zeros(3)
-        origins = [np.ascontiguousarray(m.global_position()) for m in (self.i, self.j)]
-        axes = [np.ascontiguousarray(m.global_orientation()) for m in (self.i, self.j)]
+        origins = [np.ascontiguousarray(place) for place in (self.i.global_position(), self.j.global_position())]
+        axes = [np.ascontiguousarray(a) for a in (self.i.global_orientation(), self.j.global_orientation())]
         gear_contact(
             gi, gr, origins[0], axes[0], zero, zero, origins[1], axes[1], zero, zero, wrench, jac, diag, 0,
             np.zeros(size),
         )  # fmt: skip
-        drive, coast, force = (
-            float(diag[layout.place(layout.TOTALS, n)]) for n in ("depth_drive", "depth_coast", "normal_force")
-        )
+        places = [layout.place(layout.TOTALS, name) for name in ("depth_drive", "depth_coast", "normal_force")]
+        drive, coast, force = diag[places].tolist()
         jammed = max(0.0, geometry.jam_backlash - geometry.normal_backlash)
         depth = max(drive, coast)
         if depth <= DEEP * geometry.driver.module + jammed:

@@ -11,7 +11,6 @@ from typing import Literal
 from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.modifications import Fault
-from gearmbs.gears.spec import require
 from gearmbs.units import Quantity, shown, to_si
 
 # Contact and friction laws as users define them; the compiled forms are in ``gearmbs.contact.laws``.
@@ -256,15 +255,14 @@ class ContactModel(Written):
 
     # mypy may lose InitVar among modules that import each other for types
     def __post_init__(self, owner: str) -> None:  # type: ignore[override]
-        require(self.load in ("slices", "adams"), f"{owner}.load is {self.load!r}; choose 'slices' or 'adams'")
-        require(
-            self.stiffness_curve in ("constant", "potential-energy"),
-            f"{owner}.stiffness_curve is {self.stiffness_curve!r}; choose 'constant' or 'potential-energy'",
-        )
-        require(
-            self.slices is None or (isinstance(self.slices, int) and self.slices >= 1),
-            f"{owner}.slices is {self.slices!r}; give an integer of 1 or more",
-        )
+        if self.load not in ("slices", "adams"):
+            raise ValueError(f"{owner}.load is {self.load!r}; choose 'slices' or 'adams'")
+        if self.stiffness_curve not in ("constant", "potential-energy"):
+            raise ValueError(
+                f"{owner}.stiffness_curve is {self.stiffness_curve!r}; choose 'constant' or 'potential-energy'"
+            )
+        if self.slices is not None and not (isinstance(self.slices, int) and self.slices >= 1):
+            raise ValueError(f"{owner}.slices is {self.slices!r}; give an integer of 1 or more")
 
     def face_slices(self, geometry: PairGeometry, faults: Iterable[Fault] = ()) -> int:
         """Slices along the face in use: those asked for, or else as many as the gap's variation needs.

@@ -26,7 +26,6 @@ from gearmbs.gears.modifications import (
     random_pitch,
     tolerances,
 )
-from gearmbs.gears.spec import require
 from gearmbs.gears.stiffness import Crack, pair_stiffness
 from gearmbs.units import Quantity
 
@@ -81,12 +80,14 @@ class ChippedCorner(Fault):
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear
-        require(
-            0 < self.length <= gear.face_width,
-            f"ChippedCorner.length is {self.length} m; give more than 0 up to the face width, {gear.face_width:.6g} m",
-        )
+        if not 0 < self.length <= gear.face_width:
+            raise ValueError(
+                f"ChippedCorner.length is {self.length} m; give more than 0 up to the face width, "
+                f"{gear.face_width:.6g} m"
+            )
         most = abs(gear.tip_radius - gear.root_radius)
-        require(0 < self.height <= most, f"ChippedCorner.height is {self.height} m; the tooth is {most:.6f} m high")
+        if not 0 < self.height <= most:
+            raise ValueError(f"ChippedCorner.height is {self.height} m; the tooth is {most:.6f} m high")
         from_end = 0.5 * gear.face_width - self.end * deviations.section
         cut = self.height * np.maximum(0.0, 1 - from_end / self.length)
         deviations.shorten(self.tooth % gear.teeth, gear.tip_radius - gear.sign * cut)
@@ -110,7 +111,8 @@ class BrokenTooth(Fault):
     tooth: int = 0
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        require(0 < self.lost <= 1, f"BrokenTooth.lost is {self.lost}; give a share of the height above 0 up to 1")
+        if not 0 < self.lost <= 1:
+            raise ValueError(f"BrokenTooth.lost is {self.lost}; give a share of the height above 0 up to 1")
         gear = deviations.gear
         radius = gear.tip_radius - self.lost * (gear.tip_radius - gear.root_radius)
         deviations.shorten(self.tooth % gear.teeth, np.full(deviations.section.size, radius))
@@ -137,7 +139,8 @@ class RootCrack(Fault):
     tooth: int = 0
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        require(self.depth > 0, f"RootCrack.depth is {self.depth} m; it must be positive")
+        if not self.depth > 0:
+            raise ValueError(f"RootCrack.depth is {self.depth} m; it must be positive")
         crack = Crack(self.depth, self.angle)
         driver = self.wheel == "driver"
         own = deviations.compliance_roll_length
@@ -185,16 +188,17 @@ class Pit(Fault):
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         for name in ("depth", "height", "width"):
             value = getattr(self, name)
-            require(value > 0, f"Pit.{name} is {value} m; it must be positive")
+            if not value > 0:
+                raise ValueError(f"Pit.{name} is {value} m; it must be positive")
         centre = deviations.gear.pitch_radius if self.radius is None else self.radius
         u = (deviations.radius - centre) / (0.5 * self.height)
         v = (deviations.section - self.position) / (0.5 * self.width)
         hollow = self.depth * np.maximum(0.0, 1 - u[None, :] ** 2 - v[:, None] ** 2)
-        require(
-            hollow.max() > 0,
-            f"Pit.radius {centre} m or Pit.position {self.position} m puts the pit off the flank or between its "
-            "sections; move or enlarge it",
-        )
+        if not hollow.max() > 0:
+            raise ValueError(
+                f"Pit.radius {centre} m or Pit.position {self.position} m puts the pit off the flank or between its "
+                "sections; move or enlarge it"
+            )
         for flank in deviations.flanks(self.flank):
             deviations.shape[flank, self.tooth % deviations.gear.teeth] += hollow
 
@@ -219,7 +223,8 @@ class Wear(Fault):
     flank: Flank = "drive"
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        require(self.depth >= 0, f"Wear.depth is {self.depth} m; it must not be negative")
+        if not self.depth >= 0:
+            raise ValueError(f"Wear.depth is {self.depth} m; it must not be negative")
         gear = deviations.gear
         pitch_point = gear.base_radius * math.tan(pair.working_pressure_angle)
         start = pair.first_roll_lengths[self.wheel == "driven"]
@@ -253,7 +258,8 @@ class Eccentricity(Fault):
     phase: Quantity = 0.0
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        require(self.amount >= 0, f"Eccentricity.amount is {self.amount} m; it must not be negative")
+        if not self.amount >= 0:
+            raise ValueError(f"Eccentricity.amount is {self.amount} m; it must not be negative")
         deviations.shift(self.amount * math.cos(self.phase), self.amount * math.sin(self.phase))
 
 
@@ -326,11 +332,12 @@ class CumulativePitchError(Fault):
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         teeth = deviations.gear.teeth
-        require(self.amount >= 0, f"CumulativePitchError.amount is {self.amount} m; it must not be negative")
-        require(
-            1 <= self.order <= teeth // 2,
-            f"CumulativePitchError.order is {self.order!r}; give 1 up to {teeth // 2} waves per revolution",
-        )
+        if not self.amount >= 0:
+            raise ValueError(f"CumulativePitchError.amount is {self.amount} m; it must not be negative")
+        if not 1 <= self.order <= teeth // 2:
+            raise ValueError(
+                f"CumulativePitchError.order is {self.order!r}; give 1 up to {teeth // 2} waves per revolution"
+            )
         wave = np.sin(2 * math.pi * self.order * np.arange(teeth) / teeth + self.phase)
         index = self.amount / np.ptp(wave) * wave
         deviations.offset[deviations.drive] -= index
@@ -368,11 +375,12 @@ class Waviness(Fault):
         gear = deviations.gear
         step = abs(deviations.roll_length[1] - deviations.roll_length[0]) / gear.base_radius
         most = int(2 * math.pi / (POINTS_A_WAVE * step))
-        require(self.amount >= 0, f"Waviness.amount is {self.amount} m; it must not be negative")
-        require(
-            self.waves <= most,
-            f"Waviness.waves is {self.waves}; the profile's points resolve up to {most} waves per revolution",
-        )
+        if not self.amount >= 0:
+            raise ValueError(f"Waviness.amount is {self.amount} m; it must not be negative")
+        if not self.waves <= most:
+            raise ValueError(
+                f"Waviness.waves is {self.waves}; the profile's points resolve up to {most} waves per revolution"
+            )
         for flank in deviations.flanks(self.flank):
             wave = np.sin(self.waves * deviations.normal_angle(flank) + self.phase)
             deviations.shape[flank] += self.amount * wave[:, None, :]
@@ -406,7 +414,8 @@ class GradedFlanks(Fault):
     def __post_init__(self) -> None:
         super().__post_init__()
         good = self.grade in range(1, 12)
-        require(good, f"GradedFlanks.grade is {self.grade}; ISO 1328-1 has the whole grades 1 to 11")
+        if not good:
+            raise ValueError(f"GradedFlanks.grade is {self.grade}; ISO 1328-1 has the whole grades 1 to 11")
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear

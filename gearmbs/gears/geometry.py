@@ -15,7 +15,7 @@ from typing import ClassVar, Literal, overload
 import numpy as np
 
 from gearmbs._shown import Written
-from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
+from gearmbs.gears.spec import GearSpec, convert_fields, involute
 from gearmbs.units import Quantity
 
 JAM_ROUNDING = 1e-12
@@ -109,13 +109,14 @@ class PairGeometry(Written):
         convert_fields(self, {name: "length" for name in lengths} | {"misalignment": "angle"}, self._name)
         for name in (*lengths, "misalignment"):
             value = getattr(self, name)
-            require(math.isfinite(value), f"{self._name}.{name} is {value}; give a finite number")
+            if not math.isfinite(value):
+                raise ValueError(f"{self._name}.{name} is {value}; give a finite number")
         self._check_settings()
         self._check_distance()
         self._check_engagement()
         self._remark()
 
-    @property
+    @cached_property
     def _name(self) -> str:
         return type(self).__name__
 
@@ -123,112 +124,112 @@ class PairGeometry(Written):
 
     def _check_settings(self) -> None:
         name = self._name
-        require(
-            self.backlash >= 0,
-            f"{name}.backlash is {self.backlash * MM:.6g} mm: negative backlash; give 0 or more, or reduce "
-            "centre_distance_error to mesh tighter",
-        )
-        require(
-            self.plane in ("skew", "inclination"), f"{name}.plane is {self.plane!r}; choose 'skew' or 'inclination'"
-        )
-        require(
-            abs(self.misalignment) <= LARGEST_MISALIGNMENT,
-            f"{name}.misalignment is {math.degrees(self.misalignment):.3f} deg; wheels mesh up to 10 deg "
-            "(a plain number is in radians: write '1 deg')",
-        )
+        if not self.backlash >= 0:
+            raise ValueError(
+                f"{name}.backlash is {self.backlash * MM:.6g} mm: negative backlash; give 0 or more, or reduce "
+                "centre_distance_error to mesh tighter"
+            )
+        if self.plane not in ("skew", "inclination"):
+            raise ValueError(f"{name}.plane is {self.plane!r}; choose 'skew' or 'inclination'")
+        if not abs(self.misalignment) <= LARGEST_MISALIGNMENT:
+            raise ValueError(
+                f"{name}.misalignment is {math.degrees(self.misalignment):.3f} deg; wheels mesh up to 10 deg "
+                "(a plain number is in radians: write '1 deg')"
+            )
         one, two = self.driver, self.driven
-        require(
-            not one.internal,
-            f"{name}.driver is internal ({one.name}); make the internal wheel the driven one, whichever drives",
-        )
-        require(
-            abs(one.helix_angle - two.helix_angle) <= 1e-12,
-            f"{name}: helix angles differ ({one.name} {math.degrees(one.helix_angle):.6g} deg, {two.name} "
-            f"{math.degrees(two.helix_angle):.6g} deg); wheels on parallel axes need the same helix_angle",
-        )
+        if one.internal:
+            raise ValueError(
+                f"{name}.driver is internal ({one.name}); make the internal wheel the driven one, whichever drives"
+            )
+        if not abs(one.helix_angle - two.helix_angle) <= 1e-12:
+            raise ValueError(
+                f"{name}: helix angles differ ({one.name} {math.degrees(one.helix_angle):.6g} deg, {two.name} "
+                f"{math.degrees(two.helix_angle):.6g} deg); wheels on parallel axes need the same helix_angle"
+            )
         wanted = "the same hand" if two.internal else "opposite hands"
-        require(
-            one.helix_angle == 0 or (one.hand == two.hand) == two.internal,
-            f"{name}: {one.name} is {one.hand}-handed and {two.name} {two.hand}-handed; "
-            f"{'an internal wheel and its mate' if two.internal else 'two external wheels'} need {wanted}",
-        )
-        require(
-            abs(one.base_pitch - two.base_pitch) <= 1e-9 * one.base_pitch,
-            f"{name}: base pitches differ ({one.name} {one.base_pitch * MM:.6f} mm, {two.name} "
-            f"{two.base_pitch * MM:.6f} mm); give both wheels the same module and pressure_angle",
-        )
+        if one.helix_angle != 0 and (one.hand == two.hand) != two.internal:
+            raise ValueError(
+                f"{name}: {one.name} is {one.hand}-handed and {two.name} {two.hand}-handed; "
+                f"{'an internal wheel and its mate' if two.internal else 'two external wheels'} need {wanted}"
+            )
+        if not abs(one.base_pitch - two.base_pitch) <= 1e-9 * one.base_pitch:
+            raise ValueError(
+                f"{name}: base pitches differ ({one.name} {one.base_pitch * MM:.6f} mm, {two.name} "
+                f"{two.base_pitch * MM:.6f} mm); give both wheels the same module and pressure_angle"
+            )
 
     def _check_distance(self) -> None:
         name, a = self._name, self.centre_distance
-        require(
-            a > abs(self.base_radius_sum) * BASE_CIRCLES_APART,
-            f"{name}.centre_distance_error is {self.centre_distance_error * MM:.4f} mm: the base circles meet; "
-            "increase it",
-        )
+        if not a > abs(self.base_radius_sum) * BASE_CIRCLES_APART:
+            raise ValueError(
+                f"{name}.centre_distance_error is {self.centre_distance_error * MM:.4f} mm: the base circles meet; "
+                "increase it"
+            )
         if self.sign < 0:
             self._check_ring_size()
         self._check_clearance(PRESSED_IN * self.driver.module)
         reach = self.tip_radius_sum
-        require(
-            self.sign * a < reach,
-            f"{name}: the wheels do not reach each other: centre distance {a * MM:.4f} mm, tip radii sum up to "
-            f"{reach * MM:.4f} mm; reduce centre_distance_error",
-        )
+        if not self.sign * a < reach:
+            raise ValueError(
+                f"{name}: the wheels do not reach each other: centre distance {a * MM:.4f} mm, tip radii sum up to "
+                f"{reach * MM:.4f} mm; reduce centre_distance_error"
+            )
         path, remedy = self.path_of_contact, "reduce" if self.sign > 0 else "increase"
-        require(
-            path > 0,
-            f"{name}: the wheels do not mesh: at the centre distance {a * MM:.4f} mm the tips leave {path * MM:.4f} mm "
-            f"of a path of contact; {remedy} centre_distance_error or give longer teeth",
-        )
+        if not path > 0:
+            raise ValueError(
+                f"{name}: the wheels do not mesh: at the centre distance {a * MM:.4f} mm the tips leave "
+                f"{path * MM:.4f} mm of a path of contact; {remedy} centre_distance_error or give longer teeth"
+            )
 
     def _check_ring_size(self) -> None:
         one, two = self.driver, self.driven
-        require(
-            one.teeth < two.teeth and one.outer_radius < two.root_radius,
-            f"{self._name}: the internal wheel {two.name} ({two.teeth} teeth, root circle {two.root_radius * MM:.4f} "
-            f"mm) is no larger than {one.name} ({one.teeth} teeth, tip circle {one.tip_radius * MM:.4f} mm); "
-            "give it more teeth",
-        )
+        if not (one.teeth < two.teeth and one.outer_radius < two.root_radius):
+            raise ValueError(
+                f"{self._name}: the internal wheel {two.name} ({two.teeth} teeth, root circle "
+                f"{two.root_radius * MM:.4f} mm) is no larger than {one.name} ({one.teeth} teeth, tip circle "
+                f"{one.tip_radius * MM:.4f} mm); give it more teeth"
+            )
 
     def _check_clearance(self, overlap: float) -> None:
         """Refuse tips that reach into the mate's root by more than ``overlap``, m."""
         for near, far, clearance in zip((self.driver, self.driven), (self.driven, self.driver), self.tip_clearances):
-            require(
-                clearance + overlap > 0,
-                f"{self._name}: overlapping wheels: centre distance {self.centre_distance * MM:.4f} mm leaves no "
-                f"clearance between the tip of {near.name} ({near.tip_radius * MM:.4f} mm) and the root of {far.name} "
-                f"({far.root_radius * MM:.4f} mm); increase centre_distance_error or dedendum",
-            )
+            if not clearance + overlap > 0:
+                raise ValueError(
+                    f"{self._name}: overlapping wheels: centre distance {self.centre_distance * MM:.4f} mm leaves no "
+                    f"clearance between the tip of {near.name} ({near.tip_radius * MM:.4f} mm) and the root of "
+                    f"{far.name} ({far.root_radius * MM:.4f} mm); increase centre_distance_error or dedendum"
+                )
 
     def _check_engagement(self) -> None:
         name = self._name
         for thinned in self.wheels:
-            require(thinned.tip_thickness > 0, f"{name}.backlash is {self.backlash * MM:.4f} mm: teeth become pointed")
+            if not thinned.tip_thickness > 0:
+                raise ValueError(f"{name}.backlash is {self.backlash * MM:.4f} mm: teeth become pointed")
         most = 0.5 * (self.driver.face_width + self.driven.face_width)
-        require(
-            self.common_face_width > SHORTEST_FACE,
-            f"{name}.axial_shift is {self.axial_shift * MM:.4f} mm: the faces do not overlap, which are "
-            f"{self.driver.face_width * MM:.4g} and {self.driven.face_width * MM:.4g} mm wide; give less than "
-            f"{most * MM:.4g} mm to either side",
-        )
+        if not self.common_face_width > SHORTEST_FACE:
+            raise ValueError(
+                f"{name}.axial_shift is {self.axial_shift * MM:.4f} mm: the faces do not overlap, which are "
+                f"{self.driver.face_width * MM:.4g} and {self.driven.face_width * MM:.4g} mm wide; give less than "
+                f"{most * MM:.4g} mm to either side"
+            )
         for near, far, start in zip((self.driver, self.driven), (self.driven, self.driver), self.first_roll_lengths):
             # the involute of an internal wheel ends outwards, at its root
             side, where, to = ("beyond", "end", "to") if near.internal else ("inside", "start", "from")
             within = near.sign * (start - near.form_roll_length) > -1e-12 and start > 0
             remedy = "reduce" if self.sign < 0 else "increase"
-            require(
-                within,
-                f"{name}: the tip of {far.name} meets {near.name} {side} the {where} of its involute (length of roll "
-                f"{start * MM:.4f} mm, involute {to} {near.form_roll_length * MM:.4f} mm): interference; reduce the "
-                f"addendum of {far.name} or {remedy} centre_distance_error",
-            )
+            if not within:
+                raise ValueError(
+                    f"{name}: the tip of {far.name} meets {near.name} {side} the {where} of its involute (length of "
+                    f"roll {start * MM:.4f} mm, involute {to} {near.form_roll_length * MM:.4f} mm): interference; "
+                    f"reduce the addendum of {far.name} or {remedy} centre_distance_error"
+                )
         if self.sign < 0:
             needed, free = self.fouling_angles
-            require(
-                free >= needed,
-                f"{name}: the tips of {self.driver.name} and {self.driven.name} foul where they leave each other "
-                f"(angle {free:.5f} rad, {needed:.5f} needed); use a greater difference of teeth or lower addenda",
-            )
+            if not free >= needed:
+                raise ValueError(
+                    f"{name}: the tips of {self.driver.name} and {self.driven.name} foul where they leave each other "
+                    f"(angle {free:.5f} rad, {needed:.5f} needed); use a greater difference of teeth or lower addenda"
+                )
 
     def _remark(self) -> None:
         """Warn of what is no mistake by itself and rarely meant."""
@@ -245,7 +246,7 @@ class PairGeometry(Written):
 
     # --- signed sums --------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def sign(self) -> int:
         """Sign of the pair's centre distance: 1 for two external wheels, -1 if one is internal."""
         return self.driver.sign * self.driven.sign
@@ -254,22 +255,22 @@ class PairGeometry(Written):
         one, two = self.driver, self.driven
         return one.sign * getattr(one, radius) + two.sign * getattr(two, radius)
 
-    @property
+    @cached_property
     def mesh_angle(self) -> float:
         """Direction from the driver to the mesh, rad: that of the driven wheel, opposite to that of an internal one."""
         return 0.0 if self.sign > 0 else math.pi
 
-    @property
+    @cached_property
     def base_radius_sum(self) -> float:
         """Signed sum of the base radii r_b1 + r_b2, m."""
         return self._sum("base_radius")
 
-    @property
+    @cached_property
     def tip_radius_sum(self) -> float:
         """Signed sum of the tip radii r_a1 + r_a2, m."""
         return self._sum("tip_radius")
 
-    @property
+    @cached_property
     def base_arc_sum(self) -> float:
         """Sum of half the teeth's thickness on the base circles, r_b1 psi_1 + r_b2 psi_2, m, thinned teeth."""
         one, two = self.wheels
@@ -288,12 +289,12 @@ class PairGeometry(Written):
             replace(self.driven, thinning=self.driven.thinning + cut),
         )
 
-    @property
+    @cached_property
     def ratio(self) -> float:
         """Speed ratio, driven teeth over driver teeth; with an internal wheel both turn in the same sense."""
         return self.driven.teeth / self.driver.teeth
 
-    @property
+    @cached_property
     def nominal_centre_distance(self) -> float:
         """Centre distance without backlash for unthinned teeth, m."""
         shift = self.driver.profile_shift + self.driven.profile_shift
@@ -305,7 +306,7 @@ class PairGeometry(Written):
             alpha -= (involute(alpha) - target) / math.tan(alpha) ** 2
         return abs(self.base_radius_sum) / math.cos(alpha)
 
-    @property
+    @cached_property
     def shift_sum(self) -> float:
         """Sum of the profile shifts x_1 + x_2 (ISO 21771) that the working centre distance needs without backlash."""
         return self.shift_sum_of(self.centre_distance)
@@ -316,44 +317,44 @@ class PairGeometry(Written):
         working = math.acos(self.base_radius_sum / (self.sign * centre_distance))
         return (involute(working) - involute(alpha)) * self._sum("teeth") / (2 * math.tan(self.driver.pressure_angle))
 
-    @property
+    @cached_property
     def centre_distance(self) -> float:
         """Working centre distance, m."""
         return self.nominal_centre_distance + self.centre_distance_error
 
-    @property
+    @cached_property
     def working_pressure_angle(self) -> float:
         """Working pressure angle alpha', rad: cos alpha' = (r_b1 + r_b2) / a'."""
         return math.acos(self.base_radius_sum / (self.sign * self.centre_distance))
 
-    @property
+    @cached_property
     def line_of_action(self) -> float:
         """Length of the line of action between the base circles, m, with the sign of the pair."""
         return self.sign * self.centre_distance * math.sin(self.working_pressure_angle)
 
-    @property
+    @cached_property
     def path_of_contact(self) -> float:
         """Length of the path of contact, m."""
         return self._sum("tip_roll_length") - self.line_of_action
 
-    @property
+    @cached_property
     def contact_ratio(self) -> float:
         """Transverse contact ratio eps_alpha: path of contact over base pitch."""
         return self.path_of_contact / self.driver.base_pitch
 
-    @property
+    @cached_property
     def overlap_ratio(self) -> float:
         """Overlap ratio eps_beta: common face width over axial pitch; 0 for spur wheels."""
         low, high = self.common_face
         return (high - low) * math.sin(self.driver.helix_angle) / (math.pi * self.driver.module)
 
-    @property
+    @cached_property
     def half_overlap(self) -> float:
         """How far the contact moves along the path from mid-face to an end of the common face, m."""
         low, high = self.common_face
         return 0.5 * (high - low) * math.tan(self.driver.base_helix_angle)
 
-    @property
+    @cached_property
     def total_contact_ratio(self) -> float:
         """Total contact ratio eps_gamma, transverse plus overlap."""
         return self.contact_ratio + self.overlap_ratio
@@ -377,7 +378,7 @@ class PairGeometry(Written):
             total += max(0.0, min(front, path) - max(front - width * tangent, 0.0))
         return total / math.sin(self.driver.base_helix_angle)
 
-    @property
+    @cached_property
     def fouling_angles(self) -> tuple[float, float]:
         """Angles of an internal pair's tips where they leave each other, rad: needed, and free.
 
@@ -395,7 +396,7 @@ class PairGeometry(Written):
         turn_2 = math.acos((a * a + r2 * r2 - r1 * r1) / (2 * a * r2))
         return turn_2, turn_1 * one.teeth / two.teeth + working - at_tip_2
 
-    @property
+    @cached_property
     def radial_assembly(self) -> bool:
         """Whether the wheels go together radially; an internal pair with too few teeth of difference only axially."""
         if self.sign > 0:
@@ -430,7 +431,7 @@ class PairGeometry(Written):
         own, mate = (self.driver, self.driven) if wheel == 0 else (self.driven, self.driver)
         return mate.sign * (self.line_of_action - own.sign * roll_length)
 
-    @property
+    @cached_property
     def first_roll_lengths(self) -> tuple[float, float]:
         """Lengths of roll on driver and driven where the mate's tip begins to bear, m."""
         return (
@@ -438,13 +439,13 @@ class PairGeometry(Written):
             self.mate_roll_length(0, self.driver.tip_roll_length),
         )
 
-    @property
+    @cached_property
     def start_of_active_profile(self) -> tuple[float, float]:
         """Radii on driver and driven where the mate's tip begins to bear, m."""
         first = self.first_roll_lengths
         return math.hypot(self.driver.base_radius, first[0]), math.hypot(self.driven.base_radius, first[1])
 
-    @property
+    @cached_property
     def normal_backlash(self) -> float:
         """Backlash j_bn along the line of action at the working centre distance, parallel axes, m."""
         return self.normal_backlash_of(self.centre_distance)
@@ -454,12 +455,12 @@ class PairGeometry(Written):
         alpha = math.acos(self.base_radius_sum / (self.sign * centre_distance))
         return 2 * (self.base_radius_sum * involute(alpha) - self.base_arc_sum) + self.driver.base_pitch
 
-    @property
+    @cached_property
     def circumferential_backlash(self) -> float:
         """Backlash j_wt on the working pitch circles, m."""
         return self.normal_backlash / math.cos(self.working_pressure_angle)
 
-    @property
+    @cached_property
     def tip_clearances(self) -> tuple[float, float]:
         """Clearances between the driver's tip and the driven wheel's root, and the reverse, m."""
         one, two = self.driver, self.driven
@@ -469,14 +470,14 @@ class PairGeometry(Written):
             a - (two.sign * two.tip_radius + one.sign * one.root_radius),
         )
 
-    @property
+    @cached_property
     def tip_clearance(self) -> float:
         """Smaller of the two clearances between a tip and the mate's root, m."""
         return min(self.tip_clearances)
 
     # --- along the face -----------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def jam_backlash(self) -> float:
         """Normal backlash the misalignment needs, m: b gamma cos(alpha) (skew) or b gamma sin(alpha) (inclination).
 
@@ -487,7 +488,7 @@ class PairGeometry(Written):
         part = math.cos(alpha) if self.plane == "skew" else math.sin(alpha)
         return self.common_face_width * abs(self.misalignment) * part
 
-    @property
+    @cached_property
     def jams(self) -> bool:
         """Whether both flanks touch at once for want of backlash, by the centre distance or under the misalignment.
 
@@ -497,12 +498,12 @@ class PairGeometry(Written):
             return self.normal_backlash < -JAM_ROUNDING
         return self.normal_backlash < self.jam_backlash
 
-    @property
+    @cached_property
     def narrower_face_width(self) -> float:
         """Face width of the narrower wheel, m, which is that of faces that stand opposite; contact laws refer to it."""
         return min(self.driver.face_width, self.driven.face_width)
 
-    @property
+    @cached_property
     def common_face_width(self) -> float:
         """Length along the axis over which both faces stand opposite, m; see `common_face`.
 
@@ -511,12 +512,12 @@ class PairGeometry(Written):
         low, high = self.common_face
         return high - low
 
-    @property
+    @cached_property
     def face_share(self) -> float:
         """Share of the narrower face that stands opposite the mate's: 1 without axial shift."""
         return self.common_face_width / self.narrower_face_width
 
-    @property
+    @cached_property
     def common_face(self) -> tuple[float, float]:
         """Range along the mean axis, from mid-way between the wheels, that both faces cover, m.
 
@@ -530,7 +531,7 @@ class PairGeometry(Written):
         high = min(-half + 0.5 * self.driver.face_width, half + 0.5 * self.driven.face_width)
         return low, high
 
-    @property
+    @cached_property
     def uniform_along_face(self) -> bool:
         """Whether the gap between perfect flanks is the same in all sections: parallel axes, faces opposite."""
         return self.misalignment == 0 and self.axial_shift == 0

@@ -16,7 +16,7 @@ from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.mesh import OperatingPoint
 from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
-from gearmbs.gears.spec import convert_fields, require
+from gearmbs.gears.spec import convert_fields
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement
 from gearmbs.units import Quantity, to_si
@@ -74,18 +74,21 @@ class IdealMesh(Written):
 
     def __post_init__(self) -> None:
         convert_fields(self, {"stiffness": "N/m", "damping": "N*s/m", "depth": "length"}, "IdealMesh")
-        require(self.stiffness > 0, f"IdealMesh.stiffness is {self.stiffness} N/m; it must be positive")
-        require(self.damping >= 0, f"IdealMesh.damping is {self.damping} N s/m; it must not be negative")
-        require(self.depth > 0, f"IdealMesh.depth is {self.depth} m; it must be positive")
+        if not self.stiffness > 0:
+            raise ValueError(f"IdealMesh.stiffness is {self.stiffness} N/m; it must be positive")
+        if not self.damping >= 0:
+            raise ValueError(f"IdealMesh.damping is {self.damping} N s/m; it must not be negative")
+        if not self.depth > 0:
+            raise ValueError(f"IdealMesh.depth is {self.depth} m; it must be positive")
         for name in ("stiffness_curve", "error"):
             curve = getattr(self, name)
             if curve is not None:
                 values = np.asarray(curve, dtype=float)
                 fine = values.ndim == 1 and values.size >= 4 and np.isfinite(values).all()
-                require(fine, f"IdealMesh.{name} needs four finite numbers or more over a mesh cycle")
-                require(
-                    name == "error" or values.min() > 0, f"IdealMesh.{name} holds {values.min():g}; give positive ones"
-                )
+                if not fine:
+                    raise ValueError(f"IdealMesh.{name} needs four finite numbers or more over a mesh cycle")
+                if not (name == "error" or values.min() > 0):
+                    raise ValueError(f"IdealMesh.{name} holds {values.min():g}; give positive ones")
                 object.__setattr__(self, name, values)
 
     @classmethod
@@ -138,7 +141,8 @@ class IdealMesh(Written):
         """
         along = to_si(stiffness, "N/m", "IdealMesh.stiffness")
         zeta = DAMPING_RATIO if ratio is None else ratio
-        require(zeta >= 0, f"damping_ratio is {zeta!r}; give a number that is not negative")
+        if not zeta >= 0:
+            raise ValueError(f"damping_ratio is {zeta!r}; give a number that is not negative")
         cosine = math.cos(pair.driver.base_helix_angle)
         return cls(pair, stiffness, 2.0 * zeta * math.sqrt(along * pair.reduced_mass) / cosine, **others)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
-from gearmbs.gears.spec import GearSpec, involute, require
+from gearmbs.gears.spec import GearSpec, involute
 
 ITERATIONS = 60
 LARGEST_HELIX_FACTOR = math.radians(30)
@@ -108,7 +108,8 @@ def iso_stresses(pair: Mesh, torque: float | None = None, cutter: tuple[int, flo
     """
     geometry = pair.geometry
     load = pair.operating_point.torque if torque is None else torque
-    require(load > 0, f"torque is {load} N m; give a positive load")
+    if not load > 0:
+        raise ValueError(f"torque is {load} N m; give a positive load")
     one, two = geometry.driver, geometry.driven
     force = load / two.pitch_radius
     width = geometry.common_face_width
@@ -243,9 +244,9 @@ def rim_factor(gear: GearSpec) -> float:
     thick = gear.rim_thickness / gear.module
     if thick >= 3.5:
         return 1.0
-    require(
-        thick > 1.75,
-        f"{gear.name}.rim_thickness is {gear.rim_thickness * 1e3:.4g} mm, {thick:.3g} modules; ISO 6336-3 needs more "
-        "than 1.75",
-    )
+    if not thick > 1.75:
+        raise ValueError(
+            f"{gear.name}.rim_thickness is {gear.rim_thickness * 1e3:.4g} mm, {thick:.3g} modules; ISO 6336-3 needs "
+            "more than 1.75"
+        )
     return 1.15 * math.log(8.324 / thick)

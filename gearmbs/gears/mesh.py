@@ -10,7 +10,6 @@ from gearmbs._shown import Written
 from gearmbs.gears.contact_model import ContactModel
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.modifications import Fault
-from gearmbs.gears.spec import require
 from gearmbs.units import Quantity, to_si
 
 # How a pair of wheels is driven and loaded.
@@ -47,13 +46,15 @@ class OperatingPoint(Written):
     # mypy may lose InitVar among modules that import each other for types
     def __post_init__(self, owner: str) -> None:  # type: ignore[override]
         object.__setattr__(self, "torque", to_si(self.torque, "torque", f"{owner}.torque"))
-        require(math.isfinite(self.torque), f"{owner}.torque is {self.torque}; give a finite number")
-        require(
-            self.torque >= 0.0,
-            f"{owner}.torque is {self.torque:g} N m; give its size (0 up): it acts against the motion, whose sense is "
-            "that of rotation, 1 or -1",
-        )
-        require(self.rotation in (1, -1), f"{owner}.rotation is {self.rotation!r}; give 1 or -1")
+        if not math.isfinite(self.torque):
+            raise ValueError(f"{owner}.torque is {self.torque}; give a finite number")
+        if not self.torque >= 0.0:
+            raise ValueError(
+                f"{owner}.torque is {self.torque:g} N m; give its size (0 up): it acts against the motion, whose sense "
+                "is that of rotation, 1 or -1"
+            )
+        if self.rotation not in (1, -1):
+            raise ValueError(f"{owner}.rotation is {self.rotation!r}; give 1 or -1")
 
     def normal_force(self, geometry: PairGeometry) -> float:
         """Sum of normal forces that carries the load torque, N: F_n = T / (r_b2 cos beta_b)."""

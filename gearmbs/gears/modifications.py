@@ -14,7 +14,7 @@ import numpy as np
 from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.settings import choice, real, switch, tooth_numbers, whole
-from gearmbs.gears.spec import GearSpec, convert_fields, require
+from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.units import Quantity, shown, to_si
 
 # Deviations of the tooth flanks of one wheel, to which every fault adds its own; packed into the contact tables.
@@ -156,7 +156,8 @@ class Fault(Written):
         for item in fields(self):
             value, place = getattr(self, item.name), f"{name}.{item.name}"
             if item.name in self.units:
-                require(value is not None or item.default is None, f"{place} is None; give a number")
+                if value is None and item.default is not None:
+                    raise ValueError(f"{place} is None; give a number")
             elif item.name in CHOICES:
                 value = COAST_ALIASES.get(value, value) if item.name == "flank" and isinstance(value, str) else value
                 value = choice(value, place, CHOICES[item.name])
@@ -175,7 +176,8 @@ class Fault(Written):
             raise ValueError(str(error)) from None
         for key in self.units:
             value = getattr(self, key)
-            require(value is None or math.isfinite(value), f"{name}.{key} is {value}; give a finite number")
+            if not (value is None or math.isfinite(value)):
+                raise ValueError(f"{name}.{key} is {value}; give a finite number")
 
     def check_teeth(self, count: int) -> None:
         """Refuse teeth that a wheel of so many teeth does not have; negative numbers count from its last.
@@ -188,10 +190,10 @@ class Fault(Written):
         for name in ("tooth", "teeth"):
             numbers = getattr(self, name, ())
             for tooth in (numbers,) if isinstance(numbers, int) else () if isinstance(numbers, str) else numbers:
-                require(
-                    -count <= tooth < count,
-                    f"{type(self).__name__}.{name} is {tooth}; the {self.wheel} wheel has teeth 0 to {count - 1}",
-                )
+                if not -count <= tooth < count:
+                    raise ValueError(
+                        f"{type(self).__name__}.{name} is {tooth}; the {self.wheel} wheel has teeth 0 to {count - 1}"
+                    )
 
     @property
     def severity(self) -> float:
@@ -218,11 +220,11 @@ class Fault(Written):
 
 def _require_removal(relief: Fault, amount: Quantity) -> None:
     """Refuse a relief that would add material."""
-    require(
-        amount >= 0.0,
-        f"{type(relief).__name__}.amount is {shown(amount, 'um')}: a relief takes material away; give 0 or more, or "
-        "for flanks with more material a FlankMap with negative amounts",
-    )
+    if not amount >= 0.0:
+        raise ValueError(
+            f"{type(relief).__name__}.amount is {shown(amount, 'um')}: a relief takes material away; give 0 or more, "
+            "or for flanks with more material a FlankMap with negative amounts"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,8 +258,10 @@ class TipRelief(Fault):
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         name = type(self).__name__
-        require(self.length > 0, f"{name}.length is {self.length} m; it must be positive")
-        require(self.power >= 1, f"{name}.power is {self.power}; give 1 (linear) or more")
+        if not self.length > 0:
+            raise ValueError(f"{name}.length is {self.length} m; it must be positive")
+        if not self.power >= 1:
+            raise ValueError(f"{name}.power is {self.power}; give 1 (linear) or more")
         relief = self.amount * np.clip(1 - self._distance(deviations, pair) / self.length, 0, None) ** self.power
         for flank in deviations.flanks(self.flank):
             deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief
@@ -363,13 +367,15 @@ class EndRelief(Fault):
         _require_removal(self, self.amount)
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        require(self.ends in (-1, 0, 1), f"EndRelief.ends is {self.ends}; choose 0 (both), 1 or -1")
-        require(self.power >= 1, f"EndRelief.power is {self.power}; give 1 (linear) or more")
+        if self.ends not in (-1, 0, 1):
+            raise ValueError(f"EndRelief.ends is {self.ends}; choose 0 (both), 1 or -1")
+        if not self.power >= 1:
+            raise ValueError(f"EndRelief.power is {self.power}; give 1 (linear) or more")
         width = deviations.gear.face_width
-        require(
-            0 < self.length <= width,
-            f"EndRelief.length is {self.length} m; give more than 0 up to the face width, {width:.6g} m",
-        )
+        if not 0 < self.length <= width:
+            raise ValueError(
+                f"EndRelief.length is {self.length} m; give more than 0 up to the face width, {width:.6g} m"
+            )
         for end in (1, -1) if self.ends == 0 else (self.ends,):
             from_end = 0.5 * width - end * deviations.section
             relief = self.amount * np.maximum(0.0, 1 - from_end / self.length) ** self.power
@@ -405,9 +411,11 @@ class FlankMap(Fault):
         rows = self.amounts
         good = isinstance(rows, (list, tuple, np.ndarray)) and len(rows) > 1
         good = good and all(isinstance(row, (list, tuple, np.ndarray)) and len(row) == len(rows[0]) > 1 for row in rows)
-        require(good, f"{place} is {rows!r}; give two or more rows of equal length, each of two or more numbers")
+        if not good:
+            raise ValueError(f"{place} is {rows!r}; give two or more rows of equal length, each of two or more numbers")
         table = tuple(tuple(float(to_si(value, "length", place)) for value in row) for row in rows)
-        require(bool(np.isfinite(table).all()), f"{place} holds a number that is not finite; give finite numbers")
+        if not bool(np.isfinite(table).all()):
+            raise ValueError(f"{place} holds a number that is not finite; give finite numbers")
         object.__setattr__(self, "amounts", table)
 
     @property
@@ -470,7 +478,8 @@ def tolerances(gear: GearSpec, grade: int) -> Tolerances:
     ValueError
         For grades outside 1 to 11.
     """
-    require(isinstance(grade, int) and 1 <= grade <= 11, f"grade is {grade!r}; ISO 1328-1 has grades 1 to 11")
+    if not (isinstance(grade, int) and 1 <= grade <= 11):
+        raise ValueError(f"grade is {grade!r}; ISO 1328-1 has grades 1 to 11")
     d, m, b = 2e3 * gear.pitch_radius, 1e3 * gear.module, 1e3 * gear.face_width
     step = math.sqrt(2) ** (grade - 5) * MICRON
     return Tolerances(

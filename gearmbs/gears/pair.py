@@ -24,7 +24,7 @@ from gearmbs.gears.mesh import OperatingPoint
 from gearmbs.gears.modifications import Fault
 from gearmbs.gears.reach import fillet_clearance
 from gearmbs.gears.show import pair_html, pair_table
-from gearmbs.gears.spec import GearSpec, require
+from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
 from gearmbs.gears.tables import pack
 from gearmbs.units import Quantity, shown, to_si
@@ -103,17 +103,19 @@ class GearPair(PairGeometry, Shown):
     input_torque: InitVar[Quantity] = None
 
     _calls: ClassVar[int] = 5
+    _input_torque: ClassVar[Quantity] = None  # of an instance, where it was given
 
     # mypy may lose InitVar among modules that import each other for types
     def __post_init__(self, input_torque: Quantity) -> None:  # type: ignore[override]
         if input_torque is not None:
-            require(
-                self.torque is None,
-                f"GearPair.torque is {self.torque!r}, on the driven wheel, and input_torque {input_torque!r}, on the "
-                "driver; give one of them",
-            )
+            if self.torque is not None:
+                raise ValueError(
+                    f"GearPair.torque is {self.torque!r}, on the driven wheel, and input_torque {input_torque!r}, on "
+                    "the driver; give one of them"
+                )
             given = to_si(input_torque, "torque", "GearPair.input_torque")
             object.__setattr__(self, "torque", given * self.driven.teeth / self.driver.teeth)
+            object.__setattr__(self, "_input_torque", input_torque)
         elif self.torque is None:
             object.__setattr__(self, "torque", OperatingPoint.torque)
         object.__setattr__(self, "faults", tuple(self.faults))
@@ -121,14 +123,15 @@ class GearPair(PairGeometry, Shown):
         point, _ = self.operating_point, self.contact_model
         object.__setattr__(self, "torque", point.torque)
         for fault in self.faults:
-            require(isinstance(fault, Fault), f"GearPair.faults holds {fault!r}; give faults of gearmbs.gears.faults")
+            if not isinstance(fault, Fault):
+                raise ValueError(f"GearPair.faults holds {fault!r}; give faults of gearmbs.gears.faults")
         super().__post_init__()
         for fault in self.faults:
             fault.check_teeth(self.wheels[fault.wheel == "driven"].teeth)
-        require(
-            not (self.root_contact and self.driver.helix_angle),
-            "GearPair.root_contact is True: tips meet roots of spur wheels only; leave it away for helical ones",
-        )
+        if self.root_contact and self.driver.helix_angle:
+            raise ValueError(
+                "GearPair.root_contact is True: tips meet roots of spur wheels only; leave it away for helical ones"
+            )
         if not self.root_contact:
             self._check_clearance(0.0)
         self._remark_on_tips()
@@ -221,14 +224,19 @@ class GearPair(PairGeometry, Shown):
         return cls(**changes)
 
     def with_changes(self, **changes: Any) -> GearPair:
-        """A copy with some fields changed, or with another ``input_torque``."""
+        """A copy with some fields changed, or with another ``input_torque``.
+
+        A pair that was given its ``input_torque`` keeps that, whatever its wheels change to.
+        """
+        if changes.get("torque") is None:
+            changes.setdefault("input_torque", self._input_torque)
         if changes.get("input_torque") is not None:
             changes.setdefault("torque", None)
         return replace(self, **changes)
 
     def with_faults(self, *faults: Fault) -> GearPair:
         """A copy with these faults added to those it has."""
-        return replace(self, faults=self.faults + faults)
+        return self.with_changes(faults=self.faults + faults)
 
     def with_potential_energy_stiffness(
         self, damping: Quantity = None, depth: Quantity = None, *, damping_ratio: float | None = None
@@ -245,7 +253,7 @@ class GearPair(PairGeometry, Shown):
         geometry = self.geometry
         largest = float(pair_stiffness(geometry, compliance_roll_lengths(geometry)).max()) / self._face_share
         made = self.with_linear_stiffness(largest, damping, depth, damping_ratio=damping_ratio)
-        return replace(made, stiffness_curve="potential-energy")
+        return made.with_changes(stiffness_curve="potential-energy")
 
     def with_iso_stiffness(
         self, kind: Literal["single", "mesh"] = "single", damping: Quantity = None, depth: Quantity = None, *,
@@ -270,7 +278,8 @@ class GearPair(PairGeometry, Shown):
         >>> round(pair.contact.stiffness / 1e6, 1)
         254.9
         """
-        require(kind in ("single", "mesh"), f"kind is {kind!r}; choose 'single' or 'mesh'")
+        if kind not in ("single", "mesh"):
+            raise ValueError(f"kind is {kind!r}; choose 'single' or 'mesh'")
         if kind == "single":
             stiffness = iso_single_stiffness(self.geometry)
         else:
@@ -307,15 +316,14 @@ class GearPair(PairGeometry, Shown):
         if damping_ratio is None:
             damping, depth = 0.0 if damping is None else damping, "0.1 mm" if depth is None else depth
         else:
-            require(damping is None, f"damping is {damping!r} and damping_ratio {damping_ratio!r}; give one of them")
-            require(
-                isinstance(damping_ratio, (int, float)) and 0.0 <= damping_ratio < math.inf,
-                f"damping_ratio is {damping_ratio!r}; give a number that is not negative",
-            )
+            if damping is not None:
+                raise ValueError(f"damping is {damping!r} and damping_ratio {damping_ratio!r}; give one of them")
+            if not (isinstance(damping_ratio, (int, float)) and 0.0 <= damping_ratio < math.inf):
+                raise ValueError(f"damping_ratio is {damping_ratio!r}; give a number that is not negative")
             share = self._pairs_in_mesh * self._face_share
             damping = 2.0 * damping_ratio * math.sqrt(law.stiffness * self.reduced_mass / share)
             depth = RATIO_DEPTH if depth is None else depth
-        return replace(self, contact=ContactLaw.linear(stiffness, damping, depth), stiffness_curve="constant")
+        return self.with_changes(contact=ContactLaw.linear(stiffness, damping, depth), stiffness_curve="constant")
 
     def with_own_stiffness(self, stiffness: Quantity = "iso", damping_ratio: float | None = None) -> GearPair:
         """A copy with the stiffness of its own wheels and a damping ratio: the default of drivetrains.
@@ -345,11 +353,11 @@ class GearPair(PairGeometry, Shown):
         if stiffness == "potential-energy":
             return self.with_potential_energy_stiffness(damping_ratio=ratio)
         is_number = not isinstance(stiffness, str) or stiffness.strip()[:1].isdigit()
-        require(
-            is_number,
-            f"stiffness is {stiffness!r}; choose 'iso', 'iso single' or 'potential-energy', give that of a tooth pair "
-            "in N/m, or give contact",
-        )
+        if not is_number:
+            raise ValueError(
+                f"stiffness is {stiffness!r}; choose 'iso', 'iso single' or 'potential-energy', give that of a tooth "
+                "pair in N/m, or give contact"
+            )
         return self.with_linear_stiffness(stiffness, damping_ratio=ratio)
 
     @property
@@ -360,7 +368,7 @@ class GearPair(PairGeometry, Shown):
     @property
     def _face_share(self) -> float:
         """Share of the law's stiffness that the faces have as they stand."""
-        return self.contact_model.face_share(self.geometry)
+        return self.contact_model.face_share(self)
 
     @property
     def mean_mesh_stiffness(self) -> float:
@@ -381,17 +389,17 @@ class GearPair(PairGeometry, Shown):
     @property
     def tips_may_bottom(self) -> bool:
         """Whether contact of tips with roots is looked for."""
-        return self.contact_model.tips_may_bottom(self.geometry)
+        return self.contact_model.tips_may_bottom(self)
 
     @property
     def face_slices(self) -> int:
         """Slices along the face in use; see `ContactModel.face_slices`."""
-        return self.contact_model.face_slices(self.geometry, self.faults)
+        return self.contact_model.face_slices(self, self.faults)
 
     @property
     def normal_force(self) -> float:
         """Sum of normal forces that carries the load torque, N: F_n = T / r_b2."""
-        return self.operating_point.normal_force(self.geometry)
+        return self.operating_point.normal_force(self)
 
     def _force(self, torque: float | None) -> float:
         return self.normal_force if torque is None else torque / self.driven.base_radius

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from numbers import Real
 from typing import Any, Literal
 
@@ -33,6 +34,9 @@ def convert_fields(obj: object, units: dict[str, str], owner: str) -> None:
 ROOT_SHARES = (0.9, 0.89, 0.87, 0.86, 0.83, 0.8, 0.75, 0.67, 0.5)
 """Steps in which the default root arc is made smaller, from 0.38 to 0.04 modules."""
 
+OF_THE_ROOT_ARC = ("fillet_centre_radius", "form_radius", "form_roll_length", "fillet_half_angle")
+"""What is kept of a wheel and follows from its root arc."""
+
 LARGEST_HELIX = math.radians(45)
 
 LARGEST_MODULE = 0.2
@@ -43,12 +47,6 @@ WIDEST_FACE = 5.0
 """m; the widest wheels, of rolling mills and ships, have half of it, and a forgotten unit is above."""
 MOST_MODULES = 300.0
 """Face width or rim of a usual wheel, in modules, at most: pump wheels and long pinions have up to 100."""
-
-
-def require(condition: bool, message: str) -> None:
-    """Raise ValueError with the message unless the condition holds."""
-    if not condition:
-        raise ValueError(message)
 
 
 @dataclass(frozen=True)
@@ -70,9 +68,12 @@ class Material(Written):
 
     def __post_init__(self) -> None:
         convert_fields(self, {"youngs_modulus": "Pa", "density": "kg/m^3"}, "Material")
-        require(self.youngs_modulus > 0, f"Material.youngs_modulus is {self.youngs_modulus} Pa; it must be positive")
-        require(self.density > 0, f"Material.density is {self.density} kg/m^3; it must be positive")
-        require(0 <= self.poisson_ratio < 0.5, f"Material.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
+        if not self.youngs_modulus > 0:
+            raise ValueError(f"Material.youngs_modulus is {self.youngs_modulus} Pa; it must be positive")
+        if not self.density > 0:
+            raise ValueError(f"Material.density is {self.density} kg/m^3; it must be positive")
+        if not 0 <= self.poisson_ratio < 0.5:
+            raise ValueError(f"Material.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
         doubt = doubt_of_material(self.youngs_modulus, self.density)
         if doubt:
             warnings.warn(f"Material '{self.name}': {doubt}", stacklevel=3)
@@ -153,21 +154,19 @@ class GearSpec(Shown, Written):
         lengths = ("module", "face_width", "addendum", "dedendum", "fillet_radius", "thinning", "tip_rounding")
         units = {name: "length" for name in (*lengths, "bore_radius", "rim_thickness")}
         convert_fields(self, units | {"pressure_angle": "angle", "helix_angle": "angle"}, self.name)
-        require(
-            self.module is not None,
-            f"{self.name}.module is None; give a length such as '3 mm'",
-        )
+        if self.module is None:
+            raise ValueError(f"{self.name}.module is None; give a length such as '3 mm'")
         shift = self.profile_shift
-        require(
-            isinstance(shift, Real) and not isinstance(shift, bool),
-            f"{self.name}.profile_shift is {shift!r}; give the coefficient x, a number: 0.5 for half a module",
-        )
+        if not (isinstance(shift, Real) and not isinstance(shift, bool)):
+            raise ValueError(
+                f"{self.name}.profile_shift is {shift!r}; give the coefficient x, a number: 0.5 for half a module"
+            )
         object.__setattr__(self, "profile_shift", float(shift))
-        require(
-            isinstance(self.material, Material),
-            f"{self.name}.material is {self.material!r}; give a Material, such as Material('2.1e5 MPa', 0.3, "
-            "'7850 kg/m^3')",
-        )
+        if not isinstance(self.material, Material):
+            raise ValueError(
+                f"{self.name}.material is {self.material!r}; give a Material, such as Material('2.1e5 MPa', 0.3, "
+                "'7850 kg/m^3')"
+            )
         if isinstance(self.teeth, int) and self.teeth < 0:
             object.__setattr__(self, "teeth", -self.teeth)
             object.__setattr__(self, "internal", True)
@@ -175,18 +174,19 @@ class GearSpec(Shown, Written):
             value = getattr(self, item.name)
             if isinstance(value, float) and not math.isfinite(value):
                 raise ValueError(f"{self.name}.{item.name} is {value}; give a finite number")
-        require(self.module > 0, f"{self.name}.module is {self.module} m; it must be positive")
-        require(
-            self.module <= LARGEST_MODULE,
-            f"{self.name}.module is {self.module:g} m; a plain number is in m, write '{self.module:g} mm'",
-        )
+        if not self.module > 0:
+            raise ValueError(f"{self.name}.module is {self.module} m; it must be positive")
+        if not self.module <= LARGEST_MODULE:
+            raise ValueError(
+                f"{self.name}.module is {self.module:g} m; a plain number is in m, write '{self.module:g} mm'"
+            )
         for name in ("face_width", "rim_thickness"):
             value = getattr(self, name) or 0.0
-            require(
-                value <= WIDEST_FACE,
-                f"{self.name}.{name} is {value:g} m, and no wheel has that; a plain number is in m, write "
-                f"'{value:g} mm'",
-            )
+            if not value <= WIDEST_FACE:
+                raise ValueError(
+                    f"{self.name}.{name} is {value:g} m, and no wheel has that; a plain number is in m, write "
+                    f"'{value:g} mm'"
+                )
             if value > MOST_MODULES * self.module:
                 warnings.warn(
                     f"{self.name}.{name} is {shown(value, 'mm')}, {value / self.module:.4g} times the module of "
@@ -219,6 +219,8 @@ class GearSpec(Shown, Written):
             if not (overlapping or shortened):
                 return
             object.__setattr__(self, "fillet_radius", arc)
+            for name in OF_THE_ROOT_ARC:
+                self.__dict__.pop(name, None)
 
     @property
     def _rack_form_roll(self) -> float:
@@ -245,14 +247,14 @@ class GearSpec(Shown, Written):
         root = to_si(root_radius, "length", f"{name}.root_radius")
         sign = -1 if inwards else 1
         words = ("outside", "inside") if inwards else ("inside", "outside")
-        require(
-            sign * tip > sign * pitch,
-            f"{name}.tip_radius is {tip * 1e3:.4f} mm, {words[0]} the pitch circle {pitch * 1e3:.4f} mm",
-        )
-        require(
-            sign * root < sign * pitch,
-            f"{name}.root_radius is {root * 1e3:.4f} mm, {words[1]} the pitch circle {pitch * 1e3:.4f} mm",
-        )
+        if not sign * tip > sign * pitch:
+            raise ValueError(
+                f"{name}.tip_radius is {tip * 1e3:.4f} mm, {words[0]} the pitch circle {pitch * 1e3:.4f} mm"
+            )
+        if not sign * root < sign * pitch:
+            raise ValueError(
+                f"{name}.root_radius is {root * 1e3:.4f} mm, {words[1]} the pitch circle {pitch * 1e3:.4f} mm"
+            )
         return cls(teeth, module, addendum=sign * (tip - pitch), dedendum=sign * (pitch - root), **others)
 
     @classmethod
@@ -279,14 +281,14 @@ class GearSpec(Shown, Written):
         -0.501
         """
         if outward_shift is not None:
-            require(
-                "profile_shift" not in others,
-                f"{name}: both profile_shift and outward_shift are given; give one (profile_shift = -outward_shift)",
-            )
-            require(
-                isinstance(outward_shift, Real) and not isinstance(outward_shift, bool),
-                f"{name}.outward_shift is {outward_shift!r}; give the coefficient, a number: half a module is 0.5",
-            )
+            if "profile_shift" in others:
+                raise ValueError(
+                    f"{name}: both profile_shift and outward_shift are given; give one (profile_shift = -outward_shift)"
+                )
+            if not (isinstance(outward_shift, Real) and not isinstance(outward_shift, bool)):
+                raise ValueError(
+                    f"{name}.outward_shift is {outward_shift!r}; give the coefficient, a number: half a module is 0.5"
+                )
             others["profile_shift"] = -outward_shift
         return cls(abs(teeth), module, internal=True, name=name, **others)
 
@@ -299,175 +301,178 @@ class GearSpec(Shown, Written):
 
     def _check_numbers(self) -> None:
         n, mm = self.name, 1e3
-        require(
-            isinstance(self.teeth, int) and self.teeth >= 5,
-            f"{n}.teeth is {self.teeth!r}; give an integer of 5 or more",
-        )
-        require(
-            math.radians(5) <= self.pressure_angle <= math.radians(40),
-            f"{n}.pressure_angle is {math.degrees(self.pressure_angle):.3f} deg; give 5 to 40 deg (text needs a unit)",
-        )
-        require(
-            0 <= self.helix_angle <= LARGEST_HELIX,
-            f"{n}.helix_angle is {math.degrees(self.helix_angle):.3f} deg; give 0 to 45 deg and the sense as hand"
-            + (
-                ""
-                if isinstance(self.helix_angle, Given)
-                else f" (plain numbers: rad; write '{self.helix_angle:g} deg')"
-            ),
-        )
-        require(self.hand in ("right", "left"), f"{n}.hand is {self.hand!r}; choose 'right' or 'left'")
+        if not (isinstance(self.teeth, int) and self.teeth >= 5):
+            raise ValueError(f"{n}.teeth is {self.teeth!r}; give an integer of 5 or more")
+        if not math.radians(5) <= self.pressure_angle <= math.radians(40):
+            raise ValueError(
+                f"{n}.pressure_angle is {math.degrees(self.pressure_angle):.3f} deg; give 5 to 40 deg (text needs a "
+                "unit)"
+            )
+        if not 0 <= self.helix_angle <= LARGEST_HELIX:
+            raise ValueError(
+                f"{n}.helix_angle is {math.degrees(self.helix_angle):.3f} deg; give 0 to 45 deg and the sense as hand"
+                + (
+                    ""
+                    if isinstance(self.helix_angle, Given)
+                    else f" (plain numbers: rad; write '{self.helix_angle:g} deg')"
+                )
+            )
+        if self.hand not in ("right", "left"):
+            raise ValueError(f"{n}.hand is {self.hand!r}; choose 'right' or 'left'")
         for name in ("face_width", "addendum", "dedendum", "fillet_radius"):
             value = getattr(self, name)
-            require(value > 0, f"{n}.{name} is {value * mm:.6g} mm; it must be positive")
+            if not value > 0:
+                raise ValueError(f"{n}.{name} is {value * mm:.6g} mm; it must be positive")
         for name in ("tip_rounding", "bore_radius", "rim_thickness"):
             value = getattr(self, name)
-            require(value >= 0, f"{n}.{name} is {value * mm:.6g} mm; it must not be negative")
-        require(
-            self.thinning >= 0,
-            f"{n}.thinning is {self.thinning * mm:.6g} mm: negative backlash; "
-            "thicken teeth with profile_shift and a larger centre distance instead",
-        )
+            if not value >= 0:
+                raise ValueError(f"{n}.{name} is {value * mm:.6g} mm; it must not be negative")
+        if not self.thinning >= 0:
+            raise ValueError(
+                f"{n}.thinning is {self.thinning * mm:.6g} mm: negative backlash; "
+                "thicken teeth with profile_shift and a larger centre distance instead"
+            )
 
     def _check_internal(self) -> None:
         n, mm = self.name, 1e3
-        require(self.bore_radius == 0, f"{n}.bore_radius is {self.bore_radius * mm:.4f} mm; an internal wheel has none")
-        require(
-            self.rim_thickness > 0, f"{n}.rim_thickness is 0; an internal wheel needs material outside its root circle"
-        )
+        if self.bore_radius != 0:
+            raise ValueError(f"{n}.bore_radius is {self.bore_radius * mm:.4f} mm; an internal wheel has none")
+        if not self.rim_thickness > 0:
+            raise ValueError(f"{n}.rim_thickness is 0; an internal wheel needs material outside its root circle")
 
     def _check_external(self) -> None:
         n, mm = self.name, 1e3
-        require(self.root_radius > 0, f"{n}.dedendum is {self.dedendum * mm:.4f} mm, larger than the pitch radius")
-        require(
-            self.bore_radius < self.root_radius,
-            f"{n}.bore_radius is {self.bore_radius * mm:.4f} mm, not inside the root circle "
-            f"{self.root_radius * mm:.4f} mm; make the bore smaller",
-        )
-        require(
-            self.rim_thickness == 0,
-            f"{n}.rim_thickness is {self.rim_thickness * mm:.4f} mm; only internal wheels have it, give bore_radius",
-        )
+        if not self.root_radius > 0:
+            raise ValueError(f"{n}.dedendum is {self.dedendum * mm:.4f} mm, larger than the pitch radius")
+        if not self.bore_radius < self.root_radius:
+            raise ValueError(
+                f"{n}.bore_radius is {self.bore_radius * mm:.4f} mm, not inside the root circle "
+                f"{self.root_radius * mm:.4f} mm; make the bore smaller"
+            )
+        if self.rim_thickness != 0:
+            raise ValueError(
+                f"{n}.rim_thickness is {self.rim_thickness * mm:.4f} mm; only internal wheels have it, give bore_radius"
+            )
         cutter = self.dedendum - self.fillet_radius * (1 - math.sin(self.pressure_angle))
         clear = self.pitch_radius * math.sin(self.transverse_pressure_angle) ** 2
         if self.tip_radius > self.base_radius and self.tooth_thickness > 0:
-            require(
-                clear >= UNDERCUT_TOLERANCE * cutter,
-                f"{n} is undercut: with {self.teeth} teeth the cutter reaches {cutter * mm:.3f} mm below the pitch "
-                f"circle where {clear * mm:.3f} mm is free; use more teeth, a larger profile_shift or a smaller "
-                "dedendum",
-            )
+            if not clear >= UNDERCUT_TOLERANCE * cutter:
+                raise ValueError(
+                    f"{n} is undercut: with {self.teeth} teeth the cutter reaches {cutter * mm:.3f} mm below the pitch "
+                    f"circle where {clear * mm:.3f} mm is free; use more teeth, a larger profile_shift or a smaller "
+                    "dedendum"
+                )
 
     def _check_teeth(self) -> None:
         n, mm = self.name, 1e3
-        require(
-            self.tip_radius > self.base_radius,
-            f"{n}.addendum is {self.addendum * mm:.4f} mm: the tip circle {self.tip_radius * mm:.4f} mm lies inside "
-            f"the base circle {self.base_radius * mm:.4f} mm and no involute is left",
-        )
-        require(
-            self.tooth_thickness > 0,
-            f"{n}.thinning is {self.thinning * mm:.4f} mm and leaves no tooth thickness at the pitch circle",
-        )
-        require(
-            self.tip_thickness > 0,
-            f"{n} has pointed teeth: the flanks meet inside the tip circle {self.tip_radius * mm:.4f} mm; "
-            "reduce addendum or profile_shift",
-        )
-        require(
-            2 * self.tip_rounding < self.tip_thickness and self.tip_rounding < 0.5 * self.addendum,
-            f"{n}.tip_rounding is {self.tip_rounding * mm:.4f} mm, too large for a tip "
-            f"{self.tip_thickness * mm:.4f} mm thick",
-        )
+        if not self.tip_radius > self.base_radius:
+            raise ValueError(
+                f"{n}.addendum is {self.addendum * mm:.4f} mm: the tip circle {self.tip_radius * mm:.4f} mm lies "
+                f"inside the base circle {self.base_radius * mm:.4f} mm and no involute is left"
+            )
+        if not self.tooth_thickness > 0:
+            raise ValueError(
+                f"{n}.thinning is {self.thinning * mm:.4f} mm and leaves no tooth thickness at the pitch circle"
+            )
+        if not self.tip_thickness > 0:
+            raise ValueError(
+                f"{n} has pointed teeth: the flanks meet inside the tip circle {self.tip_radius * mm:.4f} mm; "
+                "reduce addendum or profile_shift"
+            )
+        if not (2 * self.tip_rounding < self.tip_thickness and self.tip_rounding < 0.5 * self.addendum):
+            raise ValueError(
+                f"{n}.tip_rounding is {self.tip_rounding * mm:.4f} mm, too large for a tip "
+                f"{self.tip_thickness * mm:.4f} mm thick"
+            )
         below = "above" if self.internal else "below"
         form = self.sign * self.form_radius
-        require(
-            form < self.sign * self.tip_radius and form < self.sign * self.pitch_radius,
-            f"{n}: root circle {self.root_radius * mm:.4f} mm and fillet_radius {self.fillet_radius * mm:.4f} mm leave "
-            f"no involute {below} the pitch circle (base circle {self.base_radius * mm:.4f} mm); increase dedendum or "
-            "reduce fillet_radius",
-        )
-        require(
-            self.fillet_half_angle < math.pi / self.teeth,
-            f"{n}.fillet_radius is {self.fillet_radius * mm:.4f} mm: the root arcs of neighbouring flanks overlap; "
-            "reduce it",
-        )
+        if not (form < self.sign * self.tip_radius and form < self.sign * self.pitch_radius):
+            raise ValueError(
+                f"{n}: root circle {self.root_radius * mm:.4f} mm and fillet_radius {self.fillet_radius * mm:.4f} mm "
+                f"leave no involute {below} the pitch circle (base circle {self.base_radius * mm:.4f} mm); increase "
+                "dedendum or reduce fillet_radius"
+            )
+        if not self.fillet_half_angle < math.pi / self.teeth:
+            raise ValueError(
+                f"{n}.fillet_radius is {self.fillet_radius * mm:.4f} mm: the root arcs of neighbouring flanks overlap; "
+                "reduce it"
+            )
 
-    @property
+    @cached_property
     def sign(self) -> int:
         """Sign of the wheel's radii in the sums over a pair (ISO 21771): 1 for external wheels, -1 for internal."""
         return -1 if self.internal else 1
 
-    @property
+    @cached_property
     def outward_shift(self) -> float:
         """Profile shift counted positive outwards, as catalogues and sums ``x_ring - x_planet`` have it."""
         return self.sign * self.profile_shift
 
-    @property
+    @cached_property
     def transverse_module(self) -> float:
         """Module in the transverse section, m."""
         return self.module / math.cos(self.helix_angle)
 
-    @property
+    @cached_property
     def transverse_pressure_angle(self) -> float:
         """Pressure angle in the transverse section, rad: tan alpha_t = tan alpha_n / cos beta."""
         if self.helix_angle == 0:
             return self.pressure_angle
         return math.atan(math.tan(self.pressure_angle) / math.cos(self.helix_angle))
 
-    @property
+    @cached_property
     def base_helix_angle(self) -> float:
         """Helix angle on the base cylinder, rad: sin beta_b = sin beta cos alpha_n."""
         return math.asin(math.sin(self.helix_angle) * math.cos(self.pressure_angle))
 
-    @property
+    @cached_property
     def twist_tangent(self) -> float:
         """Tangent of the base helix angle, positive for a right hand: the section at z turns by it times z/r_b."""
         return (1.0 if self.hand == "right" else -1.0) * math.tan(self.base_helix_angle)
 
-    @property
+    @cached_property
     def virtual_teeth(self) -> float:
         """Teeth of the equivalent spur wheel, z / (cos^2 beta_b cos beta)."""
         return self.teeth / (math.cos(self.base_helix_angle) ** 2 * math.cos(self.helix_angle))
 
-    @property
+    @cached_property
     def pitch_radius(self) -> float:
         """Pitch circle radius, m."""
         return 0.5 * self.teeth * self.transverse_module
 
-    @property
+    @cached_property
     def base_radius(self) -> float:
         """Base circle radius, m."""
         return self.pitch_radius * math.cos(self.transverse_pressure_angle)
 
-    @property
+    @cached_property
     def tip_radius(self) -> float:
         """Tip circle radius, m; the smaller one of an internal wheel."""
         return self.pitch_radius + self.sign * self.addendum
 
-    @property
+    @cached_property
     def root_radius(self) -> float:
         """Root circle radius, m."""
         return self.pitch_radius - self.sign * self.dedendum
 
-    @property
+    @cached_property
     def outer_radius(self) -> float:
         """Largest radius of the body, m: the tip circle, or the rim of an internal wheel."""
         return self.root_radius + self.rim_thickness if self.internal else self.tip_radius
 
-    @property
+    @cached_property
     def base_pitch(self) -> float:
         """Transverse distance of neighbouring flanks along the base tangent, m."""
         return 2 * math.pi * self.base_radius / self.teeth
 
-    @property
+    @cached_property
     def tooth_thickness(self) -> float:
         """Transverse arc thickness at the pitch circle, m."""
         half_pitch = 0.5 * math.pi * self.module
         normal = half_pitch + 2 * self.profile_shift * self.module * math.tan(self.pressure_angle)
         return normal / math.cos(self.helix_angle) - self.thinning
 
-    @property
+    @cached_property
     def base_half_angle(self) -> float:
         """Half angle of the tooth on the base circle, rad; that of an internal one may be negative."""
         return self.tooth_thickness / (2 * self.pitch_radius) + self.sign * involute(self.transverse_pressure_angle)
@@ -476,52 +481,52 @@ class GearSpec(Shown, Written):
         """Half angle of the tooth at a radius outside the base circle, rad."""
         return self.base_half_angle - self.sign * involute(math.acos(min(1.0, self.base_radius / radius)))
 
-    @property
+    @cached_property
     def tip_thickness(self) -> float:
         """Arc thickness at the tip circle, m."""
         return 2 * self.tip_radius * self.half_angle(self.tip_radius)
 
-    @property
+    @cached_property
     def tip_roll_length(self) -> float:
         """Length of roll (along the base tangent) where the involute ends at the tip, m."""
         return math.sqrt(self.corner_radius**2 - self.base_radius**2) + self.sign * self.tip_rounding
 
-    @property
+    @cached_property
     def corner_radius(self) -> float:
         """Radius of the tip corner, or of the centre of its rounding, m."""
         return self.tip_radius - self.sign * self.tip_rounding
 
-    @property
+    @cached_property
     def corner_half_angle(self) -> float:
         """Half angle of the tip corner (or its rounding's centre) from the tooth's middle, rad."""
         return self.half_angle(self.corner_radius) - self.tip_rounding / self.base_radius
 
-    @property
+    @cached_property
     def fillet_centre_radius(self) -> float:
         """Radius of the centre of the root arc, which touches the root circle, m."""
         return self.root_radius + self.sign * self.fillet_radius
 
-    @property
+    @cached_property
     def form_radius(self) -> float:
         """Radius where the root arc stands radially, and the involute begins if that is outside the base circle, m."""
         return math.sqrt(self.fillet_centre_radius**2 - self.fillet_radius**2)
 
-    @property
+    @cached_property
     def form_roll_length(self) -> float:
         """Length of roll where the involute begins, m."""
         return math.sqrt(max(0.0, self.form_radius**2 - self.base_radius**2))
 
-    @property
+    @cached_property
     def fillet_half_angle(self) -> float:
         """Angle of the centre of the root arc from the tooth's middle, rad."""
         start = self.half_angle(max(self.form_radius, self.base_radius))
         return start + math.asin(self.fillet_radius / self.fillet_centre_radius)
 
-    @property
+    @cached_property
     def _body_radii(self) -> tuple[float, float]:
         return (self.pitch_radius, self.outer_radius) if self.internal else (self.bore_radius, self.pitch_radius)
 
-    @property
+    @cached_property
     def mass(self) -> float:
         """Mass of a disc of the pitch radius with the bore removed, or of a rim from the pitch radius outwards, kg."""
         inner, outer = self._body_radii
@@ -539,7 +544,7 @@ class GearSpec(Shown, Written):
         area = math.pi * max(0.0, min(radius, outer) ** 2 - inner**2)
         return self.material.density * area * min(width, self.face_width)
 
-    @property
+    @cached_property
     def inertia(self) -> tuple[float, float, float]:
         """Principal moments of inertia (Ixx, Iyy, Izz) of that body about its centre, z the axis, kg m^2."""
         inner, outer = self._body_radii

@@ -186,10 +186,14 @@ class StaticMesh:
         return self.rows[:count]
 
     def ideal_angle(self, driver_angle: float) -> float:
-        """Driven angle of exact ratio, through kinematic contact of endless perfect flanks on parallel axes."""
+        """Driven angle of exact ratio, through kinematic contact of endless perfect flanks on parallel axes.
+
+        Axially shifted helical wheels meet in other sections, turned by the shift times the twist.
+        """
         geometry = self.geometry
         alpha, pitch = geometry.working_pressure_angle, geometry.driver.base_pitch
         slack = geometry.base_radius_sum * (math.tan(alpha) - alpha) - geometry.base_arc_sum
+        slack -= self.rotation * geometry.axial_shift * geometry.driver.twist_tangent
         slack -= round(slack / pitch) * pitch
         turned = self.rotation * slack / geometry.driven.base_radius
         if geometry.sign < 0:

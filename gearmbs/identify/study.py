@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.identify.cases import CaseProblem
 from gearmbs.identify.measured import harmonic_table
 from gearmbs.identify.parameters import Free, IdentifyError
+from gearmbs.schema.described import make
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import check_keys
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,15 +37,8 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
         For unknown keys, missing parts, and whatever is wrong with them.
     """
     path = Path(path)
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise IdentifyError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise IdentifyError(f"{path}: not a valid TOML file ({error})") from error
-    for key in tree:
-        if key not in SECTIONS:
-            raise IdentifyError(f"{path}: unknown key {key!r}; known ones are {', '.join(SECTIONS)}")
+    tree = read_toml(path, IdentifyError)
+    check_keys(tree, SECTIONS, str(path), IdentifyError)
     for key in ("recording", "free"):
         if not tree.get(key):
             raise IdentifyError(f"{path}: [{key}] is missing")
@@ -66,19 +60,11 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
 
 def _free(item: dict[str, Any], path: Path) -> Free | str:
     """Return a parameter of the file; a path alone starts at its case's value."""
-    known = [f.name for f in fields(Free)][1:]
-    for key in item:
-        if key not in ("path", *known):
-            raise IdentifyError(f"{path}: [[free]]: unknown key {key!r}; give path, {', '.join(known)}")
     settings = dict(item)
     if "path" not in settings:
         raise IdentifyError(f"{path}: [[free]]: path is missing; write for instance contact.depth")
     name = settings.pop("path")
-    if not settings:
-        return name
-    if "start" not in settings:
-        raise IdentifyError(f"{path}: [[free]]: {name}: start is missing")
-    return Free(name, **settings)
+    return make(Free, settings, f"{path}: [[free]]: {name}", IdentifyError, name=name) if settings else name
 
 
 def _cases(given: dict[str, Any], recordings: dict[str, str]) -> dict[str, Case]:

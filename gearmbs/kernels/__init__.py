@@ -17,7 +17,13 @@ from importlib.metadata import PackageNotFoundError, version
 
 COMPILER = "GEARMBS_COMPILER"
 NEWEST_KNOWN = (0, 68)
-"""The newest release of numba that the own stages were tried with."""
+"""The newest release of numba that the own stages were tried with: a later one may move the private parts they use."""
+
+STAND_INS = ("jit", "views", "lanes", "pointers")
+"""Modules of which the plain mode has its own, in ``plain``."""
+
+WITH_PRIVATE_PARTS = ("jit", "views", "lanes")
+"""Those that show, when they are imported, whether numba has what the own stages use."""
 
 
 def is_plain(chosen: str, found: str) -> bool:
@@ -40,14 +46,17 @@ def is_plain(chosen: str, found: str) -> bool:
     release = tuple(int(part) for part in re.findall(r"\d+", found)[:2])
     if chosen or release <= NEWEST_KNOWN:
         return chosen == "plain"
-    newest = ".".join(map(str, NEWEST_KNOWN))
-    warnings.warn(
-        f"numba {found} is newer than {newest}, the newest that gearmbs compiles with in its own way: kernels are "
-        f"compiled in the plain mode, which takes longer and has the same results; set {COMPILER}=plain to say that "
-        f"this is meant, or {COMPILER}=own to try the own way",
-        stacklevel=2,
-    )
+    _warn(f"numba {found} is newer than {'.'.join(map(str, NEWEST_KNOWN))}, the newest that gearmbs was tried with")
     return True
+
+
+def _warn(reason: str) -> None:
+    warnings.warn(
+        f"{reason}: kernels are compiled in the plain mode. The results are the same; the first run compiles for some "
+        f"minutes, and each takes about twice the time. Set {COMPILER}=plain to leave out this remark, or "
+        f"{COMPILER}=own to try the usual mode",
+        stacklevel=3,
+    )
 
 
 def _numba() -> str:
@@ -58,10 +67,35 @@ def _numba() -> str:
         return ""
 
 
-PLAIN = is_plain(os.environ.get(COMPILER, ""), _numba())
-STAND_INS = ("jit", "pointers")
-"""Modules of which the plain mode has its own, in ``plain``."""
+def _lacks_private_parts(chosen: str) -> bool:
+    """Return whether numba has not what the own stages use, with a warning; what was imported of them is forgotten.
 
+    Raises
+    ------
+    ImportError
+        If the own stages were asked for, or numba cannot be imported at all.
+    """
+    try:
+        for name in WITH_PRIVATE_PARTS:
+            import_module(f"{__name__}.{name}")
+    except (ImportError, AttributeError) as error:
+        reason = f"numba {_numba()} has not what the usual mode of gearmbs uses ({error})"
+        if chosen:
+            raise ImportError(f"{reason}: leave out {COMPILER}={chosen}, or set it to plain") from error
+        import_module("numba")
+        for name in [name for name in sys.modules if name.startswith(f"{__name__}.")]:
+            del sys.modules[name]
+        _warn(reason)
+        return True
+    return False
+
+
+_chosen = os.environ.get(COMPILER, "")
+PLAIN = is_plain(_chosen, _numba())
+if not PLAIN and _lacks_private_parts(_chosen):
+    PLAIN = True
 if PLAIN:
+    # processes that this one starts need not say so again
+    os.environ[COMPILER] = "plain"
     for _name in STAND_INS:
         sys.modules[f"{__name__}.{_name}"] = globals()[_name] = import_module(f"{__name__}.plain.{_name}")

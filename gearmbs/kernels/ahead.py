@@ -16,9 +16,11 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from threading import Condition, Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gearmbs.kernels import COMPILER, PLAIN
 
@@ -36,6 +38,9 @@ KEPT_FILES = {".entry", ".part", ".lock", ".tmp"}
 
 PRUNED_AFTER = 30.0
 """Days without use after which `--prune` deletes a kernel: a month, so that work on a branch survives a holiday."""
+
+TASKS_OF_A_PROCESS = 8
+"""Entries that a process compiles in the plain mode: numba keeps in memory what it has compiled, up to 0.1 GB each."""
 
 SILENT = 5.0
 """Seconds of compiling in a program before it tells how far it is, and between two such lines."""
@@ -77,14 +82,29 @@ def compile_all(
     return time.perf_counter() - start
 
 
-def _compile_in_turn(wanted: list[Kernel], report: Report) -> None:
-    """Compile entries in this process, for numba's cache."""
+def _compile_in_turn(wanted: list[Any], report: Report) -> None:
+    """Compile entries one after the other, for numba's cache, in processes that end before they grow large."""
     from gearmbs.kernels.calls import address
 
-    for number, kernel in enumerate(wanted, 1):
-        start = time.perf_counter()
+    start = time.perf_counter()
+    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=TASKS_OF_A_PROCESS) as pool:
+        done = pool.map(_keep, map(address, wanted), [kernel.is_c_function for kernel in wanted])
+        for number, name in enumerate(done, 1):
+            now = time.perf_counter()
+            report(f"{number}/{len(wanted)} {name} {now - start:.1f} s")
+            start = now
+
+
+def _keep(name: str, is_c_function: bool) -> str:
+    """Compile a kernel, or load it, as it will be asked for; return its name."""
+    from gearmbs.kernels.calls import find
+
+    kernel: Any = find(*name.split(":"))
+    if is_c_function:
+        kernel.as_c_function()
+    else:
         kernel.ready()
-        report(f"{number}/{len(wanted)} {address(kernel)} {time.perf_counter() - start:.1f} s")
+    return name
 
 
 _said: set[str] = set()
@@ -301,7 +321,7 @@ class _Tasks:
 
 def _started() -> subprocess.Popen:
     """Start a helper process that imports and keeps what this process would, wherever it was started."""
-    from numba.core import config
+    import numba
 
     root = str(Path(__file__).resolve().parents[2])
     paths = [os.path.abspath(path) for path in sys.path if path]
@@ -309,8 +329,8 @@ def _started() -> subprocess.Popen:
         # this package was found in the current folder
         paths.insert(0, root)
     environment = {**os.environ, HELPER: "1", "PYTHONPATH": os.pathsep.join(paths)}
-    if config.CACHE_DIR:
-        environment["NUMBA_CACHE_DIR"] = os.path.abspath(config.CACHE_DIR)
+    if numba.config.CACHE_DIR:
+        environment["NUMBA_CACHE_DIR"] = os.path.abspath(numba.config.CACHE_DIR)
     if environment.get("XDG_CACHE_HOME"):
         environment["XDG_CACHE_HOME"] = os.path.abspath(environment["XDG_CACHE_HOME"])
     # without -P the folder it runs in would come first

@@ -26,12 +26,14 @@ import uuid
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
 from numba.core import config, dispatcher, serialize
+
+from gearmbs.kernels.locks import held
 
 FORMAT = "3"
 """To be raised when the files or what they hold change."""
@@ -314,38 +316,5 @@ class Slot:
 def compiling(kernel: Any, kind: str, args: tuple) -> Iterator[Slot]:
     """Yield the slot of an entry or part, while no other process compiles the same."""
     slot = Slot(kernel, kind, args)
-    with _lock(folders(slot.package)[-1] / f"{slot.file}.lock"):
+    with held(folders(slot.package)[-1] / f"{slot.file}.lock"):
         yield slot
-
-
-@contextlib.contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    try:
-        stream = _locked(path)
-    except (ImportError, OSError):
-        # two processes may then compile the same; both results are right
-        stream = None
-    try:
-        yield
-    finally:
-        if stream is not None:
-            # removed while it is held: who waits for it will see that it is gone
-            with contextlib.suppress(OSError):
-                path.unlink()
-            stream.close()
-
-
-def _locked(path: Path) -> IO:
-    """Return a file, held by this process alone, that stands at a path."""
-    import fcntl
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    while True:
-        with contextlib.ExitStack() as unless_held:
-            stream = unless_held.enter_context(open(path, "w"))
-            fcntl.flock(stream, fcntl.LOCK_EX)
-            # its last holder may have removed it meanwhile; what is locked then is a file that nobody else finds
-            with contextlib.suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(stream.fileno()), path.stat()):
-                    unless_held.pop_all()
-                    return stream

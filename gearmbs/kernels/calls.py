@@ -18,6 +18,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+from gearmbs.kernels import PLAIN
 from gearmbs.kernels.jit import Kernel
 
 MAKES_KERNELS = re.compile(
@@ -25,8 +26,8 @@ MAKES_KERNELS = re.compile(
 )
 MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "late")}
 """Modules that make kernels and hold none."""
-STAND_INS = "gearmbs.kernels.plain"
-"""Package of modules that are imported in the place of others, or not at all."""
+OTHER_MODE = tuple(f"gearmbs.kernels.{name}" for name in (("cache", "late", "library") if PLAIN else ("plain",)))
+"""Where the modules are, or their names begin, that are not imported in this mode."""
 
 NAMED = {"LOAD_NAME", "LOAD_GLOBAL", "LOAD_ATTR", "LOAD_METHOD", "LOAD_DEREF"}
 
@@ -37,7 +38,7 @@ def kernel_modules(package: str = "gearmbs") -> list[str]:
     found = []
     for path in sorted(root.rglob("*.py")):
         name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
-        if path.relative_to(root).as_posix() in MAKERS or name.startswith(STAND_INS):
+        if path.relative_to(root).as_posix() in MAKERS or name.startswith(OTHER_MODE):
             continue
         if MAKES_KERNELS.search(path.read_text("utf-8")):
             found.append(name)
@@ -48,7 +49,7 @@ def import_all(package: str = "gearmbs") -> None:
     """Import all modules of a package, but those that need what is not installed."""
     root = importlib.import_module(package)
     for info in pkgutil.walk_packages(root.__path__, f"{package}."):
-        if not info.name.endswith("__main__") and not info.name.startswith(STAND_INS):
+        if not info.name.endswith("__main__") and not info.name.startswith(OTHER_MODE):
             with contextlib.suppress(ImportError):
                 importlib.import_module(info.name)
 

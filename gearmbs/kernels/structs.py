@@ -18,109 +18,27 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Self, TypeAlias, TypeVar
 
 import numpy as np
-from llvmlite import ir
-from numba import from_dtype, types
-from numba.core import cgutils
-from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic, lower_setattr_generic
-from numba.core.typing.templates import AttributeTemplate
-from numba.extending import NativeValue, infer_getattr, intrinsic, models, register_model, typeof_impl, unbox
-from numba.np.arrayobj import make_array, populate_array
+from numba.extending import typeof_impl
 
-from gearmbs.kernels.jit import njit
+from gearmbs.kernels.views import StructType, matrix_at, uncounted, uncounted_rows, vector_at
 
-# Numba's type of a `gearmbs.kernels.structs.Struct`: how compiled code reads and writes its members.
-
-
-_WORD = 8
-
-
-class StructType(types.Type):
-    """Numba's type of a `Struct`.
-
-    Parameters
-    ----------
-    name : str
-        Name of the class.
-    scalars : tuple of (str, str)
-        Names and numpy kinds.
-    arrays : tuple of (str, str, int)
-        Names, numpy kinds and numbers of dimensions.
-    """
-
-    def __init__(self, name: str, scalars: tuple, arrays: tuple) -> None:
-        self.layout = np.dtype(
-            [*scalars, *((f"{a}:", "i8", (1 + dimensions,)) for a, _, dimensions in arrays)], align=True
-        )
-        self.members: dict[str, types.Type] = {field: from_dtype(np.dtype(kind)) for field, kind in scalars}
-        for field, kind, dimensions in arrays:
-            self.members[field] = types.Array(from_dtype(np.dtype(kind)), dimensions, "C")
-        super().__init__(name=f"{name}({scalars}, {arrays})")
-
-    def offset(self, member: str) -> int:
-        """Return the place of a scalar, or of an array's address and shape, in bytes."""
-        assert self.layout.fields is not None
-        key = member if member in self.layout.fields else f"{member}:"
-        return self.layout.fields[key][1]
-
-
-register_model(StructType)(models.OpaqueModel)
-
-
-@unbox(StructType)
-def _unbox(typ, value, c):
-    address = c.pyapi.object_getattr_string(value, "_address")
-    pointer = c.builder.inttoptr(c.pyapi.long_as_longlong(address), cgutils.voidptr_t)
-    c.pyapi.decref(address)
-    return NativeValue(pointer)
-
-
-@infer_getattr
-class _Members(AttributeTemplate):
-    key = StructType
-
-    def generic_resolve(self, typ, attribute):
-        return typ.members.get(attribute)
-
-
-def _place(builder, value, offset, pointee):
-    byte = ir.IntType(8)
-    place = builder.gep(value, [ir.Constant(ir.IntType(64), offset)], inbounds=True, source_etype=byte)
-    return builder.bitcast(place, pointee.as_pointer())
-
-
-@lower_getattr_generic(StructType)
-def _get(context, builder, typ, value, attribute):
-    member = typ.members[attribute]
-    offset = typ.offset(attribute)
-    if not isinstance(member, types.Array):
-        return context.unpack_value(builder, member, _place(builder, value, offset, context.get_data_type(member)))
-    word = ir.IntType(64)
-
-    def fixed(index):
-        # arrays are not replaced while compiled code runs
-        load = builder.load(_place(builder, value, offset + _WORD * index, word))
-        load.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return load
-
-    out = make_array(member)(context, builder)
-    item = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(member.dtype)))
-    shape = [fixed(1 + d) for d in range(member.ndim)]
-    strides = [item]
-    for size in shape[:0:-1]:
-        strides.insert(0, builder.mul(strides[0], size))
-    data = builder.inttoptr(fixed(0), context.get_data_type(member.dtype).as_pointer())
-    populate_array(out, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-    return out._getvalue()
-
-
-@lower_setattr_generic(StructType)
-def _set(context, builder, signature, args, attribute):
-    typ, member = signature.args
-    if isinstance(member, types.Array):
-        raise NotImplementedError(f"arrays of {typ} are replaced in Python only")
-    place = _place(builder, args[0], typ.offset(attribute), context.get_data_type(member))
-    context.pack_value(builder, member, args[1], place)
-
+__all__ = [
+    "ARRAYS",
+    "KEPT_LAYOUTS",
+    "LINE",
+    "SCALARS",
+    "BlockLayout",
+    "IndexVector",
+    "IntVector",
+    "Matrix",
+    "Struct",
+    "StructType",
+    "Vector",
+    "matrix_at",
+    "uncounted",
+    "uncounted_rows",
+    "vector_at",
+]
 
 Vector: TypeAlias = np.ndarray
 """Annotation of a member: doubles with one dimension."""
@@ -331,71 +249,3 @@ def _rebuild(cls: type[Struct], members: dict[str, Any]) -> Struct:
 @typeof_impl.register(Struct)
 def _typeof(value, context):
     return value.numba_type
-
-
-# Views into flat arrays for compiled code, without the price of a slice.
-#
-# A slice of numba's normalises its bounds and counts a reference, a reshape calls a C function: some 40 ns each, which
-# a residual of a few microseconds that unpacks two dozen tables cannot afford. These views know that they lie inside,
-# and live no longer than the array they look into.
-
-
-def _view(dimensions: int):
-    def typing(array, *places):
-        if not isinstance(array, types.Array) or array.layout != "C":
-            return None
-        if not all(isinstance(place, types.Integer) for place in places):
-            return None
-        return types.Array(array.dtype, dimensions, "C")(array, *[types.intp] * len(places))
-
-    def codegen(context, builder, signature, args):
-        source = make_array(signature.args[0])(context, builder, args[0])
-        out = make_array(signature.return_type)(context, builder)
-        size = context.get_abi_sizeof(context.get_data_type(signature.return_type.dtype))
-        itemsize = context.get_constant(types.intp, size)
-        first, *shape = args[1:]
-        strides = [itemsize] if dimensions == 1 else [builder.mul(shape[1], itemsize), itemsize]
-        populate_array(
-            out,
-            data=cgutils.gep(builder, source.data, first),
-            shape=shape,
-            strides=strides,
-            itemsize=itemsize,
-            meminfo=None,
-        )
-        return impl_ret_borrowed(context, builder, signature.return_type, out._getvalue())
-
-    return typing, codegen
-
-
-_VECTOR, _MATRIX = _view(1), _view(2)
-
-
-@intrinsic
-def vector_at(typingctx, array, first, size):
-    """Return ``array.ravel()[first : first + size]``."""
-    signature = _VECTOR[0](array, first, size)
-    return (signature, _VECTOR[1]) if signature is not None else None
-
-
-@intrinsic
-def matrix_at(typingctx, array, first, rows, columns):
-    """Return ``array.ravel()[first : first + rows * columns].reshape(rows, columns)``."""
-    signature = _MATRIX[0](array, first, rows, columns)
-    return (signature, _MATRIX[1]) if signature is not None else None
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def uncounted(array):
-    """Return a view of a whole vector without its reference count.
-
-    Every inlined call that is handed a counted array counts up and down, some 12 ns each: a third of a residual. The
-    view must not outlive the array.
-    """
-    return vector_at(array, 0, array.size)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def uncounted_rows(table):
-    """Return a view of a whole matrix without its reference count, as `uncounted` of a vector."""
-    return matrix_at(table, 0, table.shape[0], table.shape[1])

@@ -19,11 +19,11 @@ from gearmbs.mechanism.forces.functions import FunctionForce, function_force
 from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.language.user_functions import UserFunction
 from gearmbs.mechanism.parts import joints as jt
-from gearmbs.mechanism.parts.bodies import Body, Marker, Vector, frame_along, make_body, vector
+from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
-from gearmbs.mechanism.parts.quantities import keeps_given, quantity
+from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
 
 E = TypeVar("E", bound=ForceElement)
 
@@ -409,7 +409,11 @@ class Mechanism(JointMethods, LoadMethods, Shown):
     @property
     def state_names(self) -> list[str]:
         """Names of `every_state`; of one given by an expression, that under which expressions know it."""
-        return [*(str(key) for key in self.states), *(state.name for state in self.every_state[len(self.states) :])]
+        return self.names_of(self.every_state)
+
+    def names_of(self, every_state: Sequence[State]) -> list[str]:
+        """Return `state_names` from `every_state`."""
+        return [*map(str, self.states), *(state.name for state in every_state[len(self.states) :])]
 
     # --- translation into tables ------------------------------------------------------------------
 
@@ -444,20 +448,6 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         return Measures(self, solution)
 
     # --- checks -----------------------------------------------------------------------------------
-
-    def _check_body(self, label: str, body: Body) -> None:
-        if not isinstance(body, Body):
-            raise ModelError(f"{label}: {body!r} is not a body or a marker")
-        if body is not self.ground and self.bodies.get(body.name) is not body:
-            raise ModelError(f"{label}: body '{body.name}' does not belong to mechanism '{self.name}'")
-
-    def _check_name(self, name: str) -> None:
-        if not isinstance(name, str) or not name:
-            raise ModelError(f"name {name!r}: give a text that is not empty")
-        for title, table in (("joint", self.joints), ("load", self.elements), ("constraint", self.constraints)):
-            if name in table:
-                kind = getattr(table[name], "kind", title)
-                raise ModelError(f"name {name!r}: it is in use by a {title} ({kind}); choose another")
 
     def _add_load(self, load: Load) -> Load:
         self._check_name(load.name)

@@ -51,4 +51,5 @@ from .trains.report import train_scene as train_scene
 from .trains.report import train_spectrum as train_spectrum
 from .trains.trains import load_train as load_train
 from .trains.trains import run_train as run_train
+from .trains.trains import run_trains as run_trains
 from .trains.trains import train_signal as train_signal

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -13,9 +15,34 @@ from gearmbs.signals.commands import check_targets, hand_over, save_figures
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
+    from gearmbs.studies.paper.preset import Claim
+    from gearmbs.studies.presets.gearbox import GearboxStudy
     from gearmbs.studies.run.simulation import SimulationFailed
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
+
+
+def carry_out(out: Path, names: list[str], run: Callable[..., Any], told: Callable[[Any], str]) -> None:
+    """Carry out a study whose runs have these names, save it, and print what is told of it and its files."""
+    from gearmbs.files import check_place
+
+    check_place(out, 0)
+    with case_bars(names) as move:
+        study = run(progress=move)
+    paths = study.save(out)
+    typer.echo(told(study))
+    typer.echo("\n".join(f"wrote {path}" for path in paths))
+
+
+def claim_lines(claims: list[Claim], where: str = "") -> str:
+    """Return which claims are held, with their numbers."""
+    marks = {True: "held    ", False: "NOT HELD"}
+    return "\n".join(f"{marks[c.held]}  {where}{c.name}\n          {c.numbers}" for c in claims)
+
+
+def mode_line(study: GearboxStudy) -> str:
+    """Return the natural frequencies of a gearbox."""
+    return "modes, Hz: " + ", ".join(f"{f:.4g}" for f in study.campbell()["frequency"].values[0])
 
 
 def bench(
@@ -27,12 +54,12 @@ def bench(
     phase: Annotated[float, typer.Option(help="Phase of the second mesh, pitches.")] = 0.0,
     pump_teeth: Annotated[int, typer.Option(help="Teeth of the pump; 0: no ripple.")] = 12,
     pair: Annotated[bool, typer.Option(help="Run the pair's study beside it.")] = True,
-    workers: Annotated[int | None, typer.Option(help="Cases of the pair at a time; default: the cores.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Runs at a time; default: the cores.")] = None,
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
-        from gearmbs.studies.presets.bench import PRESSURES, STATES, BenchSettings, bench_train
-        from gearmbs.studies.run.store import check_place
+        from gearmbs.studies.paper.preset import paper_cases
+        from gearmbs.studies.presets.bench import PRESSURES, SENSORS, STATES, BenchSettings, bench_train, run_bench
         from gearmbs.studies.trains.trains import RunSettings, check_record
 
         settings = BenchSettings(
@@ -40,22 +67,11 @@ def bench(
         )
         run = RunSettings(settling=0.2, duration=duration)
         check_record(bench_train(settings=settings), run)
-        check_place(out, 0)
-
-        from gearmbs.studies.paper.preset import paper_cases
-        from gearmbs.studies.presets.bench import run_bench
-
         names = [f"bench, {state}, {load} load" for load in PRESSURES for state in STATES]
         if pair:
             names += [case.name for case in paper_cases()]
-        with case_bars(names) as move:
-            study = run_bench(settings, run, pair=pair, workers=workers, progress=move)
-        paths = study.save(out)
-        for sensor in ("laser", "support"):
-            for claim in study.claims(sensor):
-                mark = "held    " if claim.held else "NOT HELD"
-                typer.echo(f"{mark}  {sensor}: {claim.name}\n          {claim.numbers}")
-        typer.echo("\n".join(f"wrote {path}" for path in paths))
+        study = partial(run_bench, settings, run, pair=pair, workers=workers)
+        carry_out(out, names, study, lambda s: "\n".join(claim_lines(s.claims(name), f"{name}: ") for name in SENSORS))
 
 
 def resonance(
@@ -70,19 +86,10 @@ def resonance(
 ) -> None:
     """Sweep a spur pair up and down through its mesh resonance: jumps, hysteresis, loads at which teeth part."""
     with guarded():
-        from gearmbs.studies.presets.resonance import DIRECTIONS, ResonanceSettings
-        from gearmbs.studies.run.store import check_place
+        from gearmbs.studies.presets.resonance import DIRECTIONS, ResonanceSettings, run_resonance
 
         settings = ResonanceSettings(torque=torque, damping_ratio=damping, addendum=addendum, span=span, cycles=cycles)
-        check_place(out, 0)
-
-        from gearmbs.studies.presets.resonance import run_resonance
-
-        with case_bars(list(DIRECTIONS)) as move:
-            study = run_resonance(settings, progress=move)
-        paths = study.save(out)
-        typer.echo(study.report())
-        typer.echo("\n".join(f"wrote {path}" for path in paths))
+        carry_out(out, list(DIRECTIONS), partial(run_resonance, settings), lambda study: study.report())
 
 
 def gearbox(
@@ -95,20 +102,12 @@ def gearbox(
 ) -> None:
     """Study an industrial gearbox of two helical stages: modes, Campbell diagram, steady state, run-up, housing."""
     with guarded():
-        from gearmbs.studies.presets.gearbox import GearboxSettings, industrial_gearbox
-        from gearmbs.studies.run.store import check_place
+        from gearmbs.studies.presets.gearbox import GearboxSettings, industrial_gearbox, run_gearbox
 
         settings = GearboxSettings(speed=speed, power=power, helix_angle=helix)
         industrial_gearbox(settings)
-        check_place(out, 0)
-
-        from gearmbs.studies.presets.gearbox import run_gearbox
-
-        with case_bars(["steady", "run-up"]) as move:
-            study = run_gearbox(settings, duration=duration, run_up=run_up, progress=move)
-        paths = study.save(out)
-        typer.echo("modes, Hz: " + ", ".join(f"{f:.4g}" for f in study.campbell()["frequency"].values[0]))
-        typer.echo("\n".join(f"wrote {path}" for path in paths))
+        study = partial(run_gearbox, settings, duration=duration, run_up=run_up)
+        carry_out(out, ["steady", "run-up"], study, mode_line)
 
 
 # ``gearmbs paper`` and ``gearmbs run``: the study, and single cases, planetary sets and drivetrains from files.
@@ -116,23 +115,40 @@ def gearbox(
 
 def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
     """Write what a run has computed before it stopped, and end: with status 130 if the user interrupted it."""
+    from gearmbs.files import KeptElsewhere
     from gearmbs.studies.run.simulation import SimulationInterrupted
-    from gearmbs.studies.run.store import KeptElsewhere, keep_dataset
+    from gearmbs.studies.run.store import keep_dataset
 
-    partial = failure.partial()
-    if partial is None:
+    computed = failure.partial()
+    if computed is None:
         raise failure
     try:
-        path = keep_dataset(path, partial)
+        path = keep_dataset(path, computed)
     except KeptElsewhere as error:
         path = error.path
     except OSError as error:
         raise RuntimeError(f"{failure}\n{error}") from failure
     if isinstance(failure, SimulationInterrupted):
-        end = float(partial.time[-1])
+        end = float(computed.time[-1])
         typer.secho(f"gearmbs: interrupted at t = {end:.6g} s; what was computed until then is in {path}", err=True)
         raise typer.Exit(130) from None
     raise RuntimeError(f"{failure}\nWhat was computed until then is in {path}") from failure
+
+
+def simulated(name: str, span: float, target: Path, run: Callable[..., Any], size: float = 0.0) -> Any:
+    """Simulate with a bar over the time of a run (s) and write the record; of a run that fails what it computed."""
+    from gearmbs.files import check_place
+    from gearmbs.studies.run.simulation import SimulationFailed
+    from gearmbs.studies.run.store import keep_dataset
+
+    check_place(target.parent, size, "its record")
+    with case_bars([name]) as move:
+        try:
+            data = run(progress=lambda t: move(name, min(t / span, 1.0)))
+        except SimulationFailed as failure:
+            keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
+    keep_dataset(target, data)
+    return data
 
 
 def paper(
@@ -182,10 +198,11 @@ def paper(
         tilt = to_si(angle, "angle", "--angle")
         check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
 
+        from gearmbs.files import check_place, keep
         from gearmbs.studies.paper.paper import run_paper
         from gearmbs.studies.paper.preset import paper_cases
         from gearmbs.studies.run.simulation import SimulationFailed
-        from gearmbs.studies.run.store import check_place, file_stem, keep, record_size, stored_record
+        from gearmbs.studies.run.store import file_stem, record_size, stored_record
 
         settings: dict[str, Any] = {"torques": (low, 2.0 * low), "misalignment": tilt}
         cases = paper_cases(base=base, **settings)
@@ -210,9 +227,7 @@ def paper(
                 name = file_stem(failure.case.name) if failure.case is not None else "failed"
                 keep_partial(failure, single / f"{name}.partial.nc")
         paths = keep(study.save, out)
-        for claim in study.claims():
-            mark = "held    " if claim.held else "NOT HELD"
-            typer.echo(f"{mark}  {claim.name}\n          {claim.numbers}")
+        typer.echo(claim_lines(study.claims()))
         typer.echo("\n".join(f"wrote {path}" for path in paths))
 
 
@@ -241,19 +256,12 @@ def run(
             case = case.changed(solver={"lump": True})
         check_record(case, str(case_file))
 
-        from gearmbs.studies.run.simulation import SimulationFailed, run_case
-        from gearmbs.studies.run.store import check_place, keep_dataset, record_size
+        from gearmbs.studies.run.simulation import run_case
+        from gearmbs.studies.run.store import record_size
 
-        target = out or case_file.with_suffix(".nc")
-        check_place(target.parent, record_size(case), "its record")
-        operation = case.operation
+        target, operation = out or case_file.with_suffix(".nc"), case.operation
         span = operation.run_up + operation.settling + operation.duration
-        with case_bars([case.name]) as move:
-            try:
-                data = run_case(case, lambda t: move(case.name, min(t / span, 1.0)))
-            except SimulationFailed as failure:
-                keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
-        keep_dataset(target, data)
+        data = simulated(case.name, span, target, partial(run_case, case), record_size(case))
         typer.echo(_level_table(data))
         for remark in remarks(case):
             typer.echo(f"note: {remark}", err=True)
@@ -266,7 +274,6 @@ def run_planetary_set(file: Path, out: Path | None) -> None:
     """Simulate a planetary set; write its record and say how the load is shared."""
     with guarded():
         from gearmbs.studies.case.section import CaseError
-        from gearmbs.studies.run.store import check_place, keep_dataset
         from gearmbs.studies.trains.planetary import load_planetary, run_planetary
 
         found = load_planetary(file)
@@ -276,11 +283,8 @@ def run_planetary_set(file: Path, out: Path | None) -> None:
         except ValueError as error:
             raise CaseError(f"{file.name}: {error}") from None
         target = out or file.with_suffix(".nc")
-        check_place(target.parent, 0, "its record")
         span = found.run_up + found.settling + found.duration
-        with case_bars([found.gears.name]) as move:
-            data = run_planetary(found, lambda t: move(found.gears.name, min(t / span, 1.0)))
-        keep_dataset(target, data)
+        data = simulated(found.gears.name, span, target, partial(run_planetary, found))
         for planet in data.planet.values:
             one = data.sel(planet=planet)
             loads = "".join(f"{float(one['force'].sel(mesh=m).mean()):12.5g} N ({m})" for m in ("sun", "ring"))
@@ -299,24 +303,17 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         train, settings = found.train, found.run
         check_record(train, settings)
 
+        from gearmbs.files import write_whole
         from gearmbs.signals.files.simulated import holds_speed
-        from gearmbs.studies.run.simulation import SimulationFailed
-        from gearmbs.studies.run.store import check_place, keep_dataset, write_text
         from gearmbs.studies.trains.report import train_report, train_scene, train_spectrum
         from gearmbs.studies.trains.trains import run_train
         from gearmbs.view import save_figure
 
         target = out or file.with_suffix(".nc")
-        check_place(target.parent, 0, "its record")
         span = train.run_up + settings.settling + settings.duration
-        with case_bars([train.name]) as move:
-            try:
-                data = run_train(train, settings, progress=lambda t: move(train.name, min(t / span, 1.0)))
-            except SimulationFailed as failure:
-                keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
-        keep_dataset(target, data)
+        data = simulated(train.name, span, target, partial(run_train, train, settings))
         report, scene = target.with_suffix(".md"), target.with_suffix(".html")
-        write_text(report, train_report(train, data))
+        write_whole(report, train_report(train, data))
         train_scene(train).save_html(scene)
         written = [target, report, scene]
         if "mesh_rms" in data and train.meshes and holds_speed(data):
@@ -371,9 +368,10 @@ def sweep(
     """
     with guarded():
         check_kind(case_file, "case")
+        from gearmbs.files import check_place
         from gearmbs.studies.case.case import load_case
         from gearmbs.studies.case.limits import check_record
-        from gearmbs.studies.run.store import check_place, record_size
+        from gearmbs.studies.run.store import record_size
         from gearmbs.studies.run.sweep import between, cases_of_sweep
         from gearmbs.studies.run.sweep import sweep as run_sweep
 

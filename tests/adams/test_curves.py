@@ -10,6 +10,7 @@ from gearmbs.adams.builders.curve_data import matrix_values
 from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism import ModelError
 from gearmbs.mechanism.parts.curves import Curve
+from tests.says import says
 
 RADIUS, OFF, ROLLER, SPEED, MASS, G = 50.0, 20.0, 10.0, 10.0, 0.5, 9810.0
 PHI = np.linspace(0.0, 2.0 * np.pi, 73)
@@ -66,7 +67,7 @@ def test_a_point_follows_a_cam():
     asked = "\nREQUEST/2, F2=PTCV(1,0,2,0)\\F3=PTCV(1,0,3,0)\\F4=PTCV(1,1,3,0)"
     result = run_deck(deck(cam + asked, height, matrix(1, circle(RADIUS, OFF))), end=1.5, steps=300)
     assert result.success
-    with pytest.raises(DeckError, match="PTCV_1 whose force could be measured here; it is known to a REQUEST only"):
+    with pytest.raises(DeckError, match=says("PTCV_1", "force", "REQUEST")):
         run_deck(deck(cam + "\nSFORCE/7, ROTATIONAL, I=20, J=10, FUNCTION=PTCV(1,0,3,0)", height,
                       matrix(1, circle(RADIUS, OFF))), end=0.1, steps=1)  # fmt: skip
     y, first, second = lift(SPEED * result.t, RADIUS)
@@ -159,9 +160,9 @@ def test_a_list_of_variables_is_read_by_place():
         ("PTCV/1, I=30, CURVE=1, RM=20", "there is no CURVE/1"),
         ("CURVE/1, CLOSED, MATRIX=7\nPTCV/1, I=30, CURVE=1, RM=20", "there is no MATRIX/7"),
         ("CURVE/1, CLOSED, MATRIX=1\nPTCV/1, I=30, CURVE=1", "RM is missing"),
-        ("CURVE/1, CLOSED, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=31", "both markers are on body"),
-        ("MATRIX/2, FULL=RORDER, ROWS=2, COLUMNS=2, VALUES=1,2,3", "need as many values, got 3"),
-        ("CURVE/1, CLOSED, FUNCTION=USER(1)\nPTCV/1, I=30, CURVE=1, RM=20", "its routine CURSUB is missing"),
+        ("CURVE/1, CLOSED, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=31", says("PTCV/1", "'PTCV_1'", "both markers")),
+        ("MATRIX/2, FULL=RORDER, ROWS=2, COLUMNS=2, VALUES=1,2,3", says("values", "3")),
+        ("CURVE/1, CLOSED, FUNCTION=USER(1)\nPTCV/1, I=30, CURVE=1, RM=20", says("CURSUB")),
     ],
 )
 def test_mistakes_are_named(touch, message):

@@ -7,6 +7,7 @@ from gearmbs.adams import DeckError, parse_deck, parse_script, read_deck, read_r
 from gearmbs.adams.builders.flexible import has_momentum, modal_ratios
 from gearmbs.flexible import Shaft, ShaftSection, mnf_of, read_mnf, reduce_model, write_mnf
 from gearmbs.mechanism import Mechanism
+from tests.says import says
 
 DECK = """\
 bar that swings
@@ -112,7 +113,7 @@ def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
     assert modal.components[8] == "QDOT1"
     np.testing.assert_array_equal(modal.values, np.hstack(result.modal(1)))
     np.testing.assert_array_equal(found["FLEX_BODY_1_XFORM"]["X"], result.flexible(1)[:, 0])
-    with pytest.raises(KeyError, match="there is no result set 'PART_9'; the file has"):
+    with pytest.raises(KeyError, match=says("result", "'PART_9'")):
         found["PART_9"]
     data = result.to_dataset()
     np.testing.assert_array_equal(data.flex_body_1_modal, result.modal(1)[0])
@@ -131,15 +132,15 @@ def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
     ("old", "new", "message"),
     [
         ("bar.mnf", "none.mnf", "MNF_FILE = none.mnf: No such file"),
-        ("bar.mnf", "mdids://x/bar.mnf", "give the path of the file"),
+        ("bar.mnf", "mdids://x/bar.mnf", says("file", "give the path")),
         ("MNF_FILE=bar.mnf,", "", "FLEX_BODY/1: MNF_FILE is missing"),
         ("NODE=3", "NODE=77", "there is no node 77"),
         ("NODE=3", "NODE=3,QP=0,0,150", "QP is 50 from node 3"),
         ("NODE=3", "QP=0,0,170", "QP is 30 from node 3"),
         ("STEP(FXFREQ,1000,0.02,20000,0.5)", "0.1*TIME", "changes with time"),
         ("STEP(FXFREQ,1000,0.02,20000,0.5)", "0.1*FREQ", "FREQ"),
-        (",CRATIO", ",INVARIANTS=T:T:F:F:F:T:T:F:F,CRATIO", "the modes have momentum"),
-        (",CRATIO", ",INVARIANTS=T:T:F:F:F:F:T:F:F,CRATIO", "is not supported; choose one of"),
+        (",CRATIO", ",INVARIANTS=T:T:F:F:F:T:T:F:F,CRATIO", says("other.adm", "FLEX_BODY", "modes have momentum")),
+        (",CRATIO", ",INVARIANTS=T:T:F:F:F:F:T:F:F,CRATIO", says("other.adm", "FLEX_BODY", "choose", "supported")),
         ("102,FLEX_BODY=1", "102,FLEX_BODY=7", "there is no FLEX_BODY/7"),
         ("I=100,J=11", "I=100,J=102", "both on FLEX_BODY/1"),
     ],

@@ -10,6 +10,7 @@ from gearmbs.adams.parse.commands import parse_script
 from gearmbs.adams.parse.readers import read_variables
 from gearmbs.mechanism import Mechanism
 from tests.adams.decks import PENDULUM
+from tests.says import says
 
 BEAM = (
     "BEAM/{n}, I=0201, J=0101, LENGTH=2, IXX=1, IYY=1, IZZ=1, AREA=1, EMODULUS=1E3, GMODULUS=1E3, FORMULATION={kind}\n"
@@ -66,9 +67,9 @@ def test_a_range_of_elements_is_switched():
     model = run_deck(deck, script).segments[-1].model
     assert sorted(n for kind, n in model.names if kind == "sforce") == [3, 9]
     for text, message in (
-        ("deactivate/sforce, range=10,20", "there is no SFORCE from 10 to 20 in the deck"),
-        ("deactivate/sforce, range=1,2", "there is no SFORCE from 1 to 2"),
-        ("deactivate/sforce, range=9,3", "the first must not be larger"),
+        ("deactivate/sforce, range=10,20", says("SFORCE", "10", "20", "deck")),
+        ("deactivate/sforce, range=1,2", says("SFORCE", "1", "2")),
+        ("deactivate/sforce, range=9,3", says("DEACTIVATE", "RANGE", "larger", "first")),
         ("deactivate/sforce, id=3, range=3,9", "not both"),
     ):
         with pytest.raises(DeckError, match=message):
@@ -97,7 +98,7 @@ def test_a_function_that_only_an_unread_variable_uses_stops_nothing():
     script = "m\no\nsimulate/dynamics, end=0.01, steps=2\n"
     result = run_deck(deck, parse_script(script))
     assert result.success
-    told = [m for m in result.messages if "nothing that is computed here reads it" in str(m)]
+    told = [m for m in result.messages if "reads it" in str(m)]
     assert len(told) == 1
     assert "VARIABLE/1, VARIABLE/2: FUNCTION" in told[0]
     assert "VARIABLE/1" in str(told[0])
@@ -173,7 +174,7 @@ def test_what_stands_on_parts_that_are_left_out_is_left_out():
         "SFORCE/9, TRANSLATIONAL, I=901, J=0101, FUNCTION=1\nMOTION/9, JOINT=9, FUNCTION=0\n"
     )
     result = run_deck(parse_deck(text), end=0.01, steps=1, allow_unsupported=True)
-    told = [str(m) for m in result.messages if "which is left out" in str(m)]
+    told = [str(m) for m in result.messages if "left out" in str(m)]
     assert result.success
     assert sum("at MARKER/901" in text for text in told) == 2
     assert any("with JOINT/9" in text for text in told)
@@ -209,7 +210,7 @@ def test_what_is_not_modelled_can_be_switched_and_requests_stay():
     assert any("DEACTIVATE of REQUEST has no effect here" in m for m in result.messages)
     for kind in ("variable", "lse"):
         lines = f"m\no\nactivate/{kind}, id=1\nsimulate/dynamics, end=0.01, steps=1\n"
-        with pytest.raises(DeckError, match=f"ACTIVATE of {kind.upper()} is not supported; it stays as it is"):
+        with pytest.raises(DeckError, match=says("ACTIVATE", kind.upper())):
             run_deck(deck, parse_script(lines))
         assert run_deck(deck, parse_script(lines), allow_unsupported=True).success
 
@@ -225,7 +226,7 @@ def test_one_remark_for_many_of_a_kind():
         run_deck(parse_deck(with_lines(lines)), end=0.01, steps=1)
     assert len(refused.value.diagnostics) == 30
     assert len(str(refused.value).splitlines()) == 1
-    assert "MARKER/5004 and 26 more: CURVE is not supported" in str(refused.value)
+    assert "MARKER/5004 and 26 more: CURVE" in str(refused.value)
 
 
 def test_friction_takes_any_word_for_when_it_rests():

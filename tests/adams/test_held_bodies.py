@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
+from tests.says import says
 
 HEAD = "held\nUNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND\nPART/1, GROUND\nMARKER/1, PART=1\n"
 PLATE = """PART/2, MASS=2, CM=20, IP=0.3,0.4,0.5, QG=1,2,0.7{extra}
@@ -98,7 +99,7 @@ def test_after_an_analysis_they_go_on_from_where_they_are():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("POINT_MASS/1, MASS=0\n", "POINT_MASS/1: MASS = 0.0; it must be positive"),
+        ("POINT_MASS/1, MASS=0\n", says("POINT_MASS/1", "MASS = 0.0")),
         ("MARKER/5, POINT_MASS=3\n", "MARKER/5: there is no POINT_MASS/3"),
         ("POINT_MASS/1, MASS=1, CM=1\n", "POINT_MASS/1: CM = 1, but MARKER/1 is on PART/1"),
     ],

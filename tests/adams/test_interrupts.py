@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from gearmbs import cli
 from gearmbs.adams import DeckError, parse_deck, parse_script, read_results, run_deck
-from gearmbs.adams.run import runner
+from gearmbs.adams.run import analysis as analyses
 from gearmbs.dae.integrators import driver
 from tests.adams.decks import PENDULUM
 
@@ -29,7 +29,7 @@ def signal_at(monkeypatch, time, number, analysis=1):
     # as often as on a slow machine
     monkeypatch.setattr(driver, "FIRST_CHUNK", 20)
     monkeypatch.setattr(driver, "CHUNK_SECONDS", 0.0)
-    original, calls, sent = runner._solve, [], []
+    original, calls, sent = analyses._solve, [], []
 
     def solve(session, command, kind, model, times, options, progress, stops=()):
         calls.append(kind)
@@ -41,7 +41,7 @@ def signal_at(monkeypatch, time, number, analysis=1):
 
         return original(session, command, kind, model, times, options, move, stops)
 
-    monkeypatch.setattr(runner, "_solve", solve)
+    monkeypatch.setattr(analyses, "_solve", solve)
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["Ctrl-C", "kill"])
@@ -87,7 +87,7 @@ def test_an_interruption_before_the_first_output_writes_the_message_file_alone(t
     def interrupted(*_args, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runner, "_model", interrupted)
+    monkeypatch.setattr(analyses, "_model", interrupted)
     deck = tmp_path / "pendulum.adm"
     deck.write_text(PENDULUM)
     result = CliRunner().invoke(cli.app, ["adams", str(deck), "--end", "1"])

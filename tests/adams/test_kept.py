@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.cli import app
+from tests.says import says
 
 from .decks import PENDULUM
 from .test_run import model
@@ -41,7 +42,7 @@ def test_interrupted_scripts_keep_what_ran(tmp_path, monkeypatch):
     def stop(*_, **__):
         raise KeyboardInterrupt("stopped by hand")
 
-    monkeypatch.setattr("gearmbs.adams.run.runner.linear_modes", stop)
+    monkeypatch.setattr("gearmbs.adams.run.analysis.linear_modes", stop)
     script = parse_script("SIM/DYN, END=0.1, STEPS=10\nLINEAR/EIGENSOL\n")
     with pytest.raises(KeyboardInterrupt, match="stopped by hand"):
         run_deck(parse_deck(model(FREE)), script, tmp_path / "run")
@@ -54,14 +55,14 @@ def test_interrupted_scripts_keep_what_ran(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("commands", "message"),
     [
-        ("SIM/DYN, END=0.1, STEPS=1\nSIM/DYN, END=0.05, STEPS=1", "<script>:2: error: END = 0.05, but the model is at"),
+        ("SIM/DYN, END=0.1, STEPS=1\nSIM/DYN, END=0.05, STEPS=1", says("script", "2", "END = 0.05", "model")),
         (
             "SIM/DYN, END=0.1, STEPS=1\nDEACT/JOINT, ID=9\nSIM/DYN, END=1, STEPS=1",
-            "<script>:2: error: there is no JOINT/9",
+            says("script", "2", "JOINT/9"),
         ),
         (
             "SIM/DYN, END=0.1, STEPS=1\nREQUEST/1, F2=DX(77)\nSIM/DYN, END=1, STEPS=1",
-            "<script>:2: error: REQUEST/1: F2: there is no MARKER 77",
+            says("script", "2", "REQUEST/1", "F2", "MARKER 77"),
         ),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from pathlib import Path
 
@@ -43,3 +44,9 @@ def test_expression_page_lists_all_functions():
     text = (DOCS / "theory" / "expressions.md").read_text(encoding="utf-8")
     assert listed("Functions", text) == {*UNARY, *BINARY, *ELEMENT_FORCES, *FUNCTIONS}
     assert listed("Refused functions", text) == set(UNSUPPORTED)
+
+
+def test_page_is_up_to_date(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS / "scripts"))
+    script = importlib.import_module("adams_support")
+    assert script.page() == PAGE, "run python docs/scripts/adams_support.py"

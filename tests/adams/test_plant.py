@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, linear_plant, parse_deck, parse_script, read_results, run_deck
+from tests.says import says
 
 MASS, STIFFNESS, DAMPING = 2.0, 50.0, 3.0
 SPRING = f"""mass, spring and damper
@@ -145,10 +146,10 @@ def test_a_script_writes_the_plant(tmp_path):
 @pytest.mark.parametrize(
     ("deck", "options", "message"),
     [
-        (SPRING.replace("PINPUT/1, VARIABLES=1\n", ""), {}, "the deck has no PINPUT; add PINPUT/1"),
-        (SPRING, {"poutput": 4}, "there is no POUTPUT/4; the deck has POUTPUT 1"),
-        (PENDULUM.format(x=0, y=-1, mx=0, my=1, torque=0), {}, "the deck has several; give PINPUT = 1, 2"),
-        (SPRING, {"at": "rest"}, "at = 'rest'; choose initial or equilibrium"),
+        (SPRING.replace("PINPUT/1, VARIABLES=1\n", ""), {}, says("deck", "add PINPUT/1")),
+        (SPRING, {"poutput": 4}, says("POUTPUT/4", "deck", "POUTPUT 1")),
+        (PENDULUM.format(x=0, y=-1, mx=0, my=1, torque=0), {}, says("deck", "1", "2", "give PINPUT")),
+        (SPRING, {"at": "rest"}, says("'rest'", "choose initial")),
     ],
 )
 def test_what_is_missing_is_named(deck, options, message):
@@ -198,7 +199,7 @@ def test_variables_and_lists_of_a_control_program_are_in_the_results(tmp_path):
     np.testing.assert_allclose(found["VARIABLE_2"]["Q"], result.variable(2), rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(found["PINPUT_1"]["IN1"], result.variable(1), rtol=1e-9)
     assert found["POUTPUT_1"].components == ("OUT1", "OUT2", "OUT3")
-    with pytest.raises(KeyError, match="no values of VARIABLE/9; there are those of 1, 2, 3, 4"):
+    with pytest.raises(KeyError, match=says("VARIABLE/9", "1", "2", "3", "4")):
         result.variable(9)
 
 

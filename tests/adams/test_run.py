@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
 from gearmbs.adams.run.runner import run_deck
+from tests.says import says
 
 from .decks import PENDULUM
 
@@ -164,7 +165,7 @@ def test_messages_name_what_a_modeller_can_mend():
         run_deck(parse_deck(PENDULUM))
     with pytest.raises(DeckError, match="already"):
         run_deck(parse_deck(PENDULUM), parse_script("m\np\nsim/dyn,end=1,steps=2\nsim/dyn,end=0.5,steps=2"))
-    with pytest.raises(DeckError, match="needs zero degrees of freedom"):
+    with pytest.raises(DeckError, match=says("needs zero degrees")):
         run_deck(parse_deck(PENDULUM), parse_script("m\np\nsim/kin,end=1,steps=2"))
 
 
@@ -201,7 +202,7 @@ def test_parts_that_cannot_be_built_are_errors_with_their_line():
     body = (
         "PART/2,MASS=1,CM=20,IP=1,1,1\nMARKER/20,PART=2\nJOINT/1,REVOLUTE,I=20,J=10,IC=1,0\nJOINT/2,FIXED,I=20,J=10\n"
     )
-    with pytest.raises(DeckError, match=r":7: error: JOINT/1: its initial conditions cannot be met"):
+    with pytest.raises(DeckError, match=says("7", "JOINT/1")):
         parse_deck(model(body), "deck.adm").to_mechanism()
 
 
@@ -220,7 +221,7 @@ ACCGRAV/KGRAV=-9.8
 END
 """
     deck = parse_deck(text)
-    with pytest.raises(DeckError, match=r"singular to rounding .* masses and moments of inertia"):
+    with pytest.raises(DeckError, match=says("moments", "singular to rounding")):
         run_deck(deck, parse_script("a\nb\nSIMULATE/DYNAMICS, END=0.1, STEPS=5\n"))
     remark = next(d for d in deck.diagnostics if "principal moments" in d.message)
     assert (remark.severity, remark.line) == ("warning", 5)
@@ -262,5 +263,5 @@ def test_motions_are_along_what_their_joint_allows(direction):
     if direction == "ROTATIONAL":
         assert run_deck(deck, end=0.1, steps=2).success
         return
-    with pytest.raises(DeckError, match="TRANSLATIONAL is not what JOINT/1 allows: it is revolute; write ROTATIONAL"):
+    with pytest.raises(DeckError, match=says("TRANSLATIONAL", "JOINT/1", "write ROTATIONAL")):
         run_deck(deck, end=0.1, steps=2)

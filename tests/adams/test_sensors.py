@@ -10,6 +10,7 @@ from gearmbs.adams.results.msg import message_text
 from gearmbs.adams.run.sensors import in_unit
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.solve.simulate import StopAt
+from tests.says import says
 
 DECK = """thrown
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
@@ -117,9 +118,9 @@ def test_driven_mechanisms_are_watched_too():
         ("SENSOR/1, VALUE=1", "FUNCTION is missing"),
         ("SENSOR/1, GE, LE, VALUE=1, FUNCTION=TIME", "both GE and LE"),
         ("SENSOR/1, VALUE=1, FUNCTION=DZ(77)", "77"),
-        ("SENSOR/1, VALUE=1, FUNCTION=TIME, DT=0", r"SENSOR/1: DT = 0\.0; it must be positive"),
-        ("SENSOR/1, VALUE=1, FUNCTION=TIME, STEPSIZE=-1", r"STEPSIZE = -1\.0; it must be positive"),
-        ("SENSOR/1, VALUE=1, FUNCTION=TIME\nINTEGRATOR/GSTIFF, HMAX=0", r"HMAX = 0\.0; it must be positive"),
+        ("SENSOR/1, VALUE=1, FUNCTION=TIME, DT=0", says("SENSOR/1", "DT = 0.0")),
+        ("SENSOR/1, VALUE=1, FUNCTION=TIME, STEPSIZE=-1", says("STEPSIZE = -1.0")),
+        ("SENSOR/1, VALUE=1, FUNCTION=TIME\nINTEGRATOR/GSTIFF, HMAX=0", says("HMAX = 0.0")),
     ],
 )
 def test_mistakes_are_named(sensor, message):
@@ -134,7 +135,7 @@ def test_stops_of_a_mechanism():
     s = m.simulate(2.0, rate=10, stops=[StopAt("height", 5.0, 1), StopAt("height", 3.75, -1)], tol=1e-9)
     assert s.result.t_events[0].size == 0
     assert s.result.t_events[1] == pytest.approx([np.sqrt(1.25)], abs=1e-9)
-    with pytest.raises(ModelError, match="there is no state 'depth'; the mechanism has height"):
+    with pytest.raises(ModelError, match=says("state 'depth'", "mechanism", "height")):
         m.simulate(1.0, stops=[StopAt("depth")])
     with pytest.raises(ModelError, match="WSTIFF or GSTIFF"):
         m.simulate(1.0, stops=[StopAt("height")], integrator="IDA")
@@ -164,7 +165,7 @@ def test_a_sensor_fires_where_a_function_of_the_position_jumps():
 
 def test_a_sensor_that_puts_its_function_back_for_ever_is_ended():
     sensor = "SENSOR/1, GE, VALUE=0.5, FUNCTION=TIME-SENVAL(1), EVALUATE=SENVAL(1)+1E-12, ERROR=1E-13"
-    with pytest.raises(DeckError, match=r"SENSOR/1: it fires again and again at TIME = 0\.5; what it evaluates"):
+    with pytest.raises(DeckError, match=says("SENSOR/1", "TIME = 0.5")):
         run(sensor)
 
 

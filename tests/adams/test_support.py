@@ -1,13 +1,19 @@
-"""The table of what is read, against the reader."""
+"""The table of statements: what is read, against the reader, and that it is the only list of them."""
 
 from __future__ import annotations
 
+import ast
+import re
 from pathlib import Path
 
 import pytest
 
+import gearmbs.adams
 from gearmbs.adams import DeckError, parse_deck, run_deck, support_table
 from gearmbs.adams import support as table
+from gearmbs.adams.builders.flexible import DEFORMING
+from gearmbs.adams.builders.mechanism import MAKERS
+from gearmbs.adams.builders.routines import BINDERS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS
 from gearmbs.adams.parse.commands import UNSUPPORTED_COMMANDS
@@ -16,6 +22,9 @@ from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
 
 from .decks import PENDULUM
 
+PACKAGE = Path(gearmbs.adams.__file__).parent
+ROWS = ("parse/statements.py", "parse/model_statements.py", "parse/data_statements.py")
+"""Where the rows of statements are; those of what builds them stand beside the functions that do."""
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "adams_table.md"
 
 
@@ -109,3 +118,55 @@ def test_what_asks_for_elements_that_are_left_out_is_left_out(tmp_path):
              "SENSOR/1": "SFORCE/2"}  # fmt: skip
     for label, need in needs.items():
         assert any(f"{label}: it needs {need}, which is left out" in str(d) for d in result.deck.diagnostics), label
+
+
+def _listed(node: ast.AST, prose: set[int]) -> set[str]:
+    """Return the statements that a tuple, list, set, table or text names, by keyword or class."""
+    classes = {cls.__name__: keyword for keyword, cls in st.STATEMENTS.items()}
+    known = {*st.STATEMENTS, *st.UNSUPPORTED, *st.IGNORED}
+    if isinstance(node, ast.Tuple | ast.List | ast.Set):
+        parts = node.elts
+    elif isinstance(node, ast.Dict):
+        parts = [part for part in (*node.keys, *node.values) if part is not None]
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+        return {word for word in node.value.split() if word in known}
+    else:
+        return set()
+    found = {part.value for part in parts if isinstance(part, ast.Constant)} & known
+    return found | {classes[p.attr] for p in parts if isinstance(p, ast.Attribute) and p.attr in classes}
+
+
+def test_no_other_module_lists_statements():
+    """A statement is a class and a function with its row: nothing else names three of them in one breath."""
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        where = path.relative_to(PACKAGE).as_posix()
+        if where in ROWS:
+            continue
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        prose = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)}
+        # tables of functions, a row beside each
+        prose |= {
+            id(n.value)
+            for n in ast.walk(tree)
+            if isinstance(n, ast.AnnAssign)
+            and re.fullmatch(r"dict\[type, (Maker|Callable)\]", ast.unparse(n.annotation))
+        }
+        found += [f"{where}:{n.lineno}" for n in ast.walk(tree) if id(n) not in prose and len(_listed(n, prose)) > 2]
+    # commands of ADAMS with the names of statements, and the words for elements that are written
+    assert [place for place in found if not place.startswith(("parse/commands.py", "write/"))] == []
+
+
+def test_rows_of_statements_are_complete():
+    for name, cls in st.STATEMENTS.items():
+        fields = specs_of(cls)
+        assert cls.__doc__.startswith(name), name
+        assert bool(cls.entity) <= (cls in MAKERS), f"{name} transmits a force, and nothing builds it"
+        assert cls.switch in ("", "on", "acts")
+        assert all(
+            spec.idle != "" or spec.instead is None or spec.instead == spec.instead.strip() for spec in fields.values()
+        )
+        if cls.subroutine:
+            assert cls in BINDERS or set(cls.results) <= set(fields), name
+    assert set(DEFORMING) | set(MAKERS) | set(BINDERS) <= set(st.STATEMENTS.values())
+    assert len({cls.entity for cls in st.KINDS}) == len(st.KINDS)

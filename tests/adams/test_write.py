@@ -15,6 +15,7 @@ from gearmbs.adams.write.text import wrapped
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism, curve, curve_integral, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.language.syntax import Units
+from tests.says import says
 
 from .decks import PENDULUM
 from .requests import read_requests
@@ -229,9 +230,9 @@ def test_what_cannot_be_written_is_named():
 
     with pytest.raises(ModelError, match="tilted axes"):
         write_deck(rig(GearPair.paper(misalignment="1 deg", backlash="0.5 mm")))
-    with pytest.raises(ModelError, match="has no form in ADAMS"):
+    with pytest.raises(ModelError, match="no form in ADAMS"):
         write_deck(rig(GearPair.paper(contact=ContactLaw.hunt_crossley())))
-    with pytest.raises(ModelError, match="stiffness varies along the path"):
+    with pytest.raises(ModelError, match=says("stiffness", "along the path")):
         write_deck(rig(GearPair.paper().with_potential_energy_stiffness()))
     # a linear law is IMPACT with the exponent 1
     assert ", 1.0, 0.0, 0.0001" in write_deck(rig(GearPair.paper(contact=ContactLaw.linear(stiffness="1e8 N/m"))))

@@ -9,6 +9,7 @@ from gearmbs.adams import parse_deck, read_deck, run_deck, write_deck
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism, Mode
 from gearmbs.mechanism.language.syntax import Units
+from tests.says import says
 
 from .test_run import model
 from .test_writers import ELEMENTS as STATEMENTS
@@ -189,12 +190,12 @@ def test_results_need_not_be_asked_for():
     assert not any(word in text for word in ("REQUEST", "OUTPUT", "RESULTS", "INTEGRATOR"))
     with pytest.raises(ModelError, match="choose one of GSTIFF, WSTIFF"):
         write_deck(m, integrator="IDA")
-    with pytest.raises(ModelError, match="holds 1 to 6 expressions, got 7"):
+    with pytest.raises(ModelError, match=says("1", "6", "7", "expressions")):
         write_deck(m, requests={"many": ["TIME"] * 7})
 
 
 def test_a_body_that_deforms_is_refused_by_name():
     m = Mechanism("flexible")
     m.modal_body("rod", 1.0, (1, 1, 1), [Mode(frequency=10.0)], lambda p: (np.zeros((1, 3)), np.zeros((1, 3))))
-    with pytest.raises(ModelError, match=r"body 'rod': it deforms by modes without a model.*Mechanism\.body"):
+    with pytest.raises(ModelError, match=says("body 'rod'", "Mechanism.body")):
         write_deck(m)

@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 
 from gearmbs.adams import parse_deck, run_deck
-from gearmbs.adams.builders.scopes import KINDS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
+from gearmbs.adams.parse.statements import KINDS
 from gearmbs.adams.results.res import ENTITY_TYPES, NAMESPACE
 
 from .requests import read_requests

@@ -11,6 +11,7 @@ from scipy.optimize import linprog, minimize
 from gearmbs.bearings import Bearing, BearingError, BearingStatics, Misalignment, OffSize, RollingBearing
 from gearmbs.mechanism import Mechanism, static_equilibrium
 from tests.generators import cases, seed
+from tests.says import says
 
 CATALOGUE = ("6205", "6206/C3", "6305/C4", "6005/CN", "NU206", "NJ205")
 
@@ -273,7 +274,7 @@ def test_what_rollers_carry_ends_at_the_cone_of_their_normals():
         just = np.tan(np.radians(14.0))
         state = statics.under([size, 0.0, 1.001 * just * size])
         assert state.load[2] == pytest.approx(1.001 * just * size, rel=1e-6)
-        with pytest.raises(BearingError, match=r"nothing stops the inner ring along .* z"):
+        with pytest.raises(BearingError, match=says("z", "inner ring along")):
             statics.under([size, 0.0, 0.999 * just * size])
 
 

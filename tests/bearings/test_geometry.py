@@ -12,6 +12,7 @@ import pytest
 from gearmbs.bearings import Bearing, BearingError, equivalent_load, groove_contact, mean_load, rating_life
 from gearmbs.bearings.laws_kernel import line_contact
 from gearmbs.bearings.ratings import dynamic_rating, load_factors
+from tests.says import says
 
 MULTIPLES = {
     "CWRU drive end": (0.3983, 3.5848, 5.4152, 2.3567),
@@ -117,25 +118,25 @@ def test_class_of_clearance(text, clearance):
 
 
 def test_an_uncertain_bearing_asks():
-    with pytest.raises(BearingError, match=r"bore 25 mm, outside diameter 62 mm, width 17 mm, but how many balls"):
+    with pytest.raises(BearingError, match=says("25 mm", "diameter 62 mm", "17 mm")):
         Bearing.from_designation("6305")
     own = Bearing.from_designation("6305", elements=7, element_diameter="11.5 mm")
     assert own.pitch_diameter == pytest.approx(0.0435)
-    with pytest.raises(BearingError, match="is not in the catalogue"):
+    with pytest.raises(BearingError, match="in the catalogue"):
         Bearing.from_designation("NU2206")
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"elements": 2}, "Bearing.elements is 2; give a whole number"),
+        ({"elements": 2}, says("Bearing.elements", "2", "give a whole number")),
         ({"elements": 40}, "do not fit"),
         ({"element_diameter": "8 kg"}, "Bearing.element_diameter"),
-        ({"pitch_diameter": 1e-3}, "give the diameter of their centres"),
+        ({"pitch_diameter": 1e-3}, says("Bearing.pitch_diameter", "give the diameter")),
         ({"kind": "magic"}, "choose deep groove"),
-        ({"kind": "angular contact"}, "needs one, such as '25 deg'"),
+        ({"kind": "angular contact"}, says("'25 deg'")),
         ({"kind": "tapered roller"}, "effective length"),
-        ({"inner_curvature": 0.4}, "wider than its ball"),
+        ({"inner_curvature": 0.4}, says("Bearing.inner_curvature", "wider", "ball")),
         ({"clearance": "9 mm"}, "give it in"),
         ({"density": float("nan")}, "density"),
     ],
@@ -177,7 +178,7 @@ def test_contact_angles_of_tapered_bearings_give_the_makers_load_factors(designa
     ("designation", "asked"),
     [("NU206", "give elements=, roller_length= (or dynamic_rating="), ("30206", "element_diameter=, roller_length="),
      ("7206-B", "contact angle 40 deg"), ("QJ208", "four point bearing"), ("30215", "contact_angle="),
-     ("NU2206", "is not in the catalogue")],
+     ("NU2206", "in the catalogue")],
 )  # fmt: skip
 def test_asks_for_what_designations_leave_open(designation, asked):
     with pytest.raises(BearingError, match=re.escape(asked)):
@@ -213,7 +214,7 @@ def test_fields_behind_a_designation():
     assert own.bpfo == pytest.approx(7 * 0.5 * (1 - 13.49 / 44))
     # what is given by name counts before the text
     assert Bearing.from_designation("6205, clearance=10 um", clearance=0.0).clearance == 0.0
-    with pytest.raises(BearingError, match="'balls=7' is no field of a bearing"):
+    with pytest.raises(BearingError, match=says("'balls=7'", "bearing")):
         Bearing.from_designation("6305, balls=7")
     with pytest.raises(BearingError, match="needs pitch_diameter="):
         Bearing.from_designation("elements=7, element_diameter=13.49 mm")
@@ -230,7 +231,7 @@ def test_defects_may_be_tables():
     made = RollingBearing("a", m.ground.marker(), m.ground.marker(), Bearing.from_designation("6205"), defects=tables)
     assert made.defects == (Spall(part="inner", width=1e-3), Waviness(order=7))
     for wrong, told in (
-        ({"kind": "hole"}, "kind 'hole' is unknown; choose one of spall"),
+        ({"kind": "hole"}, says("kind 'hole'", "spall", "choose")),
         ({"kind": "spall", "size": 1.0}, "spall: .*'size'"),
         ("spall", "give defects of gearmbs.bearings, or tables"),
     ):
@@ -255,7 +256,7 @@ def test_class_of_clearance_as_makers_write_it(text, clearance):
 @pytest.mark.parametrize("text", ["6205/C9", "6205C9", "6205 C1", "6205ZZ/C33", "6205-2RSC6", "NU206/C9"])
 def test_classes_that_are_none_are_refused_by_name(text):
     counted = {"elements": 13, "roller_length": 9e-3} if text.startswith("NU") else {}
-    with pytest.raises(BearingError, match=r"C(\d+|M) is no class of clearance .* choose C2, CN, C3, C4, C5"):
+    with pytest.raises(BearingError, match=r"C(\d+|M) is .* choose C2, CN, C3, C4, C5"):
         Bearing.from_designation(text, **counted)
     assert Bearing.from_designation(text, clearance="30 um", **counted).clearance == pytest.approx(30e-6)
 
@@ -263,10 +264,10 @@ def test_classes_that_are_none_are_refused_by_name(text):
 def test_other_suffixes_never_stand_for_a_class_in_silence():
     with pytest.raises(BearingError, match="C2 and C3; give one"):
         Bearing.from_designation("6205C2/C3")
-    with pytest.warns(UserWarning, match="what XYZ means is not known"):
+    with pytest.warns(UserWarning, match=says("XYZ")):
         assert Bearing.from_designation("6205-XYZ/C3").clearance == pytest.approx(20.5e-6)
     sizes = {"elements": 10, "element_diameter": 20e-3, "pitch_diameter": 130e-3}
-    with pytest.raises(BearingError, match="not in the catalogue, so that C3 says no clearance"):
+    with pytest.raises(BearingError, match=says("C3", "clearance", "catalogue")):
         Bearing.from_designation("6220/C3", **sizes)
     assert Bearing.from_designation("6220", **sizes).clearance == 0.0
 
@@ -287,11 +288,11 @@ def test_loads_count_by_their_size():
         (lambda b: rating_life(b, math.nan), "load is nan N"),
         (lambda b: equivalent_load(b, math.nan), "radial is nan N"),
         (lambda b: equivalent_load(b, 1.0, math.inf), "axial is inf N"),
-        (lambda b: mean_load(b, np.array([1.0, math.nan])), "radial has values that are not finite"),
+        (lambda b: mean_load(b, np.array([1.0, math.nan])), says("radial has values")),
         (lambda b: mean_load(b, np.ones(2), speed=np.zeros(2)), "speed is 0 throughout"),
         (lambda b: mean_load(b, np.ones(2), speed=np.array([1.0, math.inf])), "speed has values"),
-        (lambda b: mean_load(b, np.ones(2), np.ones(3)), r"axial has the shape \(3,\)"),
-        (lambda b: mean_load(b, np.ones(0)), r"radial has the shape \(0,\)"),
+        (lambda b: mean_load(b, np.ones(2), np.ones(3)), says("3", "axial")),
+        (lambda b: mean_load(b, np.ones(0)), says("0", "radial")),
     ],
 )
 def test_loads_that_give_no_life_are_refused_by_name(call, told):

@@ -25,6 +25,7 @@ from gearmbs.campaigns.folder import make_folder
 from gearmbs.studies import Case
 from tests.campaigns.models import PLACES, ishigami
 from tests.campaigns.support import function, ranges, small
+from tests.says import says
 
 TORQUE = Factor("operation.torque", 50.0, 60.0)
 BAD_PLANS = [
@@ -96,7 +97,7 @@ def test_rows_of_a_list_leave_out_what_stays():
 
 def test_wrong_everywhere_is_said_once():
     plan = make_plan(FunctionSubject("nowhere:f", {"x": 1.0}), [Factor("x", 0.0, 1.0)], n=2)
-    with pytest.raises(CampaignError, match=r"^plan: no case is possible: function 'nowhere:f': cannot be imported"):
+    with pytest.raises(CampaignError, match=says("plan", "'nowhere:f'")):
         plan.check()
 
 
@@ -111,15 +112,15 @@ def test_functions_of_more_than_numbers(tmp_path):
     campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("law.stiffness", "1 N/mm", "3 N/mm")], n=4))
     campaign.run(workers=0)
     np.testing.assert_allclose(campaign.table.nested, campaign.table["law.stiffness"] + 3.0)
-    with pytest.raises(CampaignError, match="is a Case, which cannot be stored"):
+    with pytest.raises(CampaignError, match=says("Case", "stored")):
         FunctionSubject(nested, {"x": Case()})
-    with pytest.raises(CampaignError, match="of a function at the top of a module"):
+    with pytest.raises(CampaignError, match=says("function", "top", "module")):
         FunctionSubject(lambda x: x, {"x": 1.0})
-    with pytest.raises(CampaignError, match="stands in the script or notebook that runs"):
+    with pytest.raises(CampaignError, match=says("script or notebook")):
         FunctionSubject("__main__:f", {"x": 1.0})
     with pytest.raises(CampaignError, match="'zork' is no unit"):
         FunctionSubject(nested, {"x": 1.0}, units={"x": "zork"})
-    with pytest.raises(CampaignError, match="has no such parameter"):
+    with pytest.raises(CampaignError, match=says("law.damping", "such parameter")):
         subject.unit_of("law.damping")
     assert FunctionSubject(ishigami, PLACES).function == "tests.campaigns.models:ishigami"
 
@@ -210,9 +211,9 @@ def test_made_by_another_at_any_moment(tmp_path, monkeypatch, moment):
 
 def test_places_that_will_not_do(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(CampaignError, match="holds something else than a campaign"):
+    with pytest.raises(CampaignError, match=says("holds something else")):
         small(tmp_path)
-    with pytest.raises(CampaignError, match="holds something else than a campaign"):
+    with pytest.raises(CampaignError, match=says("holds something else")):
         small(tmp_path / "notes.txt")
     with pytest.raises(CampaignError, match="cannot be made"):
         small(tmp_path / "notes.txt" / "c")
@@ -221,9 +222,9 @@ def test_places_that_will_not_do(tmp_path):
 
 def test_an_edited_plan_is_told(tmp_path):
     small(tmp_path / "c", n=8)
-    with pytest.raises(CampaignError, match="with other seed and unit; choose another folder"):
+    with pytest.raises(CampaignError, match=says("seed", "unit", "choose another folder")):
         small(tmp_path / "c", n=8, seed=4, unit=4)
-    with pytest.raises(CampaignError, match="8 points have been drawn, the plan has n = 16"):
+    with pytest.raises(CampaignError, match=says("8", "n = 16", "points")):
         small(tmp_path / "c", n=16)
     # a script whose campaign was extended since is run again
     Campaign(tmp_path / "c").extend(12)
@@ -256,7 +257,7 @@ def test_damaged_files_are_named(tmp_path):
     with pytest.raises(CampaignError, match=r"plan.json is damaged"):
         Campaign(campaign.path)
     plan.write_text(json.dumps({}))
-    with pytest.raises(CampaignError, match="format None is unknown"):
+    with pytest.raises(CampaignError, match=says("format", "None")):
         Campaign(campaign.path)
 
 
@@ -317,12 +318,12 @@ def test_ranges_held_out(tmp_path):
 
 @pytest.mark.parametrize("settings", [{"draws": 2.5}, {"draws": "5"}, {"draws": 5, "errors": {"fault.backlash": 1e-4}}])
 def test_bad_specimens(settings):
-    with pytest.raises(CampaignError, match=r"draws = |give its two ends"):
+    with pytest.raises(CampaignError, match=r"draws = |give its two"):
         Specimens(**settings)
 
 
 def test_a_base_without_a_place_on_a_logarithmic_range():
     plan = make_plan(function(), [Factor("x1", 1.0, 2.0, scale="log")], "one at a time")
     plan.subject.parameters["x1"] = 0.0
-    with pytest.raises(CampaignError, match="no place on a logarithmic range"):
+    with pytest.raises(CampaignError, match=says("logarithmic range")):
         plan.points()

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from gearmbs.campaigns.runners.dask import job_script
+from gearmbs.campaigns.cluster import job_script
 from tests.campaigns.support import digest, small
 
 SUBMIT = """#!/bin/bash

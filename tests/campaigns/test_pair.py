@@ -8,6 +8,7 @@ import pytest
 from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, load_plan, make_plan
 from gearmbs.campaigns.settings import PHYSICS
 from gearmbs.studies import Case, run_case
+from tests.says import says
 
 BASE = Case(operation={"duration": 0.08, "run_up": 0.02, "settling": 0.02})
 KEEP = ["harmonics", "contact", "indicators", "signal:line_of_action"]
@@ -51,7 +52,7 @@ STORED = {1: {"orders.line_of_centres.1": 64.972, "orders.line_of_action.1": 29.
 
 def test_rates_that_differ_are_named(tmp_path):
     plan = make_plan(BASE, [Factor("operation.speed", "1000 rpm", "3000 rpm")], n=2, keep=KEEP)
-    with pytest.raises(CampaignError, match="would have the sampling rates 12800, 25600 Hz"):
+    with pytest.raises(CampaignError, match=says("12800", "25600 Hz", "sampling rates")):
         Campaign(tmp_path / "c", plan)
 
 
@@ -93,7 +94,7 @@ def test_a_deck_with_parameters(tmp_path):
 
 def test_impossible_values_of_a_deck_come_before_any_case(tmp_path):
     plan = make_plan(DeckSubject(DECK, {"mass": 1.0}, end=1.0), [Factor("mass", -1.0, 4.0)], "grid", unit=2)
-    with pytest.raises(CampaignError, match=r"1 of 2 corners(?s:.*)mass = -1: corner 0: .*MASS = -1.0; it cannot be"):
+    with pytest.raises(CampaignError, match=says("2", "mass = -1", "0", "MASS = -1.0")):
         Campaign(tmp_path / "c", plan)
 
 
@@ -150,5 +151,5 @@ def test_variables_of_a_deck_as_factors(tmp_path):
     for name in ("VARIABLE/9", "VARIABLE/10", "other"):
         with pytest.raises(CampaignError, match="VARIABLEs whose FUNCTION is a number"):
             DeckSubject(deck, {name: 1.0}, end=1.0)
-    with pytest.raises(CampaignError, match="either the end of the analysis or a script"):
+    with pytest.raises(CampaignError, match=says("end", "script", "analysis", "either")):
         DeckSubject(deck, {"rest": 1.0})

@@ -18,6 +18,7 @@ from gearmbs.campaigns import (
 )
 from gearmbs.studies import Case
 from tests.campaigns.support import function, ranges, small
+from tests.says import says
 
 SHORT = Case(operation={"duration": 0.1})
 
@@ -51,7 +52,7 @@ def test_wrong_factors_are_named(factor, message):
 
 def test_impossible_corners_are_named_before_anything_runs(tmp_path):
     plan = make_plan(SHORT, [Factor("contact.stiffness", "1 N/mm^1.3", "3e5 N/mm^1.3")], n=4)
-    with pytest.raises(CampaignError, match=r"1 of 2 corners are impossible[\s\S]*contact.stiffness"):
+    with pytest.raises(CampaignError, match=says("1", "2", "contact.stiffness")):
         Campaign(tmp_path / "c", plan)
     assert not (tmp_path / "c").exists()
 
@@ -156,7 +157,7 @@ def test_a_folder_holds_one_campaign(tmp_path):
 
 
 def test_names_of_columns_are_different():
-    with pytest.raises(CampaignError, match="names of their own"):
+    with pytest.raises(CampaignError, match=says("names", "own")):
         make_plan(function(), [*ranges(), Factor("x1", 0.0, 1.0)], n=4)
 
 
@@ -175,5 +176,5 @@ def test_a_plan_is_printed_as_what_it_does():
 def test_kinds_of_subjects_are_listed():
     assert {"pair", "drivetrain", "planetary", "bearing", "deck", "function"} <= set(subject_kinds())
     assert make_subject("pair", {}).base() == Case().settings()
-    with pytest.raises(CampaignError, match="'wheel' is unknown; choose one of pair, "):
+    with pytest.raises(CampaignError, match=says("'wheel'", "pair", "choose")):
         make_subject("wheel", {})

@@ -4,6 +4,7 @@ import pytest
 
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, read_description
 from tests.drivetrain.support import stage
+from tests.says import says
 
 TEXT = """
 name = "one stage"
@@ -85,12 +86,12 @@ def test_file_says_the_same_as_python(tmp_path):
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    ('shaft = "in"\nteeth', 'shft = "in"\nteeth', r"wheels.pinion: unknown key 'shft'; did you mean 'shaft'"),
+    ('shaft = "in"\nteeth', 'shft = "in"\nteeth', says("wheels.pinion", "'shft'", "'shaft'")),
     ("teeth = 20\n", "", "wheels.pinion: teeth is missing"),
-    ('kind = "elastic"', 'kind = "soft"', "bearings.b: kind 'soft' is unknown; choose one of ideal, elastic"),
+    ('kind = "elastic"', 'kind = "soft"', says("bearings.b", "kind 'soft'", "elastic", "choose")),
     ('"1500 rpm"', '"1500 mm"', "drive 'motor': speed"),
     ('speed = "1500 rpm"', "", "drives.motor: 'speed' is missing"),
-    ("[loads.brake]", "[load.brake]", "unknown key 'load'; did you mean 'loads'"),
+    ("[loads.brake]", "[load.brake]", says("'load'", "'loads'")),
     ("backlash =", "faults = [1]\nbacklash =", "faults cannot be read here"),
     ("teeth = 20", "teeth = 2", "wheels.pinion: .*teeth is 2"),
     ('duration = "0.2 s"', "duration = -1", "run.duration is -1 s"),

@@ -29,6 +29,7 @@ from gearmbs.signals import SignalError
 from gearmbs.studies import bench_train, run_train, train_campbell, train_modes, train_report
 from tests.drivetrain.support import stage
 from tests.generators import cases, seed
+from tests.says import says
 
 LIGHT = 1.0
 """N m: deflections so small that tips do not bear beyond the path of contact."""
@@ -140,9 +141,9 @@ def test_default_of_a_planetary_set():
         ),
         ({"damping_ratio": 0.05, "contact": ContactLaw.impact()}, "damping_ratio is 0.05 beside contact"),
         ({"stiffness": "din"}, "stiffness is 'din'; choose 'iso', 'iso single' or 'potential-energy'"),
-        ({"damping_ratio": -0.1}, "damping_ratio is -0.1; give a number that is not negative"),
-        ({"torque": "300 N m"}, "torque follows from the drives and loads"),
-        ({"input_torque": "300 N m"}, "input_torque follows from the drives and loads"),
+        ({"damping_ratio": -0.1}, says("damping_ratio", "-0.1", "give a number")),
+        ({"torque": "300 N m"}, says("drives and loads")),
+        ({"input_torque": "300 N m"}, says("input_torque", "drives and loads")),
     ],
 )
 def test_settings_that_contradict(settings, message):
@@ -213,7 +214,7 @@ def test_chain_of_tilted_wheels_has_the_modes_of_the_whole_train(tilt, torque):
 def test_chain_of_tilted_wheels_without_load_is_warned_of():
     train = meshed(misalignment="0.2 deg", backlash="0.6 mm")
     empty = train.with_parts(TorqueLoad(name="brake", shaft="out", torque=0.0))
-    with pytest.warns(UserWarning, match=r"mesh 'mesh': misalignment is 0.2 deg, and without load .* give .* a load"):
+    with pytest.warns(UserWarning, match=says("mesh 'mesh'", "misalignment", "0.2 deg", "give", "without load")):
         chain = empty.torsional()
     assert chain.frequencies()[-1] == pytest.approx(meshed(backlash="0.6 mm").torsional().frequencies()[-1])
     # an ideal mesh is the spring it was given
@@ -221,7 +222,7 @@ def test_chain_of_tilted_wheels_without_load_is_warned_of():
                                     settings={"backlash": "0.6 mm", "stiffness": "4e8 N/m",
                                               "misalignment": "0.2 deg"})])  # fmt: skip
     assert spring.torsional().springs[0].stiffness == pytest.approx(4e8)
-    with pytest.warns(UserWarning, match=r"mesh 'mesh': misalignment is 0.2 deg, and the stiffness 'iso' .* parallel"):
+    with pytest.warns(UserWarning, match=says("mesh 'mesh'", "misalignment", "0.2 deg", "stiffness 'iso'")):
         stage(meshes=[GearMesh(name="mesh", driver="pinion", driven="gear", pair=IdealMesh,
                                settings={"backlash": "0.6 mm", "misalignment": "0.2 deg"})])  # fmt: skip
 
@@ -231,7 +232,7 @@ def test_overdamped_meshes_are_warned_of():
     for contact in (ContactLaw.impact(depth="0.01 mm"), ContactLaw.impact(), hard):
         train = meshed(contact=contact)
         assert train.mesh_dynamics["mesh"].damping_ratio > 1
-        damped = r"mesh 'mesh' is damped .* times critically by its law"
+        damped = says("mesh 'mesh'", "damped")
         for analysis in (train_modes, Drivetrain.torsional):
             with pytest.warns(UserWarning, match=damped):
                 analysis(train)
@@ -268,14 +269,14 @@ def test_chain_tells_frequencies_of_what_oscillates():
 
 @pytest.mark.parametrize("phase", ["x", True, math.nan, math.inf])
 def test_phase_is_a_number(phase):
-    with pytest.raises(DrivetrainError, match=r"mesh 'mesh': phase is .*; give a number of pitches"):
+    with pytest.raises(DrivetrainError, match=says("mesh 'mesh'", "phase", "give a number")):
         GearMesh(name="mesh", driver="pinion", driven="gear", phase=phase)
     assert GearMesh(name="mesh", driver="pinion", driven="gear", phase=np.float64(0.5)).phase == 0.5
 
 
 @pytest.mark.parametrize("harmonics", [0, -1, 2.5, True, "3"])
 def test_harmonics_are_a_whole_number(harmonics):
-    with pytest.raises(DrivetrainError, match=r"run.harmonics is .*; give a whole number of mesh harmonics from 1 up"):
+    with pytest.raises(DrivetrainError, match=says("run.harmonics", "1", "give a whole number")):
         RunSettings(harmonics=harmonics)
     assert RunSettings(harmonics=1).harmonics == 1
 
@@ -336,11 +337,9 @@ def test_the_torque_of_either_shaft():
     assert by_output.with_changes(input_torque=50.0).torque == pytest.approx(150.0)
     assert "300 N m on the driven wheel" in repr(by_output)
     assert GearPair(one, two).torque == 100.0
-    with pytest.raises(
-        ValueError, match=r"torque is 300.0, on the driven wheel, and input_torque 100.0, on the driver"
-    ):
+    with pytest.raises(ValueError, match=says("torque", "300.0", "driven wheel", "input_torque 100.0")):
         GearPair(one, two, torque=300.0, input_torque=100.0)
-    with pytest.raises(gm.CaseError, match="torque is that of the driven wheel"):
+    with pytest.raises(gm.CaseError, match="torque is that"):
         gm.Case(operation={"input_torque": "100 N m"})
 
 
@@ -353,11 +352,11 @@ def test_diameters_and_radii():
     made = [Shaft(name="a", sections=sections) for sections in (pairs, tables, flexible)]
     for one in made:
         assert np.array(one.cylinders) == pytest.approx(np.array([(0.1, 0.015), (0.05, 0.02)]))
-    with pytest.raises(DrivetrainError, match=r"radius is 0.015 m and diameter 0.03 m; give one of them"):
+    with pytest.raises(DrivetrainError, match=says("radius", "0.015 m", "diameter 0.03 m", "give")):
         Shaft(name="a", radius="15 mm", diameter="30 mm")
-    with pytest.raises(DrivetrainError, match="give diameter or sections, not both"):
+    with pytest.raises(DrivetrainError, match=says("sections", "give diameter")):
         Shaft(name="a", diameter="30 mm", sections=pairs)
-    with pytest.raises(DrivetrainError, match="without bore or cone"):
+    with pytest.raises(DrivetrainError, match=says("'100 mm'", "'30 mm'", "without bore")):
         Shaft(name="a", sections=[ShaftSection("100 mm", "30 mm", inner="10 mm")])
     with pytest.raises(DrivetrainError, match="give length and diameter"):
         Shaft(name="a", sections=[{"length": 0.1, "width": 0.2}])

@@ -14,6 +14,7 @@ from scipy.io import mmread
 
 from gearmbs.flexible import FlexibleError, check_model, read_ansys
 from tests.flexible.test_files import cube
+from tests.says import says
 
 FILES = os.environ.get("GEARMBS_ANSYS_FILES")
 
@@ -86,34 +87,34 @@ def test_files_of_ansys_that_lie_are_named(reader, tmp_path):
         (
             body(ids, **loose)[1],
             nodes,
-            "3 degrees of freedom of 1 nodes",
+            says("3", "1 nodes"),
         ),
-        (body(ids, m=None)[1], nodes, "it has no mass; write it in a modal analysis"),
+        (body(ids, m=None)[1], nodes, says("write", "modal analysis")),
         (
             body(ids, dofs=heat)[1],
             nodes,
             "freedom 20 of node 1",
         ),
-        (body(ids, dofs=twice)[1], nodes, "direction 1 of node 3 is there twice"),
-        (FullFile(None, k, m), nodes, "its matrices cannot be read .RuntimeError: short read"),
-        (types.SimpleNamespace(mesh=1), nodes, "it is a SimpleNamespace, no file with matrices"),
-        (full, (ids[:7], corners[:7]), "the matrices name node 8, which is not in the node table"),
-        (full, (ids[:7], corners), "7 numbers of nodes for 8 positions"),
-        (full, tmp_path / "none.rst", "none.rst: there is no such file"),
+        (body(ids, dofs=twice)[1], nodes, says("1", "3", "twice")),
+        (FullFile(None, k, m), nodes, says("read", "RuntimeError")),
+        (types.SimpleNamespace(mesh=1), nodes, says("SimpleNamespace")),
+        (full, (ids[:7], corners[:7]), says("8", "matrices name node")),
+        (full, (ids[:7], corners), says("7", "nodes", "8")),
+        (full, tmp_path / "none.rst", says("none.rst")),
     ]
     for content, given, message in cases:
         with pytest.raises(FlexibleError, match=message):
             read_ansys(reader("b.full", content), given)
-    with pytest.raises(FlexibleError, match=r"none\.full: there is no such file"):
+    with pytest.raises(FlexibleError, match=says("none.full")):
         read_ansys(tmp_path / "none.full", nodes)
     (tmp_path / "small.full").write_bytes(b"odd")
-    with pytest.raises(FlexibleError, match=r"small\.full: 3 bytes are no file with matrices"):
+    with pytest.raises(FlexibleError, match=says("small.full", "3 bytes")):
         read_ansys(tmp_path / "small.full", nodes)
     (tmp_path / "odd.full").write_bytes(bytes(4096))
     full._header = {"ptrEND": 5000}
-    with pytest.raises(FlexibleError, match=r"b\.full: byte 4096: it is cut off; its header says .* 20000 bytes"):
+    with pytest.raises(FlexibleError, match=says("b.full", "4096", "header", "20000 bytes")):
         read_ansys(reader("b.full", full), nodes)
-    with pytest.raises(FlexibleError, match=r"odd\.full: it is no file with matrices \(.full\) of Ansys"):
+    with pytest.raises(FlexibleError, match=says("odd.full", "Ansys")):
         read_ansys(tmp_path / "odd.full", nodes)
 
 
@@ -123,10 +124,10 @@ def test_terms_are_counted_and_a_reader_that_breaks_down_is_survived(reader):
     full._header = {"ntermKl": full.parts[1].nnz, "ntermMl": full.parts[2].nnz}
     assert check_model(read_ansys(reader("c.full", full), (ids, corners))).good
     full._header = {"ntermKl": full.parts[1].nnz + 3, "ntermMl": full.parts[2].nnz}
-    with pytest.raises(FlexibleError, match=r"c\.full: its header says that the stiffness has \d+ terms, it has \d+"):
+    with pytest.raises(FlexibleError, match=says("c.full", "header")):
         read_ansys(reader("c.full", full), (ids, corners))
     full.load_km = lambda sort: os.kill(os.getpid(), signal.SIGKILL)
-    with pytest.raises(FlexibleError, match=r"c\.full: its matrices cannot be read: its indices lead out of it"):
+    with pytest.raises(FlexibleError, match=says("c.full", "read")):
         read_ansys(reader("c.full", full), (ids, corners))
 
 
@@ -138,7 +139,7 @@ def test_without_the_reader_its_extra_is_named(monkeypatch):
 
 def test_the_example_of_the_reader_is_held_and_refused():
     examples = pytest.importorskip("ansys.mapdl.reader.examples")
-    with pytest.raises(FlexibleError, match=r"file\.full: 63 degrees of freedom of 21 nodes \(1 and so on\) are held"):
+    with pytest.raises(FlexibleError, match=says("file.full", "63", "21", "1")):
         read_ansys(examples.fullfile, examples.rstfile)
 
 
@@ -164,5 +165,5 @@ def test_public_rotor_of_ansys(tmp_path):
     cut, data = tmp_path / "cut.full", (folder / "sparse.full").read_bytes()
     for size in (100, 3000, 60000, 150000):
         cut.write_bytes(data[:size])
-        with pytest.raises(FlexibleError, match=r"cut\.full: (byte \d+: it is cut off|100 bytes)"):
+        with pytest.raises(FlexibleError, match=r"cut\.full: .*(cut off|100 bytes)"):
             read_ansys(cut, (nodes[:, 0].astype(int), nodes[:, 1:4]))

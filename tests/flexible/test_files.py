@@ -28,6 +28,7 @@ from gearmbs.flexible import (
 )
 from gearmbs.flexible.fe_model import MassProperties
 from gearmbs.mechanism import Mechanism
+from tests.says import says
 
 MNF = os.environ.get("GEARMBS_MNF_FILES")
 ROTOR = os.environ.get("GEARMBS_ROTOR_FILES")
@@ -108,14 +109,14 @@ def changed(path: Path, at: int, new: bytes) -> Path:
     ("at", "new", "message"),
     [
         (0, b"\x3c\x01\x00\x00", "little-endian"),
-        (0, b"\x00\x00\x01\x32", "not the version code"),
-        (0xA14, b"\x05\x00\x00\x00", "no number of them"),
+        (0, b"\x00\x00\x01\x32", says("MNF", "version code")),
+        (0xA14, b"\x05\x00\x00\x00", "number of them"),
         (0xA14 + 4, b"\x00\x00\x00\x02", "nodes of 2 coordinates"),
         (0xA14 + 8, b"\x00\x00\x00\x02", "there twice"),
         (0xA14 + 12, b"\x7f\xf8" + bytes(6), "not finite"),
-        (0xA14 - 400 + 4 * 9, b"\x00\x00\x00\x01", "generalised stiffness, which is not understood"),
+        (0xA14 - 400 + 4 * 9, b"\x00\x00\x00\x01", says("generalised stiffness")),
         (0xA14 - 400 + 4 * 5, b"\x00\x00\x00\x00", "no nodal masses"),
-        (0xA14 + 8 + 5 * 28, b"\x40\x59" + bytes(6), "nodal masses sum to"),
+        (0xA14 + 8 + 5 * 28, b"\x40\x59" + bytes(6), says("nodal masses sum")),
     ],
 )
 def test_files_that_lie_are_named(tmp_path, at, new, message):
@@ -129,15 +130,15 @@ def test_numbers_that_do_not_fit_each_other_are_named(tmp_path):
     found = read_mnf(path)
     shapes = found.shapes * [1e3, 1e3, 1e3, 1, 1, 1]
     write_mnf(path, replace(found, shapes=shapes))
-    with pytest.raises(FlexibleError, match=r"bar.mnf: mode 1: its shape has the mass 1.*e\+06 .* other units"):
+    with pytest.raises(FlexibleError, match=says("bar.mnf", "1", "06", "units")):
         read_mnf(path)
     eigenvalues = found.eigenvalues.copy()
     eigenvalues[9, 0] *= 1.01
     write_mnf(path, replace(found, eigenvalues=eigenvalues))
-    with pytest.raises(FlexibleError, match=r"mode 10: eigenvalue .* do not fit each other"):
+    with pytest.raises(FlexibleError, match=says("10", "fit each other")):
         read_mnf(path)
     write_mnf(path, replace(found, units=("KILOGRAM", "MILLIMETER", "SECOND", "NEWTON"), unit_bytes=b""))
-    with pytest.warns(UserWarning, match="units of mass and length do not fit; the file names KILOGRAM, MILLIMETER"):
+    with pytest.warns(UserWarning, match=says("units", "file", "KILOGRAM", "MILLIMETER")):
         read_mnf(path)
 
 
@@ -145,7 +146,7 @@ def test_other_nodes_units_and_no_nodal_inertias(tmp_path):
     found = read_mnf(rotating_bar_file(tmp_path))
     path = tmp_path / "other.mnf"
     write_mnf(path, replace(found, units=("STONE", "METER", "SECOND", "NEWTON"), unit_bytes=b""))
-    with pytest.raises(FlexibleError, match="unit of mass 'STONE' is not known"):
+    with pytest.raises(FlexibleError, match=says("unit", "mass 'STONE'")):
         read_mnf(path)
     small = replace(
         found, units=("MEGAGRAM", "MILLIMETER", "SECOND", "NEWTON"), unit_bytes=b"", positions=1e3 * found.positions,
@@ -157,7 +158,7 @@ def test_other_nodes_units_and_no_nodal_inertias(tmp_path):
     np.testing.assert_allclose(scaled.properties.mass, found.mass, rtol=1e-12)
     np.testing.assert_allclose(np.ptp(scaled.positions[:, 2]), 0.4, rtol=1e-12)
     np.testing.assert_allclose(np.diag(scaled.integrals.mass), 1e-3, rtol=1e-12)
-    with pytest.raises(FlexibleError, match="there is no node 9"):
+    with pytest.raises(FlexibleError, match="no node 9"):
         scaled.place(9)
 
 
@@ -271,16 +272,16 @@ def test_wrong_units_of_a_file_are_warned_of(tmp_path):
             np.testing.assert_allclose(found.wave_speed(found.mass_properties()), np.sqrt(210e9 / 7850), rtol=0.02)
     inches = {"length": 0.0254, "force": 4.448, "mass_unit": 175.1}
     for wrong in ({}, {"length": 1e-3}, {"length": 1e-3, "force": 1e3, "mass_unit": 1e3}, inches):
-        with pytest.warns(UserWarning, match=r"waves run at .* m/s in it, faster than in any material: give the units"):
+        with pytest.warns(UserWarning, match=says("give the units", "material")):
             found = reduce_model(read_abaqus(*paths, **wrong), parts, modes=4)
         assert not check_model(read_abaqus(*paths, **wrong)).good
-    with pytest.warns(UserWarning, match=r"it has .* kg/m\^3 or more, and waves run at 16\d m/s in it: give the units"):
+    with pytest.warns(UserWarning, match=says("3", "give the units")):
         reduce_model(read_abaqus(*paths, length=1e-3, mass_unit=1e6), parts, modes=4)
     for wrong, message in (
-        ({"length": -1}, "length = -1; give the file's unit, above zero"),
-        ({"length": 0}, "length = 0; give the file's unit, above zero"),
+        ({"length": -1}, says("length = -1", "unit", "give the file's")),
+        ({"length": 0}, says("length = 0", "unit", "give the file's")),
         ({"force": np.inf}, "force = inf; give"),
-        ({"mass_unit": "mm"}, "mass_unit: '1 mm' is in mm where a quantity in kg is expected"),
+        ({"mass_unit": "mm"}, says("mass_unit", "'1 mm'", "expected")),
         ({"length": None}, "length: got None"),
     ):
         with pytest.raises(FlexibleError, match=message):
@@ -304,11 +305,11 @@ def test_a_mass_file_of_abaqus_that_ends_early(tmp_path):
     files = [tmp_path / name for name in ("k.mtx", "m.mtx", "n.inp")]
     assert check_model(read_abaqus(*files)).good
     files[1].write_text("".join(files[1].read_text().splitlines(True)[:15]))
-    with pytest.raises(FlexibleError, match=r"m\.mtx: 9 displacements, from node 6 on, have stiffness and no mass"):
+    with pytest.raises(FlexibleError, match=says("m.mtx", "9 displacements", "6", "mass")):
         read_abaqus(*files)
     write_triplets(files[1], m, both=False, pairs=True)
     files[0].write_text("".join(files[0].read_text().splitlines(True)[:40]))
-    with pytest.raises(FlexibleError, match=r"k\.mtx: it lacks direction \d of node \d, which has mass"):
+    with pytest.raises(FlexibleError, match=says("k.mtx", "mass", "lacks direction")):
         read_abaqus(*files)
     half = np.diag([0.5] * 21 + [0.0] * 3)
     report = check_model(from_matrices(k, half, corners))
@@ -328,7 +329,7 @@ def test_op4_files_through_pyyeti(tmp_path):
     with pytest.raises(FlexibleError, match="no matrix 'kaa'; matrices: kxx, mxx"):
         read_op4(path, model.positions, 6, stiffness="kaa")
     path.write_bytes(path.read_bytes()[:100])
-    with pytest.raises(FlexibleError, match=r"bar\.op4: byte \d+: a record of \d+ bytes is cut off"):
+    with pytest.raises(FlexibleError, match=says("bar.op4", "bytes")):
         read_op4(path, model.positions, 6)
 
 
@@ -338,9 +339,9 @@ def test_op4_files_through_pyyeti(tmp_path):
         (lambda f: f["sti"].write_text("1 1\n"), r"a.sti: line 1: 2 columns"),
         (
             lambda f: f["sti"].write_text("1 1 2.0\n2 2\n"),
-            r"a.sti: line 2: 2 columns instead of 3; the file is cut off",
+            says("a.sti", "2", "3", "columns instead"),
         ),
-        (lambda f: f["sti"].write_text("1 1 2.x\n"), r"a.sti: line 1: an entry is no number"),
+        (lambda f: f["sti"].write_text("1 1 2.x\n"), says("a.sti", "1", "number")),
         (lambda f: f["sti"].write_text("1 1 nan\n"), r"a.sti: line 1: not finite"),
         (lambda f: f["sti"].write_text("0 1 1.0\n"), r"count from 1"),
         (lambda f: f["sti"].write_text(""), r"no entries"),
@@ -350,13 +351,13 @@ def test_op4_files_through_pyyeti(tmp_path):
             lambda f: f["dof"].write_text("1.1\n1.\u00b2\n", "latin-1"),
             r"a.dof: line 2: '1.\u00b2' is no node.direction",
         ),
-        (lambda f: f["dof"].write_text("1.1\n1.2"), r"a.dof: line 2: the file ends within it, and may be cut off"),
-        (lambda f: f["sti"].write_bytes(f["sti"].read_bytes()[:-1]), r"a.sti: line \d+: the file ends within it"),
-        (lambda f: f["inp"].write_text("*NODE\n1, 0, 0, 0.2"), r"a.inp: line 2: the file ends within it"),
-        (lambda f: f["sti"].write_bytes(b"1 1 2.0\n1 \xe4 2.0\n"), r"a.sti: line 2: an entry is no number"),
+        (lambda f: f["dof"].write_text("1.1\n1.2"), says("a.dof", "2", "file ends within")),
+        (lambda f: f["sti"].write_bytes(f["sti"].read_bytes()[:-1]), says("a.sti", "file ends within")),
+        (lambda f: f["inp"].write_text("*NODE\n1, 0, 0, 0.2"), says("a.inp", "2", "file ends within")),
+        (lambda f: f["sti"].write_bytes(b"1 1 2.0\n1 \xe4 2.0\n"), says("a.sti", "2", "number")),
         (
             lambda f: f["sti"].write_bytes(b"1 1 2.0\n24 23 2.0\n"),
-            r"23 displacements, from node 1 on, have mass and no",
+            says("23", "node 1"),
         ),
         (
             lambda f: f["dof"].write_text("".join(f"{i // 3 + 5}.{i % 3 + 1}\n" for i in range(24))),
@@ -364,10 +365,10 @@ def test_op4_files_through_pyyeti(tmp_path):
         ),
         (lambda f: f["inp"].write_text("*NODE\n1, 0, 0\n"), r"a.inp: line 2: .* is no node"),
         (lambda f: f["inp"].write_text("*ELEMENT\n1, 0, 0\n"), r"it has no nodes"),
-        (lambda f: f["mas"].unlink(), r"a.mas: there is no such file"),
+        (lambda f: f["mas"].unlink(), says("a.mas", "such file")),
         (
             lambda f: f["mas"].write_text("".join(f["mas"].read_text().splitlines(True)[:21])),
-            r"a.mas: 3 displacements, from node 8 on, have stiffness and no mass: the file is cut off",
+            says("a.mas", "3", "node 8"),
         ),
     ],
 )
@@ -394,7 +395,7 @@ def test_models_that_are_no_free_bodies_are_refused_or_remarked():
         from_matrices(np.triu(k), m, corners)
     with pytest.raises(FlexibleError, match="in x, y and z"):
         reduce_model(from_matrices(k, np.diag([0.0] + [0.5] * 23), corners), [], method="free")
-    with pytest.raises(FlexibleError, match="8 nodes of 6 degrees of freedom make 48"):
+    with pytest.raises(FlexibleError, match=says("8", "6", "48", "degrees of freedom")):
         from_matrices(k, m, corners, dofs=6)
     with pytest.raises(FlexibleError, match="below max_frequency"):
         reduce_model(from_matrices(k, m, corners), [], method="free", max_frequency=1e-3)

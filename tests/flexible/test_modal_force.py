@@ -6,6 +6,7 @@ import pytest
 from gearmbs.flexible import Shaft, ShaftSection
 from gearmbs.mechanism import Mechanism, ModelError, add_modal_force
 from gearmbs.mechanism.forces.modal_force import frame_marker
+from tests.says import says
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +54,9 @@ def test_modal_coordinates_that_do_not_exist_are_named(bar):
     m = Mechanism("wrong")
     body = bar.add_to(m, "bar")
     m.body("rigid", 1.0, (1.0, 1.0, 1.0))
-    with pytest.raises(ModelError, match="body 'bar': mode 5; modes go from 1 to 4"):
+    with pytest.raises(ModelError, match=says("body 'bar'", "mode 5", "1", "4")):
         body.mode(5)
-    for text, message in (("MODAL(bar,9)", "4"), ("MODAL(rigid,1)", "no body RIGID with modes; those with modes: BAR")):
+    for text, message in (("MODAL(bar,9)", "4"), ("MODAL(rigid,1)", says("body RIGID", "BAR"))):
         m.elements.pop("f", None)
         add_modal_force(m, "f", body, np.eye(10)[6], text)
         with pytest.raises(ModelError, match=message):
@@ -101,7 +102,7 @@ def test_force_and_reaction_keep_the_momentum(bar):
 def test_what_is_no_load_is_refused(bar):
     m = Mechanism("m")
     body = bar.add_to(m, "bar")
-    with pytest.raises(ModelError, match="it has 4 numbers; force, torque and the forces on 4 modes are 10"):
+    with pytest.raises(ModelError, match=says("4", "force", "10")):
         add_modal_force(m, "f", body, np.ones(4))
-    with pytest.raises(ModelError, match="has no modes; apply a load"):
+    with pytest.raises(ModelError, match=says("'rigid'", "apply a load")):
         add_modal_force(m, "f", m.body("rigid", 1.0, (1, 1, 1)), np.ones(10))

@@ -23,6 +23,7 @@ from gearmbs.flexible import (
 from gearmbs.flexible.files.nastran import op2_tables
 from tests.flexible.op2_files import Op2Writer
 from tests.generators import cases, seed
+from tests.says import says
 
 with np.printoptions():
     op4 = pytest.importorskip("pyyeti.nastran.op4")
@@ -193,7 +194,7 @@ def test_grid_points_of_geom1_alone_make_the_same_body(tmp_path, bar):
         np.testing.assert_array_equal(found.positions, whole.positions)
         np.testing.assert_allclose(found.moved, whole.moved, rtol=1e-12, atol=1e-15)
         np.testing.assert_allclose(found.properties.inertia, whole.properties.inertia, rtol=1e-12, atol=1e-15)
-    with pytest.raises(FlexibleError, match=r"no grid points \(GEOM1 is missing; GEOM1 alone would do\)"):
+    with pytest.raises(FlexibleError, match=r"GEOM1.*missing.*GEOM1 alone"):
         read_op2_modes(modes_file(tmp_path / "c.op2", bar, model, without=("GEOM1",)))
 
 
@@ -204,7 +205,7 @@ def test_shapes_that_are_no_modes_are_named(tmp_path, bar, analysis, what):
     data = file.read_bytes()
     at = data.index(np.array([22, 7, 0, 1, 1], "<i4").tobytes())
     file.write_bytes(data[:at] + np.array([10 * analysis + 2], "<i4").tobytes() + data[at + 4 :])
-    with pytest.raises(FlexibleError, match=f"OUGV1 holds {what} in 8 words a point and no real modes; run SOL 103"):
+    with pytest.raises(FlexibleError, match=says("OUGV1", what, "SOL 103")):
         read_op2_modes(file)
 
 
@@ -212,21 +213,21 @@ def test_modes_and_masses_must_fit(tmp_path, bar):
     model = reduce_model(bar, modes=6)
     own = mnf_of(model)
     without = modes_file(tmp_path / "a.op2", bar, model, mgg=False)
-    with pytest.raises(FlexibleError, match="modes without masses of the grid points make no body; export MGG"):
+    with pytest.raises(FlexibleError, match=says("modes without masses", "MGG")):
         read_op2_modes(without)
     found = read_op2_modes(without, own.nodal_masses, inertias=own.inertias())
     np.testing.assert_allclose(found.eigenvalues[:, 1], model.frequencies, rtol=1e-6)
-    with pytest.raises(FlexibleError, match="its grid point weight generator says"):
+    with pytest.raises(FlexibleError, match=says("weight", "generator says")):
         read_op2_modes(without, 2 * own.nodal_masses)
-    with pytest.raises(FlexibleError, match="mode 1 has the generalised mass 1 in the file and"):
+    with pytest.raises(FlexibleError, match=says("mass 1", "file")):
         read_op2_modes(without, np.eye(5)[0] * own.nodal_masses.sum())
-    with pytest.raises(FlexibleError, match="they are 5 numbers, none negative"):
+    with pytest.raises(FlexibleError, match=says("5", "none negative")):
         read_op2_modes(without, own.nodal_masses[:3])
-    with pytest.raises(FlexibleError, match="has no shapes of grid point 4; ask for all points"):
+    with pytest.raises(FlexibleError, match=says("4", "ask for all")):
         read_op2_modes(modes_file(tmp_path / "b.op2", bar, model, drop=3))
     with pytest.raises(FlexibleError, match=r"no table of eigenvalues \(LAMA\)"):
         read_op2_modes(g_set_file(tmp_path / "c.op2", bar))
-    with pytest.raises(FlexibleError, match="grid point weight generator says"):
+    with pytest.raises(FlexibleError, match=says("weight", "generator says")):
         read_op2_modes(modes_file(tmp_path / "d.op2", bar, model, weight=1e-3 * model.properties.mass))
 
 
@@ -236,7 +237,7 @@ def test_op2_files_that_lie_are_named(tmp_path, bar):
     cut = tmp_path / "cut.op2"
     for share in np.linspace(0.02, 0.999, 25):
         cut.write_bytes(data[: int(share * len(data))])
-        with pytest.raises(FlexibleError, match=r"cut\.op2: byte \d+: .*(cut off|within a data block)"):
+        with pytest.raises(FlexibleError, match=r"cut\.op2: byte \d+: .*(cut off|within)"):
             read_op2(cut)
     for text, message in ((b"\x07\x00\x00\x00" + data[4:], "byte 0: 07000000 begins no op2"), (b"", "begins no op2")):
         cut.write_bytes(text)
@@ -244,17 +245,17 @@ def test_op2_files_that_lie_are_named(tmp_path, bar):
             read_op2(cut)
     at = data.index(b"BGPDT") - 4
     cut.write_bytes(data[:at] + b"\x0a\x00\x00\x00" + data[at + 4 :])
-    with pytest.raises(FlexibleError, match=rf"byte {at}: a record of 10 bytes does not end where it says"):
+    with pytest.raises(FlexibleError, match=says(f"byte {at}", "10 bytes")):
         read_op2(cut)
-    with pytest.raises(FlexibleError, match=r"none\.op2: there is no such file"):
+    with pytest.raises(FlexibleError, match=says("none.op2", "file")):
         read_op2(tmp_path / "none.op2")
-    with pytest.raises(FlexibleError, match=r"it has no matrix 'kxx'; matrices: .*mgg"):
+    with pytest.raises(FlexibleError, match=says("matrix 'kxx'", "mgg")):
         read_op2(file, stiffness="KXX")
-    with pytest.raises(FlexibleError, match="the stiffness has 30 rows and 30 columns, the grid points have 2 degrees"):
+    with pytest.raises(FlexibleError, match=says("stiffness", "30", "2")):
         read_op2(file, dofs=[(1, 1), (1, 2)])
     bare = Op2Writer()
     bare.matrix("KGG", bar.stiffness.toarray())
-    with pytest.raises(FlexibleError, match=r"no grid points \(GEOM1, BGPDT, EQEXIN are missing;.*Data blocks: KGG"):
+    with pytest.raises(FlexibleError, match=says("GEOM1", "BGPDT", "EQEXIN", "Data", "KGG")):
         read_op2(bare.write(tmp_path / "bare.op2"))
     held = Op2Writer()
     held.grids(bar.ids, 1e3 * bar.positions)
@@ -296,7 +297,7 @@ def test_stresses_of_op2_are_means_of_elements_and_follow_the_modes(tmp_path, ba
     np.testing.assert_allclose(body.stress_modes().values, found.values / 2e6, rtol=1e-6, atol=1e-6)
     few = body.selected([4, 1])
     np.testing.assert_allclose(few.stress_modes().values, body.stress_modes().values[[4, 1]], rtol=1e-9, atol=1e-9)
-    with pytest.raises(FlexibleError, match="its stresses are not known"):
+    with pytest.raises(FlexibleError, match=says("stresses", "known")):
         read_op2_modes(tmp_path / "a.op2").modal_model("bar").stress_modes()
 
 
@@ -304,12 +305,12 @@ def test_stresses_of_op2_that_cannot_be_taken_are_named(tmp_path, bar):
     model = reduce_model(bar, modes=2)
     values = np.ones((model.modes, 2, 4, 6))
     cases = [
-        ({"system": 3}, "stresses of CTETRA 7 are in coordinate system 3; leave CORDM of its PSOLID blank"),
-        ({"w1": 2005}, "a table of code 2005, format 1, where 5 and 1 are stresses of real modes"),
-        ({"w8": 3}, "a table of code 5, format 3"),
-        ({"w9": 50}, "872 bytes are no elements of 50 words"),
+        ({"system": 3}, says("stresses", "CTETRA 7", "system 3", "PSOLID", "leave CORDM")),
+        ({"w1": 2005}, says("2005", "1", "5", "stresses", "modes")),
+        ({"w8": 3}, says("5", "3", "table of code")),
+        ({"w9": 50}, says("872 bytes", "50 words")),
         ({"w9": 218}, "CTETRA has 218 words, 109 hold the stresses"),
-        ({"w4": 1}, "mode 1 has its stresses twice; write one subcase"),
+        ({"w4": 1}, says("1", "stresses", "write")),
     ]
     for head, message in cases:
         with pytest.raises(FlexibleError, match=message):
@@ -318,17 +319,17 @@ def test_stresses_of_op2_that_cannot_be_taken_are_named(tmp_path, bar):
     words = np.frombuffer(whole, "<i4").copy()
     words[np.flatnonzero(words == 39)[1]] = 40
     (tmp_path / "a.op2").write_bytes(words.tobytes())
-    with pytest.raises(FlexibleError, match="mode 2 has stresses of elements of type 40 and none of solids"):
+    with pytest.raises(FlexibleError, match=says("2", "stresses", "40")):
         read_op2_stresses(tmp_path / "a.op2")
-    with pytest.raises(FlexibleError, match=f"stresses of 1 modes, LAMA has {model.modes}; ask for all"):
+    with pytest.raises(FlexibleError, match=says("1 modes", "LAMA", str(model.modes), "ask for all")):
         read_op2_modes(with_stresses(tmp_path / "a.op2", bar, model, values[:1]), stresses=True)
-    with pytest.raises(FlexibleError, match=r"no stresses of solid elements \(OES1X1, OES1X, OES1\)"):
+    with pytest.raises(FlexibleError, match=says("stresses", "OES1X1", "OES1X", "OES1")):
         read_op2_stresses(modes_file(tmp_path / "b.op2", bar, model))
     writer = Op2Writer()
     writer.grids(bar.ids, bar.positions)
     writer.stresses(BARS, values, kind=39)
     writer.stresses([(9, 1, 2, 3, 4)], values[:, :1], kind=1, name="OES1")
-    with pytest.warns(UserWarning, match=r"elements that are no solids \(types 1 of Nastran\) are left out"):
+    with pytest.warns(UserWarning, match=says("1", "left out")):
         assert len(read_op2_stresses(writer.write(tmp_path / "c.op2")).values) == model.modes
 
 
@@ -402,12 +403,12 @@ def test_op4_files_that_lie_are_named(tmp_path, bar):
     assert ends[-1] == len(data)
     for end in {*ends[:-1], *(end + part for end in (0, *ends[:-1]) for part in (1, 3, 4, 7, 8, 20))}:
         cut.write_bytes(data[:end])
-        with pytest.raises(FlexibleError, match=r"cut\.op4: (byte \d+: .*cut off|it has no matrix|byte 0)"):
+        with pytest.raises(FlexibleError, match=r"cut\.op4: .*(cut off|matrix|byte 0)"):
             read_op4(cut, assembly=tmp_path / "bar.asm")
-    with pytest.raises(FlexibleError, match="give positions and dofs, or assembly"):
+    with pytest.raises(FlexibleError, match=says("assembly", "give positions")):
         read_op4(file)
     (tmp_path / "short.asm").write_text(ASSEMBLY.replace("SPOINT   2995001 2995002\n", "SPOINT   2995001\n"))
-    with pytest.raises(FlexibleError, match=r"14 rows and 14 columns, the grid points have|no assembly file"):
+    with pytest.raises(FlexibleError, match=r"14 rows|no assembly file"):
         read_op4(file, assembly=tmp_path / "short.asm")
     (tmp_path / "no.asm").write_text("nothing\n")
     with pytest.raises(FlexibleError, match=r"no\.asm: it is no assembly file"):
@@ -416,7 +417,7 @@ def test_op4_files_that_lie_are_named(tmp_path, bar):
     whole = cut.read_bytes()
     for end in range(1, len(whole.rstrip().rpartition(b"\n")[0]), 37):
         cut.write_bytes(whole[:end])
-        with pytest.raises(FlexibleError, match=r"cut\.op4: (it cannot be read as OP4|it has no matrix)"):
+        with pytest.raises(FlexibleError, match=r"cut\.op4: .*(OP4|no matrix)"):
             read_op4(cut, assembly=tmp_path / "bar.asm")
 
 

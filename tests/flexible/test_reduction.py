@@ -22,6 +22,7 @@ from gearmbs.flexible.interfaces import resolve
 from gearmbs.flexible.reduction import of_lumps, of_mass_matrix
 from gearmbs.mechanism import Mechanism, ShapeIntegrals, static_equilibrium
 from tests.flexible.test_files import cube
+from tests.says import says
 
 
 def tower(floors: int = 6):
@@ -157,20 +158,23 @@ def test_sparse_and_dense_solvers_agree():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Interface("f", [1, 2, 3], "soft"), "choose one of rigid, average"),
+        (lambda: Interface("f", [1, 2, 3], "soft"), says("rigid", "choose", "average")),
         (lambda: Interface("f", []), "no nodes"),
         (lambda: Interface("f", [1, 2, 3], weights=[1.0]), "1 weights for 3 nodes"),
         (lambda: reduce_model(tower(), [Interface("f", [1, 2])]), "determine no rotation"),
-        (lambda: reduce_model(tower(), [Interface("f", [1, 2, 99])]), "there is no node 99"),
-        (lambda: reduce_model(tower(), ["f"]), "there is no seat 'f'"),
+        (lambda: reduce_model(tower(), [Interface("f", [1, 2, 99])]), says("99", "node")),
+        (lambda: reduce_model(tower(), ["f"]), says("'f'", "seat")),
         (lambda: reduce_model(tower(), [*ends("rigid"), Interface("x", [4, 5, 6])]), "in the rigid faces"),
         (lambda: reduce_model(tower(), [*ends("rigid"), *ends("rigid")]), "is there twice"),
         (lambda: reduce_model(tower(), []), "needs interfaces"),
-        (lambda: reduce_model(tower(), ends("rigid"), modes=0), "needs one at least"),
-        (lambda: reduce_model(tower(), ends("rigid"), method="guess"), "choose one of craig-bampton, free"),
-        (lambda: reduce_model(tower(), ends("rigid"), modes=500), "beside its static shapes the model has"),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=0), "at least"),
+        (
+            lambda: reduce_model(tower(), ends("rigid"), method="guess"),
+            says("'guess'", "choose", "craig-bampton"),
+        ),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=500), says("shapes", "model", "beside its static")),
         (lambda: reduce_model(tower(), ends("rigid"), modes=4).shapes(np.array([0.3, 0.3, 0.3])), "the nearest, "),
-        (lambda: reduce_model(tower(), ends("rigid"), modes=4).place("roof"), "there is no seat 'roof'"),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=4).place("roof"), says("'roof'")),
     ],
 )
 def test_wrong_interfaces_are_named(make, message):
@@ -236,7 +240,7 @@ def test_what_modes_counts():
     sizes = [reduce_model(model, seats, max_frequency=limit).modes for limit in (1.0, 500.0, 2000.0, 2e4)]
     assert sizes[0] == static
     assert sizes == sorted(set(sizes))
-    with pytest.warns(UserWarning, match="modes are kept instead of"):
+    with pytest.warns(UserWarning, match=says("modes", "kept instead")):
         reduce_model(model, seats, modes=4).slowest(1 + static)
     with pytest.raises(FlexibleError, match="give 1 to 17"):
         reduce_model(model, seats, modes=4).slowest(18)

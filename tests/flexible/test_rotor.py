@@ -17,6 +17,7 @@ from gearmbs.flexible import (
     shear_coefficient,
 )
 from tests.generators import cases, seed
+from tests.says import says
 
 RPM = np.pi / 30
 PINNED = 1e15
@@ -158,9 +159,12 @@ def test_masses_of_sections_cones_and_discs():
         (lambda: Disc(0.1, outer=0.2), "give outer and width"),
         (lambda: ElasticMaterial(poisson_ratio=0.5), "poisson_ratio is 0.5"),
         (lambda: Rotor(Shaft([ShaftSection(1.0, 0.1)]), [Support("A", 1e6)]), "no such seat"),
-        (lambda: Rotor(Shaft([ShaftSection(1.0, 0.1)]), kind="radial"), "choose one of lateral"),
+        (
+            lambda: Rotor(Shaft([ShaftSection(1.0, 0.1)]), kind="radial"),
+            says("Rotor.kind", "'radial'", "lateral"),
+        ),
         (lambda: friswell().unbalance_response([1.0], {2.0: 1e-3}), "unbalance at 2.0 m"),
-        (lambda: Support("A", np.ones(3)).matrices(), "give one number, two"),
+        (lambda: Support("A", np.ones(3)).matrices(), says("give one number")),
     ],
 )
 def test_wrong_settings_are_named(make, message):
@@ -216,7 +220,7 @@ def test_unbalance_may_be_text_and_must_be_finite():
 
 def test_motions_that_grow_without_a_frequency_are_warned_of():
     shaft = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}, elements=6)
-    with pytest.warns(UserWarning, match=r"the rotor is unstable: \d+ motion"):
+    with pytest.warns(UserWarning, match=says("rotor", "unstable", "motion")):
         Rotor(shaft, [Support("A", -1e9), Support("B", 1e9)]).modes()
     for supports in ([Support("A", 1e9), Support("B", 1e9)], []):
         with warnings.catch_warnings():
@@ -227,6 +231,6 @@ def test_motions_that_grow_without_a_frequency_are_warned_of():
 @pytest.mark.parametrize("modes", [2.5, True, "8", 0])
 def test_a_number_of_modes_is_whole(modes):
     shaft = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}, elements=6)
-    with pytest.raises(FlexibleError, match=r"modes = .*; a modal body needs one at least, and a whole number"):
+    with pytest.raises(FlexibleError, match=says("modes", "modal", "whole number")):
         shaft.modal_model(modes)
     assert shaft.modal_model(np.int64(2)).modes

@@ -15,6 +15,7 @@ from gearmbs.mechanism import Mechanism
 from gearmbs.signals import SignalError, make_signal
 from gearmbs.units import doubt_of_material
 from tests.generators import cases, seed
+from tests.says import says
 
 REFUSED = (ValueError, TypeError)
 
@@ -109,29 +110,29 @@ def test_moments_of_a_disc_are_those_of_a_body(case):
     diametral = 10.0 ** rng.uniform(-6, 2)
     assert Disc(0.1, mass=3.0, polar=2.0 * diametral, diametral=diametral).polar == 2.0 * diametral
     over = diametral * (2.0 + 10.0 ** rng.uniform(-2, 3))
-    with pytest.raises(FlexibleError, match=r"polar = .* exceeds twice diametral = .* a thin disc has polar = 2 diam"):
+    with pytest.raises(FlexibleError, match=says("diametral", "disc", "polar = 2")):
         Disc(0.1, mass=3.0, polar=over, diametral=diametral)
-    with pytest.warns(UserWarning, match="the largest exceeds the sum of the others, as in no body"):
+    with pytest.warns(UserWarning, match=says("body", "largest exceeds")):
         Mechanism("m").body("b", 1.0, (diametral, diametral, over))
 
 
 def test_bores_that_overlap_are_refused():
     carrier = {"bore": 0.04, "outer": 0.2, "width": 0.02, "pin_circle": 0.12}
-    with pytest.raises(FlexibleError, match=r"12 pins of 0.04 m on a circle of 0.12 m overlap; .* 0.03106 m"):
+    with pytest.raises(FlexibleError, match=says("12 pins", "0.04 m", "circle", "0.12 m", "0.03106 m")):
         planet_carrier(pins=12, pin=0.04, **carrier)
     box = ("0.4 m", "0.3 m", "0.2 m")
-    with pytest.raises(FlexibleError, match=r"bearings of 0.08 m at \(0.24, 0.15\) m and \(0.2, 0.15\) m overlap"):
+    with pytest.raises(FlexibleError, match=says("0.08 m", "0.24", "0.15", "0.2", "bearings")):
         box_housing(box, 0.01, [(0.1, 0.15), (0.2, 0.15), (0.24, 0.15)], 0.08)
     with pytest.raises(FlexibleError, match=r"ShaftSection: bore 0.03 m in 0.03 m"):
         ShaftSection(0.1, 0.03, 0.03)
 
 
 def test_lengths_in_millimetres_are_doubted():
-    with pytest.warns(UserWarning, match=r"shaft 's': a length or radius of 120 m; are millimetres meant"):
+    with pytest.warns(UserWarning, match=says("shaft 's'", "length", "120 m")):
         RigidShaft(name="s", length=120.0)
-    with pytest.warns(UserWarning, match=r"7.85 kg/m\^3 is the density of no solid; is 7850 kg/m\^3 meant"):
+    with pytest.warns(UserWarning, match=says("7.85", "3", "density", "7850")):
         RigidShaft(name="s", length=0.1, density=7.85)
-    with pytest.raises(DrivetrainError, match="none may be negative"):
+    with pytest.raises(DrivetrainError, match=says("negative", "none")):
         ElasticBearing(name="b", shaft="s", stiffness=np.diag([1e8, 1e8, -1e8, 0, 0, 0]).tolist())
-    with pytest.raises(SignalError, match="teeth: must be positive whole numbers, got True"):
+    with pytest.raises(SignalError, match=says("teeth", "True")):
         make_signal(np.zeros(9), 1e3, teeth=True)

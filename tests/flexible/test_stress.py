@@ -16,6 +16,7 @@ from gearmbs.flexible import (
     reduce_model,
     solid_model,
 )
+from tests.says import says
 
 RADIUS = 0.02
 AREA = np.pi * RADIUS**2
@@ -109,11 +110,11 @@ def test_von_mises_and_what_is_refused():
     found = shear.peak([[1.0], [-3.0], [2.0]])
     assert found.instant == 1
     np.testing.assert_allclose(found.stress, 3 * np.sqrt(3))
-    with pytest.raises(FlexibleError, match=r"coordinates have shape \(2,\); there are stresses of 1 modes"):
+    with pytest.raises(FlexibleError, match=says("2", "1", "coordinates have shape")):
         shear.at([1.0, 2.0])
     with pytest.raises(FlexibleError, match="no instants"):
         shear.peak(np.zeros((0, 1)))
-    with pytest.raises(FlexibleError, match=r"values have shape \(1, 2, 6\) for 1 places"):
+    with pytest.raises(FlexibleError, match=says("1", "2", "6", "values have shape")):
         StressModes(np.zeros((1, 3)), np.zeros((1, 2, 6)))
     with pytest.raises(FlexibleError, match="not finite"):
         StressModes(np.zeros((1, 3)), np.full((1, 1, 6), np.nan))
@@ -130,5 +131,5 @@ def test_given_stresses_follow_the_modes():
     np.testing.assert_allclose(own.selected([5, 0]).stress_modes().values, values[[5, 0]], atol=1e-9)
     with pytest.raises(FlexibleError, match="stresses of 5 modes for 6 modes"):
         model.with_stresses(StressModes([[0, 0, 0.1], [0, 0, 0.2]], values[:5]))
-    with pytest.raises(FlexibleError, match="mode 7 is no combination of the 6 shapes"):
+    with pytest.raises(FlexibleError, match=says("7", "6", "combination")):
         own.recovery(BAR.modal_model().slowest(8).moved, None)

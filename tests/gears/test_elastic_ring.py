@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gearmbs.gears import ContactLaw, ElasticRim, GearSpec, PlanetarySet, RimModes, planetary_mechanism
+from tests.says import says
 
 GEARS = PlanetarySet(
     GearSpec(28, "2 mm", face_width="20 mm"),
@@ -96,6 +97,7 @@ def lines(x, orders, turns):
     return np.array([2 * abs(np.mean((x - x.mean()) * np.exp(-2j * np.pi * order * t))) for order in orders])
 
 
+@pytest.mark.slow
 def test_sidebands_of_the_carrier_at_a_fixed_sensor():
     """The rim's sensor hears orders 96 and 104, those of a rigid ring's seat nothing; energy is kept in both."""
     turns, points, begin = 1, 4096, 0.04
@@ -137,9 +139,9 @@ def test_a_stiff_rim_is_a_rigid_ring():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (dict(thickness="-1 mm"), "thickness is -0.001; give more than 0"),
-        (dict(waves=1), "waves is 1; give a whole number from 2 to 30"),
-        (dict(damping_ratio=-0.1), "damping_ratio is -0.1; give 0 or more"),
+        (dict(thickness="-1 mm"), says("thickness", "-0.001", "0", "give more")),
+        (dict(waves=1), says("waves", "1", "2", "30", "give a whole number")),
+        (dict(damping_ratio=-0.1), says("damping_ratio", "-0.1", "give 0")),
         (dict(bolt_stiffness=(1.0,)), "give two numbers"),
     ],
 )
@@ -149,7 +151,7 @@ def test_wrong_rims_are_named(changes, message):
 
 
 def test_where_a_rim_cannot_bend():
-    with pytest.raises(ValueError, match="a rim can bend on a ring that is held"):
+    with pytest.raises(ValueError, match=says("rim", "ring", "held", "bend")):
         planetary_mechanism(GEARS, held="carrier", speeds={"sun": 10.0}, rim=BOLTED)
     ideal = PlanetarySet(GEARS.sun, GEARS.planet, GEARS.ring, planets=4, ideal=(1e8, 1e8))
     with pytest.raises(ValueError, match="needs tooth contact"):

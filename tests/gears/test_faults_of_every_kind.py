@@ -38,7 +38,7 @@ def torques(pair, angles, depth):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("wheel", ["driver", "driven"])
+@pytest.mark.parametrize("wheel", ["driver", pytest.param("driven", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", FAULTS)
 def test_effect_and_derivatives(name, wheel, kind):
     fault = FAULTS[name](wheel=wheel, **SETTINGS.get(name, {}))

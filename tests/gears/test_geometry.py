@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearmbs.gears import GearPair, GearSpec, PairGeometry, involute
+from tests.says import says
 
 MM = 1e-3
 
@@ -173,7 +174,7 @@ BAD_PAIRS = {
     "slices": {"slices": 0},
     "load": {"load": "magic"},
     "axial_shift": {"axial_shift": "25 mm"},
-    "axial_shift is -20.0000 mm: the faces do not overlap": {"axial_shift": "-20 mm"},
+    says("axial_shift", "-20.0000 mm"): {"axial_shift": "-20 mm"},
     "torque": {"torque": "100 N"},
     "module and pressure_angle": {"driven": GearSpec(29, "3 mm")},
     "interference": {"driver": GearSpec(15, 95e-3 / 31), "driven": GearSpec(120, 95e-3 / 31)},
@@ -193,7 +194,7 @@ def test_common_face_width_is_the_overlap_of_both_faces(b1, b2, shift):
     one, two = (GearSpec(29, "3 mm", face_width=b * 1e-3) for b in (b1, b2))
     overlap = min(b1, b2, 0.5 * (b1 + b2) - abs(shift))
     if overlap <= 1e-3:
-        with pytest.raises(ValueError, match=r"axial_shift is .* the faces do not overlap, .* give less than"):
+        with pytest.raises(ValueError, match=says("axial_shift", "overlap", "give less")):
             PairGeometry(one, two, axial_shift=shift * 1e-3)
         return
     pair = PairGeometry(one, two, axial_shift=shift * 1e-3)
@@ -229,3 +230,20 @@ def test_pair_shows_itself():
         "wheel, skew 1 deg, impact, 2.9852e+05 N/mm^1.3 a tooth pair, damping 298.5 N s/mm, fully on at 100 um)"
     )
     assert "<td>contact ratio</td><td>1.6" in pair._repr_html_()
+
+
+@pytest.mark.parametrize("teeth", [24, 80, 150])
+def test_what_is_kept_of_a_wheel_is_that_of_its_final_root_arc(teeth):
+    """Default arcs are fitted step by step; what follows from them is that of a wheel given the last one."""
+    fitted = GearSpec(teeth, "2 mm")
+    given = GearSpec(teeth, "2 mm", fillet_radius=fitted.fillet_radius)
+    for name in ("fillet_centre_radius", "form_radius", "form_roll_length", "fillet_half_angle"):
+        assert getattr(fitted, name) == getattr(given, name)
+
+
+def test_geometry_is_kept_and_not_handed_on_to_copies():
+    pair = GearPair.paper()
+    assert pair.centre_distance is pair.centre_distance
+    wider = pair.with_changes(centre_distance_error="1 mm")
+    assert wider.centre_distance == pytest.approx(pair.centre_distance + 1e-3, abs=1e-15)
+    assert wider.contact_ratio < pair.contact_ratio

@@ -83,3 +83,15 @@ def test_slices_follow_what_varies_along_the_face(changes, slices):
 def test_wrong_settings_are_named_by_their_owner(make, words):
     with pytest.raises(ValueError, match=words):
         make()
+
+
+def test_a_pair_keeps_the_input_torque_that_it_was_given():
+    """The torque on the driven wheel follows from it with other wheels; one that was given itself stays."""
+    driver, driven, other = (GearSpec(z, "3 mm") for z in (19, 37, 57))
+    pair = GearPair(driver, driven, input_torque="30 N m")
+    for changed in (pair, pair.with_own_stiffness(), pair.with_changes(slices=3)):
+        assert changed.torque == pytest.approx(30.0 * 37 / 19, rel=1e-14)
+        assert changed.with_changes(driven=other).torque == pytest.approx(30.0 * 57 / 19, rel=1e-14)
+    assert pair.with_changes(driven=other, torque=70.0).torque == 70.0
+    assert pair.with_changes(torque=70.0).with_changes(driven=other).torque == 70.0
+    assert GearPair(driver, driven, torque=70.0).with_changes(driven=other).torque == 70.0

@@ -10,6 +10,7 @@ import pytest
 from gearmbs.gears import ContactLaw, FlankFriction, GearSpec, IdealMesh, PlanetarySet, Support, faults, planetary
 from gearmbs.gears import planetary_mechanism as mechanism_of
 from gearmbs.mechanism import linear_modes, static_equilibrium
+from tests.says import says
 
 TABLE = {
     3: (
@@ -169,16 +170,14 @@ def test_phases_of_the_first_stage_of_a_wind_turbine():
 def test_a_second_wheel_that_does_not_reach_the_ring_is_refused():
     step = GearSpec(20, "1.5 mm", name="step")
     assert planetary((24, 30, 74), "1.5 mm", 1, planet_at_ring=step).pairs_ring[0].centre_distance == 40.5e-3
-    with pytest.raises(
-        ValueError, match=r"step and ring do not mesh at the carrier_radius of 40\.5000 mm, .* 48\.0000 mm"
-    ):
+    with pytest.raises(ValueError, match=says("step", "ring", "carrier_radius", "40.5000 mm", "48.0000 mm")):
         planetary((24, 30, 84), "1.5 mm", 1, planet_at_ring=step).pairs_ring  # noqa: B018
 
 
 def test_backlash_beyond_what_was_asked_is_told():
     """A carrier 0.1 mm too wide leaves 2 sin(alpha) of it between sun and planet; the ring is thinned as asked."""
     wide = {"carrier_radius": "40.6 mm", "backlash_sun": "0.05 mm", "backlash_ring": "0.05 mm"}
-    said = r"backlash_sun is 0\.05 mm, but at the carrier_radius of 40\.6000 mm sun and planet have 0\.06904 mm"
+    said = says("backlash_sun", "0.05 mm", "carrier_radius", "40.6000 mm sun", "0.06904 mm")
     with pytest.warns(UserWarning, match=said):
         gears = planetary((24, 30, 84), "1.5 mm", **wide)
     assert gears.pairs_sun[0].normal_backlash == pytest.approx(2e-4 * np.sin(np.radians(20.0)), rel=0.01)
@@ -200,7 +199,7 @@ def test_harmonics_of_unequally_spaced_planets():
     pairs = planetary((24, 30, 84), "1.5 mm", planets=4, angles=["0 deg", "80 deg", "180 deg", "260 deg"])
     assert [pairs.harmonic_action(h, "sun") for h in (1, 2, 3)] == ["torque"] * 3
     for wrong in ({"harmonic": 1.5}, {"harmonic": -1}, {"harmonic": 1, "which": "carrier"}):
-        with pytest.raises(ValueError, match=r"harmonic is|which is 'carrier'; choose 'sun' or 'ring'"):
+        with pytest.raises(ValueError, match=r"harmonic is|choose 'sun' or 'ring'"):
             equal.harmonic_action(**wrong)
 
 
@@ -361,11 +360,11 @@ def test_the_set_that_is_recommended_fits(teeth, planets):
 @pytest.mark.parametrize(
     ("build", "words"),
     [
-        (lambda: planetary((24, 30, 85), "2 mm", 3), "cannot be assembled.*nearest"),
-        (lambda: planetary((24, 30, 84), "2 mm", 5), "nearest angles are 0.0000, 73.3333.*with 25, 30, 85 teeth"),
+        (lambda: planetary((24, 30, 85), "2 mm", 3), says("nearest", "assembled")),
+        (lambda: planetary((24, 30, 84), "2 mm", 5), says("angles", "0.0000", "73.3333", "25", "30", "85")),
         (lambda: planetary((24, 31, 84), "2 mm", 3), "z_r = z_s . 2 z_p = 86 teeth; .* shifts .* 24, 30, 84 teeth"),
         (lambda: planetary((24, 30, 84), "2 mm", 6), "neighbouring planets"),
-        (lambda: planetary((24, 30, 28), "2 mm", 2), "inside the base circle"),
+        (lambda: planetary((24, 30, 28), "2 mm", 2), says("inside the base")),
         (lambda: planetary((24, 60, 50), "2 mm", 3), "ring has 50 teeth and planet 60"),
         (lambda: planetary((24, 30, 84), "2 mm", 3, faults=[("planet 4", faults.BrokenTooth())]), "planet 4"),
         (lambda: planetary((24, 30, 84), "2 mm", 3, angles=[0, 1]), "2 numbers for 3 planets"),
@@ -375,11 +374,11 @@ def test_the_set_that_is_recommended_fits(teeth, planets):
         (lambda: mechanism_of(small_set(), held="planet"), "choose among"),
         (
             lambda: mechanism_of(small_set(), speeds={"sun": 9.0}, torques={"ring": "60 N m"}),
-            r"torques\['ring'\] is 60 N m, but ring is held: .* reaction there .* or give the torque on carrier$",
+            says("torques", "'ring'", "60 N m", "held", "carrier"),
         ),
         (
             lambda: mechanism_of(small_set(), speeds={"sun": 9.0}, torques={"sun": 5.0}),
-            r"torques\['sun'\] is 5 N m, but sun has a speed",
+            says("torques", "'sun'", "5 N m"),
         ),
     ],
 )
@@ -400,6 +399,6 @@ def test_torques_that_something_feels_are_taken():
 @pytest.mark.parametrize("name", ["backlash_sun", "backlash_ring"])
 def test_negative_backlash_is_refused(name):
     for value in ("-1 mm", -1e-9):
-        with pytest.raises(ValueError, match=rf"PlanetarySet.{name} is -.* mm: negative backlash; give 0 or more"):
+        with pytest.raises(ValueError, match=rf"PlanetarySet.{name} is -.* mm.*give 0"):
             planetary((24, 30, 84), "1.5 mm", **{name: value})
     assert planetary((24, 30, 84), "1.5 mm", **{name: "0.05 mm"})

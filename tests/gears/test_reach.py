@@ -61,6 +61,7 @@ def check(pair, label):
         assert largest_step(lambda x, depth=depth: pressed(mesh, x, depth), pitch) < STEP, (label, depth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("internal", [True, False])
 def test_pairs_at_random(internal):
     rng = np.random.default_rng(seed())
@@ -68,6 +69,7 @@ def test_pairs_at_random(internal):
         check(pair, f"pair {k} of seed {seed()}: {pair}")
 
 
+@pytest.mark.slow
 def test_pairs_far_apart():
     # contact ratios mostly below one: tip corners carry the motion over part of the cycle
     rng, below = np.random.default_rng(seed()), 0

@@ -12,6 +12,7 @@ from gearmbs.gears.planetary.rig import planetary_mechanism
 from gearmbs.mechanism import Mechanism
 from tests.drivetrain.support import rotation, stage
 from tests.generators import cases, seed
+from tests.says import says
 
 PAPER = GearPair.paper(backlash="0.1 mm")
 
@@ -38,9 +39,7 @@ def two_wheels(pair, depth=0.0, torque=0.0, held=False):
 def test_deep_teeth_are_refused_by_name_with_a_way_out(depth):
     flanks = "drive" if depth > 0 else "coast"
     deep = depth if depth > 0 else -depth - PAPER.normal_backlash
-    with pytest.raises(
-        ModelError, match=rf"gear contact 'mesh': at the start its teeth are .* on the {flanks}"
-    ) as error:
+    with pytest.raises(ModelError, match=rf"gear contact 'mesh'.*{flanks}") as error:
         two_wheels(PAPER, depth).simulate(1e-4)
     said = float(re.search(r"teeth are ([\d.]+) mm deep", str(error.value)).group(1)) * 1e-3
     assert said == pytest.approx(deep, rel=1e-3)
@@ -58,9 +57,9 @@ def test_a_start_under_load_runs_as_deep_as_the_load_presses():
         two_wheels(PAPER, static, torque).simulate(1e-4)
         two_wheels(PAPER, 1.6 * static, torque).simulate(1e-4)
     static = PAPER.penetration(400.0, 2)
-    with pytest.raises(ModelError, match="the loads there explain nothing"):
+    with pytest.raises(ModelError, match=says("explain nothing")):
         two_wheels(PAPER, 1.5 * static, -400.0).simulate(1e-4)
-    with pytest.raises(ModelError, match=r"the loads there explain \d+ % of that"):
+    with pytest.raises(ModelError, match=r"loads there explain \d+ %"):
         two_wheels(PAPER, 3.5 * static, 400.0).simulate(1e-4)
 
 
@@ -75,7 +74,7 @@ def test_soft_teeth_start_as_deep_as_they_yield():
 
 def test_wheels_both_held_are_refused_where_they_are_deep():
     two_wheels(PAPER, 30e-6, held=True).simulate(1e-4)
-    with pytest.raises(ModelError, match=r"its teeth are 0\.2 mm deep"):
+    with pytest.raises(ModelError, match=says("0.2 mm", "teeth")):
         two_wheels(PAPER, 0.2e-3, held=True).simulate(1e-4)
 
 
@@ -115,7 +114,7 @@ def turned(mechanism, body, depth, radius):
 def test_a_wheel_of_a_drivetrain(depth):
     train = stage()
     radius = train.wheels[1].gear.base_radius
-    with pytest.raises(ModelError, match="gear contact 'mesh': at the start its teeth are"):
+    with pytest.raises(ModelError, match=says("gear", "'mesh'")):
         turned(train.build(), "out", depth, radius).simulate(1e-4)
     turned(train.build(), "out", math.copysign(30e-6, depth), radius).simulate(1e-4)
 
@@ -126,7 +125,7 @@ def test_a_planet_of_a_set():
     planetary_mechanism(gears, **settings).simulate(1e-5)
     for sign in (1, -1):
         deep = turned(planetary_mechanism(gears, **settings), "planet 2", sign * 0.3e-3, gears.planet.base_radius)
-        with pytest.raises(ModelError, match=r"gear contact '(sun-planet 2|planet 2-ring)': at the start its teeth"):
+        with pytest.raises(ModelError, match=r"gear contact '(sun-planet 2|planet 2-ring)'"):
             deep.simulate(1e-5)
 
 

@@ -9,6 +9,7 @@ import pytest
 from gearmbs.identify import CaseProblem, Free, IdentifyError, fit, harmonic_table
 from gearmbs.identify.study import load_problem
 from gearmbs.studies import Case
+from tests.says import says
 
 ROWS = [("a", c, k, 10.0, 0.02) for c in ("line_of_action", "line_of_centres") for k in (1, 2, 3)]
 TABLE = pd.DataFrame(ROWS, columns=["case", "channel", "harmonic", "value", "sigma"])
@@ -91,9 +92,9 @@ def test_noise_known_up_to_a_factor():
 
 
 def test_bad_recordings(tmp_path):
-    with pytest.raises(IdentifyError, match="give recordings by the name"):
+    with pytest.raises(IdentifyError, match=says("give recordings")):
         harmonic_table(np.zeros(100))
-    with pytest.raises(IdentifyError, match="a is no signal with time and channels"):
+    with pytest.raises(IdentifyError, match=says("time and channels")):
         harmonic_table({"a": np.zeros(100)})
     TABLE.drop(columns="case").to_csv(tmp_path / "a.csv", index=False)
     file = tmp_path / "fit.toml"
@@ -102,7 +103,7 @@ def test_bad_recordings(tmp_path):
         ('[[free]]\npath = "contact.depth"\nsart = 1\n', "unknown key 'sart'"),
         (
             '[case.b.operation]\ntorque = 1\n[[free]]\npath = "contact.depth"\n',
-            r"\[case.b\]: no recording has this name",
+            says("case.b", "recording"),
         ),
     ):
         file.write_text('[recording]\na = "a.csv"\n' + text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
@@ -41,6 +42,7 @@ also = { "friction.static" = 2.0 }
 """
 
 
+@pytest.mark.slow
 def test_from_recordings_to_a_report(tmp_path):
     """A recording of one state and a table of another, both made with a friction that the fit does not know."""
     friction = {"static": 0.12, "dynamic": 0.06}

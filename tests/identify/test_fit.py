@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.identify import Free, IdentifyError, fit, posterior
+from tests.says import says
 
 T = np.linspace(0.0, 4.0, 60)
 
@@ -91,7 +92,7 @@ def test_reports_and_errors():
     assert found.aic < found.bic
     with pytest.raises(IdentifyError, match="fitted are a, rate, b"):
         found["c"]
-    with pytest.raises(IdentifyError, match="2 independent values for 3 parameters"):
+    with pytest.raises(IdentifyError, match=says("2", "3", "independent values")):
         fit(lambda p: p[:2], [1.0, 2.0], FREE)
     with pytest.raises(IdentifyError, match="has no logarithm"):
         Free("x", -1.0)

@@ -16,9 +16,10 @@ from gearmbs.identify import (
     rank_experiments,
 )
 from gearmbs.signals import make_signal
-from gearmbs.studies import Case, run_case
+from gearmbs.studies import Case
+from tests.identify.levels import CASES, SHORT, run_stored
+from tests.says import says
 
-SHORT = {"duration": 0.08, "run_up": 0.02, "settling": 0.02}
 COMPONENTS = ("line_of_action", "line_of_centres")
 
 
@@ -49,10 +50,10 @@ def test_what_would_tell_them_apart_comes_first():
 @pytest.fixture(scope="module")
 def measured():
     """Two loads of the healthy pair, without noise."""
-    cases = {name: Case(operation={**SHORT, "torque": torque}) for name, torque in (("low", 100.0), ("high", 200.0))}
+    cases = {"low": CASES["100 N m"], "high": CASES["200 N m"]}
     rows = []
     for name, case in cases.items():
-        levels = run_case(case.changed(solver={"tolerance": 1e-8}), False)["gmf_rms"].sel(way="orders")
+        levels = run_stored(case)["gmf_rms"].sel(way="orders")
         for component in COMPONENTS:
             for k in (1, 2, 3):
                 rows.append((name, component, k, float(levels.sel(component=component, harmonic=k)), 0.02))
@@ -61,12 +62,15 @@ def measured():
 
 def test_backlash_of_a_healthy_pair_cannot_be_told(measured):
     table, cases = measured
-    with pytest.raises(IdentifyError, match=r"fault\.backlash has hardly any influence"):
+    with pytest.raises(IdentifyError, match=says("fault.backlash")):
         identify(table, cases, ["friction.dynamic", "fault.backlash"], way="orders")
 
 
-def test_friction_is_found_again(measured):
+@pytest.mark.parametrize("run", [run_stored, pytest.param(None, marks=pytest.mark.slow, id="simulated")])
+def test_friction_is_found_again(measured, run, monkeypatch):
     """From numbers with a gain of three that the fit does not know."""
+    if run is not None:
+        monkeypatch.setattr("gearmbs.studies.run_case", run)
     table, cases = measured
     table = table.assign(value=3.0 * table["value"])
     free = [Free("friction.dynamic", 0.035, 0.01, 0.2, also={"friction.static": 2.0})]
@@ -79,9 +83,9 @@ def test_friction_is_found_again(measured):
 
 def test_wrong_tables_are_named(measured):
     table, cases = measured
-    with pytest.raises(IdentifyError, match="no case is given for high"):
+    with pytest.raises(IdentifyError, match=says("measured", "given for high")):
         CaseProblem(table, {"low": cases["low"]}, ["contact.depth"])
-    with pytest.raises(IdentifyError, match="is no component of the force"):
+    with pytest.raises(IdentifyError, match=says("component", "force")):
         CaseProblem(table.assign(channel="a1"), cases, ["contact.depth"])
     with pytest.raises(IdentifyError, match="no such field"):
         CaseProblem(table, cases, ["contact.deepness"])
@@ -122,6 +126,7 @@ def test_a_parameter_of_one_case_and_gains_of_lines():
         CaseProblem(table, cases, ["middle:operation.torque"], **settings)
 
 
+@pytest.mark.slow
 def test_the_experiment_that_would_tell():
     """Backlash does not show in a healthy pair, and does where both flanks are in contact."""
     cases = {"healthy": Case(operation=SHORT)}
@@ -137,6 +142,7 @@ def test_the_experiment_that_would_tell():
         rank_experiments(problem, {"x": {"operation.heat": 2.0}})
 
 
+@pytest.mark.slow
 def test_what_is_unknown_of_a_case_is_unknown_of_experiments_with_it():
     cases = {name: Case(operation={**SHORT, "torque": torque}) for name, torque in (("low", 50.0), ("high", 100.0))}
     rows = [(case, c, k, 1.0, 0.02) for case in cases for c in COMPONENTS for k in (1, 2, 3)]

@@ -7,18 +7,18 @@ import pandas as pd
 import pytest
 
 from gearmbs.identify import CaseProblem, Free, compare_models
-from gearmbs.studies import Case, run_case
+from tests.identify.levels import CASES, run_stored
 
-SHORT = {"duration": 0.08, "run_up": 0.02, "settling": 0.02}
 FRICTION = Free("friction.dynamic", 0.05, 0.01, 0.2, also={"friction.static": 2.0})
 
 
 @pytest.mark.parametrize("planted", ["skew", "inclination"])
-def test_the_plane_of_a_misalignment_is_chosen(planted):
+def test_the_plane_of_a_misalignment_is_chosen(planted, monkeypatch):
     """From six noisy numbers of one recording of a sensor of unknown gain, with friction unknown, too."""
-    planes = {p: Case(operation=SHORT, fault={"misalignment": "1 deg", "plane": p}) for p in ("skew", "inclination")}
+    monkeypatch.setattr("gearmbs.studies.run_case", run_stored)
+    planes = {p: CASES[p] for p in ("skew", "inclination")}
     secret = planes[planted].changed(friction={"static": 0.12, "dynamic": 0.06})
-    levels = run_case(secret, variables=["gmf_rms"])["gmf_rms"].sel(way="orders")
+    levels = run_stored(secret)["gmf_rms"].sel(way="orders")
     generator = np.random.default_rng(5)
     rows = [
         ("tilted", c, k, 3.0 * float(levels.sel(component=c, harmonic=k)) * np.exp(0.02 * generator.normal()), 0.02)

@@ -433,7 +433,11 @@ def test_meshes_are_read(tmp_path):
         ("a.step", b"", "is read from"),
         ("none.stl", None, "cannot be read"),
         ("a.stl", b"solid\nendsolid", "holds no triangles"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 2 4 3", "belong to one triangle"),
+        (
+            "a.obj",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 2 4 3",
+            "one triangle",
+        ),
         ("a.obj", b"v 0 0 nonsense", "not a whole .obj"),
         ("a.shl", b"", "not a whole .shl"),
     ],

@@ -6,6 +6,7 @@ import pytest
 from gearmbs.dae.result import Status
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import AssemblyError, Mechanism, ModelError, SingularModelError, polynomial, ramp, step
+from tests.says import says
 
 UNIT = (1.0, 1.0, 1.0)
 
@@ -21,7 +22,7 @@ def pendulum() -> Mechanism:
     ("options", "words"),
     [
         ({"mass": -1.0}, "body 'b': mass = -1.0 kg"),
-        ({"mass": "2 N"}, "body 'b': mass: '2 N' is in N where a quantity in kg is expected"),
+        ({"mass": "2 N"}, says("body 'b'", "mass", "'2 N'")),
         ({"position": ("100 mm", 0, "3 kg")}, "body 'b': position: '3 kg'"),
         ({"inertia": ("a", 1, 1)}, "body 'b': inertia"),
         ({"mass": float("nan")}, "body 'b': mass: got NaN"),
@@ -29,7 +30,7 @@ def pendulum() -> Mechanism:
         ({"inertia": (1, 2)}, "give 3 moments"),
         ({"inertia": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, "not symmetric"),
         ({"position": (0, 0)}, "body 'b': position"),
-        ({"position": (0, np.inf, 0)}, "not three finite numbers"),
+        ({"position": (0, np.inf, 0)}, says("three finite numbers")),
         ({"orientation": 2 * np.eye(3)}, "not a rotation"),
         ({"velocity": "fast"}, "body 'b': velocity"),
     ],
@@ -42,7 +43,7 @@ def test_bad_body(options, words):
 
 def test_names_are_unique_and_belong():
     m = pendulum()
-    with pytest.raises(ModelError, match="body 'rod': the name is in use"):
+    with pytest.raises(ModelError, match=says("body 'rod'", "name")):
         m.body("rod", 1.0, UNIT)
     with pytest.raises(ModelError, match="in use"):
         m.revolute("pin", m.bodies["rod"], m.ground)
@@ -54,24 +55,24 @@ def test_names_are_unique_and_belong():
 def test_bad_joints():
     m = pendulum()
     rod = m.bodies["rod"]
-    with pytest.raises(ModelError, match="kind 'rubber' is unknown; choose one of"):
+    with pytest.raises(ModelError, match=says("'rubber'", "choose")):
         m.joint("rubber", "x", rod, m.ground)
-    with pytest.raises(ModelError, match="both markers are on body 'rod'"):
+    with pytest.raises(ModelError, match=says("'rod'", "both markers")):
         m.fixed("weld", rod, rod)
     with pytest.raises(ModelError, match="the zero vector"):
         m.revolute("x", rod, m.ground, axis=(0, 0, 0))
-    with pytest.raises(ModelError, match="must be translational or cylindrical"):
+    with pytest.raises(ModelError, match=says("'push'", "'pin'", "translational or cylindrical")):
         m.translation("push", m.joints["pin"], 1.0)
     with pytest.raises(ModelError, match="positive length"):
         m.distance("stick", rod.marker(), m.ground.marker(), length=-1)
-    with pytest.raises(ModelError, match="later than its start"):
+    with pytest.raises(ModelError, match=says("step", "later", "start")):
         step(1.0, 0.0, 1.0, 1.0)
     with pytest.raises(ModelError, match="cannot be negative"):
         ramp(1.0, over=-1.0)
 
 
 def test_empty_mechanism():
-    with pytest.raises(ModelError, match="it has no bodies"):
+    with pytest.raises(ModelError, match=says("'nothing'", "bodies")):
         Mechanism("nothing").compile()
 
 
@@ -199,7 +200,7 @@ def test_conflicting_constraints():
 
 
 def test_moments_no_body_can_have():
-    with pytest.warns(UserWarning, match="exceeds the sum of the others"):
+    with pytest.warns(UserWarning, match=says("exceeds the sum")):
         Mechanism("m").body("b", 1.0, (1.0, 1.0, 5.0))
 
 
@@ -249,7 +250,7 @@ def test_impossible_assembly():
 def test_massless_free_body():
     m = Mechanism("massless")
     m.body("ghost", 0.0, (0, 0, 0))
-    with pytest.raises(SingularModelError, match="body 'ghost' can move without any inertia"):
+    with pytest.raises(SingularModelError, match=says("body 'ghost'")):
         m.compile().problem()
 
 
@@ -266,7 +267,7 @@ def test_a_light_body_beside_a_heavy_one_is_not_massless(monkeypatch, dense_up_t
             assert m.compile().problem().n > 0
             continue
         m.body("ghost", 0.0, (0, 0, 0))
-        with pytest.raises(SingularModelError, match="body 'ghost' can move without any inertia"):
+        with pytest.raises(SingularModelError, match=says("body 'ghost'")):
             m.compile().problem()
 
 
@@ -288,7 +289,7 @@ def test_massless_free_body_at_the_end_of_a_chain(monkeypatch, dense_up_to):
         if not ball:
             assert system.problem().n > 20 * 12
             continue
-        with pytest.raises(SingularModelError, match="body 'rod 19' can move without any inertia"):
+        with pytest.raises(SingularModelError, match=says("body 'rod 19'")):
             system.problem()
 
 
@@ -311,9 +312,9 @@ def test_repr_lists_the_parts():
 
 def test_unknown_names_in_results():
     solution = pendulum().simulate(0.1, integrator="IDA")
-    with pytest.raises(KeyError, match="the bodies are rod"):
+    with pytest.raises(KeyError, match=says("'arm'", "bodies are rod")):
         solution.com_position("arm")
-    with pytest.raises(KeyError, match="the joints are pin"):
+    with pytest.raises(KeyError, match=says("'hinge'", "joints are pin")):
         solution.reaction("hinge")
 
 
@@ -330,9 +331,9 @@ def test_wheels_in_each_other_or_out_of_reach():
     one = m.body("one", 1.0, UNIT)
     same = m.body("same", 1.0, UNIT)
     far = m.body("far", 1.0, UNIT, position=(0.2, 0.0, 0.0))
-    with pytest.raises(ModelError, match="gear contact 'mesh': the axes are 0 mm apart, less than the sum of the base"):
+    with pytest.raises(ModelError, match=says("gear contact 'mesh'", "0 mm")):
         m.gear_contact("mesh", one, same, pair)
-    with pytest.warns(UserWarning, match="the teeth cannot touch"):
+    with pytest.warns(UserWarning, match=says("'far mesh'", "teeth cannot touch")):
         m.gear_contact("far mesh", one, far, pair)
 
 
@@ -340,16 +341,16 @@ def test_wheels_in_each_other_or_out_of_reach():
 def test_axes_that_should_cross(kind):
     m = Mechanism("cross")
     one, two = m.body("one", 1.0, UNIT), m.body("two", 1.0, UNIT)
-    with pytest.raises(ModelError, match=f"{kind} joint 'j': it needs two axes at right angles.*axis_j"):
+    with pytest.raises(ModelError, match=says(f"{kind} joint 'j'", "axis_j")):
         m.joint(kind, "j", one, two, at=(0, 0, 0), axis=(0, 0, 1))
-    with pytest.raises(ModelError, match="must be at right angles, not at 10 degrees"):
+    with pytest.raises(ModelError, match=says("10", "right angles")):
         m.joint(kind, "j", one, two, axis=(0, 0, 1), axis_j=(0, np.sin(np.pi / 18), np.cos(np.pi / 18)))
-    with pytest.raises(ModelError, match="'k' and 'l' must be at right angles, not at 0 degrees"):
+    with pytest.raises(ModelError, match=says("'k'", "'l'", "0", "right angles")):
         m.joint(kind, "j", one.marker(name="k"), two.marker(name="l"))
     joint = m.joint(kind, "j", one, two, at=(0, 0, 0), axis=(0, 0, 1), axis_j=(1, 0, 0))
     assert joint.j.global_orientation()[:, 2] == pytest.approx([1, 0, 0])
     assert m.compile().initialise().largest_correction == 0.0
-    with pytest.raises(ModelError, match="axis_j is for universal and perpendicular joints"):
+    with pytest.raises(ModelError, match=says("axis_j", "universal", "perpendicular")):
         m.revolute("r", one, m.ground, axis_j=(1, 0, 0))
 
 
@@ -363,13 +364,13 @@ def test_a_body_takes_the_axis_of_the_marker_it_is_joined_to():
     # it swings about y, and nothing had to be moved to assemble it
     assert solution.com_position("rod")[-1, 2] < -0.2
     assert "assembly" not in solution.message
-    with pytest.raises(ModelError, match="either markers or bodies"):
+    with pytest.raises(ModelError, match=says("'again'", "markers or bodies")):
         m.revolute("again", end, m.ground, axis=(0, 1, 0))
 
 
 @pytest.mark.parametrize(
     ("expression", "words"),
-    [("1/TIME", "its value at t = 0 s is not finite"), ("SQRT(-1-TIME)", "SQRT"), ("LOG(-TIME)", "sforce 's'")],
+    [("1/TIME", says("t = 0 s", "value")), ("SQRT(-1-TIME)", "SQRT"), ("LOG(-TIME)", "sforce 's'")],
 )
 def test_forces_that_are_not_finite_are_named(expression, words):
     m = Mechanism("free")
@@ -403,18 +404,16 @@ def test_corrections_of_the_assembly_are_told():
 
 def test_slips_get_an_answer():
     m = pendulum()
-    with pytest.raises(
-        ModelError, match=r"motion 'r': a function of Python cannot be compiled; give a number, an expr"
-    ):
+    with pytest.raises(ModelError, match=says("'r'", "give a number")):
         m.rotation("r", m.joints["pin"], lambda t: t)
-    with pytest.raises(ModelError, match="no option 'steps': outputs are set by rate, t_eval or every_step"):
+    with pytest.raises(ModelError, match=says("'steps'", "t_eval", "every_step")):
         m.simulate(1.0, steps=100)
-    with pytest.raises(ModelError, match="no option 'toll': did you mean tol"):
+    with pytest.raises(ModelError, match=says("'toll'", "tol")):
         m.simulate(1.0, toll=1e-6)
-    with pytest.raises(KeyError, match="the force elements are none in this mechanism"):
+    with pytest.raises(KeyError, match=says("'nope'", "elements are none")):
         m.simulate(0.1).load("nope")
     m.friction("dry", m.joints["pin"], 0.3, 0.2, pin_radius=0.01)
-    with pytest.raises(ModelError, match=r"name 'dry': it is in use by a load \(friction\)"):
+    with pytest.raises(ModelError, match=says("load", "friction", "name 'dry'")):
         m.friction("dry", m.joints["pin"], 0.3, 0.2, pin_radius=0.01)
 
 
@@ -445,5 +444,5 @@ def test_axes_that_should_cross_in_decks(line, ok):
     if ok:
         assert len(parse_deck(deck).to_mechanism().joints) == 1
         return
-    with pytest.raises(DeckError, match=r":8: error: J.*must be at right angles, not at 0 degrees"):
+    with pytest.raises(DeckError, match=says("8", "0", "right angles")):
         parse_deck(deck).to_mechanism()

@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 PENDULUM = """
 import json, sys
 from gearmbs.mechanism import Mechanism
@@ -35,10 +37,12 @@ def families(names: set[str]) -> set[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_pendulum_loads_no_kernel_of_a_force():
     assert families(loaded()) == set()
 
 
+@pytest.mark.slow
 def test_a_mechanism_loads_what_it_has():
     spring = 'm.spring_damper("s", rod.marker(), m.ground.marker(), stiffness=10.0)'
     assert families(loaded(spring)) == {"gearmbs.mechanism.forces.spring_kernel"}

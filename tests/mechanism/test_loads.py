@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from gearmbs.mechanism import Mechanism, ModelError
+from tests.says import says
 
 MASS, INERTIA = 2.0, np.diag([0.11, 0.22, 0.27])
 GRAVITY = np.array([0.5, -1.0, -9.81])
@@ -181,7 +182,7 @@ def test_beam_is_the_field_of_its_stiffness():
     rest = static_equilibrium(m)
     np.testing.assert_allclose(rest.com_position("tip")[1], 0.6 / 18000, rtol=1e-4)
     np.testing.assert_allclose(rest.orientation("tip")[1, 0], 0.6 / 12000, rtol=1e-4)
-    with pytest.raises(ModelError, match=r"length = 0\.0; it must be positive"):
+    with pytest.raises(ModelError, match=says("length = 0.0")):
         m.beam("b", i, j, length=0.0, area=1, second_moments=(1, 1, 1), modulus=1, shear_modulus=1)
     with pytest.raises(ModelError, match="stiffness and damping are 6x6"):
         m.field("f", i, j, stiffness=np.eye(3))

@@ -11,18 +11,19 @@ from hypothesis import strategies as st
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import ExpressionError, Scope, parse, unparse
 from tests.dae.equations.expressions.support import MARKER_BODY, MARKERS, time_series
+from tests.says import says
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "empty"),
-        ("1+", "found the end at column 3"),
-        ("2*(3+4", "expected '\\)' to close the bracket"),
-        ("STP(1,2,3,4,5)", "unknown function STP; did you mean STEP\\?"),
-        ("STEP(1,2,3)", "STEP takes 5 arguments, got 3 at column 1"),
+        ("1+", "end at column 3"),
+        ("2*(3+4", says("'2*(3+4'", "close the bracket")),
+        ("STP(1,2,3,4,5)", says("STP", "STEP")),
+        ("STEP(1,2,3)", says("STEP", "5", "3", "1", "arguments")),
         ("1 + DX(77)", "no MARKER 77 at column 8"),
-        ("DX(1.5)", "expected the id or name"),
+        ("DX(1.5)", says("'DX(1.5)'", "name", "expected")),
         ("3*TIM", "TIM is not TIME"),
         ("1/0", "division by zero"),
         ("SQRT(-1)", "not a finite number"),
@@ -30,13 +31,13 @@ from tests.dae.equations.expressions.support import MARKER_BODY, MARKERS, time_s
         ("VARVAL(3)", "no VARIABLE 3"),
         ("JOINT(1,0,2,0)", "no JOINT 1"),
         ("CUBSPL(TIME,0,4)", "no SPLINE 4"),
-        ("ACCX(1)", "accelerations can be measured"),
+        ("ACCX(1)", says("'ACCX(1)'", "accelerations", "measured")),
         ("CONTACT(1,0,2,0)", "no CONTACT 1"),
-        ("ORIENT(13,1,1)", "system 13 is not supported"),
-        ("FX(1,2)", "no force or joint acts between MARKER 1 and MARKER 2"),
-        ("1 2", "unexpected '2' after the expression at column 3"),
-        ("2*(60D+3*TIME)", "60D\\+3 may be 60 degrees .* write 60D \\+ 3 or 60E\\+3 at column 4"),
-        ("5 # 3", "unexpected character '#' at column 3"),
+        ("ORIENT(13,1,1)", says("13", "supported")),
+        ("FX(1,2)", says("joint", "MARKER 1", "MARKER 2")),
+        ("1 2", says("'2'", "expression", "3")),
+        ("2*(60D+3*TIME)", says("60D+3", "60", "60E+3", "4", "write 60D")),
+        ("5 # 3", says("3", "unexpected character")),
         ("(" * 500, "nested deeper than 100"),
         ("1E999", "too large"),
     ],
@@ -99,6 +100,7 @@ WORDS = """DX STEP ( ) , : TIME 1 2.5E3 90D ** * - / + ' .m.p
            IF IMPACT CUBSPL VARVAL ORIENT JOINT 1E5 \\ é 0 FX D E""".split()
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None, derandomize=True)
 @given(st.one_of(st.lists(st.sampled_from(WORDS), max_size=25).map("".join), st.text(max_size=40)))
 def test_any_text_gives_a_tape_or_an_expression_error(text):

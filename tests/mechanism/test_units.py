@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.mechanism import Mechanism, ModelError, constant, harmonic, ramp, step
+from tests.says import says
 
 
 def model(si: bool) -> Mechanism:
@@ -82,11 +83,11 @@ def test_functions_of_time_in_usual_units():
         (lambda m, i, j: m.bushing("b", i, j, stiffness="soft"), "bushing 'b': stiffness: 'soft' is not a vector"),
         (lambda m, i, j: m.line_force("f", i, j, "10 mm"), "sforce 'f': '10 mm' is in mm"),
         (lambda m, i, j: m.line_force("f", i, j, "10*(DM(a,b)"), r"sforce 'f': expected '\)'"),
-        (lambda m, i, j: m.rotation("r", m.joints["pin"], "3 m"), "motion 'r': '3 m' is in m where .* rad"),
+        (lambda m, i, j: m.rotation("r", m.joints["pin"], "3 m"), says("'r'", "'3 m'", "motion")),
         (lambda m, i, j: m.rotation("r", m.joints["pin"], "2*TIM("), "motion 'r': expected"),
         (lambda m, i, j: m.rotation("r", m.joints["pin"], "5 mm/s", level="velocity"), "motion 'r': '5 mm/s' is in mm"),
         (lambda m, i, j: m.friction("f", m.joints["pin"], 0.2, 0.1, pin_radius="1 s"), "f': pin_radius: '1 s'"),
-        (lambda m, i, j: m.field("k", i, j, stiffness="1 N/m"), "field 'k': stiffness: '1 N/m' is not made of numbers"),
+        (lambda m, i, j: m.field("k", i, j, stiffness="1 N/m"), says("field 'k'", "stiffness", "'1 N/m'")),
         (lambda m, i, j: ramp("5 apples"), "ramp: rate: cannot read '5 apples'"),
         (lambda m, i, j: m.simulate("5 m"), "t_end: '5 m' is in m"),
     ],

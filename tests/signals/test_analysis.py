@@ -22,6 +22,8 @@ from gearmbs.signals import (
     write_signal,
 )
 from gearmbs.signals.rotation.shaft import Known, mesh_shaft
+from tests.says import says
+from tests.signals.test_measured_lines import LEVELS
 
 RATE = 12800.0
 TEETH = 32
@@ -146,11 +148,11 @@ def test_speed_and_teeth_that_contradict_the_record_are_told(tmp_path, way):
             return analyse(own, **given)
         return analyse(to_signal(own, **given) if way == "signal" else read_signal(path, **given))
 
-    with pytest.warns(UserWarning, match=r"teeth=31 is given, but .* itself says 32, 45; the given ones are used"):
+    with pytest.warns(UserWarning, match=says("teeth=31", "given", "32", "45")):
         report = analysed(teeth=31)
     assert report.teeth == (31,)
     assert any("teeth=31 is given" in note for note in report.notes)
-    with pytest.warns(UserWarning, match=r"speed=1700 rpm is given, but .* itself says 1785 rpm; the given one"):
+    with pytest.warns(UserWarning, match=says("speed=1700 rpm", "given", "1785 rpm")):
         report = analysed(speed="1700 rpm")
     assert report.speed == pytest.approx(1700 * math.pi / 30, rel=0.02)
     with warnings.catch_warnings():
@@ -213,6 +215,7 @@ def test_analyse_file_and_its_progress(tmp_path):
         analyse_file(tmp_path / "none.csv", teeth=32)
 
 
+@pytest.mark.slow
 def test_scratch_memory_stays_below_twice_the_record():
     t = np.arange(10 * 51200) / 51200.0
     angle = 2 * np.pi * 29.75 * t
@@ -268,3 +271,8 @@ class TestMeasuredRecords:
             state="healthy", load="0 %"
         )
         assert float(ratio.min()) > 1.0
+        # as in the repository
+        for name, levels in LEVELS.items():
+            case = {"state": "healthy" if name[0] == "h" else "broken", "load": f"{name[5:]} %"}
+            found = report.data["experiment"].sel(case).transpose("harmonic", "channel")
+            np.testing.assert_allclose(found, levels, atol=6e-5)

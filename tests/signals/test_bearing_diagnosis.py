@@ -23,6 +23,7 @@ from gearmbs.signals import (
 )
 from gearmbs.signals.bearings.judgement import EnvelopeSpectrum, find_lines, judge, log_tail, power_of
 from gearmbs.signals.bearings.report import PartFinding
+from tests.says import says
 from tests.view.looking import assert_readable
 
 RATE, SHAFT, SECONDS = 12000.0, 29.0, 5.0
@@ -192,7 +193,7 @@ def test_own_band_and_its_limits():
     report = diagnose_bearing(data, "6205", f"{SHAFT} Hz", band=(2000.0, 4000.0))
     assert report.bands == {"case": (2000.0, 4000.0)}
     assert report.fault == "outer race"
-    with pytest.raises(SignalError, match="band: must lie inside 0 to 6000 Hz"):
+    with pytest.raises(SignalError, match=says("band", "0", "6000 Hz")):
         diagnose_bearing(data, "6205", f"{SHAFT} Hz", band=(2000.0, 9000.0))
 
 
@@ -201,9 +202,9 @@ def test_multiples_by_name():
     assert bearing_lines(given) == BearingLines("bearing", 0.4, 2.3, 3.6, 5.4)
     with pytest.raises(SignalError, match="BPFI missing"):
         bearing_lines({"FTF": 0.4, "BSF": 2.3, "BPFO": 3.6})
-    with pytest.raises(SignalError, match="how many balls it has"):
+    with pytest.raises(SignalError, match=says("bearing", "'6305'", "how many balls")):
         bearing_lines("6305")
-    with pytest.raises(SignalError, match="is none; give a designation"):
+    with pytest.raises(SignalError, match=says("bearing", "'6205'", "give a designation")):
         bearing_lines(17)
 
 
@@ -212,9 +213,9 @@ def test_what_is_missing_is_asked_for():
     with pytest.raises(MissingMetadataError, match="speed"):
         diagnose_bearing(data, "6205")
     assert diagnose_bearing(with_metadata(data, speed=2 * np.pi * SHAFT), "6205").shaft == pytest.approx(SHAFT)
-    with pytest.raises(SignalError, match=r"turns of the shaft.*give a record of .* s or more"):
+    with pytest.raises(SignalError, match=says("shaft", "give a record")):
         diagnose_bearing(data.isel(time=slice(0, 5000)), "6205", f"{SHAFT} Hz")
-    with pytest.raises(SignalError, match="needs a sampling rate above"):
+    with pytest.raises(SignalError, match=says("sampling rate above")):
         diagnose_bearing(data, "6205", "60000 rpm")
 
 
@@ -294,7 +295,7 @@ def test_cepstrum_editing_levels_a_family_only():
     between = (np.arange(90, 115) + 0.5) * SHAFT
     quiet = [spectrum(s, scaling="power", segment=0.5).sel(frequency=between, method="nearest") for s in (data, edited)]
     assert float(quiet[1].sum()) == pytest.approx(float(quiet[0].sum()), rel=0.3)
-    with pytest.raises(SignalError, match="frequencies: must be above"):
+    with pytest.raises(SignalError, match=says("frequencies", "above")):
         edit_cepstrum(data, 0.0)
 
 
@@ -310,7 +311,7 @@ def test_prewhitened_spectrum_is_flat():
     white = prewhiten(record(MESH))
     lines = np.abs(np.fft.rfft(white.values[:, 0]))[1:-1]
     np.testing.assert_allclose(lines, lines.mean(), rtol=1e-6)
-    with pytest.raises(SignalError, match="a channel that is zero"):
+    with pytest.raises(SignalError, match=says("signal", "zero", "channel")):
         prewhiten(make_signal(np.zeros(1000), RATE))
 
 

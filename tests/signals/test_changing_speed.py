@@ -25,6 +25,7 @@ from gearmbs.signals import (
     to_signal,
     waterfall,
 )
+from tests.says import says
 
 RATE = 12800.0
 RUN_UP = [("0 s", "0 rpm"), ("0.5 s", "0 rpm"), ("4.5 s", "3000 rpm"), ("5 s", "3000 rpm")]
@@ -71,15 +72,15 @@ def test_angle_is_the_exact_integral_of_the_curve():
 @pytest.mark.parametrize(
     ("speed", "said"),
     [
-        ("12 mm", "where a quantity in rad/s is expected"),
+        ("12 mm", says("speed", "'12 mm'", "quantity in rad/s")),
         ([(0.0, 10.0), (0.0, 20.0)], "must increase"),
         ([(0.0, 10.0), (1.0, -20.0)], "turns back at t = 1 s"),
         ([(0.0, 0.0), (1.0, 0.0)], "zero throughout"),
         ([(0.0, np.nan), (1.0, 1.0)], "not finite|NaN"),
-        ([1.0, 2.0, 3.0], "no list of points"),
+        ([1.0, 2.0, 3.0], says("speed", "list of points")),
         ({"a": 1}, "is no speed"),
         (-5.0, "must be positive"),
-        ([(10.0, 5.0), (11.0, 5.0)], "the curve spans 10 to 11 s, the record 0 to"),
+        ([(10.0, 5.0), (11.0, 5.0)], says("10", "11 s", "0", "curve spans")),
     ],
 )
 def test_speeds_that_cannot_be(speed, said):
@@ -126,13 +127,13 @@ def test_tracked_orders_are_constant_from_rest_to_full_speed():
 def test_samples_without_a_rate_are_asked_for_it():
     samples = np.sin(np.arange(12800) / 10.0)
     for track in (order_track, order_map, spectrogram):
-        with pytest.raises(SignalError, match=r"rate is missing: .*pass to_signal\(data, rate=\.\.\.\)"):
+        with pytest.raises(SignalError, match=says("rate=", "pass to_signal")):
             track(samples, speed="1000 rpm")
 
 
 def test_orders_in_the_place_of_the_speed_are_told():
     signal = make_signal(np.sin(np.arange(4000) / 10.0), 1000.0, speed=10.0)
-    with pytest.raises(SignalError, match=r"orders are given by name, orders=\[21, 42\]"):
+    with pytest.raises(SignalError, match=says("orders=", "21", "42")):
         order_track(signal, [21, 42])
 
 
@@ -163,7 +164,7 @@ def test_the_same_from_a_tacho_a_channel_of_speed_and_an_angle():
         order_track(both, orders=29, tacho="pulse", speed_channel="n")
     with pytest.raises(MissingMetadataError, match="speed is missing"):
         order_track(both, orders=29)
-    with pytest.raises(SignalError, match="is in 'V'; say its unit"):
+    with pytest.raises(SignalError, match=says("'V'", "say its unit")):
         order_track(both, orders=29, speed_channel="pulse")
 
 

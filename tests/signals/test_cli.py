@@ -97,6 +97,7 @@ def test_wrong_calls_end_with_one_message(tmp_path, monkeypatch, words, said):
     assert "Traceback" not in result.output
 
 
+@pytest.mark.slow
 def test_commands_for_measurements_need_no_kernels(tmp_path):
     """Whoever has a file and no wish to simulate does not wait for compilers."""
     path = write(tmp_path, "x.csv")

@@ -24,6 +24,7 @@ from gearmbs.signals import (
     write_signal,
 )
 from gearmbs.signals.signal.signal import unit_dimension
+from tests.says import says
 
 RATE = 12800.0
 COUNT = 64
@@ -99,7 +100,7 @@ def test_shaft_rate_beside_a_sampling_rate(tmp_path):
 def test_a_bearing_asks_for_the_speed_with_what_the_file_holds(tmp_path):
     path = tmp_path / "shaft.mat"
     scipy.io.savemat(path, {"bearing": {"sr": 48828.0, "gs": X[:, None], "rate": 25.0}})
-    with pytest.raises(SignalError, match=r"speed is missing: .*bearing\.rate = 25 .*speed='25 Hz'") as caught:
+    with pytest.raises(SignalError, match=says("bearing.rate = 25", "speed='25 Hz'")) as caught:
         diagnose_bearing(path, "6205")
     assert len(str(caught.value).splitlines()) == 1
 
@@ -114,7 +115,7 @@ def test_two_rates_that_disagree_are_asked_about_in_one_line(tmp_path):
     assert "\n" not in str(caught.value)
     assert_is(read_signal(path, rate=25600.0), X, rate=25600.0)
     text = written(tmp_path, f"Fs: 6400\ntime,a\n{rows(np.arange(COUNT) / RATE, X)}\n")
-    with pytest.raises(SignalFileError, match="Fs = 6400 Hz and the column of times = 12800 Hz"):
+    with pytest.raises(SignalFileError, match=says("Fs = 6400 Hz", "12800 Hz", "column of times")):
         read_signal(text)
     assert_is(read_signal(text, rate=RATE), X)
 
@@ -122,7 +123,7 @@ def test_two_rates_that_disagree_are_asked_about_in_one_line(tmp_path):
 def test_rates_of_each_channel(tmp_path):
     path = tmp_path / "x.mat"
     scipy.io.savemat(path, {"a": {"data": X, "fs": RATE}, "b": {"data": Y, "fs": 6400.0}})
-    with pytest.raises(SignalFileError, match=r"different sampling rates: a\.data 12800 Hz, b\.data 6400 Hz; choose"):
+    with pytest.raises(SignalFileError, match=says("a.data 12800 Hz", "b.data 6400 Hz", "choose")):
         read_signal(path)
     assert_is(read_signal(path, channels=["b.data"]), Y, rate=6400.0)
     header = {"Channel_1_Header": {"SampleFrequency": RATE, "Unit": "g"}, "Channel_1_Data": X}
@@ -205,7 +206,7 @@ def test_gaps(tmp_path):
     holes = [str(v) for v in X]
     holes[10], holes[11], holes[40] = "", "NaN", ""
     path = written(tmp_path, f"a,b\n{rows(holes, Y)}\n")
-    with pytest.raises(SignalFileError, match=r"line 12 holds nothing in column 'a'; pass gaps='interpolate'"):
+    with pytest.raises(SignalFileError, match=says("12", "'a'", "'interpolate'", "pass gaps=")):
         read_signal(path, rate=RATE)
     filled = read_signal(path, rate=RATE, gaps="interpolate")
     expected = X.copy()
@@ -217,7 +218,7 @@ def test_gaps(tmp_path):
     assert_is(longest, X[12:40], Y[12:40])
     assert float(longest["time"][0]) == pytest.approx(12 / RATE)
     assert sum(part.sizes["time"] for part in sections(path, 0.001, rate=RATE, gaps="interpolate")) >= COUNT - 6
-    with pytest.raises(SignalError, match="gaps: must be one of"):
+    with pytest.raises(SignalError, match=r"gaps: .*one of"):
         read_signal(path, rate=RATE, gaps="ignore")
 
 
@@ -320,7 +321,7 @@ def test_parquet_of_others(tmp_path):
     frame.to_feather(tmp_path / "x.feather")
     assert_is(read_signal(tmp_path / "x.feather"), X)
     (tmp_path / "y.parquet").write_bytes((tmp_path / "x.parquet").read_bytes()[:-20])
-    with pytest.raises(SignalFileError, match="damaged or cut short"):
+    with pytest.raises(SignalFileError, match=says("y.parquet", "damaged or cut")):
         read_signal(tmp_path / "y.parquet")
 
 
@@ -435,7 +436,7 @@ def test_data_of_any_shape(data, settings):
         ("none.csv", {}, "cannot be opened"),
         (object(), {"rate": 1.0}, "no array of numbers"),
         ({"a": X, "b": Y[:5]}, {"rate": 1.0}, "same length"),
-        (pd.DataFrame({"a": ["x", "y"]}), {"rate": 1.0}, "no column of numbers"),
+        (pd.DataFrame({"a": ["x", "y"]}), {"rate": 1.0}, "column of numbers"),
         (np.r_[X, np.nan], {"rate": 1.0}, "gaps='interpolate'"),
         (np.ones((2, 3, 4)), {"rate": 1.0}, "must have shape"),
         (np.array([]), {"rate": 1.0}, "must have shape"),
@@ -558,13 +559,13 @@ def test_damaged_files_give_a_signal_or_one_line(tmp_path, name, capfd):
 
 @pytest.mark.parametrize("units", ["mV/g", "pC/g", "mV/(m/s^2)", "G/V", "m/s^2/V", "mV/um"])
 def test_a_sensitivity_is_no_unit_of_samples(units):
-    with pytest.raises(SignalError, match=r"is a sensitivity or a scale.* give units='(mV|pC|V)'"):
+    with pytest.raises(SignalError, match=r"scale.* give units='(mV|pC|V)'"):
         to_signal([0.0, 1.0, 2.0], rate=10.0, units=units)
 
 
 @pytest.mark.parametrize("units", ["dB", "dBA", "dB(A)", "dB re 1e-6 m/s^2"])
 def test_a_level_is_no_unit_of_samples(units):
-    with pytest.raises(SignalError, match=r"is a level.*one of 'm/s.2', 'g', 'mg'"):
+    with pytest.raises(SignalError, match=says("'g'", "'mg'", "level")):
         to_signal([0.0, 1.0, 2.0], rate=10.0, units=units)
 
 

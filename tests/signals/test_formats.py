@@ -19,6 +19,7 @@ from gearmbs.signals.files.formats import written_endings
 from gearmbs.signals.files.table import TABLE, Row, format_of, formats_table, known_endings, titles
 from gearmbs.signals.signal.record import Record
 from tests.docs.support import DOCS
+from tests.says import says
 from tests.signals.test_io import assert_same, example
 
 PACKAGE = Path(gm.__file__).parent
@@ -65,24 +66,24 @@ def test_a_row_and_a_module_make_a_format(tmp_path):
     other = path.rename(tmp_path / "level.0001")
     np.testing.assert_array_equal(read_signal(other), signal)
     np.testing.assert_array_equal(np.concatenate(list(sections(other, 0.05))), signal)
-    with pytest.raises(SignalFileError, match=r"is named as fake but holds plain text; .*lvm, fake\)"):
+    with pytest.raises(SignalFileError, match=says("fake", "text", "holds plain")):
         read_signal(_text(tmp_path / "text.fak"))
     wrong = tmp_path / "wrong.wav"
     wrong.write_bytes(other.read_bytes())
-    with pytest.raises(SignalFileError, match="is named as wav but holds a fake recording"):
+    with pytest.raises(SignalFileError, match=says("wav", "fake", "recording", "named", "holds")):
         read_signal(wrong)
 
 
 @pytest.mark.usefixtures("fake")
 def test_messages_help_and_documentation_know_it(tmp_path):
     signal = gm.make_signal(np.sin(np.arange(64.0)), 640.0)
-    with pytest.raises(SignalError, match=r"format: must be one of csv, .*, fake, got 'fik'"):
+    with pytest.raises(SignalError, match=says("format", "fake", "'fik'")):
         write_signal(signal, tmp_path / "x.fak", format="fik")
-    with pytest.raises(SignalFileError, match=r"use one of \.csv, .*\.fok or pass format="):
+    with pytest.raises(SignalFileError, match=says("fok", "format=", "use", "pass", "csv")):
         write_signal(signal, tmp_path / "x.unknown")
     with pytest.raises(SignalFileError, match=r"x\.fok: a \.fok file holds nothing"):
         write_signal(signal, tmp_path / "x.fok")
-    with pytest.raises(ValueError, match=r"a signal is saved as .* or \.fak"):
+    with pytest.raises(ValueError, match=says("signal", "fak", "saved")):
         gm.save(signal, tmp_path / "x.docx")
     assert ".fak" in written_endings()
     assert ".fok" not in written_endings()
@@ -121,7 +122,7 @@ def test_rows_fit_together():
         assert set(known.not_written) <= set(row.endings.split()), name
         assert all(contents[content] == name for content in known.contents), name
     assert len(known_endings()) == sum(len(row.endings.split()) for row in TABLE.values())
-    with pytest.raises(ValueError, match=r"endings of X: 'xyz' is not of the form '\.abc'"):
+    with pytest.raises(ValueError, match=says("endings", "X", "'xyz'", "'.abc'")):
         Row("X", "x", ".x xyz")
 
 

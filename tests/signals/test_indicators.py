@@ -34,6 +34,7 @@ from gearmbs.signals import (
     sideband_level,
     time_synchronous_average,
 )
+from tests.says import says
 
 N = 4096
 ANGLE = 2 * np.pi * np.arange(N) / N
@@ -193,7 +194,7 @@ def test_indicators_over_two_revolutions():
 @pytest.mark.parametrize(
     ("call", "error", "match"),
     [
-        (lambda: condition_indicators(average_of(SINE[:32])), SignalError, "do not reach the mesh order 32"),
+        (lambda: condition_indicators(average_of(SINE[:32])), SignalError, says("32", "reach the mesh")),
         (lambda: condition_indicators(average_of(SINE).drop_attrs()), MissingMetadataError, "teeth is missing"),
         (lambda: regular_signal(average_of(SINE), sidebands=16), SignalError, "overlap"),
         (lambda: regular_signal(average_of(SINE)[:100]), SignalError, "whole number"),

@@ -24,6 +24,7 @@ from gearmbs.signals import (
     write_signal,
 )
 from tests.generators import cases, seed
+from tests.says import says
 
 NAMES = {
     "csv": "x.csv",
@@ -136,7 +137,7 @@ def test_cut_csv_is_reported_with_its_line(tmp_path):
     path = write_signal(example(n=50), tmp_path / "x.csv")
     lines = path.read_text().splitlines()
     path.write_text("\n".join(lines[:-1]) + "\n" + lines[-1].rsplit(",", 1)[0])
-    with pytest.raises(SignalFileError, match=f"line {len(lines)} has 2 values where 3 are expected"):
+    with pytest.raises(SignalFileError, match=says(f"line {len(lines)}", "2 values")):
         read_signal(path)
 
 
@@ -149,7 +150,7 @@ def test_mislabelled_files_say_what_they_hold(tmp_path, content):
             continue
         path = tmp_path / f"wrong_{NAMES[wrong]}"
         path.write_bytes(data)
-        with pytest.raises(SignalFileError, match=r"is named as .* but holds"):
+        with pytest.raises(SignalFileError, match=says("mat7.3", "named", "holds")):
             read_signal(path, format=wrong)
 
 
@@ -174,7 +175,7 @@ def test_missing_file_unknown_ending_and_missing_folder(tmp_path):
         read_signal(tmp_path / "x.xyz")
     with pytest.raises(SignalFileError, match="no folder"):
         write_signal(example(), tmp_path / "nowhere" / "x.csv")
-    with pytest.raises(SignalError, match="format: must be one of"):
+    with pytest.raises(SignalError, match=r"format: .*one of"):
         read_signal(tmp_path / "x.xyz", format="mp3")
 
 
@@ -189,14 +190,14 @@ def test_rate_is_asked_for_and_checked(tmp_path):
     assert signal.attrs["teeth"] == (32,)
     assert units_of(signal) == ["m/s^2", "m/s^2"]
     other = write_signal(example(), tmp_path / "x.nc")
-    with pytest.raises(SignalFileError, match=r"says its sampling rate is 51200 Hz, the call says rate=12800"):
+    with pytest.raises(SignalFileError, match=says("sampling rate", "51200 Hz", "rate=12800")):
         read_signal(other, rate=12800.0)
 
 
 def test_channel_choice(tmp_path):
     path = write_signal(example(), tmp_path / "x.h5")
     assert read_signal(path, channels=["aux"])["channel"].values.tolist() == ["aux"]
-    with pytest.raises(SignalFileError, match=r"has no channel \['nope'\]; it holds"):
+    with pytest.raises(SignalFileError, match=says("channel", "'nope'")):
         read_signal(path, channels=["nope"])
 
 
@@ -234,14 +235,14 @@ def test_csv_of_others(tmp_path, text, names, units, rate, first):
 @pytest.mark.parametrize(
     ("text", "match"),
     [
-        ("a,b\n1,2\n3,oops\n", "line 3 holds 'oops', which is not a number"),
-        ("a,b\n1,2\n3,4,5\n6,7\n", "line 3 has 3 values where 2 are expected"),
-        ("a,b\n1,2\n3\n", "line 3 has 1 values where 2 are expected"),
+        ("a,b\n1,2\n3,oops\n", says("3", "'oops'")),
+        ("a,b\n1,2\n3,4,5\n6,7\n", says("line 3", "3 values", "2")),
+        ("a,b\n1,2\n3\n", says("3", "1", "2", "expected")),
         ("a,b\n1,2\n3,nan\n", "line 3 holds 'nan'"),
-        ("a,b\n1,2\n3,\n", "line 3 holds nothing in column 'b'; pass gaps="),
-        ("<html>\n<body>not data</body>\n", "no row of numbers"),
+        ("a,b\n1,2\n3,\n", says("line 3", "'b'", "pass gaps=")),
+        ("<html>\n<body>not data</body>\n", says("bad.csv", "'<html>'", "row of numbers")),
         ("time,x\n0,1\n1,2\n5,3\n", "time: is not uniform"),
-        ("# teeth: many\nx\n1\n2\n", "header is not understood"),
+        ("# teeth: many\nx\n1\n2\n", says("bad.csv", "understood", "header")),
     ],
 )
 def test_bad_csv_names_the_line(tmp_path, text, match):
@@ -255,7 +256,7 @@ def test_damaged_gzip(tmp_path):
     path = tmp_path / "x.csv.gz"
     body = gzip.compress(b"a\n" + b"1.5\n" * 20000)
     path.write_bytes(body[:-30])
-    with pytest.raises(SignalFileError, match="damaged or cut short"):
+    with pytest.raises(SignalFileError, match=says("damaged or cut")):
         read_signal(path, rate=1.0)
 
 
@@ -274,7 +275,7 @@ def test_mat_of_others(tmp_path):
         read_signal(tmp_path / "c.mat", rate=1.0)
     assert read_signal(tmp_path / "c.mat", rate=1.0, channels=["y"]).sizes["time"] == 7
     scipy.io.savemat(tmp_path / "d.mat", {"note": "no numbers"})
-    with pytest.raises(SignalFileError, match="holds no numeric record"):
+    with pytest.raises(SignalFileError, match=says("d.mat", "holds no numeric")):
         read_signal(tmp_path / "d.mat", rate=1.0)
 
 
@@ -298,7 +299,7 @@ def test_netcdf_with_a_wrong_rate_is_mislabelled(tmp_path):
     path = write_signal(example(), tmp_path / "x.nc")
     with h5py.File(path, "a") as file:
         file.attrs["sampling_rate"] = 12800.0
-    with pytest.raises(SignalFileError, match="time axis runs at 51200 Hz, its sampling_rate says 12800 Hz"):
+    with pytest.raises(SignalFileError, match=says("51200 Hz", "sampling_rate", "12800 Hz")):
         read_signal(path)
 
 
@@ -409,7 +410,7 @@ def test_rounded_times_are_no_uneven_clock_if_the_rate_is_known(tmp_path):
     t = np.round(np.arange(200_000) / 12800.0, 3)
     x = np.sin(np.arange(t.size))
     np.savetxt(tmp_path / "x.csv", np.column_stack([t, x]), delimiter=",", header="time,a", comments="", fmt="%.17g")
-    with pytest.raises(SignalFileError, match="if the times of a file are only rounded"):
+    with pytest.raises(SignalFileError, match=says("file are only")):
         read_signal(tmp_path / "x.csv")
     signal = read_signal(tmp_path / "x.csv", rate=12800.0)
     assert signal.attrs["sampling_rate"] == 12800.0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.signals import SignalError, VibrationReport, analyse, compare, make_signal
+from tests.says import says
 
 RATE = 12800.0
 SHAFT = 25.0
@@ -116,5 +117,5 @@ def test_states_as_arrays_and_loads_left_out():
     assert float(report.changes().sel(state="worn").mean()) == pytest.approx(20 * math.log10(2), abs=0.01)
     with pytest.raises(SignalError, match="by state"):
         compare({"healthy": pair(), "low": {"worn": pair()}}, rate=RATE, teeth=32)
-    with pytest.raises(TypeError, match="there is no setting 'speeed'"):
+    with pytest.raises(TypeError, match=says("'speeed'")):
         analyse(pair(), 32, rate=RATE, speeed=1)

@@ -10,6 +10,8 @@ from gearmbs.gears import ContactLaw, FlankFriction, faults, planetary
 from gearmbs.signals import MissingMetadataError, SignalError, analyse, diagnose_planetary, make_signal, planetary_lines
 from gearmbs.signals.planetary.averages import path_weight
 from gearmbs.studies.trains.planetary import PlanetaryRun, run_planetary
+from tests.make_records import read
+from tests.says import says
 
 TEETH = (17, 19, 55)
 BROKEN = faults.BrokenTooth(tooth=5, lost=0.6)
@@ -40,7 +42,7 @@ def simulated(*where, turns=9.0):
 
 
 def test_a_planet_is_named_from_the_simulated_record():
-    record = simulated("planet 2 ring side")
+    record = read("planet.nc")
     report = analyse(record)
     assert report.fault == "planet 2"
     assert [f.grade for f in report.findings] == ["none", "clear", "none"]
@@ -92,8 +94,9 @@ def test_pulses_at_the_kinematic_orders(part):
     assert [f.part for f in report.accused] == [part]
 
 
-def test_sound_records_are_not_accused():
-    for seed in range(20):
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 20), marks=pytest.mark.slow)])
+def test_sound_records_are_not_accused(seeds):
+    for seed in seeds:
         for noise in (1e-3, 0.05, 0.5):
             report = diagnose_planetary(pulses("none", noise=noise, turns=10, seed=seed), (23, 31, 85))
             assert report.fault is None, report.verdict
@@ -133,10 +136,10 @@ def test_the_report_shows_itself(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"planetary": (23, 31)}, "teeth of sun, planet and ring"),
-        ({"planetary": (85, 31, 23)}, "must have the most teeth"),
+        ({"planetary": (23, 31)}, says("ring", "teeth of sun")),
+        ({"planetary": (85, 31, 23)}, says("planetary", "most teeth")),
         ({"planets": 0}, "1 or more"),
-        ({"speed": "20 rpm"}, "turns of the carrier.*record of 24 s or more"),
+        ({"speed": "20 rpm"}, says("turns", "24 s")),
         ({"speed": "6000 rpm"}, "sampling rate above"),
         ({"speed": "60 rpm", "member": "ring"}, "'carrier' or 'sun'"),
     ],

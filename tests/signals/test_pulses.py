@@ -8,6 +8,7 @@ import pytest
 
 from gearmbs.signals import SignalError, analyse, make_signal, phase_from_tacho
 from gearmbs.signals.rotation.pulses import pulse_faults
+from tests.says import says
 
 RATE = 5000.0
 
@@ -62,7 +63,7 @@ def test_intervals_that_scatter_are_no_fault(seed):
 @pytest.mark.parametrize("missing", [[30], [30, 31], [25, 40], [30, 35]])
 def test_missing_pulses_are_counted(name, missing):
     edges = pulse_times(COURSES[name])
-    with pytest.warns(UserWarning, match=f"{len(missing)} pulses? (is|are) missing: .* between"):
+    with pytest.warns(UserWarning, match=f"{len(missing)} pulses?.*missing.*between"):
         mended = phase_from_tacho(tacho(np.delete(edges, missing)))
     turns = mended.values[-1] / math.tau
     assert turns == pytest.approx(edges.size - 1, abs=0.1)
@@ -90,7 +91,7 @@ def test_extra_pulses_are_left_out(name, part):
 def test_a_gap_of_no_whole_number_is_named_and_left():
     edges = pulse_times(lambda t: fluctuating(t, 0.02))
     later = np.r_[edges[:30], edges[30:] + 0.05]
-    with pytest.warns(UserWarning, match=r"1 interval between pulses fit.*1\.5 pitches\. Left as found"):
+    with pytest.warns(UserWarning, match=says("1", "1.5", "interval between pulses")):
         phase = phase_from_tacho(tacho(later))
     assert phase.values[-1] / math.tau == pytest.approx(np.sum(later < 8.0) - 1, abs=0.6)
 

@@ -20,6 +20,7 @@ from gearmbs.signals import (
     trend_table,
     write_signal,
 )
+from tests.says import says
 
 RATE, TEETH = 12800.0, 32
 NAMES = {
@@ -83,7 +84,7 @@ def test_files_of_others_with_a_time_column(tmp_path):
     # a gap of 50 ms between the blocks that are read at a time
     t[131_072:] += 0.05
     pd.DataFrame({"time": t, "a": np.sin(t)}).to_csv(tmp_path / "y.csv", index=False)
-    with pytest.raises(SignalFileError, match="jump by 500 samples after row 131072"):
+    with pytest.raises(SignalFileError, match=says("500", "131072", "samples after row")):
         list(sections(tmp_path / "y.csv", 8.0))
 
 
@@ -91,7 +92,7 @@ def test_what_is_missing_or_damaged_is_named(tmp_path):
     np.savetxt(tmp_path / "x.csv", np.ones((1000, 2)), delimiter=",", header="a,b", comments="")
     with pytest.raises(MissingMetadataError, match="rate is missing"):
         list(sections(tmp_path / "x.csv", 1.0))
-    with pytest.raises(SignalError, match="seconds: must be a positive"):
+    with pytest.raises(SignalError, match=says("positive", "seconds")):
         list(sections(tmp_path / "x.csv", 0.0, rate=100.0))
     with pytest.raises(SignalFileError, match="has no channel"):
         list(sections(tmp_path / "x.csv", 1.0, rate=100.0, channels=["c"]))
@@ -105,6 +106,7 @@ def test_what_is_missing_or_damaged_is_named(tmp_path):
         list(sections(tmp_path / "x.csv", 1.0, rate=100.0))
 
 
+@pytest.mark.slow
 def test_trend_follows_what_changes(tmp_path):
     whole = record()
     path = write_signal(whole, tmp_path / "x.csv.gz")
@@ -129,7 +131,7 @@ def test_sections_without_a_mesh_line_are_gaps_with_a_reason(tmp_path):
     found = trend(write_signal(whole, tmp_path / "x.nc"), 4.0)
     assert np.isnan(found["gmf"].values).tolist() == [False, True, False]
     assert "no gear mesh line stands out" in found["note"].values[1]
-    with pytest.raises(SignalError, match="no section could be analysed"):
+    with pytest.raises(SignalError, match=says("section", "could be analysed")):
         trend(write_signal(whole[51200:102400], tmp_path / "y.nc"), 4.0)
     bare = write_signal(make_signal(whole.values, RATE), tmp_path / "z.nc")
     plain = trend(bare, 4.0)
@@ -137,7 +139,7 @@ def test_sections_without_a_mesh_line_are_gaps_with_a_reason(tmp_path):
     assert "the speed is not known" in plain["note"].values[0]
 
 
-@pytest.mark.parametrize("name", ["x.nc", "x.csv", "x.wav"])
+@pytest.mark.parametrize("name", ["x.nc", pytest.param("x.csv", marks=pytest.mark.slow), "x.wav"])
 def test_memory_does_not_grow_with_the_file(tmp_path, name):
     peaks = []
     for seconds in (40.0, 120.0):

@@ -24,6 +24,7 @@ from gearmbs.signals import (
     units_of,
     write_signal,
 )
+from tests.says import says
 
 RATE = 51200.0
 
@@ -110,7 +111,7 @@ def test_frf_path_reproduces_the_modal_path_it_was_sampled_from():
 @pytest.mark.parametrize(
     ("call", "match"),
     [
-        (lambda: Mode(-1.0, 0.1, 1.0), "frequency must be a positive"),
+        (lambda: Mode(-1.0, 0.1, 1.0), says("mode", "frequency", "positive")),
         (lambda: Mode(1.0, 1.5, 1.0), "damping"),
         (lambda: Mode(1.0, 0.1, 0.0), "mass"),
         (lambda: FrfPath(np.array([1.0, 1.0]), np.array([1.0, 2.0]), 0.1), "increasing"),
@@ -118,7 +119,7 @@ def test_frf_path_reproduces_the_modal_path_it_was_sampled_from():
         (lambda: accelerometer(vector(units="N"), ModalPath((Mode(1.0, 0.1, 1.0),))), "settling time"),
         (lambda: laser_vibrometer(vector(), [0, 0, 0]), "direction"),
         (lambda: laser_vibrometer(make_signal([1.0], RATE), [1, 0, 0]), "Cartesian"),
-        (lambda: add_noise(vector(), seed=0), "one of rms and density"),
+        (lambda: add_noise(vector(), seed=0), says("noise", "rms and density")),
         (lambda: quantise(vector(), bits=1, full_scale=1.0), "bits"),
         (lambda: quantise(vector(), bits=16, full_scale=0.0), "full_scale"),
         (lambda: sample(vector(), 1e6), "above the signal's own"),

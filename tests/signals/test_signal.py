@@ -16,6 +16,7 @@ from gearmbs.signals import (
     units_of,
     with_metadata,
 )
+from tests.says import says
 
 
 def test_make_signal_carries_its_metadata():
@@ -33,14 +34,14 @@ def test_make_signal_carries_its_metadata():
     ("call", "match"),
     [
         (lambda: make_signal([], 1.0), "non-empty"),
-        (lambda: make_signal([1.0, np.nan, 2.0], 1.0), "not finite, the first at row 1, channel 0"),
-        (lambda: make_signal([1.0], -5.0), "rate: must be a positive"),
+        (lambda: make_signal([1.0, np.nan, 2.0], 1.0), says("1", "0", "first at row")),
+        (lambda: make_signal([1.0], -5.0), says("positive", "rate")),
         (lambda: make_signal([1.0], 5.0, teeth=0), "teeth"),
         (lambda: make_signal([1.0], 5.0, teeth=28.5), "teeth"),
         (lambda: make_signal([1.0], 5.0, speed=float("nan")), "speed"),
         (lambda: make_signal([[1.0, 2.0]], 5.0, channels=["a", "a"]), "different names"),
         (lambda: make_signal({"a": [1.0], "b": [1.0, 2.0]}, 5.0), "same length"),
-        (lambda: make_signal([1.0], 5.0, units={"nope": "V"}), "no channel is named"),
+        (lambda: make_signal([1.0], 5.0, units={"nope": "V"}), says("units", "'nope'", "channel is named")),
         (lambda: make_signal([1.0], 5.0, units=["V", "V"]), "need one or 1"),
     ],
 )

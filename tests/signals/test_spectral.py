@@ -102,7 +102,7 @@ def test_units_that_measure_no_vibration(unit):
 @pytest.mark.parametrize(
     ("kwargs", "match"),
     [
-        ({"to": "jerk", "band": (10.0, 100.0)}, "to: must be one of"),
+        ({"to": "jerk", "band": (10.0, 100.0)}, "to: .*one of"),
         ({"to": "velocity", "band": (100.0, 10.0)}, "band"),
         ({"to": "velocity", "band": (0.0, 10.0)}, "band"),
         ({"to": "velocity", "band": (1.0, 10.0)}, "too short"),

@@ -6,6 +6,7 @@ from scipy.interpolate import PchipInterpolator
 
 from gearmbs.signals import SignalError, even_signal
 from gearmbs.signals.monotone_cubic import monotone_cubic
+from tests.says import says
 
 RATE = 51200.0
 
@@ -60,8 +61,8 @@ def test_tones_above_half_the_rate_do_not_fold_back():
     ("t", "values", "span", "words"),
     [
         ([0.0, 0.1, 0.1], [1, 2, 3], (0.0, 0.05), "do not increase"),
-        ([0.0, 0.1], [1, 2, 3], (0.0, 0.05), "one row of values a time"),
-        ([0.0, 0.1], [1, 2], (0.0, 0.5), "is not within the times"),
+        ([0.0, 0.1], [1, 2, 3], (0.0, 0.05), says("values", "time", "row")),
+        ([0.0, 0.1], [1, 2], (0.0, 0.5), says("within the times")),
     ],
 )
 def test_wrong_input(t, values, span, words):

@@ -3,13 +3,12 @@
 import pytest
 
 from gearmbs.drivetrain import Drivetrain
-from gearmbs.studies.presets.files import FOLDER
 from gearmbs.studies.trains.trains import described, load_train
 
 
 def agrees_with_its_file(name: str, train: Drivetrain) -> None:
     """Assert that a file describes a drivetrain; contact laws, which files may leave to defaults, by their pairs."""
-    made = load_train(FOLDER / f"{name}.toml").train
+    made = load_train(name).train
     assert (made.name, made.run_up, made.running) == (train.name, train.run_up, train.running)
     assert list(made.parts) == list(train.parts)
     for part in made.parts:

@@ -37,6 +37,7 @@ def test_joints_need_no_inertia_of_the_pump():
         bench_train(settings=BenchSettings(pump_inertia=0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("motor", "tol"), [("speed", 1e-7), ("induction", 1e-8)])
 def test_energy_and_drift_of_the_whole_bench(motor, tol):
     """Everything that stores, works and dissipates: the balance closes to a hundred-thousandth of the work.

@@ -11,6 +11,7 @@ from gearmbs.studies import Case, CaseError, load_case, make_case, paper_cases
 from gearmbs.studies.case import case as case_module
 from gearmbs.studies.case.case import CaseWarning, Gears, Operation
 from tests.generators import cases, seed
+from tests.says import says
 
 FILE = """
 name = "tilted"
@@ -63,7 +64,7 @@ def test_name_defaults_to_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[operation]\nspead = '10 rpm'", r"operation.spead: unknown key; known ones are speed"),
+        ("[operation]\nspead = '10 rpm'", says("operation.spead", "speed")),
         ("[operation]\nspeed = '10 parsnips'", r"operation.speed = '10 parsnips'"),
         ("[operation]\nspeed = '10 mm'", r"operation.speed"),
         ("[operation]\nspeed = -1.0", r"operation.speed = -1.0"),
@@ -74,7 +75,7 @@ def test_name_defaults_to_the_file(tmp_path):
         ("[gears]\nteeth = [3, 29]", r"teeth"),
         ("[contact]\ndepth = '0 mm'", r"contact.depth"),
         ("[solver]\nsignal_rate = 1e6\noutput_rate = 51200.0", r"signal_rate"),
-        ("[engine]\npower = 1", r"engine: unknown key; known ones are name"),
+        ("[engine]\npower = 1", says("engine", "ones are name")),
         ("[operation\n", r"not a valid TOML file"),
     ],
 )
@@ -132,10 +133,10 @@ def test_faults_of_teeth_by_name_table_and_file(tmp_path):
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        ("chip", "kind 'chip' is unknown; known ones are chipped corner"),
-        ({"kind": "pitting", "deep": 1}, "pitting: unknown key 'deep'; known ones are wheel, depth"),
+        ("chip", says("kind 'chip'")),
+        ({"kind": "pitting", "deep": 1}, says("pitting", "'deep'", "depth")),
         ({"kind": "pitting", "depth": "1 N"}, r"fault.teeth\[0\].depth: '1 N' is in N"),
-        ({"lost": 0.3}, "write its name or a table with 'kind'"),
+        ({"lost": 0.3}, says("'kind'", "write its name")),
         (3, "3 is no fault"),
     ],
 )
@@ -149,7 +150,7 @@ def test_wrong_faults_of_teeth(fault, words):
     [
         ({"kind": "broken tooth", "lost": 1.5}, r"fault\.teeth\[1\]\.lost is 1\.5; give"),
         ({"kind": "broken tooth", "tooth": 1.5}, r"fault\.teeth\[1\]\.tooth is 1\.5; give"),
-        ({"kind": "cumulative pitch error", "order": 20}, r"fault\.teeth\[1\]\.order is 20; give 1 up to 14"),
+        ({"kind": "cumulative pitch error", "order": 20}, says("fault.teeth[1]", "order", "20", "14", "give 1")),
         ({"kind": "wear", "teeth": "some"}, r"fault\.teeth\[1\]\.teeth is 'some'; give 'all'"),
         ({"kind": "chipped corner", "length": "50 mm"}, r"fault\.teeth\[1\]\.length is 0\.05 m"),
         ({"kind": "pitting", "depth": "3 kg"}, r"fault\.teeth\[1\]\.depth"),
@@ -162,34 +163,34 @@ def test_faults_that_do_not_fit_are_named_by_their_place(fault, words):
 
 
 WRONG = [
-    ({"bogus": 1}, "case: bogus: unknown key; known ones are name, gears"),
+    ({"bogus": 1}, "case: bogus: unknown"),
     ({"operation": {"speed": "10 N m"}}, "case: operation.speed = '10 N m': '10 N m' is in"),
-    ({"gears": {"modul": "3 mm"}}, r"gears.modul: unknown key; .*; did you mean module\?"),
-    ({"speed": "1000 rpm"}, r"speed: unknown key; .*; did you mean operation.speed\?"),
-    ({"operation": "1000 rpm"}, "operation = '1000 rpm': give its keys, speed, torque"),
+    ({"gears": {"modul": "3 mm"}}, says("gears.modul", "module")),
+    ({"speed": "1000 rpm"}, says("operation.speed", "unknown key")),
+    ({"operation": "1000 rpm"}, says("'1000 rpm'", "give its keys")),
     ({"gears": {"teeth": 20.5}}, r"^\S+: gears.teeth = 20.5: give a whole number$"),
-    ({"gears": {"teeth": [20, 21, 22]}}, "gears.teeth = .*3 values; give one for both wheels"),
-    ({"contact": {"depth": 0.01}}, r"contact.depth is 10 mm, more than the module .*\(a plain number is in m\)"),
-    ({"fault": {"teeth": {"kind": "broken tooth", "lost": 1.5}}}, r"fault.teeth\[0\].lost is 1.5; give a share"),
+    ({"gears": {"teeth": [20, 21, 22]}}, "gears.teeth = .*3 values; give"),
+    ({"contact": {"depth": 0.01}}, says("contact.depth", "10 mm", "m")),
+    ({"fault": {"teeth": {"kind": "broken tooth", "lost": 1.5}}}, says("fault.teeth[0]", "1.5", "give a share")),
     ({"fault": {"teeth": {"kind": "root crack", "depth": "50 mm"}}}, r"fault.teeth\[0\]: crack depth is 50.0000 mm"),
     (
         {"fault": {"teeth": {"kind": "broken tooth", "tooth": 99}}},
-        r"\[0\].tooth is 99; the driver wheel has teeth 0 to 28",
+        says("0", "99", "28", "wheel has teeth"),
     ),
     (
         {"fault": {"teeth": {"kind": "wear", "teeth": [3, 77]}}},
-        r"\[0\].teeth is 77; the driver wheel has teeth 0 to 28",
+        says("0", "77", "28", "wheel has teeth"),
     ),
-    ({"fault": {"teeth": {"kind": "pitting", "depth": "30 mm"}}}, "displaced by 30 mm, more than a tooth is thick"),
-    ({"fault": {"teeth": "root cracks"}}, r"did you mean root crack\?"),
-    ({"fault": {"teeth": {"kind": "wear", "deptt": 1}}}, r"did you mean depth\?"),
+    ({"fault": {"teeth": {"kind": "pitting", "depth": "30 mm"}}}, says("30 mm", "tooth is thick")),
+    ({"fault": {"teeth": "root cracks"}}, says("teeth", "root crack")),
+    ({"fault": {"teeth": {"kind": "wear", "deptt": 1}}}, says("deptt", "depth")),
     (
         {"operation": {"speed": [["0 s", "0 rpm"], ["0 s", "5 rpm"]]}},
-        "speed = .*point 2 is at 0 s; give times from 0 on",
+        says("2", "0 s", "give times"),
     ),
-    ({"operation": {"speed": [["0 s", "0 rpm"], ["1 s", "5 mm"]]}}, "speed = .*point 2: '5 mm' is in mm"),
-    ({"operation": {"speed": [["0 s", "0 rpm"]]}}, "a curve needs two points at least"),
-    ({"operation": {"speed": ["0 rpm", "5 rpm"]}}, r"a curve is a list of points \[time, value\]"),
+    ({"operation": {"speed": [["0 s", "0 rpm"], ["1 s", "5 mm"]]}}, says("2", "'5 mm'", "speed")),
+    ({"operation": {"speed": [["0 s", "0 rpm"]]}}, says("case", "needs two points")),
+    ({"operation": {"speed": ["0 rpm", "5 rpm"]}}, says("value", "list of points")),
 ]
 
 
@@ -214,7 +215,7 @@ def test_sections_raise_the_same_error():
     with pytest.raises(CaseError, match=r"case: gears.teeth = \[3\]: 1 values") as caught:
         Gears(teeth=[3])
     assert len(str(caught.value).splitlines()) == 1
-    with pytest.raises(CaseError, match="give its fields by name"):
+    with pytest.raises(CaseError, match=says("name", "give its fields")):
         Operation(3)
     case = Case()
     for change, words in (
@@ -238,8 +239,8 @@ def test_one_count_of_teeth_is_for_both_wheels(tmp_path):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"operation": {"speed": 1000}}, "which is 9549.3 rpm; write '1000 rpm' if that is meant, '1000 rad/s' if not"),
-        ({"shafts": {"radius": 1.0}}, "shafts.radius = 1.0 is a plain number and so in m, which is 1000 mm"),
+        ({"operation": {"speed": 1000}}, says("9549.3 rpm", "'1000 rad/s'", "write '1000 rpm'")),
+        ({"shafts": {"radius": 1.0}}, says("shafts.radius = 1.0", "m", "1000 mm")),
     ],
 )
 def test_plain_numbers_that_look_like_another_unit_are_remarked(data, words):
@@ -299,9 +300,9 @@ def test_faults_are_told_in_our_own_words_in_one_line(data, words):
 
 def test_names_that_are_no_fields_are_refused_like_keys():
     case = Case()
-    with pytest.raises(CaseError, match=r"case\.bogus: unknown key; known ones are name"):
+    with pytest.raises(CaseError, match=says("case.bogus")):
         setattr(case, "bogus", 3)  # noqa: B010
-    with pytest.raises(CaseError, match=r"gears\.tooth: unknown key.*did you mean teeth"):
+    with pytest.raises(CaseError, match=says("gears.tooth", "teeth")):
         setattr(case.gears, "tooth", 3)  # noqa: B010
 
 

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from gearmbs import cli
 from gearmbs.studies import commands
+from gearmbs.studies.paper.preset import Claim
 
 CASE = "[operation]\nrun_up = '30 ms'\nsettling = '10 ms'\nduration = '200 ms'\n"
 
@@ -112,3 +113,56 @@ def test_remarks_on_an_unusual_case(tmp_path, keep_handlers):
         assert record.attrs["contact_ratio"] == pytest.approx(0.7733, abs=1e-4)
         assert record.attrs["operation_speed_units"] == "rad/s"
         assert record.attrs["gears_density"] == 7850.0
+
+
+class Studied:
+    """What a study may be asked for by its command."""
+
+    def save(self, folder):
+        return [folder / "report.md"]
+
+    def report(self):
+        return "the report"
+
+    def claims(self, sensor):
+        return [Claim(f"claim {held}", sensor, held, "1 < 2", "is less") for held in (True, False)]
+
+    def campbell(self):
+        return xr.Dataset({"frequency": (("speed", "mode"), [[12.5, 310.0]])})
+
+
+@pytest.mark.parametrize(
+    ("words", "runs", "told"),
+    [
+        (["bench", "--no-pair"], 6, "held      laser: claim True\n          1 < 2\nNOT HELD  laser: claim False"),
+        (["bench"], 12, "held      support: claim True"),
+        (["resonance", "--cycles", "400"], 2, "the report"),
+        (["gearbox"], 2, "modes, Hz: 12.5, 310"),
+    ],
+)
+def test_studies_as_commands(tmp_path, monkeypatch, words, runs, told):
+    """Each runs what it names, writes to its folder and prints what came of it; wrong settings run nothing."""
+    named, moved = [], []
+
+    @contextlib.contextmanager
+    def bars(names):
+        named.extend(names)
+        yield lambda name, done: moved.append(name)
+
+    def run(*settings, progress, **options):
+        progress(named[0], 1.0)
+        return Studied()
+
+    module = f"gearmbs.studies.presets.{words[0]}"
+    monkeypatch.setattr(f"{module}.run_{words[0]}", run)
+    monkeypatch.setattr(commands, "case_bars", bars)
+    result = CliRunner().invoke(cli.app, [*words, "--out", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert len(named) == runs
+    assert moved == named[:1]
+    assert told in result.output
+    assert f"wrote {tmp_path / 'report.md'}" in result.output
+    wrong = {"bench": ["--motor", "steam"], "resonance": ["--damping", "0"], "gearbox": ["--speed", "5 mm"]}[words[0]]
+    result = CliRunner().invoke(cli.app, [*words, *wrong, "--out", str(tmp_path)])
+    assert result.exit_code == 1
+    assert len(moved) == 1

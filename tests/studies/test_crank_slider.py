@@ -7,6 +7,7 @@ from gearmbs.drivetrain import RunSettings
 from gearmbs.gears import faults
 from gearmbs.signals import analyse
 from gearmbs.studies import CrankSlider, run_train, train_signal
+from tests.studies.presets import agrees_with_its_file
 
 
 def test_inertia_torque_in_closed_form():
@@ -19,6 +20,14 @@ def test_inertia_torque_in_closed_form():
     assert np.rad2deg(angle[np.argmin(torque)]) == pytest.approx(36.66, abs=0.005)
     assert torque[:-1].mean() == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(np.rad2deg(slider.flank_changes()), [0.0, 76.72, 180.0, 283.28], atol=0.005)
+
+
+def test_the_file_is_the_pair():
+    agrees_with_its_file("crank_slider", CrankSlider().train())
+    other = CrankSlider(teeth=(21, 50), backlash=3e-4).train()
+    assert [wheel.gear.teeth for wheel in other.wheels] == [21, 50]
+    assert other.pairs["mesh"].backlash == 3e-4
+    assert other.speeds["crank"] == pytest.approx(100.0 * np.pi / 30.0)
 
 
 @pytest.mark.parametrize("tol", [1e-6, 1e-7])
@@ -52,6 +61,7 @@ def test_broken_tooth_shows_once_a_turn_of_its_wheel():
     np.testing.assert_allclose(np.diff(first) * slider.speed / (2 * np.pi), 1.0, atol=0.01)
 
 
+@pytest.mark.slow
 def test_eccentric_wheel_has_its_first_sidebands():
     """By `analyse` on the recorded speed: the lines one crank order beside each mesh harmonic rise, no others."""
     beside = []

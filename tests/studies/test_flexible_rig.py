@@ -1,6 +1,7 @@
 """The paper's pair on shafts that bend and twist."""
 
 import numpy as np
+import pytest
 
 from gearmbs.flexible import ElasticMaterial
 from gearmbs.gears import GearPair
@@ -34,6 +35,7 @@ def test_shafts_bend_and_twist_by_the_tooth_force():
     assert 0.7 * expected < bent < 1.4 * expected
 
 
+@pytest.mark.slow
 def test_stiff_shafts_are_rigid_shafts():
     rigid = run("rigid")
     angles = [s.joint_angle("bearing 2") for s in (run(), run(stiffer=1e4), rigid)]

@@ -5,12 +5,15 @@ import pickle
 import signal
 import subprocess
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
-from gearmbs.studies.run.processes import DEATH, RESULT, WorkerDied, messages, run_jobs
+from gearmbs.studies.run.engine import WorkerDied, claimed, run_jobs, take
 from gearmbs.studies.run.simulation import simulate_case
+from gearmbs.studies.run.workers import DEATH, RESULT, here, processes, threads
 from tests.studies.jobs import fail_or_wait, raise_what_cannot_travel, square, square_or_die
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
@@ -55,10 +58,72 @@ def test_a_worker_that_dies_is_replaced_and_jobs_are_taken_when_one_is_free():
             taken.append(job)
             yield job
 
-    told = messages(square_or_die, jobs(), 1)
+    told = processes(square_or_die, jobs(), 1)
     assert next(told) == (0, "die", DEATH, None)
     assert taken == ["die"]
     assert list(told) == [(1, 3, RESULT, 9), (2, 2, RESULT, 4)]
+
+
+@pytest.mark.parametrize("where", [here, threads], ids=["here", "in threads"])
+def test_jobs_run_elsewhere_by_the_same_engine(where):
+    """Order, results as they come, the first error; after no time nothing is begun."""
+    finished = []
+    assert run_jobs(square, [3, 1, 2], 2, where=where, done=lambda job, x: finished.append(job)) == [9, 1, 4]
+    assert sorted(finished) == [1, 2, 3]
+    with pytest.raises(TypeError):
+        run_jobs(square, [1, "text"], 2, where=where)
+    assert run_jobs(square, [3, 1], 2, where=where, seconds=0.0) == []
+
+
+def test_a_thread_that_ends_without_a_word_is_a_death():
+    def leave(job, report):
+        raise SystemExit(3)
+
+    with pytest.raises(WorkerDied) as died:
+        run_jobs(leave, ["job"], where=threads)
+    assert died.value.job == "job"
+
+
+def test_a_job_whose_worker_dies_is_tried_again_so_often():
+    finished = []
+    with pytest.raises(WorkerDied) as died:
+        run_jobs(square_or_die, ["die", 3], 1, tries=2, done=lambda job, x: finished.append(job))
+    assert died.value.job == "die"
+    assert finished == [3]
+
+
+@dataclass
+class Squares:
+    """A ledger of squares, a text file a job."""
+
+    folder: Path
+
+    def result(self, job):
+        path = self.folder / str(job)
+        return int(path.read_text()) if path.exists() else None
+
+    def claim(self, job):
+        return self.folder / f"{job}.claim"
+
+
+def test_what_others_are_at_work_on_is_theirs(tmp_path, monkeypatch):
+    """One job is finished by somebody else, another one given back: each is worked on once, both are in the results."""
+    monkeypatch.setattr("gearmbs.studies.run.engine.POLL", 0.0)
+    ledger, worked = Squares(tmp_path), []
+    theirs, given_back = (take(ledger.claim(job)) for job in (5, 6))
+
+    def work(job, report):
+        return claimed(ledger, job, lambda claim: worked.append(job) or square(job, report))
+
+    def done(job, value):
+        if job == 4:
+            (tmp_path / "5").write_text("25")
+            theirs.release()
+            given_back.release()
+
+    assert run_jobs(work, [4, 5, 6], where=here, done=done, ledger=ledger) == [16, 25, 36]
+    assert worked == [4, 6]
+    assert not list(tmp_path.glob("*.claim"))
 
 
 def test_an_error_that_cannot_be_sent_arrives_as_text():
@@ -74,7 +139,7 @@ def test_ctrl_c_ends_all_processes(everyone):
     code = (
         "import signal\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from gearmbs.studies.run.processes import run_jobs\n"
+        "from gearmbs.studies.run.engine import run_jobs\n"
         "from tests.studies.jobs import fail_or_wait\n"
         "if __name__ == '__main__':\n"
         "    try:\n"
@@ -101,6 +166,7 @@ def test_ctrl_c_ends_all_processes(everyone):
     assert all(gone(pid) for pid in pids)
 
 
+@pytest.mark.slow
 def test_processes_and_threads_give_the_same_records():
     """IDA runs in processes when there is more than one worker; bars move before a case ends."""
     cases = [

@@ -120,6 +120,7 @@ def test_a_differential_set_turns_freely():
     assert (sun - carrier) * 24 == pytest.approx(-(ring - carrier) * 84, rel=0.05)
 
 
+@pytest.mark.slow
 def test_planets_on_rolling_bearings():
     tables = {
         "planetary": {

@@ -7,6 +7,7 @@ import pytest
 
 from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.studies.presets.rattle import MODELS, RattleSettings, rattle, rattle_map, rattle_table, rattle_train
+from tests.studies.presets import agrees_with_its_file
 
 
 def test_one_description_for_all():
@@ -17,6 +18,10 @@ def test_one_description_for_all():
     chain = train.torsional()
     assert chain.inertias[chain.names.index("loose")] == pytest.approx(1e-3)
     assert train.part("l1").gear.teeth + train.part("l2").gear.teeth == train.part("g1").gear.teeth + 27
+
+
+def test_the_file_is_the_transmission():
+    agrees_with_its_file("rattle", rattle_train())
 
 
 @pytest.mark.parametrize("model", ["equivalent", "torsional", pytest.param("multibody", marks=pytest.mark.slow)])

@@ -11,7 +11,10 @@ from gearmbs.studies.paper.paper import gmf_levels
 STORED = json.loads((Path(__file__).parent / "gmf_levels.json").read_text())
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["all bodies", "angles alone"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(False, id="all bodies", marks=pytest.mark.slow), pytest.param(True, id="angles alone")],
+)
 def levels(request):
     return gmf_levels(workers=2, lump=request.param)
 

@@ -14,10 +14,16 @@ from gearmbs.studies.presets.resonance import (
     ResonanceStudy,
     jump_frequency,
     lowest_lag,
+    resonance_train,
+    run_resonance,
     separation_load,
     separation_loads,
     sweep_resonance,
 )
+from gearmbs.studies.trains.trains import load_train
+from tests.make_records import read
+from tests.says import says
+from tests.studies.presets import agrees_with_its_file
 
 WINDOW = 20
 
@@ -67,8 +73,10 @@ def classical_jump(settings, direction, cycles=8000, settling=400):
 
 @pytest.fixture(scope="module")
 def study():
-    settings = ResonanceSettings()
-    return ResonanceStudy(settings, {(m, d): sweep_resonance(settings, d, m) for m in MODELS for d in DIRECTIONS})
+    sweeps = read("resonance.nc")
+    return ResonanceStudy(
+        ResonanceSettings(), {(m, d): sweeps.sel(model=m, direction=d) for m in MODELS for d in DIRECTIONS}
+    )
 
 
 def test_jumps_of_both_models(study):
@@ -103,6 +111,7 @@ def test_slower_sweeps_jump_at_the_same_place(study):
         assert found == pytest.approx(study.jumps()["one degree"][direction], rel=3e-3)
 
 
+@pytest.mark.slow
 def test_no_separation_below_a_load():
     """With a contact ratio of two only the deflection excites: teeth stay together below the load that is told."""
     settings = ResonanceSettings(addendum=1.157, damping_ratio=0.03, cycles=2000)
@@ -119,6 +128,7 @@ def test_no_separation_below_a_load():
     assert separation_load(settings, (5.0, 10.0)) is None
 
 
+@pytest.mark.slow
 def test_loads_of_both_models_are_printed():
     settings = ResonanceSettings(addendum=1.157, damping_ratio=0.03, cycles=400)
     found = separation_loads(settings)
@@ -137,19 +147,35 @@ def test_report_and_figure(study, tmp_path):
 
 
 @pytest.mark.parametrize(("changes", "words"), [
-    ({"torque": "-3 N m"}, "torque is -3 N m; it must be positive"),
+    ({"torque": "-3 N m"}, says("torque", "-3 N m")),
     ({"span": (1.0, 0.5)}, "span is"),
     ({"damping_ratio": 0.0}, "damping_ratio is 0"),
-    ({"cycles": 10}, "cycles is 10; give 300 or more"),
+    ({"cycles": 10}, says("cycles", "10", "give 300")),
 ])  # fmt: skip
 def test_wrong_settings(changes, words):
     with pytest.raises(ValueError, match=words):
         ResonanceSettings(**changes)
 
 
+def test_both_directions_side_by_side(monkeypatch):
+    monkeypatch.setattr("gearmbs.studies.presets.resonance.separation_loads", lambda settings: {})
+    settings, told = ResonanceSettings(cycles=300), {}
+    found = run_resonance(settings, progress=lambda name, fraction: told.update({name: fraction}))
+    assert list(found.sweeps) == [(model, direction) for direction in DIRECTIONS for model in MODELS]
+    assert told == {"up": 1.0, "down": 1.0}
+    assert found.sweeps["multibody", "down"].equals(sweep_resonance(settings, "down"))
+    assert found.sweeps["one degree", "up"].equals(sweep_resonance(settings, "up", "one degree"))
+
+
 def test_no_jump_where_amplitudes_only_slope():
     quiet = sweep_resonance(ResonanceSettings(span=(0.4, 0.45), cycles=1000), "up", "one degree")
     assert np.isnan(jump_frequency(quiet))
+
+
+def test_the_file_is_the_rig_before_its_sweep():
+    train = resonance_train().changed("drive", function=None)
+    assert train.run_up == pytest.approx(load_train("resonance").train.run_up)
+    agrees_with_its_file("resonance", replace(train, run_up=load_train("resonance").train.run_up))
 
 
 def test_wrong_model():

@@ -3,14 +3,15 @@
 import pytest
 
 from gearmbs.studies import Case, CaseError, run_case
+from tests.says import says
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"lump": True}, r"lump: is a setting of the case's solver; .*case.changed\(solver=\{'lump': True\}\)"),
-        ({"speed": 100.0}, r"speed: is a setting of the case's operation; .*operation=\{'speed': 100.0\}"),
-        ({"color": "red"}, r"color: run_case takes a case, progress, mechanism and variables"),
+        ({"lump": True}, says("case.changed", "solver=", "'lump'", "True")),
+        ({"speed": 100.0}, says("operation=", "'speed'", "100.0")),
+        ({"color": "red"}, says("color", "run_case", "case")),
     ],
 )
 def test_settings_of_the_case_are_refused_by_their_place(settings, message):

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -13,17 +14,12 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from gearmbs import cli, files
+from gearmbs.files import KeptElsewhere, check_place
 from gearmbs.studies import Case, CaseError, SimulationFailed, case_mechanism, run_case, run_cases, simulate_case
-from gearmbs.studies.run import simulation
+from gearmbs.studies.run import engine, simulation
 from gearmbs.studies.run.parallel import StorageWarning
-from gearmbs.studies.run.store import (
-    KeptElsewhere,
-    check_place,
-    keep_dataset,
-    record_size,
-    stored_record,
-    write_dataset,
-)
+from gearmbs.studies.run.store import RecordFolder, keep_dataset, record_size, stored_record, write_dataset
+from tests.says import says
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
 
@@ -49,9 +45,7 @@ def full_disk(tmp_path, monkeypatch):
 
 
 def test_a_record_is_kept_elsewhere_when_the_disk_is_full(full_disk, tmp_path):
-    with pytest.raises(
-        KeptElsewhere, match=r"r\.nc: cannot be written \(No space left on device\); it is in"
-    ) as caught:
+    with pytest.raises(KeptElsewhere, match=says("r.nc", "No space left")) as caught:
         keep_dataset(full_disk / "r.nc", small())
     assert caught.value.path.parent.parent == tmp_path
     with xr.open_dataset(caught.value.path, engine="h5netcdf") as found:
@@ -66,7 +60,7 @@ def test_nothing_is_left_where_nothing_can_be_written(tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "write_bytes", refuse)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(files.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
-    with pytest.raises(OSError, match="nor anywhere else; it is lost"):
+    with pytest.raises(OSError, match=says("r.nc", "anywhere else")):
         keep_dataset(tmp_path / "r.nc", small())
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
@@ -99,10 +93,10 @@ def test_places_are_looked_at_before_the_work(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     with pytest.raises(NotADirectoryError, match="is a file; write elsewhere"):
         check_place(tmp_path / "file" / "in it", 1e3)
-    with pytest.raises(OSError, match=r"are free in .*, two records takes about 1000000000.0 GB; make room"):
+    with pytest.raises(OSError, match=says("two records", "1000000000.0 GB", "make room")):
         check_place(tmp_path, 1e18, "two records")
     monkeypatch.setattr(files.tempfile, "TemporaryFile", lambda dir: open("/proc/version", "x"))
-    with pytest.raises(OSError, match=r"cannot be written .*; write elsewhere"):
+    with pytest.raises(OSError, match=says("write elsewhere", "written")):
         check_place(tmp_path, 1e3)
 
 
@@ -136,6 +130,37 @@ def test_finished_cases_are_taken_up(tmp_path, monkeypatch):
     assert stored_record(tmp_path, cases[0]) is None
 
 
+def test_two_calls_share_the_cases(tmp_path, monkeypatch):
+    """The case that another call is at work on comes from there; that of one that was killed is computed here."""
+    monkeypatch.setattr(engine, "POLL", 0.0)
+    cases = [Case(name=name, operation=SHORT) for name in ("mine", "theirs", "of the dead")]
+    ledger = RecordFolder(tmp_path)
+    claim = engine.take(ledger.claim(cases[1]))
+    ledger.claim(cases[2]).write_text(json.dumps({"host": socket.gethostname(), "pid": 2**22 + 1, "started": "1"}))
+    record, computed = run_case(cases[1]), []
+
+    def counted(case, progress=None):
+        computed.append(case.name)
+        return record.assign_attrs(case=case.name, case_json=case.model_dump_json())
+
+    def done(case, _record):
+        if case.name == "mine":
+            ledger.enter(cases[1], record.assign_attrs(title="theirs"))
+            claim.release()
+
+    monkeypatch.setattr("gearmbs.studies.run.parallel.run_case", counted)
+    records = run_cases(cases, workers=1, folder=tmp_path, done=done)
+    assert computed == ["mine", "of the dead"]
+    assert [r.attrs["case"] for r in records] == ["mine", "theirs", "of the dead"]
+    assert records[1].attrs["title"] == "theirs"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.nc", "of the dead.nc", "theirs.nc"]
+    # a claim only saves work: where none can be written, cases run all the same
+    (tmp_path / "mine.nc").unlink()
+    monkeypatch.setattr(engine, "take", lambda path: os.open(tmp_path / "no" / "folder", os.O_CREAT))
+    assert len(run_cases(cases, workers=1, folder=tmp_path)) == 3
+    assert computed[2:] == ["mine"]
+
+
 def test_errors_can_be_kept(tmp_path, monkeypatch):
     """The case whose record is too short, the one that fails, and the sound one, each in its place."""
     monkeypatch.setattr(
@@ -167,6 +192,7 @@ def test_a_full_disk_stops_no_case(full_disk):
     assert all(record.gmf_rms.size for record in records)
 
 
+@pytest.mark.slow
 def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     """Three cases are there from before; three are computed, and a full disk at the end costs nothing."""
     words = ["paper", "--out", str(tmp_path / "out"), "--duration", "80 ms", "--workers", "1"]
@@ -177,7 +203,7 @@ def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     assert len(list((tmp_path / "out" / "cases").glob("*load.nc"))) == 3
     with monkeypatch.context() as patch:
         patch.chdir(tmp_path)
-        patch.setattr("gearmbs.studies.paper.paper.write_dataset", _refuse_in(tmp_path / "out"))
+        patch.setattr("gearmbs.studies.run.store.write_dataset", _refuse_in(tmp_path / "out"))
         result = CliRunner().invoke(cli.app, words)
     assert "taking up 3 finished of 6 cases" in result.output
     assert result.exit_code == 1
@@ -220,7 +246,7 @@ def test_a_record_on_bearings_is_told_from_one_on_joints(tmp_path):
     solution = simulate_case(case, False, mechanism=m)
     assert simulation.record(case, solution, m).attrs["bearings_json"] == record.attrs["bearings_json"]
     assert "bearings_json" not in simulation.record(case, solution).attrs
-    with pytest.raises(ValueError, match="there is no 'bearing 3'; choose among bearing 1 a"):
+    with pytest.raises(ValueError, match=says("'bearing 3'", "1", "choose among bearing")):
         case_mechanism(case, "6206", each={"bearing 3": {}})
 
 

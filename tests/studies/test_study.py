@@ -9,6 +9,7 @@ from scipy.signal.windows import blackmanharris
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
+from gearmbs.files import whole_file
 from gearmbs.signals.files.simulated import model_signals, parse_states
 from gearmbs.studies import Case, SimulationFailed, run_case, run_paper, simulate_case
 from gearmbs.studies.case.case import CaseError, make_case
@@ -16,7 +17,7 @@ from gearmbs.studies.paper.preset import judge, paper_cases
 from gearmbs.studies.paper.report import choices
 from gearmbs.studies.run import rig as parts
 from gearmbs.studies.run.simulation import case_mechanism
-from gearmbs.studies.run.store import whole_file, write_dataset
+from gearmbs.studies.run.store import write_dataset
 
 SHORT = {"run_up": 0.03, "settling": 0.01, "duration": 0.06}
 
@@ -174,6 +175,7 @@ def test_only_lines_at_multiples_of_the_mesh_frequency():
     assert between.max() < 1e-4 * spectrum[periods]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [{}, {"centre_distance_error": "3 mm"}, {"misalignment": "1 deg"}])
 def test_floor_between_the_lines_at_the_study_settings(fault):
     """1000 rpm, friction, a sampling rate that is no multiple of the mesh frequency: what lies between the lines below

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from gearmbs.studies import Case, CaseError, SimulationFailed, load_case, sweep
 from gearmbs.studies.case.case import case_toml
 from gearmbs.studies.run import simulation
+from tests.says import says
 from tests.view.looking import assert_readable
 
 SHORT = {"run_up": "20 ms", "settling": 0.0, "duration": "70 ms"}
@@ -68,7 +69,7 @@ def test_errors_are_kept_in_their_places(monkeypatch):
 @pytest.mark.parametrize(
     ("field", "values", "words"),
     [
-        ("operation.sped", ["1 rpm"], "'operation.sped' is no setting of a case; did you mean operation.speed"),
+        ("operation.sped", ["1 rpm"], says("'operation.sped'", "case", "operation.speed")),
         ("speed", ["1 rpm"], "did you mean operation.speed"),
         ("operation.speed", ["1000 rpm", "5 mm"], "value 2 of operation.speed: operation.speed = '5 mm'"),
         ("operation.speed", "1000 rpm", "give a sequence of values"),

@@ -28,12 +28,13 @@ from gearmbs.drivetrain import (
 from gearmbs.signals import analyse
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.rotation.orders import harmonic_amplitudes
-from gearmbs.studies import run_train, train_report, train_scene, train_signal, train_spectrum
+from gearmbs.studies import run_train, run_trains, train_report, train_scene, train_signal, train_spectrum
 from gearmbs.studies.trains.recorder import counted_turns
 from gearmbs.studies.trains.speed import HeldSpeed, by_angle
 from gearmbs.studies.trains.trains import check_record, load_train
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_description import TEXT
+from tests.says import says
 
 
 def measured_stage():
@@ -164,7 +165,7 @@ def test_figure_names_lines_by_the_kinematic_table(train, record):
     ticks = lower.collections[rows.index("mesh mesh")].get_segments()
     assert sorted(segment[0, 0] for segment in ticks) == pytest.approx([500.0, 1000.0, 1500.0], rel=1e-3)
     assert train_spectrum(train, record, maximum=600.0).axes[0].get_title(loc="left").endswith(": seat")
-    with pytest.raises(DrivetrainError, match="in a run-up lines move"):
+    with pytest.raises(DrivetrainError, match=says("record", "mesh_track", "run-up")):
         train_spectrum(train, record.assign(mesh_track=record.mesh_rms))
 
 
@@ -201,12 +202,30 @@ def test_faults_in_files_and_wrong_files(tmp_path):
 
 
 @pytest.mark.parametrize(("settings", "words"), [
-    ({"rate": 2500.0}, "run.rate is 2500 Hz: 3 harmonics of mesh 'mesh' reach 1500 Hz"),
-    ({"duration": 0.005}, "run.duration is 0.005 s: mesh 'mesh' has 500 mesh cycles a second"),
+    ({"rate": 2500.0}, says("run.rate", "2500 Hz", "3", "'mesh'", "1500 Hz")),
+    ({"duration": 0.005}, says("run.duration", "0.005 s", "'mesh'", "500")),
 ])  # fmt: skip
 def test_records_that_cannot_be_are_refused(settings, words):
     with pytest.raises(DrivetrainError, match=words):
         check_record(stage(), RunSettings(**settings))
+
+
+@pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
+def test_trains_side_by_side_have_the_records_of_each_alone(integrator):
+    """In the order of their names, with the progress of each; a failure of one stops the others."""
+    run = RunSettings(duration=0.02, settling=0.0, tolerance=1e-6, integrator=integrator)
+    torques = {"a": 80.0, "b": 90.0, "c": 90.0}
+    loads = {name: [TorqueLoad(name="brake", shaft="out", torque=torque)] for name, torque in torques.items()}
+    runs = {name: (stage(loads=load, running=True), run) for name, load in loads.items()}
+    told = {}
+    records = run_trains(runs, workers=2, progress=lambda name, fraction: told.update({name: fraction}))
+    assert list(records) == list(runs)
+    assert told == dict.fromkeys(runs, 1.0)
+    assert records["b"]["mesh_rms"].equals(run_train(*runs["b"])["mesh_rms"])
+    assert records["c"]["mesh_rms"].equals(records["b"]["mesh_rms"])
+    assert not records["a"]["mesh_rms"].equals(records["b"]["mesh_rms"])
+    with pytest.raises(DrivetrainError, match=r"run\.duration is 0\.005 s"):
+        run_trains({**runs, "short": (stage(), RunSettings(duration=0.005))}, progress=False)
 
 
 def driven(drive, **settings):

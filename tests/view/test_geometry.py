@@ -87,6 +87,7 @@ def test_area_of_the_paper_s_wheel_by_quadrature():
     assert profile_area(PAPER) == pytest.approx(58 * (tooth + tip + land), rel=1e-7)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(gears())
 def test_any_wheel_is_a_watertight_solid_of_the_right_volume(gear):
@@ -230,6 +231,7 @@ def test_dxf_of_a_pair_stands_where_the_pair_stands(tmp_path):
         write_dxf(pair.with_faults(BrokenTooth()), tmp_path / "x.dxf")
 
 
+@pytest.mark.slow
 def test_dxf_passes_the_audit_of_another_program(wheel, tmp_path):
     ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed")
     drawing = ezdxf.readfile(write_dxf(wheel, tmp_path / "wheel.dxf"))

@@ -210,6 +210,7 @@ def opened(page, tmp_path, query=""):
         return text, np.asarray(image.convert("RGB")).astype(int)
 
 
+@pytest.mark.slow
 @needs_browser
 @pytest.mark.parametrize("query", ["", "?plain"])
 def test_scene_opens_in_a_browser(scene, tmp_path, query):
@@ -225,6 +226,7 @@ def test_scene_opens_in_a_browser(scene, tmp_path, query):
     assert ((red > blue + 90) & (green > blue + 50)).mean() > 0.02  # the driven wheel
 
 
+@pytest.mark.slow
 @needs_browser
 def test_animation_opens_in_a_browser(tmp_path):
     page = mesh_animation(GearPair.paper(), frames=4).save(tmp_path / "mesh.html")

@@ -15,11 +15,11 @@ import numpy as np
 
 from gearmbs.adams.builders.control import diff_name, implicit_states, state_system
 from gearmbs.adams.builders.curve_data import curve_points
-from gearmbs.adams.builders.frames import add_point_mass, hold, inertia_about_cm, marker_orientation, part_orientation
+from gearmbs.adams.builders.frames import hold, inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.functions import FUNCTIONS, Accelerations, Present, translated
 from gearmbs.adams.builders.scopes import (
-    KINDS,
     AdamsModel,
+    Beam,
     BodyState,
     acts,
     joints_of,
@@ -46,7 +46,6 @@ from gearmbs.mechanism.parts.joints import Joint
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from gearmbs.adams.builders.flexible import Beam
     from gearmbs.flexible import ModalModel
     from gearmbs.mechanism.contacts.shapes import Shape
     from gearmbs.solids.bodies import Body as SolidBody
@@ -89,8 +88,8 @@ class Builder:
         self.mechanism.reads_units = False
         self.mechanism.redundancy = "adams"
         self.model = AdamsModel(self.mechanism, deck, present=present)
-        self.accelerations = Accelerations(self)
         self.markers = Markers()
+        self.accelerations = Accelerations(self.mechanism, self.markers)
         self.joints: dict[int, Joint] = {}
         self.flexible: dict[int, ModalModel] = {}
         self.solid_files: dict[Path, list[SolidBody]] = {}
@@ -117,7 +116,7 @@ class Builder:
         for part in self.deck.of(st.Part).values():
             self.attempt(part, self.add_part)
         for point in self.deck.of(st.PointMass).values():
-            self.attempt(point, partial(add_point_mass, self))
+            self.attempt(point, self.add_point_mass)
         for kind, make in bodies.items():
             deforming: Mapping[int, st.Statement] = self.deck.of(kind)
             for statement in deforming.values():
@@ -182,7 +181,7 @@ class Builder:
 
     def name_elements(self) -> None:
         """Name everything that transmits a force before any expression refers to it."""
-        for cls, kind in KINDS.items():
+        for cls, kind in st.KINDS.items():
             for statement in self.active(cls):
                 self.claim(statement, kind)
             for statement in self.deck.of(cls).values():
@@ -249,6 +248,29 @@ class Builder:
         if part.planar:
             hold(self.mechanism, body, "planar")
 
+    def add_point_mass(self, s: st.PointMass) -> None:
+        """POINT_MASS: a body of any inertia that does not turn."""
+        name = self.claim(s, "point_mass")
+        units = self.units
+        cm = self.deck.of(st.Marker).get(s.cm or 0)
+        com = np.zeros(3) if cm is None else units.length * np.array(cm.qp)
+        start = self.state.get(("POINT_MASS", s.id))
+        if start is None:
+            velocity = units.factor("velocity") * np.array([s.vx, s.vy, s.vz])
+            start = BodyState(units.length * np.array(s.qg), part_orientation(s), velocity, np.zeros(3))
+        mass = units.mass * s.mass
+        body = self.mechanism.body(
+            name,
+            mass,
+            (mass, mass, mass),
+            com=com,
+            position=start.position,
+            orientation=start.orientation,
+            velocity=start.velocity,
+        )
+        self.model.sources[body.name] = s
+        hold(self.mechanism, body, "orientation")
+
     def direction(
         self, ref: int | None, part: st.Part | st.FlexBody, axes: np.ndarray, cm: st.Marker | None
     ) -> np.ndarray:
@@ -297,9 +319,8 @@ class Builder:
                 m.variables[variable.id] = variable.function or "0"
         for array in self.deck.of(st.Array).values():
             m.arrays[array.id] = array.numbers
-        for kind, group in (("pinput", st.PlantInput), ("poutput", st.PlantOutput)):
-            for plant in self.deck.of(group).values():
-                m.plants[kind, plant.id] = plant.variables
+        for plant in self.deck.each(st.Plant):
+            m.plants[plant.keyword.lower(), plant.id] = plant.variables
         for spline in self.deck.of(st.Spline).values():
             if spline.data_file is None:
                 m.splines[spline.id] = spline_data(spline)
@@ -308,8 +329,9 @@ class Builder:
                 self.attempt(curve, self.add_curve)
         for diff in self.active(st.Diff):
             self.attempt(diff, self.add_diff)
-        for system in (*self.active(st.Lse), *self.active(st.Tfsiso), *self.active(st.Gse)):
-            self.attempt(system, self.add_state_system)
+        for system in self.deck.each(st.System):
+            if acts(system, self.inactive):
+                self.attempt(system, self.add_state_system)
         for sensor in self.active(st.Sensor):
             m.algebraic_state(sensor_state(sensor.id), self.text(sensor.function or "0"))
 
@@ -329,7 +351,7 @@ class Builder:
         else:
             states[diff.id] = State(diff_name(diff), f"({text})/{self.units.time!r}", diff.ic[0])
 
-    def add_state_system(self, statement: st.Lse | st.Tfsiso | st.Gse) -> None:
+    def add_state_system(self, statement: st.System) -> None:
         """Add the states of an LSE, TFSISO or GSE."""
         system, states = state_system(self.deck, statement), self.mechanism.states
         for name, rate, start in zip(system.names, system.rates(), system.start):

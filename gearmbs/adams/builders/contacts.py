@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
@@ -224,4 +223,4 @@ MAKERS: dict[str, Callable[[Builder, st.Graphics], Shape]] = {
     "REVOLUTION": _revolution,
     "TORUS": _torus,
 }
-CONTACTS: dict[type, Callable[[Builder, Any], None]] = {st.Contact: add_contact}
+CONTACTS: dict[type, Maker] = {st.Contact: add_contact}

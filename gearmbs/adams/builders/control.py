@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 from gearmbs.mechanism.parts.elements import State
-
-if TYPE_CHECKING:
-    from gearmbs.adams.builders.scopes import AdamsModel
 
 # Differential equations that are not solved for the rates: DIFF and GSE with IMPLICIT.
 #
@@ -224,7 +221,7 @@ class LinearSystem(NamedTuple):
 
 def state_systems(deck: Deck) -> Iterator[tuple[st.Statement, LinearSystem | StateEquations]]:
     """Yield the LSE, TFSISO and GSE statements of a deck that hold together, each with what it stands for."""
-    for statement in (*deck.of(st.Lse).values(), *deck.of(st.Tfsiso).values(), *deck.of(st.Gse).values()):
+    for statement in deck.each(st.System):
         try:
             system = state_system(deck, statement)
         except ValueError:
@@ -322,18 +319,3 @@ def _canonical(s: st.Tfsiso, inputs: tuple[int, ...]) -> tuple[np.ndarray, np.nd
     b = np.zeros((n, 1))
     b[-1:] = 1.0
     return a, b, (above[:-1] - above[-1] * below)[None], above[-1:][None]
-
-
-def hold_states(model: AdamsModel) -> None:
-    """Make the states of statements with STATIC_HOLD keep their values, as in static analyses."""
-    deck, states = model.deck, model.mechanism.states
-    held: list[int | str] = []
-    for diff in deck.of(st.Diff).values():
-        if diff.static_hold:
-            held += [diff.id, diff_name(diff), rate_name(diff_name(diff))]
-    for s, system in state_systems(deck):
-        if getattr(s, "static_hold", False):
-            held += [*system.names, *(state.name for state in system.algebraic)]
-    for name in held:
-        if name in states:
-            states[name].expression = repr(states[name].start) if states[name].algebraic else "0"

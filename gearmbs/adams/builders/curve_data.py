@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import read_matrices
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.matrix_files import read_matrices
 from gearmbs.mechanism.parts.curves import Curve
 
 if TYPE_CHECKING:

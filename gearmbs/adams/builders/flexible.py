@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder, LeftOutError
+from gearmbs.adams.builders.builder import Builder, LeftOutError, Maker
 from gearmbs.adams.builders.curve_data import flexible_body
 from gearmbs.adams.builders.frames import hold, marker_orientation, part_orientation
-from gearmbs.adams.builders.scopes import BodyState
+from gearmbs.adams.builders.scopes import Beam, BodyState
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.data_statements import NODES
 from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Call, Scope, parse, walk
@@ -171,32 +169,6 @@ OF_POINTS = frozenset(["SD", "SV", "SA"])
 """Position, velocity and acceleration at S."""
 
 
-@dataclass(frozen=True, eq=False)
-class Beam:
-    """An FE_PART as it was built.
-
-    Attributes
-    ----------
-    bodies : list of Body
-        At all nodes along the beam, those in between, too.
-    labels : dict of int to int
-        Number of a node in the deck -> place in ``bodies``.
-    share, reach : ndarray
-        Share of the length at each body, and the length that it stands for, m.
-    axes : ndarray, shape (3, 3)
-        Of the part's frame.
-    places : ndarray, shape (bodies, 3)
-        In the part's frame, m.
-    """
-
-    bodies: list[Body]
-    labels: dict[int, int]
-    share: np.ndarray
-    reach: np.ndarray
-    axes: np.ndarray
-    places: np.ndarray
-
-
 def add_fe_part(b: Builder, s: st.FePart) -> None:
     """FE_PART: nodes, and elements between them."""
     from gearmbs.flexible.large_beam import LargeBeam, node_shares
@@ -267,7 +239,7 @@ def _node(
     where: tuple[np.ndarray, np.ndarray],
 ) -> Body:
     """Add the body of a node, where an earlier analysis left it."""
-    source = st.FeNode(id=s.id * NODES + k + 1, file=s.file, line=s.line, part=s.label())
+    source = st.FeNode(id=s.id * st.NODES + k + 1, file=s.file, line=s.line, part=s.label())
     start = b.state.get((source.keyword, source.id))
     if start is None:
         start = BodyState(*where, np.zeros(3), np.zeros(3))
@@ -418,3 +390,10 @@ def add_fe_load(b: Builder, s: st.FeLoad) -> None:
         rm = b.markers[s.rm] if s.rm is not None else ground
         marker = body.marker(name=f"{name}.{k + 1}")
         b.mechanism.load(f"{name}.{k + 1}", marker, ground, rm=rm, kind="fe_load", **parts)  # type: ignore[arg-type]
+
+
+DEFORMING: dict[type, Maker] = {st.FlexBody: add_flex_body, st.FePart: add_fe_part}
+"""What adds bodies that deform."""
+ON_NODES: dict[str, Maker] = {"FLEX_BODY": add_flexible_marker, "FE_PART": add_node_marker}
+"""What adds their markers."""
+LINE_LOADS: dict[type, Maker] = {st.FeLoad: add_fe_load}

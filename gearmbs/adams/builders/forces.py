@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.builders.curve_data import LOADS, flexible_body
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
@@ -165,18 +165,6 @@ def add_friction(b: Builder, s: st.Friction) -> None:
     )
 
 
-FORCES: dict[type, Callable[[Builder, Any], None]] = {
-    st.Sforce: add_sforce,
-    st.Vforce: add_vforce,
-    st.Vtorque: add_vtorque,
-    st.Gforce: add_gforce,
-    st.SpringDamper: add_spring_damper,
-    st.Bushing: add_bushing,
-    st.Field: add_field,
-    st.Beam: add_beam,
-    st.Friction: add_friction,
-}
-
 # Load cases of an MFORCE, and what its routine becomes.
 
 
@@ -255,3 +243,17 @@ def add_mforce(b: Builder, s: st.Mforce) -> None:
         raise ValueError(f"CASE_INDEX = {s.case_index}, but {no_cases(s)}")
     column = loads[:, load_case(s.case_index, loads) - 1]
     add_modal_force(b.mechanism, name, body, unit * column, b.text(s.scale), reaction=reaction)
+
+
+FORCES: dict[type, Maker] = {
+    st.Sforce: add_sforce,
+    st.Vforce: add_vforce,
+    st.Vtorque: add_vtorque,
+    st.Gforce: add_gforce,
+    st.SpringDamper: add_spring_damper,
+    st.Bushing: add_bushing,
+    st.Field: add_field,
+    st.Beam: add_beam,
+    st.Friction: add_friction,
+    st.Mforce: add_mforce,
+}

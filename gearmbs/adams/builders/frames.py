@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.adams.builders.scopes import BodyState
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import Body
-
-if TYPE_CHECKING:
-    from gearmbs.adams.builders.builder import Builder
 
 PARALLEL = 1e-10
 """Sine of the angle between the axis and the second direction below which the two give no plane, as rounding of
@@ -92,27 +87,3 @@ def hold(mechanism: Mechanism, body: Body, kind: str, normal: int = 2) -> None:
     axes = np.roll(np.eye(3), 2 - normal, axis=1)
     i, j = (owner.marker_at(at, axes, name=f"{name} {owner.name}") for owner in (body, mechanism.ground))
     mechanism.joint(kind, name, i, j)
-
-
-def add_point_mass(b: Builder, s: st.PointMass) -> None:
-    """POINT_MASS: a body of any inertia that does not turn."""
-    name = b.claim(s, "point_mass")
-    units = b.units
-    cm = b.deck.of(st.Marker).get(s.cm or 0)
-    com = np.zeros(3) if cm is None else units.length * np.array(cm.qp)
-    start = b.state.get(("POINT_MASS", s.id))
-    if start is None:
-        velocity = units.factor("velocity") * np.array([s.vx, s.vy, s.vz])
-        start = BodyState(units.length * np.array(s.qg), part_orientation(s), velocity, np.zeros(3))
-    mass = units.mass * s.mass
-    body = b.mechanism.body(
-        name,
-        mass,
-        (mass, mass, mass),
-        com=com,
-        position=start.position,
-        orientation=start.orientation,
-        velocity=start.velocity,
-    )
-    b.model.sources[body.name] = s
-    hold(b.mechanism, body, "orientation")

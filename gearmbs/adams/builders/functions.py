@@ -18,7 +18,8 @@ from gearmbs.mechanism.language.syntax import parse as parsed
 from gearmbs.mechanism.parts.probes import split_off
 
 if TYPE_CHECKING:
-    from gearmbs.adams.builders.builder import Builder
+    from gearmbs.mechanism import Mechanism
+    from gearmbs.mechanism.parts.bodies import Marker
 
 CONCERNED = re.compile(r"\b(SENVAL|CURVE|ARYVAL|DIF|DIF1)\s*\(", re.IGNORECASE)
 MODE = re.compile(r"\bMODE\b(?!\s*\()", re.IGNORECASE)
@@ -135,8 +136,8 @@ FUNCTIONS = (*LINEAR, *ANGULAR)
 class Accelerations:
     """The probes of a deck, one for each marker whose acceleration is asked for."""
 
-    def __init__(self, builder: Builder) -> None:
-        self.builder = builder
+    def __init__(self, mechanism: Mechanism, markers: Mapping[int, Marker]) -> None:
+        self.mechanism, self.markers, self.units = mechanism, markers, mechanism.units
         self.probes: dict[int, tuple[str, float, float]] = {}
         self.gravity: tuple[str, str] | None = None
 
@@ -163,7 +164,7 @@ class Accelerations:
         return parse(text)
 
     def _moves(self, ref: int) -> bool:
-        marker = self.builder.markers.get(ref)
+        marker = self.markers.get(ref)
         return marker is not None and not marker.body.is_ground
 
     def _of(self, ref: int, along: int, axis: int, torque: bool) -> str:
@@ -171,10 +172,10 @@ class Accelerations:
         if not self._moves(ref):
             return "0"
         if ref not in self.probes:
-            joint, mass, inertia = split_off(self.builder.mechanism, f"PROBE_{ref}", self.builder.markers[ref])
+            joint, mass, inertia = split_off(self.mechanism, f"PROBE_{ref}", self.markers[ref])
             self.probes[ref] = joint.name, mass, inertia
         name, mass, inertia = self.probes[ref]
-        units = self.builder.units
+        units = self.units
         if torque:
             factor = units.factor("torque") / (inertia * units.factor("angular_acceleration"))
             return f'{factor!r}*JOINT("{name}", 0, {6 + axis}, {along})'
@@ -183,7 +184,7 @@ class Accelerations:
 
     def _weight(self, along: int, axis: int) -> str:
         """Return a component of gravity, shown by two markers on the ground."""
-        mechanism, units = self.builder.mechanism, self.builder.units
+        mechanism, units = self.mechanism, self.units
         if not np.any(mechanism.gravity):
             return "0"
         if self.gravity is None:

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder, Maker
-from gearmbs.adams.builders.constraints import CONSTRAINTS
+from gearmbs.adams.builders.constraints import CONSTRAINTS, CURVES
 from gearmbs.adams.builders.contacts import CONTACTS
-from gearmbs.adams.builders.curves import CURVES
-from gearmbs.adams.builders.flexible import (
-    add_fe_load,
-    add_fe_part,
-    add_flex_body,
-    add_flexible_marker,
-    add_node_marker,
-)
-from gearmbs.adams.builders.forces import FORCES, add_mforce
+from gearmbs.adams.builders.flexible import DEFORMING, LINE_LOADS, ON_NODES
+from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.functions import IN_DYNAMICS, Present
+from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.builders.scopes import AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -127,19 +121,34 @@ def part_states(
     return found
 
 
-DEFORMING: dict[type, Maker] = {st.FlexBody: add_flex_body, st.FePart: add_fe_part}
-"""What adds bodies that deform."""
-ON_NODES: dict[str, Maker] = {"FLEX_BODY": add_flexible_marker, "FE_PART": add_node_marker}
-"""What adds their markers."""
+MAKERS: dict[type, Maker] = CONSTRAINTS | CURVES | FORCES | LINE_LOADS | CONTACTS
+"""What adds a statement to the mechanism, in the order in which that is done; a row stands beside its function."""
 
 
 def build_mechanism(
-    deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple[str, int]] = frozenset()
+    deck: Deck, allow_unsupported: bool = False, routines: Mapping[str, Callable] | None = None
 ) -> Mechanism:
-    """Return the mechanism a deck describes, its joints with the initial conditions given; see :func:`build_model`."""
-    model = build_model(deck, allow_unsupported, inactive)
+    """Return the mechanism a deck describes, its joints with the initial conditions given.
+
+    Parameters
+    ----------
+    deck : Deck
+        Gets the remarks on what is left out.
+    allow_unsupported : bool
+        Build it without what is not supported instead of refusing.
+    routines : mapping, optional
+        Functions of the user, as in :func:`gearmbs.adams.run_deck`.
+
+    Raises
+    ------
+    DeckError
+        Naming the line of what is not supported or cannot be built.
+    """
+    made = bound(deck, routines, allow_unsupported)
+    model = build_model(made, allow_unsupported)
     if model.initial_motions:
-        model = build_model(deck, allow_unsupported, inactive, with_initial_motions(model))
+        model = build_model(made, allow_unsupported, state=with_initial_motions(model))
+    deck.diagnostics.extend(d for d in made.diagnostics if d not in deck.diagnostics)
     return model.mechanism
 
 
@@ -183,9 +192,7 @@ def build_model(
     if builder.add_bodies(DEFORMING, ON_NODES):
         builder.name_elements()
         builder.add_data()
-        for kind, make in (
-            CONSTRAINTS | CURVES | FORCES | {st.Mforce: add_mforce, st.FeLoad: add_fe_load} | CONTACTS
-        ).items():
+        for kind, make in MAKERS.items():
             for statement in builder.active(kind):
                 builder.attempt(statement, partial(make, builder))
     model = builder.model

@@ -17,7 +17,7 @@ from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall, c
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.refused import without_refused
+from gearmbs.adams.parse.readers import without_refused
 from gearmbs.mechanism.language.syntax import Call, Negative, Node, Number, parse
 from gearmbs.mechanism.language.user_functions import UserFunction
 
@@ -161,27 +161,14 @@ def _slopes(residual: Callable[..., float], n: int) -> list[float] | None:
     return slopes
 
 
-ROUTINES: dict[type, tuple[str, tuple[str, ...]]] = {
-    st.Sforce: ("SFOSUB", ("function",)),
-    st.Vforce: ("VFOSUB", ("fx", "fy", "fz")),
-    st.Vtorque: ("VTOSUB", ("tx", "ty", "tz")),
-    st.Gforce: ("GFOSUB", ("fx", "fy", "fz", "tx", "ty", "tz")),
-    st.Motion: ("MOTSUB", ("function",)),
-    st.Variable: ("VARSUB", ("function",)),
-    st.Diff: ("DIFSUB", ("function",)),
-    st.Sensor: ("SENSUB", ("function",)),
-    st.Request: ("REQSUB", ("f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8")),
+BINDERS: dict[type, Callable] = {
+    st.Coupler: bind_coupler,
+    st.Field: bind_field,
+    st.CurveStatement: bind_curve,
+    st.Gse: bind_gse,
+    st.Mforce: bind_mforce,
 }
-"""ADAMS's name of the routine of a statement, and where its results go."""
-
-BINDERS: dict[type, tuple[str, Callable]] = {
-    st.Coupler: ("COUSUB", bind_coupler),
-    st.Field: ("FIESUB", bind_field),
-    st.CurveStatement: ("CURSUB", bind_curve),
-    st.Gse: ("GSE_DERIV", bind_gse),
-    st.Mforce: ("MFOSUB", bind_mforce),
-}
-"""Likewise, with what makes of a routine what the statement needs."""
+"""What makes of a routine what a statement needs, where that is not expressions in place of its arguments."""
 
 EVALUATED = "SEVSUB"
 """That of what a SENSOR evaluates when it fires."""
@@ -300,11 +287,10 @@ class _Use:
 
 def _uses(s: st.Statement) -> Iterator[_Use]:
     """Yield what a statement calls of the user."""
-    if type(s) in ROUTINES or type(s) in BINDERS:
-        name, fields = ROUTINES.get(type(s)) or (BINDERS[type(s)][0], ())
+    if s.subroutine:
         call = _user_call(getattr(s, "function", None)) or _user_call(getattr(s, "force", None))
         if call is not None:
-            yield _Use(s, call, name, fields, getattr(s, "routine", None))
+            yield _Use(s, call, s.subroutine, s.results, getattr(s, "routine", None))
     if isinstance(s, st.Sensor):
         call = _user_call(s.evaluate)
         if call is not None:
@@ -347,7 +333,7 @@ def _with_function(deck: Deck, s: st.Statement, use: _Use, found: Mapping[str, R
     """Return a statement whose results are calls of functions that the deck then has."""
     parameters = tuple(_number(a) for a in use.call.args)
     if type(s) in BINDERS:
-        return BINDERS[type(s)][1](deck, s, parameters, found)
+        return BINDERS[type(s)](deck, s, parameters, found)
     caller = Caller(deck, s, parameters, found[""], len(use.fields))
     if isinstance(s, st.Motion) and caller.asked:
         raise ValueError(f"asks for {caller.asked[0]}; a motion depends on TIME only")
@@ -366,7 +352,6 @@ def _number(node: Node) -> float:
 
 __all__ = [
     "BINDERS",
-    "ROUTINES",
     "RoutineCall",
     "bound",
     "load_routines",

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.adams.builders.control import implicit_states, state_systems
+from gearmbs.adams.builders.control import diff_name, implicit_states, rate_name, state_systems
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.functions import IN_DYNAMICS, Present, translated
 from gearmbs.adams.parse import statements as st
@@ -17,28 +17,18 @@ from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.language.syntax import Scope
-from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.curves import AXES
 from gearmbs.mechanism.parts.joints import Joint
 
 # Between which markers the elements of a deck act, and what they need to act.
 
 
-KINDS: dict[type, str] = {
-    st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
-    st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
-    st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
-    st.Beam: "beam", st.Friction: "friction", st.Contact: "contact",
-    st.Ptcv: "ptcv", st.Cvcv: "cvcv",
-}  # fmt: skip
-"""Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
-
-
 def joints_of(s: st.Statement) -> tuple[int, ...]:
     """Return the joints without which an element cannot act."""
-    if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
-        return (s.joint,)
-    return s.joints if isinstance(s, (st.Coupler, st.Gear)) else ()
+    one: int | None = getattr(s, "joint", None)
+    several: tuple[int, ...] = getattr(s, "joints", ())
+    return several if one is None else (one,)
 
 
 def resting_joint(s: st.Statement, inactive: frozenset[tuple[str, int]]) -> int | None:
@@ -65,7 +55,7 @@ def marker_pair(deck: Deck, s: Any) -> tuple[int, int | None]:
     if isinstance(s, st.Contact):
         i, j = (deck.of(st.Graphics)[refs[0]].marker for refs in (s.igeom, s.jgeom))
         return i or 0, j
-    if isinstance(s, (st.Vforce, st.Vtorque, st.Gforce)):
+    if isinstance(s, st.Acting):
         return s.i or 0, s.jfloat
     if isinstance(s, st.Sforce) and s.action_only:
         return s.i or 0, None
@@ -98,11 +88,7 @@ def data_scope(deck: Deck, present: Present) -> Scope:
         splines={s.id: spline_data(s) for s in deck.of(st.Spline).values() if s.data_file is None},
         arrays={a.id: a.numbers for a in deck.of(st.Array).values()},
         functions=deck.functions,
-        plants={
-            (kind, plant.id): plant.variables
-            for kind, group in (("pinput", st.PlantInput), ("poutput", st.PlantOutput))
-            for plant in deck.of(group).values()
-        },
+        plants={(plant.keyword.lower(), plant.id): plant.variables for plant in deck.each(st.Plant)},
         units=deck.units,
     )
 
@@ -120,7 +106,7 @@ def deck_scope(deck: Deck, present: Present, inactive: frozenset[tuple[str, int]
         markers[marker.id] = markers[(marker.name or f"MARKER_{marker.id}").replace('"', "'").upper()] = k
         owner = marker.owner()
         rows.append(0 if owner in grounds else bodies.setdefault(owner, 1 + len(bodies)))
-    of_kind: dict[str, dict[int, Any]] = {kind: deck.of(cls) for cls, kind in KINDS.items()}
+    of_kind: dict[str, dict[int, Any]] = {kind: deck.of(cls) for cls, kind in st.KINDS.items()}
     elements = [(kind, s) for kind, group in of_kind.items() for s in group.values()]
     data = data_scope(deck, present)
     return replace(
@@ -190,6 +176,32 @@ class BodyState(NamedTuple):
     v_f: np.ndarray = np.zeros(0)
 
 
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """An FE_PART as it was built.
+
+    Attributes
+    ----------
+    bodies : list of Body
+        At all nodes along the beam, those in between, too.
+    labels : dict of int to int
+        Number of a node in the deck -> place in ``bodies``.
+    share, reach : ndarray
+        Share of the length at each body, and the length that it stands for, m.
+    axes : ndarray, shape (3, 3)
+        Of the part's frame.
+    places : ndarray, shape (bodies, 3)
+        In the part's frame, m.
+    """
+
+    bodies: list[Body]
+    labels: dict[int, int]
+    share: np.ndarray
+    reach: np.ndarray
+    axes: np.ndarray
+    places: np.ndarray
+
+
 @dataclass
 class AdamsModel:
     """A mechanism built from a deck, with the way back from names to ids.
@@ -252,3 +264,18 @@ def _curves_of_model(mechanism: Mechanism) -> dict[Any, Any]:
 def markers_of(mechanism: Mechanism) -> list[Marker]:
     """Return all markers of a mechanism."""
     return [m for body in (mechanism.ground, *mechanism.bodies.values()) for m in body.markers]
+
+
+def hold_states(model: AdamsModel) -> None:
+    """Make the states of statements with STATIC_HOLD keep their values, as in static analyses."""
+    deck, states = model.deck, model.mechanism.states
+    held: list[int | str] = []
+    for diff in deck.of(st.Diff).values():
+        if diff.static_hold:
+            held += [diff.id, diff_name(diff), rate_name(diff_name(diff))]
+    for s, system in state_systems(deck):
+        if getattr(s, "static_hold", False):
+            held += [*system.names, *(state.name for state in system.algebraic)]
+    for name in held:
+        if name in states:
+            states[name].expression = repr(states[name].start) if states[name].algebraic else "0"

@@ -7,50 +7,24 @@ from collections.abc import Callable, Sequence
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic, labels_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
-from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, specs_of
-from gearmbs.adams.parse.remedies import refused_message
+from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, Spec, specs_of
+from gearmbs.mechanism.forces.friction import KINDS
 from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
-REQUIRED: dict[type, tuple[str, ...]] = {
-    st.Marker: ("part",),
-    st.Joint: ("type", "i", "j"),
-    st.Jprim: ("type", "i", "j"),
-    st.Coupler: ("joints",),
-    st.Gear: ("joints", "cv"),
-    st.Gcon: ("function",),
-    st.Motion: ("function",),
-    st.Sforce: ("type", "i", "j", "function"),
-    st.Vforce: ("i", "rm"),
-    st.Vtorque: ("i", "rm"),
-    st.Gforce: ("i", "rm"),
-    st.SpringDamper: ("type", "i", "j"),
-    st.Bushing: ("i", "j"),
-    st.Field: ("i", "j"),
-    st.Variable: ("function",),
-    st.Diff: ("function",),
-    st.Beam: ("i", "j", "length", "ixx", "iyy", "izz", "area", "emodulus", "gmodulus"),
-    st.Friction: ("joint", "mu_static", "mu_dynamic"),
-    st.Contact: ("igeom", "jgeom", "law"),
-    st.Graphics: ("type",),
-    st.Matrix: ("rows", "columns", "values"),
-    st.CurveStatement: ("matrix",),
-    st.Ptcv: ("i", "curve", "rm"),
-    st.Cvcv: ("icurve", "jcurve", "irm", "jrm"),
-    st.Sensor: ("function",),
-    st.Gse: ("function",),
-    st.Mforce: ("flex_body",),
-    st.FePart: ("type", "node_labels", "coordinates", "section", "material"),
-    st.FeLoad: ("fe_part",),
-}
-POSITIVE: dict[type, tuple[str, ...]] = {
-    st.Beam: ("length", "area", "emodulus", "gmodulus"),
-    st.Integrator: ("error", "hinit", "hmax", "hmin"),
-    st.PointMass: ("mass",),
-    st.Sensor: ("dt", "stepsize"),
-}
+
+def _with(fact: Callable[[Spec], bool]) -> dict[type, tuple[str, ...]]:
+    """Return of each statement the arguments of which something holds."""
+    found = {cls: tuple(name for name, spec in specs_of(cls).items() if fact(spec)) for cls in st.STATEMENTS.values()}
+    return {cls: names for cls, names in found.items() if names}
+
+
+REQUIRED = _with(lambda spec: spec.required)
+POSITIVE = _with(lambda spec: spec.positive)
 """Arguments that must be positive where they are given."""
+UNSUPPORTED_ARGUMENTS = _with(lambda spec: spec.instead is not None)
+WITHOUT_EFFECT = _with(lambda spec: bool(spec.idle))
+"""Arguments that are read and change nothing: each is remarked on."""
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
     WDTX WDTY WDTZ WDTM""".split()
@@ -58,61 +32,6 @@ MEASURES = frozenset(
 """Functions of the places and motions of markers."""
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
-UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
-    st.Marker: ("curve",),
-    st.FePart: ("cratiom", "preload"),
-    st.FeLoad: ("function",),
-    st.FlexBody: ("db_file", "bdf_file", "index_in_database"),
-    st.Joint: ("friction",),
-    st.Coupler: ("function",),
-    st.Field: ("function",),
-    st.Spline: ("data_file",),
-    st.Request: ("function",),
-    st.CurveStatement: ("function",),
-    st.Contact: ("normal_function", "friction_function", "iflex", "jflex"),
-}
-
-WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
-    st.Integrator: ("hratio", "pattern", "fixit", "adaptivity", "beta", "gamma", "alpha", "scale"),
-    st.InitialConditions: tuple(specs_of(st.InitialConditions)),
-    st.Kinematics: tuple(specs_of(st.Kinematics)),
-    st.Equilibrium: tuple(specs_of(st.Equilibrium)),
-    st.Output: ("dscale", "vscale", "ascale", "fscale", "dzero", "vzero", "azero", "fzero", "chart"),
-    st.Results: tuple(n for n in specs_of(st.Results) if n.startswith("no")),
-    st.Part: ("exact",),
-    st.PointMass: ("exact",),
-    st.FlexBody: ("exact", "char_len"),
-    st.Friction: ("formulation",),
-    st.Variable: ("ic",),
-    st.Contact: ("augmented", "stiction_law", "max_deformation", "flip_i", "flip_j"),
-    st.Graphics: ("xmin", "xmax", "ymin", "ymax", "faceting"),
-    st.Joint: tuple(
-        """delta_v max_deformation max_friction max_fric_rot max_fric_trans mu_dyn_rot mu_dyn_trans mu_stat_rot
-        mu_stat_trans preload_axial preload_radial preload_x preload_y inner_radius outer_radius pin_radius height
-        width""".split()
-    ),
-    st.CurveStatement: ("minpar", "maxpar"),
-    st.Cvcv: ("ivel", "jvel"),
-    st.Gse: ("xxflag", "xuflag", "yxflag", "yuflag"),
-    st.Sensor: ("angular", "bisection", "codgen"),
-}
-"""Arguments that are read and change nothing: each is remarked on."""
-WHY = {
-    st.Output: "values are written as they are",
-    st.Results: "everything is written",
-    st.FlexBody: "bodies are moved as little as the joints allow, and deform linearly",
-    st.PointMass: "the parts are moved as little as the joints allow",
-    st.Part: "the parts are moved as little as the joints allow",
-    st.Friction: "friction follows one law, see the documentation",
-    st.Variable: "variables need no starting value",
-    st.Contact: "solids press by depth and rub by speed alone",
-    st.Joint: "a joint rubs by them only where it says FRICTION = ON; for friction write a FRICTION statement",
-    st.Gse: "derivatives are made by differences",
-    st.CurveStatement: "the points alone say how far the curve goes",
-    st.Cvcv: "the speeds follow from those of the parts",
-    st.Sensor: "the time is found to the last digits",
-}
-CODGEN = "every analysis chooses its pivots anew"
 MESH_FILES = (".stl", ".obj", ".shl", ".slp")
 
 
@@ -190,9 +109,7 @@ def _by_routine(statement: st.Statement) -> bool:
     """Whether a statement takes from a routine of the user what others give by arguments."""
     if isinstance(statement, st.CurveStatement):
         return "function" in statement.given
-    return isinstance(statement, (st.Gse, st.Coupler, st.Field)) and (
-        "function" in statement.given and statement.function is None
-    )
+    return bool(statement.subroutine) and "function" in statement.given and getattr(statement, "function", "") is None
 
 
 def refused_arguments(statement: st.Statement) -> list[str]:
@@ -234,14 +151,13 @@ def _remark_idle(deck: Deck) -> None:
 
 def _why(statement: st.Statement, name: str) -> str:
     """Return why an argument of a statement has no effect."""
-    if isinstance(statement, st.Sensor) and name == "codgen":
-        return CODGEN
+    why = specs_of(type(statement))[name].idle
     if not isinstance(statement, st.Graphics):
-        return WHY.get(type(statement), "the program's own settings are tight enough")
+        return why
     if name != "faceting":
-        return "a plane that bodies touch has no edges" if statement.type == "PLANE" else "they are limits of a PLANE"
+        return "a plane that bodies touch has no edges" if statement.type == "PLANE" else why
     if statement.type != "EXTERNAL":
-        return "the kind of the solid says into how many facets it is cut, if any"
+        return why
     if (statement.data_file or "").lower().endswith(MESH_FILES):
         return "a mesh is as fine as its file"
     return "a body of a Parasolid file is exact, or is cut within 0.001 of its diagonal"
@@ -340,10 +256,9 @@ def _check_constraints(deck: Deck, fail: Fail) -> None:
 
 
 def _check_forces(deck: Deck, fail: Fail) -> None:
-    for kind, names in ((st.Vforce, "fx fy fz"), (st.Vtorque, "tx ty tz"), (st.Gforce, "fx fy fz tx ty tz")):
-        for force in deck.of(kind).values():
-            if force.function is None and all(getattr(force, name) is None for name in names.split()):
-                fail(force, f"give at least one of {', '.join(names.upper().split())}")
+    for force in deck.each(st.Acting):
+        if force.function is None and all(getattr(force, name) is None for name in force.results):
+            fail(force, f"give at least one of {', '.join(force.results).upper()}")
     for friction in deck.of(st.Friction).values():
         if friction.joint is not None and friction.joint not in deck.of(st.Joint):
             fail(friction, f"there is no JOINT/{friction.joint}", "joint")
@@ -398,14 +313,13 @@ def _check_data(deck: Deck, fail: Fail) -> None:
                 spline_data(spline)
             except ValueError as error:
                 fail(spline, str(error), "x")
-    for kind in (st.PlantInput, st.PlantOutput):
-        for plant in deck.of(kind).values():
-            for ref in plant.variables:
-                if ref not in deck.of(st.Variable):
-                    fail(plant, f"there is no VARIABLE/{ref}", "variables")
+    for plant in deck.each(st.Plant):
+        for ref in plant.variables:
+            if ref not in deck.of(st.Variable):
+                fail(plant, f"there is no VARIABLE/{ref}", "variables")
     for request in deck.of(st.Request).values():
         if request.type is None and not any(request.functions()) and request.function is None:
-            *others, last = REQUEST_TYPES
+            *others, last = st.REQUEST_TYPES
             fail(request, f"give {', '.join(others)} or {last}, or F1 to F8")
         if request.type is not None and request.i is None:
             fail(request, "I is missing")
@@ -436,3 +350,68 @@ def measured_markers(text: str) -> list[int]:
                 if isinstance(a, Number) and a.integer and a.integer not in found:
                     found.append(a.integer)
     return found
+
+
+# What to write instead of arguments that are refused.
+
+
+FRICTION_OF_JOINTS = (
+    (("mu_stat_rot", "mu_stat_trans"), "MU_STATIC"),
+    (("mu_dyn_rot", "mu_dyn_trans"), "MU_DYNAMIC"),
+    (("delta_v",), "STICTION_TRANSITION_VELOCITY"),
+    (("max_deformation",), "MAX_STICTION_DEFORMATION"),
+)
+"""Arguments of a JOINT with friction, the first given one of each counts, and those of a FRICTION statement."""
+
+
+def refused_message(statement: st.Statement, name: str) -> str:
+    """Return that an argument is not supported, and what to write instead."""
+    if isinstance(statement, st.Joint):
+        return (
+            f"{statement.label()}: {name.upper()} = {getattr(statement, name)} is not supported, as its law is not "
+            f"known; write {_friction(statement)} instead"
+        )
+    spec = specs_of(type(statement))[name]
+    way = f"; instead, use {spec.instead}" if spec.instead else ""
+    return f"{statement.label()}: {spec.keyword} is not supported{way}"
+
+
+def _friction(joint: st.Joint) -> str:
+    """Return the FRICTION statement that comes nearest to a joint's own friction."""
+    words = [f"FRICTION/{joint.id}", f"JOINT = {joint.id}"]
+    for names, word in FRICTION_OF_JOINTS:
+        given = [getattr(joint, name) for name in names if getattr(joint, name) is not None]
+        if given or word.startswith("MU"):
+            words.append(f"{word} = {f'{given[0]:g}' if given else '...'}")
+    radius = joint.pin_radius if joint.pin_radius is not None else joint.outer_radius
+    kind = KINDS.get((joint.type or "").lower())
+    if kind is None or kind.lever:
+        word = specs_of(st.Friction)[kind.lever if kind is not None else "pin_radius"].keyword
+        words.append(f"{word} = {'...' if radius is None else f'{radius:g}'}")
+    if joint.friction == "PRELOAD_ONLY":
+        force = "FORCE" if kind is not None and not kind.torque else "TORQUE"
+        words += ["INPUTS = PRELOAD", f"FRICTION_{force}_PRELOAD = ..."]
+    return ", ".join(words)
+
+
+# Remarks on defaults of ADAMS that depend on the deck's units.
+
+
+VISIBLE = 1e-3
+"""Displacement of a joint that sticks, m, from which on a default is remarked."""
+
+
+def remark_defaults(deck: Deck) -> None:
+    """Remark on FRICTION whose stiction yields visibly, since MAX_STICTION_DEFORMATION is a number of length units."""
+    found = [
+        f
+        for f in deck.of(st.Friction).values()
+        if "deformation" not in f.given and f.effect != "SLIDING" and f.deformation * deck.units.length >= VISIBLE
+    ]
+    if found:
+        yields = f"{found[0].deformation:g} units of length, here {1e3 * found[0].deformation * deck.units.length:g} mm"
+        message = (
+            f"{labels_of([f.label() for f in found])}: MAX_STICTION_DEFORMATION is not given; its default is {yields}, "
+            "by which surfaces that stick still yield until the friction is whole: give a smaller one"
+        )
+        deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, found[0].line))

@@ -28,16 +28,11 @@ from gearmbs.adams.parse.source import CONTINUED, RawStatement, read_file, state
 from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
-ONLY_IN_DECKS = ("UNITS", "COUPLER", "CURVE", "FLEX_BODY", "GEAR", "GRAPHICS", "GSE", "LSE", "MATRIX", "TFSISO")
-"""Statements that no command changes."""
 SIMULATIONS = "DYNAMICS KINEMATICS STATICS TRANSIENT INITIAL_CONDITIONS ACCELERATION DISPLACEMENT VELOCITY"
-ELEMENTS = (
-    "ACCGRAV BEAM BUSHING CONTACT COUPLER CVCV DIFF FE_LOAD FIELD FRICTION GCON GEAR GFORCE JOINT JPRIM MFORCE MOTION "
-    "PTCV SENSOR SFORCE SPRINGDAMPER VFORCE VTORQUE"
-)
-LEFT_ON = "FE_PART FLEX_BODY GSE LSE POINT_MASS REQUEST TFSISO VARIABLE"
+ELEMENTS = " ".join(st.switched("acts"))
+LEFT_ON = " ".join(st.switched("on"))
 """What ADAMS can switch, too, and stays on here."""
-NOT_MODELLED = "CLEARANCE NFORCE TIRE UCON"
+NOT_MODELLED = " ".join(st.switched(""))
 """What ADAMS can switch and is not there: to switch it changes nothing."""
 DEEPEST = 10
 """Command files that may call each other."""
@@ -120,9 +115,9 @@ COMMANDS: dict[str, type[Command]] = {
     "LINEAR": Linear,
     "STOP": Stop,
 }
-FIXED = "UNITS COUPLER CURVE FLEX_BODY GEAR GRAPHICS GSE LSE MATRIX PINPUT POUTPUT TFSISO".split()
+CHANGEABLE = tuple(sorted(name for name, cls in st.STATEMENTS.items() if cls.changeable))
+FIXED = tuple(sorted(name for name, cls in st.STATEMENTS.items() if not cls.changeable))
 """Statements without a command."""
-CHANGEABLE = tuple(n for n in st.STATEMENTS if n not in FIXED)
 IGNORED_COMMANDS = ("PREFERENCES", "HELP", "INFO", "MENU", "SHOW", "TIME", "DEBUG", "ENVIRONMENT", "LSOLVER")
 UNSUPPORTED_COMMANDS = ("SAVE", "RELOAD", "CONTROL", "FLEX_BODY")
 _NAMES = (*COMMANDS, *CHANGEABLE, *IGNORED_COMMANDS, *UNSUPPORTED_COMMANDS)
@@ -258,7 +253,7 @@ def _read(script: Script, raw: RawStatement, errors: list[Diagnostic]) -> Comman
         fail(f"expected a command such as SIMULATE/DYNAMICS, found {raw.text.strip()[:40]!r}", raw.line)
         return None
     name = resolve_statement(match.group(1), _NAMES)
-    deck_only = resolve_statement(match.group(1), ONLY_IN_DECKS)
+    deck_only = resolve_statement(match.group(1), FIXED)
     if name is None and deck_only is not None:
         fail(f"{deck_only} is a statement of the deck (.adm), no command of a script; put it there", raw.line)
         return None

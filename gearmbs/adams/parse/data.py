@@ -1,6 +1,13 @@
-"""Data elements of a deck as the expressions need them."""
+"""Data elements of a deck as the expressions need them, and the files of matrices: ADAMSMAT, which says itself how its
+numbers are written.
+"""
 
 from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
 
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.equations.expressions import SplineData
@@ -24,3 +31,79 @@ def spline_data(spline: st.Spline) -> SplineData:
             raise ValueError(f"a curve of a family has its z value and {n} y values, got {len(row)} numbers")
     rows = tuple(row[1:] for row in spline.y)
     return SplineData(spline.x, rows, tuple(row[0] for row in spline.y), spline.linear_extrapolate)
+
+
+# Files of MATRIX statements.
+
+
+FORMAT = re.compile(r"\(\s*(\d*)\s*[FEDG]\s*(\d+)\s*\.\s*\d+\s*\)", re.IGNORECASE)
+"""Fields in a line and their width."""
+OTHERS = {
+    "ADAMSMAT2": "the second form of ADAMS", "MATRIXx": "FSAVE of MATRIXx", "MATSAVE": "MATSAVE of MATRIXx",
+}  # fmt: skip
+
+
+def read_matrices(path: Path) -> dict[str, np.ndarray]:
+    """Return the matrices of a file by their names in capitals.
+
+    A file has a line of title that begins with ADAMSMAT, the number of matrices, their names, and for each a line
+    ``NAME FULL RORDER rows columns numbers (8F8.5)`` and its numbers in this format, by rows (RORDER) or columns
+    (CORDER).
+
+    Raises
+    ------
+    ValueError
+        With file and line, for another format, numbers that cannot be, and a file that is cut off.
+    """
+    try:
+        lines = path.read_text(errors="replace").splitlines()
+    except OSError as error:
+        raise ValueError(f"FILE = {path.name}: {error.strerror}; looked for {path}") from error
+
+    def wrong(line: int, what: str) -> ValueError:
+        return ValueError(f"FILE = {path.name}: line {line + 1}: {what}")
+
+    head = lines[0] if lines else ""
+    other = next((text for word, text in OTHERS.items() if head.startswith(word)), None)
+    if other is not None or not head.startswith("ADAMSMAT"):
+        what = f"it is {other}" if other else f"{head[:20]!r} begins no file of matrices"
+        raise wrong(0, f"{what}; the text format ADAMSMAT is read")
+    words = " ".join(lines[1:3]).split()
+    if not words or not words[0].isdigit() or len(words) != 1 + int(words[0]):
+        raise wrong(1, "the number of matrices and their names are expected")
+    found: dict[str, np.ndarray] = {}
+    at = 3
+    for name in words[1:]:
+        if at >= len(lines):
+            raise wrong(at, f"matrix {name} is missing; the file is cut off")
+        parts = lines[at].split("(")[0].split()
+        layout = FORMAT.search(lines[at])
+        if len(parts) != 6 or parts[0].upper() != name.upper() or layout is None:
+            raise wrong(at, f"{name} FULL RORDER rows columns numbers (format) is expected")
+        if parts[1].upper() != "FULL" or parts[2].upper() not in ("RORDER", "CORDER"):
+            raise wrong(at, f"{parts[1]} {parts[2]} is not read; write the matrix FULL, by rows or columns")
+        rows, columns, count = (int(word) if word.isdigit() else -1 for word in parts[3:])
+        if min(rows, columns) < 1 or rows * columns != count:
+            raise wrong(at, f"{' '.join(parts[3:])}: rows times columns are not the numbers")
+        values, at = _numbers(lines, at + 1, count, int(layout[1] or 1), int(layout[2]), wrong)
+        by_columns = parts[2].upper() == "CORDER"
+        found[name.upper()] = (
+            np.reshape(values, (columns, rows)).T if by_columns else np.reshape(values, (rows, columns))
+        )
+    return found
+
+
+def _numbers(lines: list[str], at: int, count: int, each: int, width: int, wrong) -> tuple[list[float], int]:
+    """Return numbers in fields of a width, so many in a line, and the line after them."""
+    values: list[float] = []
+    while len(values) < count:
+        if at >= len(lines):
+            raise wrong(at, f"{len(values)} of {count} numbers are there; the file is cut off")
+        for k in range(min(each, count - len(values))):
+            text = lines[at][k * width : (k + 1) * width].strip()
+            try:
+                values.append(float(text.replace("D", "E").replace("d", "e")))
+            except ValueError:
+                raise wrong(at, f"{text!r} is no number in columns {k * width + 1} to {(k + 1) * width}") from None
+        at += 1
+    return values, at

@@ -56,6 +56,12 @@ class Deck:
         """Return the statements of one class by id."""
         return self.items.get(kind, {})
 
+    def each(self, base: type[S]) -> Iterator[S]:
+        """Yield the statements of all classes that have a base in common, class by class in the order of the table."""
+        for cls in st.STATEMENTS.values():
+            if issubclass(cls, base):
+                yield from self.of(cls).values()
+
     def only(self, kind: type[S]) -> S | None:
         """Return the single statement of a class without id, or None."""
         return next(iter(self.of(kind).values()), None)
@@ -88,12 +94,7 @@ class Deck:
     def to_mechanism(
         self, allow_unsupported: bool = False, routines: Mapping[str, Callable] | None = None
     ) -> Mechanism:
-        """Build the mechanism; see `gearmbs.adams.builders.mechanism.build_mechanism`, and `run_deck` for routines."""
-        # the one arrow from reading to building: a facade, so that read_deck(path).to_mechanism() reads as one sentence
-        from gearmbs.adams.builders.mechanism import build_mechanism
-        from gearmbs.adams.builders.routines import bound
+        """Build the mechanism as `gearmbs.adams.build_mechanism` does: ``read_deck(path).to_mechanism()``."""
+        from gearmbs.adams import build_mechanism
 
-        made = bound(self, routines, allow_unsupported)
-        mechanism = build_mechanism(made, allow_unsupported=allow_unsupported)
-        self.diagnostics.extend(d for d in made.diagnostics if d not in self.diagnostics)
-        return mechanism
+        return build_mechanism(self, allow_unsupported, routines)

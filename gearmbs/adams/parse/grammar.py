@@ -1,8 +1,8 @@
-"""What the arguments of a statement may be, and how a statement's text becomes their values.
+"""What a statement and its arguments may be, and how a statement's text becomes their values.
 
-A statement class is a dataclass whose fields carry their keyword and kind (``arg``); this module
-reads the text of a statement into a dictionary of field values.  Keywords may be shortened as long
-as they stay unambiguous among the statement's own.
+A statement class is a dataclass whose fields carry their keyword, their kind and what else is known of them (``arg``);
+its own options say what the statement is (`Statement`). The reader, the checks, the messages and the tables of the
+documentation follow from both. Keywords may be shortened as long as they stay unambiguous among the statement's own.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from gearmbs.adams.parse.source import CONTINUED, RawStatement
 from gearmbs.mechanism.language.syntax import ExpressionError, parse
@@ -50,6 +50,14 @@ class Spec:
         Unit of the value, a key of the expression dimensions.
     aliases : tuple of str
         Short forms that ADAMS accepts although they are ambiguous prefixes.
+    required, positive : bool
+        Whether a statement needs it, and whether its value must be positive.
+    start : bool
+        Whether it says how the first analysis starts.
+    idle : str
+        Why it changes nothing where it is given, "" if it has an effect.
+    instead : str or None
+        What to write instead of an argument that is refused, "" if there is nothing; None of one that is read.
     """
 
     keyword: str
@@ -58,6 +66,11 @@ class Spec:
     choices: tuple[str, ...] = ()
     dimension: str = "number"
     aliases: tuple[str, ...] = ()
+    required: bool = False
+    positive: bool = False
+    start: bool = False
+    idle: str = ""
+    instead: str | None = None
 
 
 def arg(
@@ -69,16 +82,109 @@ def arg(
     choices: str = "",
     dimension: str = "number",
     aliases: str = "",
+    **facts: Any,
 ) -> Any:
-    """Return a dataclass field for a keyword argument."""
+    """Return a dataclass field for a keyword argument; for further facts see `Spec`."""
     counts = (count, count) if isinstance(count, int) else count
-    spec = Spec(keyword, kind, counts, tuple(choices.split()), dimension, tuple(aliases.split()))
+    spec = Spec(keyword, kind, counts, tuple(choices.split()), dimension, tuple(aliases.split()), **facts)
     return field(default=default, kw_only=True, metadata={"spec": spec})
 
 
 def specs_of(cls: type) -> dict[str, Spec]:
     """Return field name -> Spec of a statement class."""
     return {f.name: f.metadata["spec"] for f in fields(cls) if "spec" in f.metadata}
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What all statements have: id, place in the source, name. A subclass is a row of the table of statements.
+
+    Attributes
+    ----------
+    id : int
+        0 for statements without one.
+    file : str
+    line : int
+    name : str or None
+        From an ``adams_view_name`` comment.
+    given : mapping of str to int
+        Source line of every argument that was given.
+    pair : str
+        A gear pair in comments in front, see `gearmbs.adams.pairs`.
+    """
+
+    table: ClassVar[dict[str, type[Statement]]] = {}
+    """All statements that are read, by name."""
+    keyword: ClassVar[str] = ""
+    entity: ClassVar[str] = ""
+    subroutine: ClassVar[str] = ""
+    results: ClassVar[tuple[str, ...]] = ()
+    read_by: ClassVar[tuple[str, ...]] = ()
+    user: ClassVar[str] = ""
+    once: ClassVar[bool] = False
+    changeable: ClassVar[bool] = True
+    moves: ClassVar[bool] = True
+    switch: ClassVar[str] = ""
+
+    id: int = 0
+    file: str = ""
+    line: int = 0
+    name: str | None = None
+    given: dict[str, int] = field(default_factory=dict, compare=False)
+    pair: str = ""
+
+    def __init_subclass__(
+        cls,
+        *,
+        keyword: str = "",
+        entity: str = "",
+        subroutine: str = "",
+        results: str = "function",
+        read_by: str = "",
+        user: str = "",
+        once: bool = False,
+        changeable: bool = True,
+        moves: bool = True,
+        switch: str = "",
+        read: bool = True,
+    ) -> None:
+        """Enter a statement into the table.
+
+        Parameters
+        ----------
+        keyword : str
+            Its name in a deck, where it is not that of the class in capitals.
+        entity : str
+            What results files call it, if it transmits a force: expressions may ask for this force then.
+        subroutine, results : str
+            What ADAMS calls the routine that USER(...) stands for, and the arguments its results go to, with blanks.
+        read_by : str
+            Functions of expressions, with blanks, that read it by its id; not those of an element's force.
+        user : str
+            What names it, as in "a CONTACT", of a statement that is read only if it is named.
+        once : bool
+            Whether it stands once and has no id.
+        changeable : bool
+            Whether a command may change it.
+        moves : bool
+            Whether it has part in the motion, instead of being merely read by others.
+        switch : {"", "on", "acts"}
+            Whether a script switches it: "acts" if it does so here, as all that transmits a force; "on" if it stays on.
+        read : bool
+            False for what several statements share.
+        """
+        super().__init_subclass__()
+        cls.keyword = keyword or cls.__name__.upper()
+        cls.entity, cls.subroutine, cls.user = entity, subroutine, user
+        cls.results, cls.read_by = tuple(results.split()), tuple(read_by.split())
+        cls.once, cls.changeable, cls.moves = once, changeable, moves
+        cls.switch = switch or ("acts" if entity else "")
+        if read:
+            Statement.table[cls.keyword] = cls
+
+    def label(self) -> str:
+        """Return the statement as a modeller names it, for instance JOINT/3."""
+        return f"{self.keyword}/{self.id}" if self.id else self.keyword
 
 
 class Grammar:

@@ -8,18 +8,16 @@ from pathlib import Path
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import check
+from gearmbs.adams.parse.check import check, remark_defaults
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.defaults import remark_defaults
 from gearmbs.adams.parse.grammar import ArgumentReader, Grammar, StatementError
-from gearmbs.adams.parse.remedies import instead_of_statement
 from gearmbs.adams.parse.source import RawStatement, read_file, statements
 from gearmbs.progress import waiting
 from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 GRAMMARS: dict[type, Grammar] = {cls: Grammar(cls) for cls in st.STATEMENTS.values()}
-_NAMES = (*st.STATEMENTS, *sorted(st.IGNORED), *sorted(st.UNSUPPORTED), "END")
+_NAMES = (*sorted(st.STATEMENTS), *sorted(st.IGNORED), *sorted(st.UNSUPPORTED), "END")
 
 
 @waiting("reading the deck")
@@ -115,10 +113,10 @@ def _take(deck: Deck, raw: RawStatement, errors: list[Diagnostic]) -> bool:
         return False
     number = int(match.group(3)) if match.group(3) else 0
     if name in st.UNSUPPORTED:
-        message = f"{name}/{number} is not supported; it changes the motion{instead_of_statement(name)}"
+        message = f"{name}/{number} is not supported; it changes the motion{st.instead_of_statement(name)}"
         deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, raw.line))
         return False
-    if name in st.ON_DEMAND:
+    if name in st.STATEMENTS and st.STATEMENTS[name].user:
         deck.unread[name, number] = raw
         return False
     if name in st.IGNORED:
@@ -144,7 +142,6 @@ def _read_named(deck: Deck, errors: list[Diagnostic]) -> None:
         "GRAPHICS": {ref for contact in deck.of(st.Contact).values() for ref in (*contact.igeom, *contact.jgeom)},
         "MATERIAL": {part.material for part in deck.of(st.FePart).values()},
     }
-    users = {"GRAPHICS": "a CONTACT", "MATERIAL": "an FE_PART"}
     for (name, number), raw in deck.unread.items():
         if number not in named[name]:
             deck.diagnostics.append(Diagnostic(IGNORED, name, deck.file, raw.line))
@@ -154,7 +151,9 @@ def _read_named(deck: Deck, errors: list[Diagnostic]) -> None:
             statement = read_statement(name, number, raw, match.end() if match else 0, deck.file)
         except StatementError as error:
             line = raw.line_at(error.offset)
-            errors.append(Diagnostic(ERROR, f"{name}/{number}, which {users[name]} names: {error}", deck.file, line))
+            errors.append(
+                Diagnostic(ERROR, f"{name}/{number}, which {st.STATEMENTS[name].user} names: {error}", deck.file, line)
+            )
             continue
         deck.items.setdefault(type(statement), {})[number] = statement
 

@@ -1,4 +1,4 @@
-"""Which statements of a deck others read."""
+"""What statements of a deck read of others, which use functions that are not evaluated here, and what goes then."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import measured_markers
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.mechanism.language.library import ELEMENT_FORCES
+from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
 from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
 Key = tuple[str, int]
@@ -38,9 +38,8 @@ def read_variables(deck: Deck, requests: bool = True) -> set[int]:
         for name, spec in specs_of(type(statement)).items()
         if spec.kind == EXPRESSION and (text := getattr(statement, name)) is not None
     ]
-    for kind in (st.Lse, st.Tfsiso, st.Gse):
-        for system in deck.of(kind).values():
-            waiting += _inputs(deck, system)
+    for system in deck.each(st.System):
+        waiting += _inputs(deck, system)
     lists: dict[str, Mapping[int, st.Plant | st.Array]] = {
         "PINVAL": deck.of(st.PlantInput), "POUVAL": deck.of(st.PlantOutput), "ARYVAL": deck.of(st.Array),
     }  # fmt: skip
@@ -99,7 +98,7 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement] = ()) -> list[Diagn
     def leave_out(s: st.Statement) -> None:
         absent[s.keyword, s.id] = s.label()
         deck.left_out.add((s.keyword, s.id))
-        for name in ("x", "y", "xd") if isinstance(s, (st.Lse, st.Tfsiso, st.Gse)) else ():
+        for name in ("x", "y", "xd") if isinstance(s, st.System) else ():
             ref = getattr(s, name, None)
             if ref is not None:
                 absent["ARRAY", ref] = f"ARRAY/{ref}"
@@ -121,22 +120,13 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement] = ()) -> list[Diagn
             leave_out(statement)
             message = f"{statement.label()}: it needs {need}, which is left out"
             remarks.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.line))
-    lists: tuple[type[st.Plant], ...] = (st.PlantInput, st.PlantOutput)
-    for kind in lists:
-        group = deck.items.get(kind, {})
-        for number, plant in group.items():
-            kept = tuple(v for v in plant.variables if ("VARIABLE", v) not in absent)
-            group[number] = replace(plant, variables=kept)
+    for plant in list(deck.each(st.Plant)):
+        kept = tuple(v for v in plant.variables if ("VARIABLE", v) not in absent)
+        deck.items[type(plant)][plant.id] = replace(plant, variables=kept)
     return remarks
 
 
-READ_BY = {
-    "VARVAL": "VARIABLE", "DIF": "DIFF", "DIF1": "DIFF", "ARYVAL": "ARRAY", "CURVE": "CURVE", "SENVAL": "SENSOR",
-    "SPDP": "SPRINGDAMPER", "BUSH": "BUSHING", "VTORQ": "VTORQUE",
-}  # fmt: skip
-"""Statements that functions read by id; of CURVE it is the last argument. Those of forces have the elements' names."""
-
-ASKED = frozenset(READ_BY) | frozenset(ELEMENT_FORCES) | frozenset(st.UNSUPPORTED)
+ASKED = st.READ_BY.keys() | st.UNSUPPORTED
 
 
 def needed_by(statement: st.Statement) -> set[Key]:
@@ -144,7 +134,7 @@ def needed_by(statement: st.Statement) -> set[Key]:
     found: set[Key] = set()
     if isinstance(statement, st.Array):
         found |= {("VARIABLE", ref) for ref in statement.variables}
-    if isinstance(statement, (st.Lse, st.Tfsiso, st.Gse)) and statement.u is not None:
+    if isinstance(statement, st.System) and statement.u is not None:
         found.add(("ARRAY", statement.u))
     if isinstance(statement, st.Contact):
         found |= {("GRAPHICS", ref) for ref in (*statement.igeom, *statement.jgeom)}
@@ -163,5 +153,73 @@ def needed_by(statement: st.Statement) -> set[Key]:
             if isinstance(node, Call) and node.args and node.name in ASKED:
                 which = node.args[-1 if node.name == "CURVE" else 0]
                 if isinstance(which, Number) and which.integer is not None:
-                    found.add((READ_BY.get(node.name, node.name), which.integer))
+                    found.add((st.READ_BY.get(node.name, node.name), which.integer))
     return found
+
+
+# Statements that use functions that are not evaluated here.
+
+
+READ_IN_DECKS = REFUSED_FUNCTIONS & st.READ_BY.keys()
+"""Functions that a mechanism refuses and a deck has, where there is a statement with their id."""
+
+
+def refused_functions(statement: st.Statement, names: tuple[str, ...] | None = None) -> list[tuple[str, str]]:
+    """Return name of the argument and message for each function of a statement that is not supported, each once.
+
+    Parameters
+    ----------
+    statement : Statement
+    names : tuple of str, optional
+        Arguments to look at; all without.
+    """
+    if isinstance(statement, st.FlexBody):
+        # a body is not left out for its damping, whose function is checked with the others
+        return []
+    found: dict[str, tuple[str, str]] = {}
+    for name, spec in specs_of(type(statement)).items():
+        text = getattr(statement, name)
+        if spec.kind != EXPRESSION or text is None or (names is not None and name not in names):
+            continue
+        try:
+            calls = [node for node in walk(parse(text)) if isinstance(node, Call)]
+        except ValueError:
+            # said where expressions are checked
+            continue
+        for call in calls:
+            if call.name in REFUSED_FUNCTIONS - READ_IN_DECKS and call.name not in found:
+                message = f"{statement.label()}: {spec.keyword}: the function {call.name} is not supported"
+                found[call.name] = name, message + st.instead_of_function(call.name)
+    return list(found.values())
+
+
+def without_refused(deck: Deck, gone: Sequence[st.Statement], readers: bool) -> list[Diagnostic]:
+    """Take out of a deck what uses functions that are not supported and what reads it; return remarks on them.
+
+    A VARIABLE that nothing reads stays: it is remarked where expressions are checked.
+
+    Parameters
+    ----------
+    deck : Deck
+        Changed in place.
+    gone : sequence of Statement
+        What has been taken out before, for other reasons.
+    readers : bool
+        Whether to remark on those that merely read what is taken out.
+    """
+    others = without_readers(deck, gone)
+    read = read_variables(deck)
+    refused = []
+    remarks = []
+    for statement in list(deck):
+        if isinstance(statement, st.Variable) and statement.id not in read:
+            continue
+        told = refused_functions(statement)
+        for name, message in told:
+            line = statement.given.get(name, statement.line)
+            remarks.append(Diagnostic(UNSUPPORTED, message, deck.file, line))
+        if told:
+            del deck.items[type(statement)][statement.id]
+            refused.append(statement)
+    others += without_readers(deck, refused) if refused else []
+    return remarks + (others if readers else [])

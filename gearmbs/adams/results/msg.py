@@ -9,11 +9,11 @@ import numpy as np
 from gearmbs.adams.errors import folded, left_out
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Simulate
-from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.adams.parse.units import unit_names
 from gearmbs.adams.results.record import NEWTON, RunRecord, Segment
 from gearmbs.adams.results.remarks import row_text
 from gearmbs.dae.analyses.plant import LinearPlant
+from gearmbs.dae.methods import FORMULATIONS
 
 RULE = "-" * 79
 TITLES = {"KINEMATICS": "Kinematic", "STATICS": "Static", "INITIAL_CONDITIONS": "Initial Conditions"}
@@ -23,17 +23,10 @@ TABLE_HEAD = """\
    ___________  ___________   ___________  ___________   _________    ________"""
 
 
-MERELY_READ = frozenset(
-    "REQUEST MREQUEST VARIABLE ARRAY CLEARANCE NODE NORMAL_MODE_ANALYSIS PSTATE PINPUT POUTPUT".split()
-)
-"""Statements that move nothing themselves; what reads them is named as well."""
-INDEX = {"I3": "INDEX-3", "SI2": "stabilized INDEX-2", "SI1": "stabilized INDEX-1"}
-
-
 def message_text(result: RunRecord) -> str:
     """Return the content of the message file: remarks on the model, then the commands in their order."""
     out = [RULE, f"|{'Model Title':^77}|", f"|{'=' * 77}|", f"|{result.deck.title[:75]:^77}|", RULE, ""]
-    without = [label for label in left_out(result.deck.diagnostics) if label.split("/")[0] not in MERELY_READ]
+    without = [label for label in left_out(result.deck.diagnostics) if label.split("/")[0] not in st.MERELY_READ]
     if without:
         text = f"The model is run without {', '.join(without)}, or parts of these: its motion is not that of the deck."
         out += _block("ERROR", text)
@@ -107,7 +100,7 @@ def _integrated(segment: Segment, title: str, t: np.ndarray, stats: dict) -> lis
     seconds = float(stats.get("cpu_time", stats.get("time", 0.0)) or 0.0)
     return [
         f"  ****** Performing {title} Simulation using {name} {form} Integrator ******",
-        f"   The system is modelled with {INDEX[form]} DAEs.",
+        f"   The system is modelled with {FORMULATIONS[form].adams} DAEs.",
         f"   The integrator is {name.upper()}, CORRECTOR = {options.get('corrector', 'original')}",
         f"   Integration error =    {options['tol']:.6E}",
         "",
@@ -210,7 +203,7 @@ def request_text(result: RunRecord, now: datetime | None = None) -> str:
     lines.append(f"{len(requests):>5}{name:>17} {factor:.15E}")
     for number, request in requests.items():
         comment = (request.comment or request.name or "")[:80]
-        kind = REQUEST_TYPES[request.type].number if request.type else OF_EXPRESSIONS
+        kind = st.REQUEST_TYPES[request.type].number if request.type else OF_EXPRESSIONS
         lines.append(f"{number:>10}{kind:>5}{request.i or 0:>10}{request.j or 0:>10}{len(comment):>5}")
         lines.append(comment)
     values = [result.request(number)[:, KEPT] for number in requests]

@@ -12,7 +12,6 @@ from gearmbs.adams.builders.scopes import AdamsModel
 from gearmbs.adams.errors import Diagnostic, folded
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Script, Simulate
-from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
 from gearmbs.adams.results.remarks import (
@@ -123,6 +122,11 @@ class RunRecord:
     log: list[tuple[Command, Segment | Modes | LinearPlant | None]] = field(default_factory=list)
     errors: list[Diagnostic] = field(default_factory=list)
     interrupted: str = ""
+
+    @property
+    def command(self) -> Command:
+        """The command that is, or was last, carried out."""
+        return self.log[-1][0] if self.log else Command(self.script.file)
 
     @property
     def segments(self) -> list[Segment]:
@@ -310,7 +314,7 @@ class RunRecord:
         if request.type is None:
             given = request.cunits
             return tuple(given[k] if k < len(given) and given[k] else "no_units" for k in range(8))
-        first, second = REQUEST_TYPES[request.type].dimensions
+        first, second = st.REQUEST_TYPES[request.type].dimensions
         return (self.unit(first),) * 4 + (self.unit(second),) * 4
 
     def unit(self, dimension: str) -> str:

@@ -107,7 +107,6 @@ def _change(given: np.ndarray, found: np.ndarray) -> float:
 # Constraint rows in the words of ADAMS's message files.
 
 
-TYPES = {st.Joint: "Joint", st.Jprim: "Primitive Joint", st.Motion: "Motion"}
 PATTERNS = (
     (re.compile(r"coincident (\w)"), "Translation of I Marker Along {0}g"),
     (re.compile(r"no offset along (\w)_J"), "Translation of I Marker Along {0}j"),
@@ -124,7 +123,7 @@ def row_text(model: AdamsModel, name: str) -> str:
     where = element
     if statement is not None:
         kind = getattr(statement, "type", None) or ""
-        words = f"{str(kind).title()} {TYPES.get(type(statement), '')}".strip()
+        words = f"{str(kind).title()} {statement.entity.replace('_', ' ')}".strip()
         where = f"{statement.label()} {element}" + (f" ({words})" if words else "")
     for pattern, text in PATTERNS:
         found = pattern.fullmatch(label)

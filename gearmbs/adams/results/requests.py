@@ -10,7 +10,6 @@ import numpy as np
 from gearmbs.adams.builders.functions import translated
 from gearmbs.adams.builders.scopes import AdamsModel, markers_of
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.data_statements import REQUEST_TYPES
 from gearmbs.dae.analyses.statics import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.expressions import eval_gradient
@@ -23,7 +22,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.building.compile import starting_angles
 from gearmbs.mechanism.language.library import compile_expression
-from gearmbs.mechanism.language.series import evaluate_series
+from gearmbs.mechanism.language.series import expression_values
 from gearmbs.mechanism.language.syntax import Scope
 from gearmbs.mechanism.language.user_functions import raised_errors
 
@@ -56,21 +55,18 @@ def request_texts(request: st.Request, ypr: bool = False) -> tuple[str | None, .
     """Return the expressions of a request's eight columns; ``ypr`` asks for yaw, pitch and roll."""
     if request.type is None:
         return request.functions()
-    i, j, k = request.i or 0, request.j or 0, request.rm or 0
+    markers = {"i": request.i or 0, "j": request.j or 0, "k": request.rm or 0}
     texts: list[str | None] = []
-    for name in REQUEST_TYPES[request.type].functions:
-        if not name:
-            texts.append(None)
-        elif name in ("PSI", "THETA", "PHI", "DM", "VM", "ACCM", "WM", "WDTM", "FM", "TM"):
-            texts.append(f"{CARDAN[name] if ypr and name in CARDAN else name}({i},{j})")
-        else:
-            texts.append(f"{name}({i},{j},{k})")
+    for column in st.REQUEST_TYPES[request.type].columns.split():
+        name, _, arguments = column.strip("-)").partition("(")
+        asked = ",".join(str(markers[one]) for one in arguments.split(",") if one)
+        texts.append(f"{CARDAN.get(name, name) if ypr else name}({asked})" if name else None)
     return tuple(texts)
 
 
 def column_names(request: st.Request, ypr: bool = False) -> tuple[str, ...]:
     """Return the names of a request's columns: CNAMES, TITLE, or the functions'."""
-    standard: tuple[str, ...] = REQUEST_TYPES[request.type].functions if request.type else NAMES
+    standard: tuple[str, ...] = st.REQUEST_TYPES[request.type].functions if request.type else NAMES
     if ypr:
         standard = tuple(CARDAN.get(name, name) for name in standard)
     given = request.cnames or request.title
@@ -147,15 +143,12 @@ class RequestEvaluator:
             y[:, q] = self._unknown(key)
         tape = tape.bind(tape.algebraic.index)
         self._note(tape)
-        angles = np.zeros((3, max(1, tape.n_angles)))
-        angles[0, : tape.n_angles] = starting_angles(tape, self._turns, self._marker_named)
-        out = np.zeros(m)
+        starts = starting_angles(tape, self._turns, self._marker_named)
         with raised_errors(self.model.mechanism.functions.values()):
-            evaluate_series(
-                tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
-                angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
+            return expression_values(
+                tape, starts, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
+                self._marker_named,
             )  # fmt: skip
-        return out
 
     def variables(self) -> dict[int, np.ndarray]:
         """Return the values of the deck's VARIABLEs over time, but for those that ask for what is not there."""

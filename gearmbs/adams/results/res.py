@@ -12,19 +12,13 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from gearmbs.adams.builders.scopes import KINDS
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS, POINT_COLUMNS, RunRecord
 from gearmbs.adams.results.remarks import TRACK_COLUMNS
 
 NAMESPACE = "http://www.mscsoftware.com/:xrf10"
-ENTITY_TYPES = {
-    "joint": "Joint", "jprim": "Primitive_Joint", "motion": "Motion", "sforce": "SForce", "vforce": "VForce",
-    "vtorque": "VTorque", "gforce": "GForce", "bushing": "Bushing", "field": "Field",
-    "springdamper": "SpringDamper", "gcon": "GCon", "coupler": "Coupler", "gear": "Gear", "beam": "Beam",
-    "friction": "Friction", "contact": "Contact", "ptcv": "PTCV", "cvcv": "CVCV",
-}  # fmt: skip
+ENTITY_TYPES = {kind: cls.entity for cls, kind in st.KINDS.items()}
 PER_LINE = 6
 STEP_TYPES = {"KINEMATICS": "kinematic", "STATICS": "static", "INITIAL_CONDITIONS": "initialConditions"}
 
@@ -57,7 +51,7 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
     yield from _flexible_entities(result)
     yield from _beam_entities(result)
     wrench_units = (result.unit("force"),) * 3 + (result.unit("torque"),) * 3
-    kinds = {kind: cls for cls, kind in KINDS.items()}
+    kinds = {kind: cls for cls, kind in st.KINDS.items()}
     for kind, number in result.elements:
         name = deck.of(kinds[kind])[number].name or f"{kind.upper()}_{number}"
         attributes = (
@@ -118,15 +112,15 @@ def _variable_entities(result: RunRecord) -> Iterator[_Entity]:
         name = quoteattr(deck.of(st.Variable)[number].name or f"VARIABLE_{number}")
         attributes = f'name={name} entity={name} entType="ADAMS_Variable" objectId="{number}"'
         yield _Entity(attributes, ("Q",), ("no_units",), result.variable(number)[:, None])
-    for kind, kind_name, letters in ((st.PlantInput, "Plant_Input", "IN"), (st.PlantOutput, "Plant_Output", "OUT")):
-        for number, plant in deck.of(kind).items():
-            if not plant.variables or not set(plant.variables) <= set(known):
-                continue
-            name = quoteattr(plant.name or f"{kind.keyword}_{number}")
-            attributes = f'name={name} entity={name} entType="{kind_name}" objectId="{number}"'
-            columns = tuple(f"{letters}{k + 1}" for k in range(len(plant.variables)))
-            values = np.stack([result.variable(v) for v in plant.variables], axis=1)
-            yield _Entity(attributes, columns, ("no_units",) * len(columns), values)
+    for plant in deck.each(st.Plant):
+        if not plant.variables or not set(plant.variables) <= set(known):
+            continue
+        way = plant.keyword[1:].title()
+        name = quoteattr(plant.name or f"{plant.keyword}_{plant.id}")
+        attributes = f'name={name} entity={name} entType="Plant_{way}" objectId="{plant.id}"'
+        columns = tuple(f"{way.removesuffix('put').upper()}{k + 1}" for k in range(len(plant.variables)))
+        values = np.stack([result.variable(v) for v in plant.variables], axis=1)
+        yield _Entity(attributes, columns, ("no_units",) * len(columns), values)
 
 
 def _package_version() -> str:

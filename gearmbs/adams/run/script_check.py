@@ -18,7 +18,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.adams.parse.readers import left_out, needed_by, read_variables
+from gearmbs.adams.parse.readers import READ_IN_DECKS, left_out, needed_by, read_variables
 from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch, unsupported
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME, ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import Tape
@@ -30,8 +30,6 @@ from gearmbs.mechanism.language.syntax import Call, Number, Scope, parse, shown,
 
 SOME_MODE = np.array([17.3]), np.array([7.0])
 """A frequency and a number with which CRATIO is tried, before the file with those of the modes is read."""
-OF_DATA: dict[str, type[st.Statement]] = {"SENVAL": st.Sensor, "CURVE": st.CurveStatement}
-"""Functions whose last argument is the id of such a statement."""
 INTO_OTHERS = (st.Variable, st.Diff)
 """Statements whose expressions are written into those of others, with what is wrong there: they come first."""
 
@@ -100,14 +98,13 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
 def _system_errors(deck: Deck, session: Session) -> list[Diagnostic]:
     """Return which LSE, TFSISO and GSE do not hold together: functions ask for their states and outputs."""
     found = []
-    for kind in (st.Lse, st.Tfsiso, st.Gse):
-        for statement in deck.of(kind).values():
-            if (st.KEYWORD_OF[kind], statement.id) in session.inactive:
-                continue
-            try:
-                state_system(deck, statement)
-            except ValueError as error:
-                found.append(Diagnostic(ERROR, f"{statement.label()}: {error}", deck.file, statement.line))
+    for statement in deck.each(st.System):
+        if (statement.keyword, statement.id) in session.inactive:
+            continue
+        try:
+            state_system(deck, statement)
+        except ValueError as error:
+            found.append(Diagnostic(ERROR, f"{statement.label()}: {error}", deck.file, statement.line))
     return found
 
 
@@ -124,11 +121,11 @@ def _absent_data(deck: Deck, text: str) -> str:
     """Return which SENSOR or CURVE an expression reads that is not there, "" if there is none."""
     with contextlib.suppress(ExpressionError):
         for node in walk(parse(text)):
-            if not isinstance(node, Call) or node.name not in OF_DATA:
+            if not isinstance(node, Call) or node.name not in READ_IN_DECKS:
                 continue
-            kind, which = OF_DATA[node.name], node.args[-1] if node.args else None
-            if isinstance(which, Number) and which.integer not in deck.of(kind):
-                return f"there is no {st.KEYWORD_OF[kind]}/{which.integer} for {node.name}"
+            keyword, which = st.READ_BY[node.name], node.args[-1] if node.args else None
+            if isinstance(which, Number) and which.integer not in deck.of(st.STATEMENTS[keyword]):
+                return f"there is no {keyword}/{which.integer} for {node.name}"
     return ""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,7 +15,8 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, refused_arguments
 from gearmbs.adams.parse.commands import Change, Simulate, Switch, apply_change
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.refused import refused_functions
+from gearmbs.adams.parse.grammar import specs_of
+from gearmbs.adams.parse.readers import refused_functions
 from gearmbs.adams.results.record import Segment
 from gearmbs.adams.results.remarks import assembly_of, tracks_of
 from gearmbs.adams.results.requests import RequestEvaluator
@@ -23,15 +25,6 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.solution import Solution
 
-AT_START: dict[type, frozenset[str]] = {
-    st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
-    st.PointMass: frozenset("qg reuler zg xg vx vy vz exact".split()),
-    st.FlexBody: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
-    st.Joint: frozenset(["ic", "ictran", "icrot"]),
-    st.Motion: frozenset(["icdisp", "icvel"]),
-    st.Diff: frozenset(["ic"]),
-}
-"""Arguments that say how the first analysis starts."""
 MOST_OUTPUTS = 10_000_000
 """Output steps of an analysis: more would not fit into memory."""
 
@@ -56,6 +49,12 @@ class Session:
         What sensors have evaluated, by id.
     pending : dict
         Of GSEs by id: number of the next sample and the discrete states from then on.
+    tol : float or None
+        Local error instead of INTEGRATOR's ERROR.
+    allow_unsupported : bool
+        Whether what is not supported is left out.
+    progress : bool, callable or None
+        As in :func:`gearmbs.mechanism.simulate`.
     redundancy : str
         Which redundant rows are kept, see `gearmbs.mechanism.checks`.
     check : bool or None
@@ -75,6 +74,9 @@ class Session:
     places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
     sensed: dict[int, float] = field(default_factory=dict)
     pending: dict[int, tuple[int, tuple[float, ...]]] = field(default_factory=dict)
+    tol: float | None = None
+    allow_unsupported: bool = False
+    progress: bool | Callable[[float], None] | None = None
     redundancy: str = "adams"
     check: bool | None = None
     interrupted: bool = False
@@ -139,7 +141,7 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
         for message in functions:
             _remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
         return
-    late = AT_START.get(type(new), frozenset()) & set(new.given)
+    late = {name for name in new.given if specs_of(type(new))[name].start}
     if late and session.state is not None and not allow_unsupported:
         what = ", ".join(sorted(name.upper() for name in late))
         raise unsupported(

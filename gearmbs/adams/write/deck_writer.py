@@ -11,13 +11,22 @@ from typing import Any, Literal
 import numpy as np
 
 from gearmbs.adams.parse.units import TABLES
-from gearmbs.adams.write.elements import as_expressions, data_statements, hidden, kept, states_of
+from gearmbs.adams.write.contacts import is_gear_contact
+from gearmbs.adams.write.elements import (
+    as_expressions,
+    constraint_statements,
+    data_statements,
+    element_statements,
+    hidden,
+    joint_statement,
+    kept,
+    load_statement,
+    states_of,
+)
 from gearmbs.adams.write.flexible import flex_body_arguments, nearest_node
-from gearmbs.adams.write.gears import is_gear_contact
-from gearmbs.adams.write.joints import constraint_statements, element_statements, joint_statement, load_statement
 from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
 from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
-from gearmbs.dae.methods import INTEGRATORS
+from gearmbs.dae.methods import FORMULATIONS, INTEGRATORS
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.contacts import SolidContact
@@ -36,7 +45,6 @@ LONGEST = 80
 NOT_ASKED = ("coupler", "gear")
 """Elements whose forces are those of their joints."""
 METHODS = sorted(name for name, known in INTEGRATORS.items() if name in known.adams)
-FORMULATIONS = ("I3", "SI2", "SI1")
 
 
 def request_statements(writer: WriterContext, requests: Mapping[str, str | Sequence[str]], all_of_them: bool) -> None:

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.schema.messages import chosen
 from gearmbs.units import DIMENSIONS
 
 KINDS = {
@@ -164,9 +165,7 @@ def make_subject(kind: str, settings: dict[str, Any]) -> Subject:
     CampaignError
         For an unknown kind.
     """
-    home = KINDS.get(kind, kind)
-    if ":" not in home:
-        raise CampaignError(f"kind {kind!r} is unknown; choose one of {', '.join(KINDS)}, or write module:Class")
+    home = kind if ":" in kind else chosen(KINDS, kind, "", CampaignError, otherwise=", or write module:Class")
     return imported(home, "kind").from_settings(settings)
 
 

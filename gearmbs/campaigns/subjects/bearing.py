@@ -10,7 +10,9 @@ import numpy as np
 
 from gearmbs.campaigns.subjects.base import Kept, kept_by_functions
 from gearmbs.campaigns.subjects.function import TablesSubject, in_si, told
-from gearmbs.units import DIMENSIONS, to_si
+from gearmbs.schema.described import measures_of
+from gearmbs.schema.messages import check_keys
+from gearmbs.units import to_si
 
 RUN = {"settling": 0.05, "duration": 0.5, "rate": 12800.0, "tolerance": 1e-6}
 """How a rig is run: s, s, Hz, and the local error allowed a step."""
@@ -51,25 +53,18 @@ class BearingSubject(TablesSubject):
         from gearmbs.bearings import DEFECTS
 
         kind = DEFECTS.get(str(table.get("kind")))
-        if path != "defects" or kind is None or key not in kind.units:
-            return "1"
-        unit = kind.units[key]
-        return DIMENSIONS.get(unit, unit)
+        measure = measures_of(kind).get(key) if path == "defects" and kind is not None else None
+        return "1" if measure is None else measure.unit
 
     def made(self, tables: dict[str, Any]) -> BearingCase:
         """Return the bearing and all about it; the rig is built once, which checks it."""
         from gearmbs.bearings import Bearing
         from gearmbs.bearings.defects import as_defects
 
-        known = ("name", "bearing", "rig", "defects", "run")
-        for key in tables:
-            if key not in known:
-                raise ValueError(f"unknown key {key!r}; known ones are {', '.join(known[1:])}")
-        run = dict(RUN)
-        for key, value in tables.get("run", {}).items():
-            if key not in RUN:
-                raise ValueError(f"run.{key}: unknown; known ones are {', '.join(RUN)}")
-            run[key] = float(to_si(value, UNITS[key], f"run.{key}"))
+        check_keys(tables, ("name", "bearing", "rig", "defects", "run"), "the file", ValueError)
+        given = tables.get("run", {})
+        check_keys(given, RUN, "run", ValueError)
+        run = RUN | {key: float(to_si(value, UNITS[key], f"run.{key}")) for key, value in given.items()}
         case = BearingCase(
             Bearing.from_designation(str(tables.get("bearing", ""))),
             as_defects(tables.get("defects", ())),

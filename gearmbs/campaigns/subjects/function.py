@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import tomllib
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
@@ -23,6 +22,8 @@ from gearmbs.campaigns.subjects.base import (
     kept_by_functions,
     tooth_fault_unit,
 )
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import chosen
 from gearmbs.units import DIMENSIONS, si_unit, to_si
 
 # What a file of nested tables describes, as the subject of a campaign: drivetrains and planetary sets.
@@ -45,10 +46,7 @@ class TablesSubject(Subject):
     @classmethod
     def from_file(cls, path: str | Path) -> TablesSubject:
         """Return the subject of a TOML file."""
-        try:
-            return cls(tomllib.loads(Path(path).read_text(encoding="utf-8-sig")))
-        except (OSError, ValueError) as error:
-            raise CampaignError(f"{path}: {error}") from error
+        return cls(read_toml(path, CampaignError))
 
     def settings(self) -> dict[str, Any]:
         """Return the tables."""
@@ -108,8 +106,7 @@ class TablesSubject(Subject):
                 continue
             name = item.removeprefix("signal:")
             known = self.channels(things[0])
-            if name not in known:
-                raise CampaignError(f"keep: signal {name!r} is unknown; choose one of {', '.join(known)}")
+            chosen(known, name, "keep: ", CampaignError, "signal")
             spans, rates = zip(*(self.span_and_rate(thing) for thing in things))
             if len(set(rates)) > 1:
                 several = ", ".join(f"{rate:g}" for rate in sorted(set(rates)))

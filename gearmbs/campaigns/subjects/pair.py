@@ -18,6 +18,7 @@ from gearmbs.campaigns.subjects.base import (
     kept_by_functions,
     tooth_fault_unit,
 )
+from gearmbs.schema.messages import chosen
 from gearmbs.signals import COMPONENTS
 from gearmbs.studies.case.case import Case, make_case, units_of_fields
 from gearmbs.units import to_si
@@ -275,9 +276,7 @@ def _chosen(item: str, components: tuple[str, ...]) -> tuple[str, tuple[str, ...
         "force_1": ("x", "y", "z"),
         "force_2": ("x", "y", "z"),
     }
-    if name not in channels:
-        raise CampaignError(f"keep: signal {name!r} is unknown; choose one of {', '.join((*components, *channels))}")
-    return name, channels[name]
+    return name, chosen({**dict.fromkeys(components), **channels}, name, "keep: ", CampaignError, "signal")
 
 
 def _signal(record: Any, item: str) -> tuple[str, np.ndarray]:

@@ -162,7 +162,7 @@ def reduce(instant: Instant) -> Reduced:
 def _free(instant: Instant, constraint: np.ndarray) -> np.ndarray:
     """Return a basis of the motions that constraints allow, lengths and angles weighed against each other."""
     arm = max(min(instant.system.length, 1.0), 1e-3)
-    sizes = instant.system.model.modal_sizes()[:, 0]
+    sizes = instant.system.model.modal_sizes[:, 0]
     half = (constraint.shape[1] - sizes.size) // 2
     weight = np.concatenate([np.ones(half), np.full(half, arm), arm / sizes])
     return allowed_motions(constraint / weight) / weight[:, None]

@@ -45,7 +45,7 @@ class Relaxation:
         weight = float(system.model.bodies[1:, T.BODY_MASS].max(initial=0.0))
         force = max(force, weight * 9.81, 1e-3)
         arm = min(self.length, 1.0)
-        typical = system.model.modal_sizes()
+        typical = system.model.modal_sizes
         sizes = np.concatenate([self._by_kind(force, force * arm), force * arm / typical[:, 0]])
         kinds = {"lambda": self.length, "F": force, "N": force * arm, "z": 1.0}
         ends = ("F", "N", "z", "mu")

@@ -142,8 +142,7 @@ TERM_J = 2
 TERM_AXES = 3
 """3 * (axis of I) + axis of J, or the component of a point term."""
 TERM_FUNCTION = 4
-TERM_EXTRA = 5
-TERM_COLUMNS = 6
+TERM_COLUMNS = 5
 
 ROW_FIRST = 0
 ROW_FUNCTION = 1

@@ -47,7 +47,7 @@ from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.loads.elastic import bring_to_body
 from gearmbs.dae.equations.loads.forces import evaluate_element
 from gearmbs.dae.equations.loads.reactions import reaction_wrench
-from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multipliers_of_row
+from gearmbs.dae.equations.unknowns import has_rate_rows, multipliers_are_rates, multipliers_of_row
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, VEC
@@ -255,7 +255,7 @@ def residual(t, y, yp, out, idata, rdata, work):
     add_constraints(t, y, yp, idata, tab, out)
     room = vector_at(tab.scratch, 0, 64)
     lam0 = idata[T.H_LAMBDA]
-    source = yp if idata[T.H_FORMULATION] == SI1 else y
+    source = yp if multipliers_are_rates(idata[T.H_FORMULATION]) else y
     multipliers = vector_at(source, lam0, idata[T.H_ROWS])
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]

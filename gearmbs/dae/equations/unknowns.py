@@ -25,13 +25,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearmbs.dae import methods
 from gearmbs.dae.equations import layout as T
 from gearmbs.kernels.jit import njit
 
-I3 = 0
-SI2 = 1
-SI1 = 2
-FORMULATIONS = {"I3": I3, "SI2": SI2, "SI1": SI1}
+FORMULATIONS = {name: known.number for name, known in methods.FORMULATIONS.items()}
+I3 = FORMULATIONS["I3"]
+SI2 = FORMULATIONS["SI2"]
+SI1 = FORMULATIONS["SI1"]
 
 BLOCKS = {
     "u": ("velocity of the centre of mass", "(6)", "m/s"),
@@ -137,6 +138,12 @@ def has_rate_rows(formulation):
     return formulation != I3
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def multipliers_are_rates(formulation):
+    """Whether lambda and mu are derivatives of unknowns."""
+    return formulation == SI1
+
+
 def places(counts: Counts, formulation: int) -> np.ndarray:
     """Return the table ``at`` of the kernels: where the unknowns of each body are, one row a body, the ground first.
 
@@ -177,17 +184,17 @@ def multipliers_of_row(r, y, yp, idata):
     """Return lambda and mu of constraint row r: unknowns, or in SI1 derivatives of unknowns."""
     form = idata[T.H_FORMULATION]
     lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
-    if form == I3:
+    if not has_rate_rows(form):
         return y[lam], 0.0
-    if form == SI2:
-        return y[lam], y[mu]
-    return yp[lam], yp[mu]
+    if multipliers_are_rates(form):
+        return yp[lam], yp[mu]
+    return y[lam], y[mu]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def multiplier_factor(cj, idata):
     """Return the derivative of lambda and mu with respect to the unknown they are made from."""
-    return cj if idata[T.H_FORMULATION] == SI1 else 1.0
+    return cj if multipliers_are_rates(idata[T.H_FORMULATION]) else 1.0
 
 
 # --- masks, scales, names ------------------------------------------------------------------------------
@@ -199,7 +206,7 @@ def differential_mask(at: dict[str, int], formulation: int, states: np.ndarray) 
     mask[: at["eps"]] = True
     mask[at["R"] : at["lambda"]] = True
     mask[at["z"] : at["mu"]] = states
-    if formulation == SI1:
+    if multipliers_are_rates.py_func(formulation):
         mask[at["lambda"] : at["F"]] = True
         mask[at["mu"] :] = True
     return mask

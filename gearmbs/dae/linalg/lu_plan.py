@@ -356,8 +356,7 @@ def analyse(
     negligible : float
         Size of an entry of the equilibrated matrix up to which it may stay left out.
     with_tail : bool
-        Whether the last pivots may be taken as a full block, as is worth it with modes; eight matrices side by side
-        cannot have one.
+        Whether the last pivots may be taken as a full block, as is worth it with modes.
 
     Returns
     -------

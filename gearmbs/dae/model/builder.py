@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -14,7 +14,7 @@ from gearmbs.dae.equations.bodies.inertia import ModalInertia
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.loads.forces import FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.equations.unknowns import Counts
-from gearmbs.dae.model.model import Model, Names, frozen
+from gearmbs.dae.model.model import Model, Names
 
 
 class TableBuilder:
@@ -94,16 +94,14 @@ class TableBuilder:
         self.function_r.extend(float(p) for p in parameters)
         return len(self.functions) - 1
 
-    def add_row(
-        self, terms: list[tuple[int, int, int, int, int, float]], function: int = -1, extras: list[int] | None = None
-    ) -> int:
-        """Add a constraint row: terms of (type, I, J, axes, function, coefficient)."""
-        self.rows.append((len(self.terms), function, -1))
-        for k, (kind, i, j, axes, fun, coefficient) in enumerate(terms):
-            self.terms.append((kind, i, j, axes, fun, extras[k] if extras else -1))
-            self.coef.append(coefficient)
-            self.reference.append(0.0)
-        return len(self.rows) - 1
+    def add_rows(self, rows: Iterable[tuple[list[tuple], int]]) -> None:
+        """Add constraint rows: terms of (type, I, J, axes, function, coefficient, start of an angle), a function."""
+        for terms, function in rows:
+            self.rows.append((len(self.terms), function, -1))
+            for *term, coefficient, start in terms:
+                self.terms.append(tuple(term))
+                self.coef.append(coefficient)
+                self.reference.append(start)
 
     def add_tape(self, tape: Any) -> int:
         """Add an expression, a `Tape` whose unknowns are bound to indices of y; return its number."""
@@ -269,20 +267,20 @@ class TableBuilder:
     def build(self, names: Names) -> Model:
         """Return the tables as an immutable model."""
         return Model(
-            gravity=frozen(self.gravity),
-            bodies=frozen(self.bodies),
+            gravity=_reals(self.gravity),
+            bodies=_reals(self.bodies),
             modes=tuple(self.modes),
             marker_body=_integers(self.marker_body),
-            marker_frame=frozen(np.array(self.marker_frame).reshape(-1, T.MARKER_COLUMNS)),
+            marker_frame=_reals(np.array(self.marker_frame).reshape(-1, T.MARKER_COLUMNS)),
             rows=_integers(self.rows, T.ROW_COLUMNS),
             terms=_integers(self.terms, T.TERM_COLUMNS),
-            coef=frozen(self.coef),
-            reference=frozen(self.reference),
+            coef=_reals(self.coef),
+            reference=_reals(self.reference),
             forces=_integers(self.forces, T.FORCE_COLUMNS),
             functions=_integers(self.functions, T.FUNCTION_COLUMNS),
-            function_r=frozen(self.function_r),
+            function_r=_reals(self.function_r),
             extra_i=_integers(self.extra_i),
-            extra_r=frozen(self.extra_r),
+            extra_r=_reals(self.extra_r),
             states=_integers(self.states, T.STATE_COLUMNS),
             tapes=tuple(self.tapes),
             tape_rows=_integers(self.tape_rows, T.TAPE_COLUMNS),
@@ -292,7 +290,7 @@ class TableBuilder:
             own_functions=MappingProxyType(dict(self.own_functions)),
             diagnostics=tuple(self.diagnostics),
             largest_jac=self.largest_jac,
-            modal=frozen(self.modal),
+            modal=_reals(self.modal),
             modal_at=tuple(self.modal_at),
             modal_inertia=tuple(self.modal_inertia),
             frame_body=tuple(self.frame_body),
@@ -301,7 +299,16 @@ class TableBuilder:
         )
 
 
+def _reals(numbers: Any) -> np.ndarray:
+    """Return an array of numbers that cannot be written to."""
+    array = np.array(numbers, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
 def _integers(rows: Sequence[Any], columns: int | None = None) -> np.ndarray:
     """Return a table of integers that cannot be written to."""
     table = np.array(rows, dtype=np.int64)
-    return frozen(table if columns is None else table.reshape(-1, columns))
+    table = table if columns is None else table.reshape(-1, columns)
+    table.setflags(write=False)
+    return table

@@ -254,6 +254,8 @@ class PosedModel:
         self.assembler = AccelerationSystem(model)
         self._of_whole = self.assembler
         self._dropped = np.zeros(0, dtype=np.int64)
+        self.has_dropped_rows = False
+        """Whether constraint rows were dropped as redundant."""
         self.row_order: np.ndarray | None = None
         """All rows from the one that is to be kept first to the one to be dropped first, if not as they stand."""
         self.typical_length: float | None = None
@@ -293,17 +295,16 @@ class PosedModel:
         """A typical length in m: the largest marker arm or distance between bodies, at least 1 mm."""
         if self.typical_length is not None:
             return self.typical_length
-        arms = np.abs(self.model.marker_places())
-        spread = np.ptp(self.pose[:, POSE_R:POSE_A], axis=0).max(initial=0.0)
-        return float(max(arms.max(initial=0.0), spread, SHORTEST))
+        spread = np.ptp(self.start.pose[:, POSE_R:POSE_A], axis=0).max(initial=0.0)
+        return float(max(self.model.longest_arm, spread, SHORTEST))
 
     def coordinate_weights(self) -> np.ndarray:
         """Weights of the coordinates: 1 for metres, L^2 for radians, more for bending by the same way."""
         length = min(self.length, 1.0)
         one = np.concatenate([np.ones(3), np.full(3, length**2)])
-        sizes = self.model.modal_sizes()[:, 0]
+        sizes = self.model.modal_sizes[:, 0]
         # assembly moves bodies rather than bending them
-        return np.concatenate([np.tile(one, self.pose.shape[0]), STIFFENED * (length / sizes) ** 2])
+        return np.concatenate([np.tile(one, len(self.start.pose)), STIFFENED * (length / sizes) ** 2])
 
     def constraint_jacobian(self, place: Configuration | np.ndarray, t: float):
         """Return Phi_q in spatial displacements, Phi, and Phi_q v + Phi_t at a configuration."""
@@ -322,13 +323,9 @@ class PosedModel:
         if kept.size == len(self.model.rows):
             return
         self._dropped = np.setdiff1d(np.arange(len(self.model.rows)), kept)
+        self.has_dropped_rows = True
         self.model = self.model.with_rows(kept)
         self.assembler = AccelerationSystem(self.model)
-
-    @property
-    def has_dropped_rows(self) -> bool:
-        """Whether constraint rows were dropped as redundant."""
-        return self._dropped.size > 0
 
     def dropped_rates(self, place: Configuration, t: float) -> tuple[scipy.sparse.csc_array, np.ndarray, list[str]]:
         """Return Phi_q, Phi_q v + Phi_t and the names of the rows dropped as redundant, at a configuration."""

@@ -28,15 +28,12 @@ from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
-from gearmbs.dae.model.lane_members import Members
 from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding, new_records
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.side_by_side import SideBySide
     from gearmbs.dae.problem import DAEProblem
 
 _VEC = float64[::1]
@@ -55,10 +52,8 @@ SAME_POSITION = 0.05
 SINGULAR = 1e-8
 """Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
 
-FEWEST_TOGETHER = 1000
-"""Outputs, of those handed over at a time, from which on they are evaluated side by side."""
-
-NEVER = 1 << 62
+LOOKED_AT = 32
+"""Entries of a matrix that are compared before the result is looked at: the processor compares several at once."""
 
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
@@ -67,13 +62,15 @@ REACTION_PASSES = 30
 @njit(cache=True, error_model="numpy", forceinline=True)
 def unchanged(vals, before, allowed):
     """Whether no entry differs from another matrix's by more than allowed: most matrices that change do so early on."""
-    for p in range(vals.size):
-        if not abs(vals[p] - before[p]) <= allowed[p]:
-            return False
-    return True
+    same, first = True, 0
+    while same and first < vals.size:
+        for p in range(first, min(first + LOOKED_AT, vals.size)):
+            same &= abs(vals[p] - before[p]) <= allowed[p]
+        first += LOOKED_AT
+    return same
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def project(t, at, phi, plan, factors, pair, idata, tab):
     """Move y to the nearest position and velocity, in the metric of the masses, that satisfy the constraints.
 
@@ -279,16 +276,13 @@ class Evaluator:
     Pieces are to be handed over in the order of time.
     """
 
-    def __init__(self, problem: DAEProblem, members: Members | None = None) -> None:
-        self.members = members
+    def __init__(self, problem: DAEProblem) -> None:
         self.pattern = pattern(problem.idata, problem.rdata, problem.work_size, problem.t0, problem.y0)
         self.rdata = problem.rdata.copy()
         self.work = np.zeros(problem.work_size)
         self.vals = np.zeros(self.pattern[1].size)
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None
-        self.side: SideBySide | None = None
-        self.fewest_together = FEWEST_TOGETHER
         self.growth = GROWTH_LIMIT
         self.counted = np.zeros(self.vals.size, dtype=bool)
         self.plans = 0
@@ -312,32 +306,11 @@ class Evaluator:
                         continue
                     if attempt > 1 or not self._choose_sparsely(*place, table):
                         self._choose_pivots(*place, table, GENERIC_TURNS[max(attempt, 1) - 1])
-                done = self._evaluate(first, last, t, y, table, records)
+                done = self._evaluate_rows(first, last, t, y, table, records)
                 attempt = attempt + 1 if done == first else 1 if done < last else 0
                 first = done
 
-    def _evaluate(
-        self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records: Records
-    ) -> int:
-        """Evaluate rows side by side, where there are enough and the model allows it, or one after the other."""
-        side = self._side_by_side(table) if t.size >= self.fewest_together and last - first >= LANES else None
-        if side is not None:
-            return side.evaluate(first, last, t, y, self.pattern[2], table, self.rdata, self.work, records, self.growth)
-        return self._evaluate_singly(first, last, t, y, table, records)
-
-    def _side_by_side(self, table: np.ndarray) -> SideBySide | None:
-        """Return what evaluates rows side by side with the present pivots; None if the model does not allow it."""
-        if self.side is None:
-            # a pendulum's few outputs are there before its kernels are compiled
-            from gearmbs.dae.model.side_by_side import SideBySide, is_possible
-
-            if not is_possible(table):
-                self.fewest_together = NEVER
-            elif self.plan is not None:
-                self.side = SideBySide(table, self.plan, self.vals.size, self.members)
-        return self.side
-
-    def _evaluate_singly(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
+    def _evaluate_rows(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
         """Evaluate rows one after the other."""
         return evaluate_rows(
             first, last, t, y, self.pattern[2], table, self.rdata, self.work, self.vals, self.plan, self.factors,
@@ -372,7 +345,6 @@ class Evaluator:
                 "that differ by too many orders of magnitude"
             ) from error
         self.factors = new_factors(self.plan)
-        self.side = None
         # an ill-scaled mechanism may grow with the best of pivots
         self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
 

@@ -27,42 +27,15 @@ from gearmbs.dae.equations.fixed_axes import (
     update_axes,
 )
 from gearmbs.dae.equations.kinematics.rotation import KIN_R, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
-from gearmbs.dae.equations.kinematics.update import track, turns_are_counted
+from gearmbs.dae.equations.kinematics.update import track, turns_are_counted, update_markers
 from gearmbs.dae.equations.outputs.accelerations import ROW_PARTIAL, ROW_RECORD, apply_loads
-from gearmbs.dae.equations.outputs.lanes import (
-    LaneTables,
-    cross,
-    new_lane_tables,
-    take_bodies,
-    three,
-    update_lane_markers,
-)
 from gearmbs.dae.equations.unknowns import SI2
-from gearmbs.dae.model.lane_members import (
-    MEMBERS_TYPE,
-    S_FIRST,
-    S_MOMENT,
-    S_SECOND,
-    TURN_I,
-    TURN_J,
-    TURN_ROOT,
-    TURN_ROWS,
-    TURN_SIDE,
-    MemberLanes,
-    Members,
-    deduct_loads,
-    internal_reactions,
-    marker_place,
-    move_member,
-    new_member_lanes,
-    put_three,
-)
+from gearmbs.dae.model.member_tables import MEMBERS_TYPE, TURN_I, TURN_J, TURN_ROOT, TURN_ROWS, TURN_SIDE, Members
+from gearmbs.dae.model.members import deduct_loads, internal_reactions, move_member
 from gearmbs.dae.model.records import RECORDS_TYPE, Records
-from gearmbs.dae.model.side_by_side import deal
 from gearmbs.dae.model.start import turns_of_one
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:
@@ -310,7 +283,7 @@ def starting_values(problem: DAEProblem, count: int) -> np.ndarray:
     return _turns_in(problem.rdata, count)[:, fx.TURN_START].copy()
 
 
-# Records of bodies that turn about fixed axes, of eight outputs side by side, from their angles alone.
+# Records of bodies that turn about fixed axes, from their angles alone.
 #
 # Nothing is solved for: where loads are known, so are the angular accelerations, and what the joint of a group
 # transmits is all that moves it,
@@ -324,11 +297,14 @@ _VEC = float64[::1]
 _MAT = float64[:, ::1]
 _IVEC = int64[::1]
 
+SCRATCH = 24
+"""Places of the scratch, as many as `move_member` takes."""
+
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def accelerate(k, lane, axes, turns, tab, lanes, s):
-    """Write a and alpha of body k + 1 of one output, from the loads on it in ``lanes.own``."""
-    turn, body, own, first = turns[k], tab.kin[k + 1], lanes.own, 6 * k
+def accelerate(k, axes, turns, tab, own, solution, s):
+    """Write a and alpha of body k + 1 to ``solution``, from the loads on it in ``own``; ``s`` is scratch."""
+    turn, body, first = turns[k], tab.kin[k + 1], 6 * k
     for c in range(3):
         s[c] = body[KIN_R + c] - turn[TURN_POINT + c]
         s[3 + c] = own[first + c] + turn[TURN_MASS] * tab.gravity[c]
@@ -343,135 +319,128 @@ def accelerate(k, lane, axes, turns, tab, lanes, s):
     cross3(body, KIN_W, s, 0, s, 6)
     cross3(body, KIN_W, s, 6, s, 6)
     for c in range(3):
-        lanes.solution[LANES * (first + c) + lane] = alpha * s[3 + c] + s[6 + c]
-        lanes.solution[LANES * (first + 3 + c) + lane] = alpha * turn[TURN_AXIS + c]
+        solution[first + c] = alpha * s[3 + c] + s[6 + c]
+        solution[first + 3 + c] = alpha * turn[TURN_AXIS + c]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def take_axes(lane, t, y, counts_turns, loads, idata, tab, axes, markers, turns, lanes, wide, s):
-    """Bring the tables up to date with one output, evaluate its loads and accelerations, and take them into lanes.
+def joint_reaction(k, function, members, tab, wrench, multipliers, phi, force, moment, s):
+    """Write what the joint of group k + 1, and its motion, transmit; the wrenches of members are less it then.
 
     Parameters
     ----------
-    lane : int
-    t, y : float, ndarray
-        Time, s, and unknowns.
-    counts_turns : bool
-        Whether angles are counted from one output to the next.
-    loads : ndarray
-        Row of the records, written.
-    idata, tab : ndarray of int, Tables
-    axes, markers, turns : ndarray
-        Of `gearmbs.dae.equations.fixed_axes`.
-    lanes, wide : LaneTables, MemberLanes
+    k : int
+    function : int
+        Function of time of the motion, or -1.
+    members, tab, wrench, multipliers, phi, force, moment
+        As of `gearmbs.dae.model.members.internal_reactions`. Of ``phi``, which begins with zeros, only the rates of
+        motions are anything else.
     s : ndarray
-        Scratch, nine places.
+        Scratch, 12 places.
     """
-    update_axes(t, y, axes, markers, turns, tab)
-    if counts_turns:
-        track(t, y, tab, False)
-    own, told = lanes.own, wide.loads
-    for c in range(own.size):
-        own[c] = 0.0
-    apply_loads(t, y, own, loads, idata, tab)
-    for q in range(told.size // LANES):
-        told[LANES * q + lane] = loads[q // 6, q % 6]
-    for k in range(axes.shape[0]):
-        accelerate(k, lane, axes, turns, tab, lanes, s)
-    take_bodies(lane, tab, lanes)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def add_wrench(m, factor, s, wrench):
-    """Add a multiple of the force and moment in ``s`` from ``S_FIRST`` on to the wrench of member m, if it is one."""
-    if m >= 0:
-        for c in range(6):
-            put_lanes(wrench, 6 * m + c, lanes_at(wrench, 6 * m + c) + factor * lanes_at(s, S_FIRST + c))
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def joint_reaction(k, function, members, tab, lanes, wide):
-    """Write what the joint of group k + 1, and its motion, transmit; the wrenches of members are less it then.
-
-    ``function`` is that of the motion, or -1. The scratch has W in `S_FIRST` and `S_SECOND`, then moments.
-    """
-    s, wrench, frame, turn = wide.scratch, wide.wrench, lanes.frame, members.turn[k]
-    zero = all_lanes(0.0)
+    frame, turn = tab.frame, members.turn[k]
+    i, j, side = turn[TURN_I], turn[TURN_J], 1.0 * turn[TURN_SIDE]
+    of_i, of_j = members.of_marker[i], members.of_marker[j]
     for c in range(6):
-        total = zero
+        total = 0.0
         for m in range(members.group.size):
             if members.group[m] == k + 1:
-                total = total + lanes_at(wrench, 6 * m + c)
-        put_lanes(s, S_FIRST + c, total)
-    i, j, side = turn[TURN_I], turn[TURN_J], 1.0 * turn[TURN_SIDE]
-    add_wrench(members.of_marker[i], -side, s, wrench)
-    add_wrench(members.of_marker[j], side, s, wrench)
+                total += wrench[m, c]
+        s[c] = total
+        if of_i >= 0:
+            wrench[of_i, c] -= side * total
+        if of_j >= 0:
+            wrench[of_j, c] += side * total
     # moment on I's body about marker I
-    marker_place(i, tab, lanes, s, S_MOMENT)
-    x, y, z = cross(s, S_MOMENT, s, S_FIRST)
-    put_three(
-        s, S_MOMENT,
-        (side * (lanes_at(s, S_SECOND) - x), side * (lanes_at(s, S_SECOND + 1) - y),
-         side * (lanes_at(s, S_SECOND + 2) - z)),
-    )  # fmt: skip
-    base = 6 * members.group.size
-    at_i, at_j = T.MK_COLUMNS * i + T.MK_AXES, T.MK_COLUMNS * j + T.MK_AXES
+    body = tab.kin[tab.marker_body[i]]
     for c in range(3):
-        row, force = turn[TURN_ROWS + c], side * lanes_at(s, S_FIRST + c)
+        s[6 + c] = body[KIN_R + c] + frame[i, T.MK_ARM + c]
+    cross3(s, 6, s, 0, s, 9)
+    for c in range(3):
+        s[6 + c] = side * (s[3 + c] - s[9 + c])
+    for c in range(3):
+        row = turn[TURN_ROWS + c]
         for d in range(3):
-            put_lanes(wide.force, 3 * row + d, force if d == c else zero)
-            put_lanes(wide.moment, 3 * row + d, zero)
-        put_lanes(wide.solution, base + row, -force)
+            force[row, d] = moment[row, d] = 0.0
+        force[row, c] = side * s[c]
+        multipliers[row] = -force[row, c]
     for c in range(3):
         row = turn[TURN_ROWS + 3 + c]
         if row < 0:
             continue
         if c < 2:
             # z_I normal to x_J, y_J
-            axis = cross(frame, at_i + 6, frame, at_j + 3 * c)
+            cross3(frame[i], T.MK_AXES + 6, frame[j], T.MK_AXES + 3 * c, s, 9)
         else:
             root = 1.0 * turn[TURN_ROOT]
-            x, y, z = three(frame, at_j + 6)
-            axis = (root * x, root * y, root * z)
-            rate = lanes_at(lanes.function, T.FUNCTION_VALUES * function + 1)
-            put_lanes(wide.phi, ROW_RECORD * row + ROW_PARTIAL, -root * rate)
-        along = lanes_at(s, S_MOMENT) * axis[0] + lanes_at(s, S_MOMENT + 1) * axis[1]
-        along = along + lanes_at(s, S_MOMENT + 2) * axis[2]
-        put_lanes(wide.solution, base + row, -along)
+            for d in range(3):
+                s[9 + d] = root * frame[j, T.MK_AXES + 6 + d]
+            phi[ROW_RECORD * row + ROW_PARTIAL] = -root * tab.fval[function, 1]
+        along = dot3(s, 6, s, 9)
+        multipliers[row] = -along
         for d in range(3):
-            put_lanes(wide.force, 3 * row + d, zero)
-            put_lanes(wide.moment, 3 * row + d, along * axis[d])
+            force[row, d] = 0.0
+            moment[row, d] = along * s[9 + d]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def write_axes(first, count, members, wide, records):
-    """Write what is in lanes to ``count`` rows of the records from ``first`` on.
+@njit(cache=True, error_model="numpy", nogil=True)
+def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turning, wrench, s):
+    """Do what `evaluate_axes` promises, in arrays that its caller keeps alive.
 
-    Of ``phi``, which begins with zeros, only the rates of motions are anything else.
+    Parameters
+    ----------
+    first, last, t, y, idata, rdata, work, members, records
+        As of `evaluate_axes`.
+    own, turning : ndarray, shape (6 groups,)
+        Scratch: applied loads on the groups, and their accelerations.
+    wrench, s : ndarray, shapes (members, 6) and (SCRATCH,)
+        Scratch.
     """
-    rows, phi, columns = records.force.shape[1], uncounted(records.phi), records.phi.shape[1]
-    deal(wide.pose, uncounted(records.pose), count, records.pose.shape[1], first)
-    deal(wide.solution, uncounted(records.solution), count, records.solution.shape[1], first)
-    for a in range(members.turn.shape[0]):
-        row = members.turn[a, TURN_ROWS + 5]
-        if row >= 0:
-            c = ROW_RECORD * row + ROW_PARTIAL
-            for lane in range(count):
-                phi[columns * (first + lane) + c] = wide.phi[LANES * c + lane]
-    deal(wide.force, uncounted(records.force), count, 3 * rows, first)
-    deal(wide.moment, uncounted(records.moment), count, 3 * rows, first)
-    for lane in range(count):
-        records.strayed[first + lane] = 0.0
+    idata, t, rdata, work = uncounted(idata), uncounted(t), uncounted(rdata), uncounted(work)
+    own, turning, s = uncounted(own), uncounted(turning), uncounted(s)
+    tab = T.unpack(idata, rdata, work)
+    axes, markers, _, turns = axes_in(idata, rdata)
+    n, count = y.shape[1], members.group.size
+    all_y, wrench = matrix_at(y, 0, y.shape[0], n), matrix_at(wrench, 0, count, 6)
+    elements, columns = records.loads.shape[1], records.loads.shape[2]
+    rows, size, poses = records.force.shape[1], records.solution.shape[1], records.pose.shape[1]
+    base, counts_turns = 6 * count, turns_are_counted(tab)
+    for k in range(first, last):
+        at = vector_at(all_y, n * k, n)
+        loads = matrix_at(records.loads, elements * columns * k, elements, columns)
+        pose = vector_at(records.pose, poses * k, poses)
+        solution = vector_at(records.solution, size * k, size)
+        multipliers = vector_at(solution, base, rows)
+        phi = vector_at(records.phi, ROW_RECORD * rows * k, ROW_RECORD * rows)
+        force = matrix_at(records.force, 3 * rows * k, rows, 3)
+        moment = matrix_at(records.moment, 3 * rows * k, rows, 3)
+        update_axes(t[k], at, axes, markers, turns, tab)
+        if counts_turns:
+            track(t[k], at, tab, False)
+        for c in range(own.size):
+            own[c] = 0.0
+        apply_loads(t[k], at, own, loads, idata, tab)
+        for a in range(axes.shape[0]):
+            accelerate(a, axes, turns, tab, own, turning, s)
+        update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+        for m in range(count):
+            move_member(m, members, tab, turning, pose, solution, wrench, s)
+        deduct_loads(loads, members, tab, wrench, s)
+        for a in range(axes.shape[0]):
+            joint_reaction(
+                a, axes[a, AXIS_FUNCTION], members, tab, wrench, multipliers, phi, force, moment, s
+            )  # fmt: skip
+        internal_reactions(members, tab, wrench, multipliers, phi, force, moment, s)
+        records.strayed[k] = 0.0
 
 
 @njit(
-    void(int64, int64, _VEC, _MAT, _IVEC, _VEC, _VEC, LaneTables.numba_type, MEMBERS_TYPE, MemberLanes.numba_type,
-         RECORDS_TYPE),
+    void(int64, int64, _VEC, _MAT, _IVEC, _VEC, _VEC, MEMBERS_TYPE, RECORDS_TYPE),
     cache=True,
     error_model="numpy",
     nogil=True,
-)  # fmt: skip
-def evaluate_axes(first, last, t, y, idata, rdata, work, lanes, members, wide, records):
+)
+def evaluate_axes(first, last, t, y, idata, rdata, work, members, records):
     """Evaluate output rows ``first`` to ``last - 1``.
 
     Parameters
@@ -482,35 +451,13 @@ def evaluate_axes(first, last, t, y, idata, rdata, work, lanes, members, wide, r
     y : ndarray, shape (m, unknowns)
     idata, rdata, work : ndarray
         Tables of `gearmbs.dae.equations.fixed_axes`.
-    lanes, wide : LaneTables, MemberLanes
-        Overwritten.
     members : Members
     records : Records
         Written.
     """
-    idata, t, rdata, work = uncounted(idata), uncounted(t), uncounted(rdata), uncounted(work)
-    tab = T.unpack(idata, rdata, work)
-    axes, markers, _, turns = axes_in(idata, rdata)
-    all_y, all_loads, n = matrix_at(y, 0, y.shape[0], y.shape[1]), uncounted(records.loads), y.shape[1]
-    elements, columns = records.loads.shape[1], records.loads.shape[2]
-    counts_turns, s = turns_are_counted(tab), vector_at(tab.scratch, 0, 9)
-    k = first
-    while k < last:
-        count = min(LANES, last - k)
-        for lane in range(LANES):
-            row = k + min(lane, count - 1)
-            at = vector_at(all_y, n * row, n)
-            loads = matrix_at(all_loads, elements * columns * row, elements, columns)
-            take_axes(lane, t[row], at, counts_turns, loads, idata, tab, axes, markers, turns, lanes, wide, s)
-        update_lane_markers(tab.marker_body, tab.marker, lanes)
-        for m in range(members.group.size):
-            move_member(m, members, tab, lanes, wide)
-        deduct_loads(members, tab, lanes, wide)
-        for a in range(axes.shape[0]):
-            joint_reaction(a, axes[a, AXIS_FUNCTION], members, tab, lanes, wide)
-        internal_reactions(members, tab, lanes, wide)
-        write_axes(k, count, members, wide, records)
-        k += count
+    loads, turning = np.zeros(idata[T.H_COORDINATES]), np.zeros(idata[T.H_COORDINATES])
+    wrench, s = np.zeros((members.group.size, 6)), np.zeros(SCRATCH)
+    _evaluate(first, last, t, y, idata, rdata, work, members, records, loads, turning, wrench, s)
 
 
 class AxisEvaluator:
@@ -520,15 +467,10 @@ class AxisEvaluator:
         self.members = members
         self.rdata = problem.rdata.copy()
         self.work = np.zeros(problem.work_size)
-        self.lanes = new_lane_tables(problem.idata, 0)
-        self.wide = new_member_lanes(members, int(problem.idata[T.H_FORCES]))
 
     def fill(self, t: np.ndarray, y: np.ndarray, epochs, records: Records) -> None:
         """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on."""
         y = np.ascontiguousarray(y)
         bounds = [row for row, _ in epochs] + [t.size]
         for (first, table), last in zip(epochs, bounds[1:]):
-            evaluate_axes(
-                first, last, t, y, np.ascontiguousarray(table), self.rdata, self.work, self.lanes, self.members,
-                self.wide, records,
-            )  # fmt: skip
+            evaluate_axes(first, last, t, y, np.ascontiguousarray(table), self.rdata, self.work, self.members, records)

@@ -29,7 +29,7 @@ from gearmbs.dae.equations.kinematics.update import update_functions, update_mar
 from gearmbs.dae.equations.outputs.accelerations import ROW_RECORD
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
 from gearmbs.dae.model.evaluator import Evaluator
-from gearmbs.dae.model.lane_members import (
+from gearmbs.dae.model.member_tables import (
     EDGE_AXES,
     EDGE_CHILD,
     EDGE_CHILD_HAS_I,
@@ -87,7 +87,7 @@ def _take_pose(pose, tab):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _move_member(m, members, tab, solution, pose, acceleration, wrench, s):
+def move_member(m, members, tab, solution, pose, acceleration, wrench, s):
     """Write the pose and accelerations of a member, and the wrench about the global origin that moves it.
 
     Parameters
@@ -177,7 +177,7 @@ def _deduct(m, factor, force, f_at, moment, m_at, point, wrench, s):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _deduct_loads(loads, members, tab, wrench, s):
+def deduct_loads(loads, members, tab, wrench, s):
     """Take what the force elements exert away from the wrenches; J's body feels the opposite at I's point."""
     for f in range(tab.force.shape[0]):
         row = tab.force[f]
@@ -232,7 +232,7 @@ def _deduct_rows(multipliers, members, tab, wrench, s):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _internal_reactions(members, tab, wrench, multipliers, phi, force, moment, s):
+def internal_reactions(members, tab, wrench, multipliers, phi, force, moment, s):
     """Write what the fixed joints transmit, from the outermost members inwards.
 
     Parameters
@@ -319,10 +319,10 @@ def _expand(first, count, t, idata, rdata, work, members, narrow, wide, wrench, 
         update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
         update_functions(t[k], tab)
         for m in range(n):
-            _move_member(m, members, tab, solution, pose, result, wrench, s)
-        _deduct_loads(loads, members, tab, wrench, s)
+            move_member(m, members, tab, solution, pose, result, wrench, s)
+        deduct_loads(loads, members, tab, wrench, s)
         _deduct_rows(vector_at(solution, groups, rows), members, tab, wrench, s)
-        _internal_reactions(members, tab, wrench, vector_at(result, base, wide_rows), wide_phi, force, moment, s)
+        internal_reactions(members, tab, wrench, vector_at(result, base, wide_rows), wide_phi, force, moment, s)
         wide.strayed[to] = narrow.strayed[k]
         for f in range(elements):
             for c in range(told):
@@ -365,19 +365,18 @@ def expand(first, count, t, idata, rdata, work, members, narrow, wide):
 class MemberEvaluator(Evaluator):
     """Evaluator of the whole mechanism's records on the unknowns of one in which bodies are integrated as one."""
 
-    members: Members
-
     def __init__(self, problem: DAEProblem, members: Members) -> None:
-        super().__init__(problem, members)
+        super().__init__(problem)
+        self.members = members
         sizes = (int(problem.idata[k]) for k in (T.H_BODIES, T.H_ROWS, T.H_FORCES, T.H_DIAGNOSTICS))
         bodies, rows, elements, diagnostics = sizes
         self.narrow = new_records(PART, bodies - 1, rows, elements, diagnostics)
 
-    def _evaluate_singly(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
+    def _evaluate_rows(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
         """Evaluate rows one after the other, and expand them."""
         while first < last:
             stop = min(first + PART, last)
-            done = super()._evaluate_singly(0, stop - first, t[first:stop], y[first:stop], table, self.narrow)
+            done = super()._evaluate_rows(0, stop - first, t[first:stop], y[first:stop], table, self.narrow)
             times = t[first : first + done]
             expand(first, done, times, table, self.rdata, self.work, self.members, self.narrow, records)
             first += done

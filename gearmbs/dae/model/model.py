@@ -121,7 +121,7 @@ class Model:
             found.setdefault(name.rsplit(": ", 1)[0], []).append(k)
         return found
 
-    @property
+    @cached_property
     def counts(self) -> Counts:
         """What the length of y depends on."""
         return Counts(
@@ -134,7 +134,11 @@ class Model:
 
     def layout(self, formulation: int) -> dict[str, int]:
         """Return the offsets of the blocks of y, eq. (9)."""
-        return offsets(self.counts, formulation)
+        return self._layouts[formulation]
+
+    @cached_property
+    def _layouts(self) -> dict[int, dict[str, int]]:
+        return {formulation: offsets(self.counts, formulation) for formulation in FORMULATIONS.values()}
 
     def unknowns(self, formulation: str = "SI2") -> list[Unknown]:
         """Return the table of the unknowns of eq. (9) in their order."""
@@ -144,18 +148,19 @@ class Model:
         owners = (names.bodies, names.rows, forces, torques, names.states)
         return named(self.counts, FORMULATIONS[formulation], *owners)
 
-    @property
+    @cached_property
     def differential_states(self) -> np.ndarray:
         """Which user-defined states are given by their rates, shape (states,)."""
         return self.states[:, T.STATE_KIND] == T.STATE_DIFFERENTIAL
 
-    @property
+    @cached_property
     def controlled_states(self) -> np.ndarray:
         """Which user-defined states have their error controlled: those by their rates, and by equations they enter."""
         return self.states[:, T.STATE_KIND] != T.STATE_ALGEBRAIC
 
+    @cached_property
     def modal_sizes(self) -> np.ndarray:
-        """Return for each modal coordinate a typical value and the modal mass, shape (modal coordinates, 2).
+        """For each modal coordinate a typical value and the modal mass, shape (modal coordinates, 2).
 
         Typical is what moves the mass of the body as much as a displacement of its radius of gyration would.
         """
@@ -166,15 +171,16 @@ class Model:
             inertia = float(np.abs(body[T.BODY_INERTIA :]).max())
             for mass in np.diag(modal.mass):
                 rows.append((np.sqrt(inertia / mass) if inertia > 0.0 else 1.0, mass))
-        return np.array(rows).reshape(-1, 2)
+        return frozen(np.array(rows).reshape(-1, 2))
 
-    def marker_places(self) -> np.ndarray:
-        """Return the origins of the markers from the undeformed bodies' centres of mass, shape (markers, 3), m."""
+    @cached_property
+    def longest_arm(self) -> float:
+        """Largest coordinate of a marker's origin from the undeformed body's centre of mass, m."""
         places = self.marker_frame[:, :3].copy()
         elastic = self.marker_body >= len(self.bodies)
         shapes = np.array(self.shape_at, dtype=np.int64)[self.marker_body[elastic] - len(self.bodies)]
         places[elastic] = self.modal[shapes[:, None] + np.arange(3)]
-        return places
+        return float(np.abs(places).max(initial=0.0))
 
     def span(self, row: int) -> slice:
         """Return where the terms of a constraint row are."""
@@ -251,23 +257,38 @@ class Model:
         idata, rdata : ndarray
         work_size : int
         """
+        if formulation not in self._packed:
+            self._packed[formulation] = self._tables(formulation)
+        head, integers, rdata = self._packed[formulation]
+        head = head.copy()
+        codes = integers[T.H_I_CODE] if codes is None else codes
+        slots = integers[T.H_I_SLOT] if slots is None else slots
+        head[T.H_SLOTS] = slots.size
+        integers = integers | {T.H_I_CODE: codes, T.H_I_SLOT: slots}
+        _place(head, integers, T.H_SIZE)
+        return np.concatenate([head, *integers.values()]), rdata.copy(), int(head[T.H_WORK])
+
+    @cached_property
+    def _packed(self) -> dict[int, tuple[np.ndarray, dict[int, np.ndarray], np.ndarray]]:
+        """Header, tables of integers and all numbers as the kernels read them, by the formulation."""
+        return {}
+
+    def _tables(self, formulation: int) -> tuple[np.ndarray, dict[int, np.ndarray], np.ndarray]:
+        """Return header, tables of integers and all numbers, with no slots and the identity as Euler reference."""
         head = self._head(formulation)
         forces, extra_i, work = self._placed_forces(formulation)
-        codes = np.zeros(len(self.bodies), dtype=np.int64) if codes is None else codes
-        slots = np.zeros(0, dtype=np.int64) if slots is None else slots
-        head[T.H_SLOTS] = slots.size
         head[T.H_WORK] = head[T.H_W_SCRATCH] + work
         end = [(len(self.terms), -1, -1)]
         integers = {
             T.H_I_AT: self._places(formulation),
-            T.H_I_CODE: codes,
+            T.H_I_CODE: np.zeros(len(self.bodies)),
             T.H_I_MARKER_BODY: self.marker_body,
             T.H_I_ROW: np.concatenate([self.rows, end]),
             T.H_I_TERM: self.terms,
             T.H_I_FORCE: forces,
             T.H_I_FUNCTION: self.functions,
             T.H_I_EXTRA: extra_i,
-            T.H_I_SLOT: slots,
+            T.H_I_SLOT: np.zeros(0),
             T.H_I_STATE: self.states,
             T.H_I_TAPE: self._addressed_tapes(),
             T.H_I_ANGLE: self.angles,
@@ -284,11 +305,9 @@ class Model:
             T.H_R_MODAL: self.modal,
             T.H_R_REFERENCE: np.concatenate([self.reference, now, self.reference, unseen]),
         }
-        _place(head, integers, T.H_SIZE)
         _place(head, reals, 0)
-        idata = np.concatenate([head, *(np.ravel(table).astype(np.int64) for table in integers.values())])
         rdata = np.concatenate([np.ravel(table).astype(np.float64) for table in reals.values()])
-        return np.ascontiguousarray(idata), np.ascontiguousarray(rdata), int(head[T.H_WORK])
+        return head, {key: np.ravel(table).astype(np.int64) for key, table in integers.items()}, rdata
 
     def _head(self, formulation: int) -> np.ndarray:
         """Return the header: counts, offsets of y and of the work array; the tables are placed later."""
@@ -306,8 +325,7 @@ class Model:
         head[T.H_N_EXTRA_I], head[T.H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)
         head[T.H_N_FUNCTION_R] = len(self.function_r)
         head[T.H_FRAMES], head[T.H_N_MODAL] = len(self.bodies) + len(self.frame_body), self.modal.size
-        head[T.H_N_PARTIAL] = sum(present_size(n) for n in self.modes)
-        head[T.H_N_PARTIAL] += sum(partials_size(self.modes[b]) for b in self.frame_body)
+        head[T.H_N_PARTIAL] = sum(self._present_sizes) + sum(self._partial_sizes)
         head[T.H_W_KIN] = 0
         head[T.H_W_MARKER] = head[T.H_FRAMES] * KIN_COLUMNS
         head[T.H_W_FUNCTION] = head[T.H_W_MARKER] + len(self.marker_body) * T.MK_COLUMNS
@@ -322,14 +340,25 @@ class Model:
         bodies = places(self.counts, formulation)
         bodies[:, T.AT_MODAL] = self.modal_at
         partial = 0
-        for row, modes in zip(bodies, self.modes):
+        for row, size in zip(bodies, self._present_sizes):
             row[T.AT_PARTIAL] = partial
-            partial += present_size(modes)
+            partial += size
         frames = bodies[list(self.frame_body)]
-        for row, body, shape in zip(frames, self.frame_body, self.shape_at):
+        for row, body, shape, size in zip(frames, self.frame_body, self.shape_at, self._partial_sizes):
             row[T.AT_BODY], row[T.AT_SHAPE], row[T.AT_PARTIAL] = body, shape, partial
-            partial += partials_size(self.modes[body])
+            partial += size
         return np.concatenate([bodies, frames])
+
+    @cached_property
+    def _present_sizes(self) -> list[int]:
+        """How many numbers the present state of each body takes."""
+        sizes = {modes: present_size(modes) for modes in {*self.modes}}
+        return [sizes[modes] for modes in self.modes]
+
+    @cached_property
+    def _partial_sizes(self) -> list[int]:
+        """How many numbers the partial derivatives of each elastic frame take."""
+        return [partials_size(self.modes[body]) for body in self.frame_body]
 
     def _addressed_tapes(self) -> np.ndarray:
         """Return the rows of the expressions with the addresses of their evaluators, loaded only if there are any."""

@@ -13,7 +13,7 @@ from gearmbs.dae.equations.constraints.terms import ANGLE
 from gearmbs.dae.equations.kinematics.rotation import KIN_ADOT, euler_rates
 from gearmbs.dae.equations.kinematics.update import hook
 from gearmbs.dae.equations.loads.reactions import reactions_from
-from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, SI1
+from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, multipliers_are_rates
 from gearmbs.dae.model import diagnosis
 from gearmbs.dae.model.configuration import Assembled, euler_references
 from gearmbs.dae.problem import DAEProblem, ModelError, SingularModelError
@@ -166,7 +166,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
     first = int(found.idata[T.H_F])
     y[: at["lambda"]] = found.y[: at["lambda"]]
     y[at["F"] : at["mu"]] = found.y[first:]
-    (yp if form == SI1 else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
+    (yp if multipliers_are_rates.py_func(form) else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
     indptr, indices, slots = jacobian.pattern(idata, rdata, size, system.t0, y)
     idata, rdata, size = model.pack(form, slots, codes)
     work = np.zeros(size)
@@ -174,7 +174,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
     _state_rates(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work, (indptr, indices))
     _rates(y, yp, acc, system.t0, idata, rdata, work)
     largest = float(np.abs(found.loads[:, :3]).max(initial=0.0))
-    scale = unknowns.scales(model.counts, form, model.bodies[1:], model.modal_sizes(), min(system.length, 1.0), largest)
+    scale = unknowns.scales(model.counts, form, model.bodies[1:], model.modal_sizes, min(system.length, 1.0), largest)
     allowed = scale.copy()
     allowed[unknowns.velocities(at)] *= rate_scale
     flexible = sum(model.modes) > 0

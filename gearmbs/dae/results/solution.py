@@ -28,7 +28,7 @@ from gearmbs.progress import waiting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.dae.model.lane_members import Members
+    from gearmbs.dae.model.member_tables import Members
 
 
 # A solution as a table for notebooks.
@@ -196,10 +196,8 @@ class Solution(Shown):
     def _new_records(self, m: int) -> outputs.Records:
         system = self.system
         diagnostics = max((len(d) for d in system.model.diagnostics), default=0)
-        return outputs.new_records(
-            m, len(system.body_names), len(system.row_names), len(system.force_names), diagnostics,
-            sum(system.model.modes),
-        )  # fmt: skip
+        names, modes = system.model.names, sum(system.model.modes)
+        return outputs.new_records(m, len(names.bodies), len(names.rows), len(names.forces), diagnostics, modes)
 
     @property
     def evaluated(self) -> Evaluated:
@@ -265,7 +263,7 @@ class Solution(Shown):
 
     def find_conflict(self, rows: np.ndarray) -> str | None:
         """Return what is wrong if a row removed as redundant is violated at one of the output times ``rows``."""
-        if not self.system.has_dropped_rows or rows.size == 0:
+        if rows.size == 0 or not self.system.has_dropped_rows:
             return None
         for part in self.parts(rows, size=1):
             found = self.system.conflict(part._configuration(0), float(part.t[0]))
@@ -287,10 +285,11 @@ class Solution(Shown):
     # --- access by name -----------------------------------------------------------------------------
 
     def _body(self, name: str) -> int:
+        names = self.system.model.names.bodies
         try:
-            return self.system.body_names.index(name)
+            return names.index(name)
         except ValueError:
-            raise KeyError(f"body {name!r}; the bodies are {', '.join(self.system.body_names)}") from None
+            raise KeyError(f"body {name!r}; the bodies are {', '.join(names)}") from None
 
     def com_position(self, body: str) -> np.ndarray:
         """Return the position of the centre of mass over time, shape (m, 3), m, global.
@@ -380,10 +379,11 @@ class Solution(Shown):
         return self.evaluated.modal(number)
 
     def _element(self, name: str) -> int:
+        names = self.system.model.names.forces
         try:
-            return self.system.force_names.index(name)
+            return names.index(name)
         except ValueError:
-            known = ", ".join(self.system.force_names) or "none in this mechanism"
+            known = ", ".join(names) or "none in this mechanism"
             raise KeyError(f"force element {name!r}; the force elements are {known}") from None
 
     def _diagnostics_by_name(self) -> Iterator[tuple[str, str, np.ndarray]]:

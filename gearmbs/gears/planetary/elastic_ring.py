@@ -13,7 +13,7 @@ from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED, Diagnostic
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.pair import GearPair
-from gearmbs.gears.spec import GearSpec, convert_fields, require
+from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
@@ -68,19 +68,17 @@ class ElasticRim:
         for name in units:
             value = getattr(self, name)
             known = value is None or (math.isfinite(value) and value > 0)
-            require(known, f"ElasticRim.{name} is {value}; give more than 0")
-        require(
-            isinstance(self.waves, int) and 2 <= self.waves <= 30,
-            f"ElasticRim.waves is {self.waves!r}; give a whole number from 2 to 30",
-        )
-        require(
-            math.isfinite(self.damping_ratio) and self.damping_ratio >= 0,
-            f"ElasticRim.damping_ratio is {self.damping_ratio}; give 0 or more",
-        )
-        require(
-            len(self.bolt_stiffness) == 2 and min(self.bolt_stiffness) >= 0,
-            f"ElasticRim.bolt_stiffness is {self.bolt_stiffness!r}; give two numbers of 0 or more, radial, tangential",
-        )
+            if not known:
+                raise ValueError(f"ElasticRim.{name} is {value}; give more than 0")
+        if not (isinstance(self.waves, int) and 2 <= self.waves <= 30):
+            raise ValueError(f"ElasticRim.waves is {self.waves!r}; give a whole number from 2 to 30")
+        if not (math.isfinite(self.damping_ratio) and self.damping_ratio >= 0):
+            raise ValueError(f"ElasticRim.damping_ratio is {self.damping_ratio}; give 0 or more")
+        if not (len(self.bolt_stiffness) == 2 and min(self.bolt_stiffness) >= 0):
+            raise ValueError(
+                f"ElasticRim.bolt_stiffness is {self.bolt_stiffness!r}; give two numbers of 0 or more, radial, "
+                "tangential"
+            )
         object.__setattr__(self, "bolts", tuple(to_si(angle, "angle", "ElasticRim.bolts") for angle in self.bolts))
 
 
@@ -245,8 +243,8 @@ def ring_meshes(
         For meshes that are no tooth contact.
     """
     pairs = tuple(mesh for mesh in meshes if isinstance(mesh, GearPair))
-    require(
-        len(pairs) == len(planets) > 0,
-        f"{name}: a rim that bends needs tooth contact with every planet; leave ideal meshes or the rim out",
-    )
+    if not len(pairs) == len(planets) > 0:
+        raise ValueError(
+            f"{name}: a rim that bends needs tooth contact with every planet; leave ideal meshes or the rim out"
+        )
     return RingMeshes(name, planets[0], ring, tuple(planets), pairs, RimModes.of(rim, spec))

@@ -21,7 +21,7 @@ from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
-from gearmbs.gears.spec import GearSpec, convert_fields, require
+from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.units import Quantity, to_si
 from gearmbs.wording import did_you_mean
 
@@ -121,45 +121,46 @@ class PlanetarySet(Written):
         )
         for name in ("backlash_sun", "backlash_ring"):
             value = getattr(self, name)
-            require(
-                0.0 <= value < math.inf,
-                f"PlanetarySet.{name} is {value * 1e3:.6g} mm: negative backlash; give 0 or more, or change "
-                "carrier_radius to mesh tighter"
-                if value < 0.0
-                else f"PlanetarySet.{name} is {value}; give a finite length",
-            )
-        require(
-            isinstance(self.planets, int) and self.planets >= 1,
-            f"PlanetarySet.planets is {self.planets!r}; give a whole number from 1 up",
-        )
-        require(self.ring.internal, f"PlanetarySet.ring ({self.ring.name}) is external; make it with GearSpec.ring")
+            if not 0.0 <= value < math.inf:
+                raise ValueError(
+                    f"PlanetarySet.{name} is {value * 1e3:.6g} mm: negative backlash; give 0 or more, or change "
+                    "carrier_radius to mesh tighter"
+                    if value < 0.0
+                    else f"PlanetarySet.{name} is {value}; give a finite length"
+                )
+        if not (isinstance(self.planets, int) and self.planets >= 1):
+            raise ValueError(f"PlanetarySet.planets is {self.planets!r}; give a whole number from 1 up")
+        if not self.ring.internal:
+            raise ValueError(f"PlanetarySet.ring ({self.ring.name}) is external; make it with GearSpec.ring")
         for wheel in (self.sun, self.planet):
-            require(not wheel.internal, f"PlanetarySet: {wheel.name} is internal; only the ring may be")
+            if wheel.internal:
+                raise ValueError(f"PlanetarySet: {wheel.name} is internal; only the ring may be")
         inner = self.planet_at_ring or self.planet
-        require(
-            self.ring.teeth > inner.teeth,
-            f"PlanetarySet.ring has {self.ring.teeth} teeth and {inner.name} {inner.teeth}: they do not fit into it; "
-            "give the ring more teeth",
-        )
-        require(self.rotation in (1, -1), f"PlanetarySet.rotation is {self.rotation!r}; give 1 or -1")
+        if not self.ring.teeth > inner.teeth:
+            raise ValueError(
+                f"PlanetarySet.ring has {self.ring.teeth} teeth and {inner.name} {inner.teeth}: they do not fit into "
+                "it; give the ring more teeth"
+            )
+        if self.rotation not in (1, -1):
+            raise ValueError(f"PlanetarySet.rotation is {self.rotation!r}; give 1 or -1")
         if self.carrier_radius is None:
             object.__setattr__(self, "carrier_radius", PairGeometry(self.sun, self.planet).nominal_centre_distance)
         self._check_angles()
         self._check_neighbours()
         for at, error in self.pin_errors.items():
-            require(
-                0 <= at < self.planets and len(error) == 2,
-                f"PlanetarySet.pin_errors has planet {at!r}: {error!r}; give planets 0 to {self.planets - 1} two "
-                "lengths",
-            )
+            if not (0 <= at < self.planets and len(error) == 2):
+                raise ValueError(
+                    f"PlanetarySet.pin_errors has planet {at!r}: {error!r}; give planets 0 to {self.planets - 1} two "
+                    "lengths"
+                )
         for where, fault in self.faults:
             self._holder(where, fault)
         for name in ("stiffness", "damping_ratio"):
-            require(
-                getattr(self, name) is None or (self.contact is None and self.ideal is None),
-                f"PlanetarySet.{name} is {getattr(self, name)!r} beside contact or ideal, which have their own; leave "
-                "one of them out",
-            )
+            if getattr(self, name) is not None and (self.contact is not None or self.ideal is not None):
+                raise ValueError(
+                    f"PlanetarySet.{name} is {getattr(self, name)!r} beside contact or ideal, which have their own; "
+                    "leave one of them out"
+                )
         _ = self.pairs_sun
         self._meshing_with_ring()
 
@@ -168,10 +169,10 @@ class PlanetarySet(Written):
             given = 2 * math.pi * np.arange(self.planets) / self.planets
         else:
             given = np.array([to_si(a, "angle", "PlanetarySet.angles") for a in self.angles], dtype=float)
-            require(
-                given.size == self.planets,
-                f"PlanetarySet.angles has {given.size} numbers for {self.planets} planets; give one each",
-            )
+            if given.size != self.planets:
+                raise ValueError(
+                    f"PlanetarySet.angles has {given.size} numbers for {self.planets} planets; give one each"
+                )
         object.__setattr__(self, "angles", tuple(given.tolist()))
         if self.planet_at_ring is not None:
             return
@@ -236,25 +237,26 @@ class PlanetarySet(Written):
         apart = float(np.diff(np.append(order, order[0] + 2 * math.pi)).min())
         distance = 2 * self.carrier_radius * math.sin(min(apart, math.pi) / 2)
         reach = 2 * max(w.tip_radius for w in (self.planet, self.planet_at_ring or self.planet))
-        require(
-            distance > reach,
-            f"PlanetarySet.planets is {self.planets}: neighbouring planets stand {distance * 1e3:.4f} mm apart and "
-            f"reach {reach * 1e3:.4f} mm; use fewer or smaller planets",
-        )
+        if not distance > reach:
+            raise ValueError(
+                f"PlanetarySet.planets is {self.planets}: neighbouring planets stand {distance * 1e3:.4f} mm apart and "
+                f"reach {reach * 1e3:.4f} mm; use fewer or smaller planets"
+            )
 
     def _holder(self, where: str, fault: Fault) -> tuple[str, int, str]:
         """Return the member, the planet's number from 0 and the set of flanks of a fault."""
         words = where.split()
-        require(isinstance(fault, Fault), f"PlanetarySet.faults: {fault!r} is no fault of gearmbs.gears.faults")
+        if not isinstance(fault, Fault):
+            raise ValueError(f"PlanetarySet.faults: {fault!r} is no fault of gearmbs.gears.faults")
         if where in ("sun", "ring"):
             return where, -1, "both"
         known = len(words) in (2, 4) and words[0] == "planet" and words[1].isdigit()
         known = known and (len(words) == 2 or (words[2] in ("sun", "ring") and words[3] == "side"))
-        require(
-            known and 1 <= int(words[1]) <= self.planets,
-            f"PlanetarySet.faults: {where!r} is no place of a fault; give 'sun', 'ring', 'planet 1' to "
-            f"'planet {self.planets}', or with 'sun side' or 'ring side' behind",
-        )
+        if not (known and 1 <= int(words[1]) <= self.planets):
+            raise ValueError(
+                f"PlanetarySet.faults: {where!r} is no place of a fault; give 'sun', 'ring', 'planet 1' to "
+                f"'planet {self.planets}', or with 'sun side' or 'ring side' behind"
+            )
         return "planet", int(words[1]) - 1, words[2] if len(words) == 4 else "both"
 
     def _faults_of(self, planet: int, mesh: str) -> tuple[Fault, ...]:
@@ -270,12 +272,12 @@ class PlanetarySet(Written):
 
     def _pairs(self, one: GearSpec, two: GearSpec, thin: str, backlash: float, mesh: str) -> tuple[GearPair, ...]:
         plain = PairGeometry(one, two)
-        require(
-            abs(plain.base_radius_sum) < self.carrier_radius,
-            f"PlanetarySet cannot be assembled: {one.name} and {two.name} do not mesh at the carrier_radius of "
-            f"{self.carrier_radius * 1e3:.4f} mm, for their centres are {plain.nominal_centre_distance * 1e3:.4f} mm "
-            "apart; change their teeth or profile shifts, or give another carrier_radius",
-        )
+        if not abs(plain.base_radius_sum) < self.carrier_radius:
+            raise ValueError(
+                f"PlanetarySet cannot be assembled: {one.name} and {two.name} do not mesh at the carrier_radius of "
+                f"{self.carrier_radius * 1e3:.4f} mm, for their centres are {plain.nominal_centre_distance * 1e3:.4f} "
+                "mm apart; change their teeth or profile shifts, or give another carrier_radius"
+            )
         error = self.carrier_radius - plain.nominal_centre_distance
         own = plain.normal_backlash_of(self.carrier_radius)
         if own > backlash * (1.0 + UNASKED) > 0.0:
@@ -352,7 +354,8 @@ class PlanetarySet(Written):
 
         gamma_s = z_s psi / 2 pi and gamma_r = -z_r psi / 2 pi.
         """
-        require(which in ("sun", "ring"), f"which is {which!r}; choose 'sun' or 'ring'")
+        if which not in ("sun", "ring"):
+            raise ValueError(f"which is {which!r}; choose 'sun' or 'ring'")
         teeth = self.sun.teeth if which == "sun" else -self.ring.teeth
         turns = teeth * (np.array(self.angles, dtype=float) - float(self.angles[0])) / (2 * math.pi)  # type: ignore
         phase = np.round(np.mod(turns, 1.0), 9) % 1.0
@@ -376,8 +379,10 @@ class PlanetarySet(Written):
         ----------
         R. G. Parker: A physical explanation for the effectiveness of planet phasing. J. Sound Vibr. 236 (2000) 561-573.
         """
-        require(which in ("sun", "ring"), f"which is {which!r}; choose 'sun' or 'ring'")
-        require(harmonic >= 0 and harmonic == int(harmonic), f"harmonic is {harmonic!r}; give a whole number from 0 up")
+        if which not in ("sun", "ring"):
+            raise ValueError(f"which is {which!r}; choose 'sun' or 'ring'")
+        if not (harmonic >= 0 and harmonic == int(harmonic)):
+            raise ValueError(f"harmonic is {harmonic!r}; give a whole number from 0 up")
         teeth = self.sun.teeth if which == "sun" else self.ring.teeth
         psi = np.array(self.angles, dtype=float) - float(self.angles[0])  # type: ignore[index]
         turns = [
@@ -402,10 +407,8 @@ class PlanetarySet(Written):
         **given
             Two of ``sun``, ``carrier``, ``ring``.
         """
-        require(
-            len(given) == 2 and set(given) <= set(MEMBERS),
-            f"speeds are given of {', '.join(given) or 'nothing'}; give two of sun, carrier, ring",
-        )
+        if not (len(given) == 2 and set(given) <= set(MEMBERS)):
+            raise ValueError(f"speeds are given of {', '.join(given) or 'nothing'}; give two of sun, carrier, ring")
         ratio = self.basic_ratio
         row = {"sun": 1.0, "ring": -ratio, "carrier": ratio - 1.0}
         missing = next(m for m in MEMBERS if m not in given)
@@ -416,10 +419,8 @@ class PlanetarySet(Written):
 
     def torques(self, **given: float) -> dict[str, float]:
         """Outer torques on sun, carrier and ring in balance without losses, from one of them, N m."""
-        require(
-            len(given) == 1 and set(given) <= set(MEMBERS),
-            f"torques are given of {', '.join(given) or 'nothing'}; give that of sun, carrier or ring",
-        )
+        if not (len(given) == 1 and set(given) <= set(MEMBERS)):
+            raise ValueError(f"torques are given of {', '.join(given) or 'nothing'}; give that of sun, carrier or ring")
         row = {"sun": 1.0, "ring": -self.basic_ratio, "carrier": self.basic_ratio - 1.0}
         member, value = next(iter(given.items()))
         return {m: value * row[m] / row[member] for m in MEMBERS}
@@ -528,14 +529,16 @@ def planetary(
     >>> planetary((19, 17, 56), "2 mm", 3, profile_shifts=(0.617, 0.802, -0.501)).mesh_phases("ring").round(3).tolist()
     [0.0, 0.333, 0.667]
     """
-    require(len(teeth) == 3, f"planetary: teeth is {teeth!r}; give those of sun, planet and ring")
+    if len(teeth) != 3:
+        raise ValueError(f"planetary: teeth is {teeth!r}; give those of sun, planet and ring")
     known = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "planets")]
     for key in settings:
         if key not in known:
             hint = did_you_mean(key, ["planets", *known], otherwise=f"known ones are {', '.join(known)}")
-            require(False, f"planetary: {key!r} is unknown; {hint}")
+            raise ValueError(f"planetary: {key!r} is unknown; {hint}")
     other = {"right": "left", "left": "right"}
-    require(hand in other, f"planetary: hand is {hand!r}; choose 'right' or 'left'")
+    if hand not in other:
+        raise ValueError(f"planetary: hand is {hand!r}; choose 'right' or 'left'")
     made = []
     for name, z, x, sense in zip(("sun", "planet", "ring"), teeth, profile_shifts, (hand, other[hand], other[hand])):
         made.append(

@@ -12,7 +12,6 @@ import numpy as np
 from gearmbs._shown import Written
 from gearmbs.gears.planetary.elastic_ring import ElasticRim, ring_meshes
 from gearmbs.gears.planetary.planetary_set import MEMBERS, PlanetarySet
-from gearmbs.gears.spec import require
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement
@@ -46,7 +45,8 @@ class Support(Written):
         units = {"radial": "N/m", "axial": "N/m", "torsional": "N*m/rad", "tilting": "N*m/rad", "damping": "time"}
         for name, unit in units.items():
             value = to_si(getattr(self, name), unit, f"Support.{name}")
-            require(math.isfinite(value) and value >= 0, f"Support.{name} is {value}; give 0 or more")
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"Support.{name} is {value}; give 0 or more")
             object.__setattr__(self, name, value)
 
 
@@ -112,10 +112,10 @@ def planetary_mechanism(
     """
     supports, speeds, torques = dict(supports or {}), dict(speeds or {}), dict(torques or {})
     _check(held, speeds, torques, supports)
-    require(
-        rim is None or "ring" in (held, *supports),
-        "planetary: the rim of a ring that turns is given; a rim can bend on a ring that is held or has a support",
-    )
+    if rim is not None and "ring" not in (held, *supports):
+        raise ValueError(
+            "planetary: the rim of a ring that turns is given; a rim can bend on a ring that is held or has a support"
+        )
     loads = {m: to_si(v, "torque", f"torques[{m!r}]") for m, v in torques.items()}
     _check_loads(loads, held, speeds, supports)
     drives = {m: to_si(v, "angular speed", f"speeds[{m!r}]") for m, v in speeds.items()}
@@ -158,22 +158,23 @@ def _check(held: str | None, speeds: dict, torques: dict, supports: dict) -> Non
         ("supports", supports),
     ):
         for name in names:
-            require(name in MEMBERS, f"planetary: {label} has {name!r}; choose among sun, carrier and ring")
+            if name not in MEMBERS:
+                raise ValueError(f"planetary: {label} has {name!r}; choose among sun, carrier and ring")
     for name in speeds:
-        require(
-            name != held,
-            f"planetary: {name} is held and has a speed; give the speed of another, or let none be held "
-            "(held=None, in a file held = 'none')",
-        )
-        require(
-            name not in supports,
-            f"planetary: {name} has a speed and a support; drive it by a torque, or guide it without a support",
-        )
+        if name == held:
+            raise ValueError(
+                f"planetary: {name} is held and has a speed; give the speed of another, or let none be held "
+                "(held=None, in a file held = 'none')"
+            )
+        if name in supports:
+            raise ValueError(
+                f"planetary: {name} has a speed and a support; drive it by a torque, or guide it without a support"
+            )
     count = len(speeds) + (held is not None)
-    require(
-        count <= 2,
-        "planetary: the speeds of all three members are given; two of them determine the third: leave one out",
-    )
+    if not count <= 2:
+        raise ValueError(
+            "planetary: the speeds of all three members are given; two of them determine the third: leave one out"
+        )
 
 
 def _check_loads(loads: Mapping[str, float], held: str | None, speeds: Mapping, supports: Mapping) -> None:
@@ -181,12 +182,12 @@ def _check_loads(loads: Mapping[str, float], held: str | None, speeds: Mapping, 
     for name, torque in loads.items():
         fixed = name == held and name not in supports
         given = "is held" if fixed else "has a speed"
-        require(
-            torque == 0.0 or not (fixed or name in speeds),
-            f"planetary: torques[{name!r}] is {torque:g} N m, but {name} {given}: the torque would change neither "
-            "motion nor meshes; leave it out (the reaction there follows from the torques on the others), or give the "
-            f"torque on {' or '.join(m for m in MEMBERS if m != held and m not in speeds) or 'another member'}",
-        )
+        if torque != 0.0 and (fixed or name in speeds):
+            raise ValueError(
+                f"planetary: torques[{name!r}] is {torque:g} N m, but {name} {given}: the torque would change neither "
+                "motion nor meshes; leave it out (the reaction there follows from the torques on the others), or give "
+                f"the torque on {' or '.join(m for m in MEMBERS if m != held and m not in speeds) or 'another member'}"
+            )
 
 
 def _about_z(angle: float) -> np.ndarray:
@@ -197,7 +198,8 @@ def _about_z(angle: float) -> np.ndarray:
 def _masses(gears: PlanetarySet, given: Mapping[str, tuple[float, Any]]) -> dict[str, tuple[float, Any]]:
     """Masses and moments of inertia of all members; the carrier's default is a disc as far as the planets' axes."""
     unknown = set(given) - {*MEMBERS, "planet"}
-    require(not unknown, f"planetary: masses has {', '.join(sorted(unknown))}; give sun, planet, carrier, ring")
+    if unknown:
+        raise ValueError(f"planetary: masses has {', '.join(sorted(unknown))}; give sun, planet, carrier, ring")
     planet_mass, planet_inertia = gears.planet.mass, np.array(gears.planet.inertia)
     if gears.planet_at_ring is not None:
         planet_mass += gears.planet_at_ring.mass

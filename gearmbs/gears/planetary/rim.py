@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from gearmbs.gears.spec import GearSpec, require
+from gearmbs.gears.spec import GearSpec
 
 SHEAR = 1.2
 """Shear correction of a rectangular section."""
@@ -72,11 +72,10 @@ def rim_compliance(gear: GearSpec, supports: int, beta: np.ndarray, lever: np.nd
     ValueError
         For an external wheel, or fewer than two bolts.
     """
-    require(gear.internal, f"{gear.name} is external; only the rim of an internal wheel is held by bolts")
-    require(
-        isinstance(supports, int) and supports >= 2,
-        f"rim_supports is {supports!r}; give the number of bolts, 2 or more",
-    )
+    if not gear.internal:
+        raise ValueError(f"{gear.name} is external; only the rim of an internal wheel is held by bolts")
+    if not (isinstance(supports, int) and supports >= 2):
+        raise ValueError(f"rim_supports is {supports!r}; give the number of bolts, 2 or more")
     young = gear.material.youngs_modulus
     moduli = young, young / (2 * (1 + gear.material.poisson_ratio))
     thickness = gear.rim_thickness

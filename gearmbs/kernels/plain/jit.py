@@ -11,7 +11,6 @@ mode stands in a folder named after a digest of all sources of the kernel's pack
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import functools
 import hashlib
 import importlib
@@ -24,11 +23,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
 import numba
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, typeof_impl
+
+from gearmbs.kernels import locks
 
 CompilationError = numba.NumbaError
 """What numba raises where a function cannot be compiled."""
@@ -36,14 +35,12 @@ CompilationError = numba.NumbaError
 OWN_OPTIONS = {"forceinline"}
 """Options of kernels that numba does not document; all that they change is time."""
 
-FINDER = "gearmbs_plain_find_late_kernel"
-"""Symbol of what compiled code calls to find a late kernel."""
+CHOSEN = numba.config.CACHE_DIR
+"""``NUMBA_CACHE_DIR``."""
 
-TELLER = "gearmbs_plain_tell_of_exception"
-"""Symbol of what a C function calls when the function behind it raises."""
-
-_POINTER = ir.IntType(8).as_pointer()
-_folder_lock = threading.RLock()
+_compiling = threading.RLock()
+"""Taken before numba's lock on its compiler, by whatever may compile: threads that take the two in turn would stop."""
+_packages_held: list[str] = []
 
 
 def njit(signature_or_function: Any = None, *, cache: bool = False, late: bool = False, **options: Any) -> Any:
@@ -111,21 +108,34 @@ class Kernel:
     def ready(self) -> Kernel:
         """Compile or load the declared signature, unless it is there; there will be no other."""
         if self.signature is not None and not self._is_ready:
-            if self.late:
-                c_function(self, self.signature)
-            else:
-                self.dispatcher.compile(self.signature)
-                self.dispatcher.disable_compile()
-            self._is_ready = True
+            with alone(self.__module__):
+                if self.late:
+                    self.as_c_function()
+                elif not self._is_ready:
+                    self.dispatcher.compile(self.signature)
+                    self.dispatcher.disable_compile()
+                self._is_ready = True
         return self
+
+    @property
+    def is_c_function(self) -> bool:
+        """Whether kernels of its signature are called through addresses, by what is imported so far."""
+        return self.signature in _called_by_address
+
+    def as_c_function(self) -> Any:
+        """Compile or load the C function of the declared signature."""
+        return c_function(self, self.signature)
 
     def compile(self, signature: Any) -> None:
         """Compile or load what is to be called with some types."""
-        self.dispatcher.compile(signature)
+        with alone(self.__module__):
+            self.dispatcher.compile(signature)
 
     def __call__(self, *args: Any, **kws: Any) -> Any:
         """Call the compiled function."""
-        return checked(self.compiled)(*args, **kws)
+        # without a signature it may be compiled for these arguments
+        with contextlib.nullcontext() if self.declared is not None else alone(self.__module__):
+            return checked(self.compiled)(*args, **kws)
 
     @functools.cached_property
     def caller(self) -> Any:
@@ -146,13 +156,28 @@ def _typeof(value: Kernel, context: Any) -> Any:
 
 
 @contextlib.contextmanager
+def alone(module: str) -> Iterator[Path]:
+    """Compile, or load, kernels of a module's package while no other thread or process does; yield their folder.
+
+    Numba's cache takes one kernel for another where two processes write of the same function.
+    """
+    package = module.partition(".")[0]
+    with _compiling, contextlib.ExitStack() as held:
+        place = folder(package)
+        if package not in _packages_held:
+            if not place.exists():
+                _say_once("compiling numerical kernels in the plain mode, which takes some minutes; they are kept")
+            held.enter_context(locks.held(place / "lock"))
+            _packages_held.append(package)
+            held.callback(_packages_held.remove, package)
+        yield place
+
+
+@contextlib.contextmanager
 def keeping(module: str, inner: str = "") -> Iterator[None]:
     """Have numba choose, for what is decorated meanwhile, the folder of a module's package, or one inside it."""
-    with _folder_lock:
+    with alone(module) as place:
         before = numba.config.CACHE_DIR
-        place = folder(module.partition(".")[0], before)
-        if not place.exists():
-            _say_once("compiling numerical kernels in the plain mode, which takes some minutes; they are kept")
         numba.config.CACHE_DIR = str(place / inner)
         try:
             yield
@@ -160,20 +185,18 @@ def keeping(module: str, inner: str = "") -> Iterator[None]:
             numba.config.CACHE_DIR = before
 
 
-@functools.cache
-def _say_once(line: str) -> None:
+def _say(line: str) -> None:
     print(f"gearmbs: {line}", file=sys.stderr, flush=True)
 
 
-@functools.cache
-def folder(package: str, chosen: str) -> Path:
-    """Return where numba keeps the kernels of a package: a new place after each edit of it.
+_say_once = functools.cache(_say)
 
-    Parameters
-    ----------
-    package : str
-    chosen : str
-        ``NUMBA_CACHE_DIR``; without it they are beside the package, or in the user's cache folder.
+
+@functools.cache
+def folder(package: str) -> Path:
+    """Return where numba keeps the kernels of a package, a new place after each edit of it.
+
+    It is in `CHOSEN`; without that, beside the package, or in the user's cache folder.
     """
     file = getattr(sys.modules.get(package), "__file__", None)
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
@@ -182,8 +205,8 @@ def folder(package: str, chosen: str) -> Path:
         for path in sorted(root.rglob("*.py")):
             digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes())
     name = f"plain-{digest.hexdigest()[:16]}"
-    if chosen:
-        return Path(chosen) / package / name
+    if CHOSEN:
+        return Path(CHOSEN) / package / name
     if root is not None and os.access(root, os.W_OK):
         return root / "__pycache__" / name
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearmbs" / package / name
@@ -193,6 +216,7 @@ def folder(package: str, chosen: str) -> Path:
 
 
 _functions: dict[Any, Any] = {}
+_called_by_address: set[Any] = set()
 
 
 def c_function(kernel: Any, signature: Any) -> Any:
@@ -201,32 +225,21 @@ def c_function(kernel: Any, signature: Any) -> Any:
     An exception cannot leave a C function. Kernels that are called so raise none; of other people's functions see
     `_guarded`.
     """
-    found = _functions.get((kernel, signature))
-    if found is None:
-        if isinstance(kernel, Kernel):
-            # numba would take a C function of the same signature, which has no wrapper for Python, for the kernel
-            with keeping(kernel.__module__, "c"):
-                found = numba.cfunc(signature, cache=True, **kernel.options)(kernel.py_func)
-        else:
-            found = numba.cfunc(signature)(_guarded(kernel, signature))
-        _functions[kernel, signature] = found
+    with alone(getattr(kernel, "__module__", __name__)):
+        found = _functions.get((kernel, signature))
+        if found is None:
+            if isinstance(kernel, Kernel):
+                # numba would take a C function of the same signature, which has no wrapper for Python, for the kernel
+                with keeping(kernel.__module__, "c"):
+                    found = numba.cfunc(signature, cache=True, **kernel.options)(kernel.py_func)
+            else:
+                found = numba.cfunc(signature)(_guarded(kernel, signature))
+            _functions[kernel, signature] = found
     return found
 
 
 def _guarded(function: Any, signature: Any) -> Callable:
     """Return a plain function that calls another one and spoils all its numbers if it raises, so that a run fails."""
-    name = function.py_func.__qualname__
-
-    @intrinsic
-    def tell(typingctx):
-        def codegen(context, builder, sig, values):
-            module = builder.module
-            told = ir.Function(module, ir.FunctionType(ir.VoidType(), (_POINTER,)), TELLER)
-            builder.call(told, (builder.bitcast(_text(module, name), _POINTER),))
-            return context.get_dummy_value()
-
-        return types.void(), codegen
-
     names = [f"a{k}" for k in range(len(signature.args))]
     arguments = ", ".join(names)
     spoiled = "".join(
@@ -234,36 +247,28 @@ def _guarded(function: Any, signature: Any) -> Callable:
         for name, kind in zip(names, signature.args)
         if isinstance(kind, types.Array) and isinstance(kind.dtype, types.Float)
     )
-    space = {"function": function, "tell": tell, "nan": math.nan}
+    space = {"function": function, "tell": _tell, "nan": math.nan, "name": function.py_func.__qualname__}
     call = (
         f"def guarded({arguments}):\n    found = {'None' if signature.return_type == types.void else 'nan'}\n"
+        f"    raised = False\n"
         f"    try:\n        {'' if signature.return_type == types.void else 'found = '}function({arguments})\n"
-        f"    except Exception:\n        tell()\n{spoiled}    return found\n"
+        f"    except Exception:\n        raised = True\n"
+        f"    if raised:\n        tell(name)\n{spoiled}    return found\n"
     )
     exec(call, space)
     return space["guarded"]
 
 
-@ctypes.CFUNCTYPE(None, ctypes.c_char_p)
-def _tell(name: bytes) -> None:
-    print(f"gearmbs: function {name.decode()} raised an exception; its numbers become NaN", file=sys.stderr, flush=True)
-
-
-llvm.add_symbol(TELLER, ctypes.cast(_tell, ctypes.c_void_p).value)
-
-
-def _text(module: ir.Module, text: str) -> Any:
-    """Return a constant that holds a text."""
-    room = bytearray(text.encode() + b"\0")
-    told = ir.GlobalVariable(module, ir.ArrayType(ir.IntType(8), len(room)), module.get_unique_name("text"))
-    told.linkage, told.global_constant = "internal", True
-    told.initializer = ir.Constant(told.value_type, room)
-    return told
+@numba.njit
+def _tell(name):
+    with numba.objmode():
+        _say(f"function {name} raised an exception; its numbers become NaN")
 
 
 def caller(signature: Any) -> Any:
     """Return what turns an address, in compiled code, into a function of ``signature`` that can be called."""
     function = types.ExternalFunctionPointer(signature, None)
+    _called_by_address.add(signature)
 
     @intrinsic
     def function_at(typingctx, address):
@@ -299,23 +304,18 @@ def checked(function: Callable) -> Callable:
 
 
 def _late(kernel: Kernel) -> Any:
-    """Return a compiled function that calls a late kernel through its address, and finds that when it is first called.
+    """Return a compiled function that calls a late kernel through its address, for which it asks Python at each call.
 
     So what most models never need is not compiled for them.
     """
     signature = kernel.signature
     name = f"{kernel.__module__}:{kernel.py_func.__name__}"
-
-    @intrinsic
-    def find(typingctx):
-        return types.int64(), lambda context, builder, sig, values: _found_address(builder, name)
-
     arguments = ", ".join(f"a{k}" for k in range(len(signature.args)))
     message = f"{name} could not be compiled; what went wrong was printed"
-    space = {"find": find, "function_at": caller(signature), "message": message}
+    space = {"place_of": _place_of, "name": name, "function_at": caller(signature), "message": message}
     exec(
-        f"def late({arguments}):\n    place = find()\n    if place == 0:\n        raise RuntimeError(message)\n"
-        f"    return function_at(place)({arguments})\n",
+        f"def late({arguments}):\n    place = place_of(name)\n    if place == 0:\n"
+        f"        raise RuntimeError(message)\n    return function_at(place)({arguments})\n",
         space,
     )
     call = numba.njit(space["late"])
@@ -324,29 +324,21 @@ def _late(kernel: Kernel) -> Any:
     return call
 
 
-def _found_address(builder: Any, name: str) -> Any:
-    """Write instructions that look an address up the first time and remember it; it is zero if there is none."""
-    module = builder.module
-    word = ir.IntType(64)
-    slot = ir.GlobalVariable(module, word, module.get_unique_name("slot"))
-    slot.linkage, slot.initializer = "internal", ir.Constant(word, 0)
-    finder = ir.Function(module, ir.FunctionType(ir.VoidType(), (word.as_pointer(), _POINTER)), FINDER)
-    first = builder.icmp_signed("==", builder.load(slot), ir.Constant(word, 0))
-    with builder.if_then(first, likely=False):
-        builder.call(finder, (slot, builder.bitcast(_text(module, name), _POINTER)))
-    return builder.load(slot)
+@numba.njit
+def _place_of(name):
+    with numba.objmode(place="intp"):
+        place = _late_address(name)
+    return place
 
 
-@ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p)
-def _find(slot: int, name: bytes) -> None:
-    """Compile or load a late kernel and write its address to a slot."""
+@functools.cache
+def _late_address(name: str) -> int:
+    """Compile or load a late kernel and return its address, 0 if there is none."""
     try:
-        kernel = _found(*name.decode().split(":"))
-        ctypes.c_int64.from_address(slot).value = c_function(kernel, kernel.signature).address
+        kernel = _found(*name.split(":"))
+        return kernel.as_c_function().address
     except BaseException:
-        # there is nobody to raise it to but compiled code, which raises an error of its own
+        # C functions on the way to Python hide an exception
         traceback.print_exc(file=sys.stderr)
-        _failures.append(f"{name.decode()} could not be compiled; what went wrong was printed")
-
-
-llvm.add_symbol(FINDER, ctypes.cast(_find, ctypes.c_void_p).value)
+        _failures.append(f"{name} could not be compiled; what went wrong was printed")
+        return 0

@@ -1,4 +1,4 @@
-"""Calls through addresses in the plain mode, of C functions made by `numba.cfunc`; the rest is as in the own mode.
+"""Calls through addresses in the plain mode, of C functions made by `numba.cfunc`.
 
 The own stages take the address of numba's internal entry and put it into numba's value of a function type, whose
 members change from version to version. An exception leaves such an entry; of C functions see `plain.jit.c_function`.
@@ -7,17 +7,31 @@ members change from version to version. An exception leaves such an entry; of C 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any
 
-from gearmbs.kernels import pointers
-from gearmbs.kernels.plain.jit import Kernel, c_function, caller, checked
+from numba import types
 
-__all__ = ["address", "bind", "caller", "direct"]
+from gearmbs.kernels.bound import F8, FUNCTIONS_TYPE, I8, IMAT, IVEC, MAT, VEC, PythonCallback, bind, no_events, no_hook
+from gearmbs.kernels.plain.jit import Kernel, c_function, caller, checked, njit
 
-
-def __getattr__(name: str) -> Any:
-    return getattr(pointers, name)
+__all__ = [
+    "F8",
+    "FUNCTIONS_TYPE",
+    "I8",
+    "IMAT",
+    "IVEC",
+    "MAT",
+    "VEC",
+    "PythonCallback",
+    "address",
+    "bind",
+    "call_address",
+    "caller",
+    "direct",
+    "no_events",
+    "no_hook",
+]
 
 
 @cache
@@ -32,8 +46,10 @@ def direct(kernel: Any) -> Callable:
     return checked(kernel.compiled) if isinstance(kernel, Kernel) else kernel
 
 
-@lru_cache(maxsize=pointers.BOUND)
-def bind(residual, jacobian, hook, events):
-    """Return the four compiled functions bound together, the same object for the same functions."""
-    functions = (residual, jacobian, hook, events)
-    return pointers.bind(*(f.compiled if isinstance(f, Kernel) else f for f in functions))
+_c_function_at = caller(types.void(F8, types.intp, types.intp, F8, types.intp))
+
+
+@njit(cache=True, error_model="numpy")
+def call_address(address, t, y, yp, extra, out):
+    """Call the C function ``void f(double t, double *y, double *yp, double extra, double *out)`` at ``address``."""
+    _c_function_at(address)(t, y.ctypes.data, yp.ctypes.data, extra, out.ctypes.data)

@@ -23,7 +23,7 @@ from gearmbs.mechanism.checks import row_order
 from gearmbs.mechanism.language.syntax import Scope
 from gearmbs.mechanism.parts import elements as el
 from gearmbs.mechanism.parts import joints as jt
-from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State
 from gearmbs.mechanism.parts.functions import TimeFunction
 from gearmbs.mechanism.parts.modal import ModalBody
@@ -61,8 +61,7 @@ def compile_mechanism(mechanism: Mechanism, t0: float) -> System:
 def scope_of(mechanism: Mechanism) -> tuple[Scope, TableBuilder, Callable[[int], str]]:
     """Return what expressions about a mechanism may name, its present markers' tables, and the names of markers."""
     compiler = _Compiler(mechanism, [])
-    for body in mechanism.bodies.values():
-        compiler.add_body(body)
+    compiler.add_bodies()
     compiler.index_all_markers()
     return compiler.scope(), compiler.builder, compiler.marker_named
 
@@ -83,15 +82,16 @@ class _Compiler:
 
     def run(self, t0: float) -> System:
         m = self.mechanism
-        pose = np.array([self.add_body(body) for body in m.bodies.values()])
+        self.add_bodies()
+        pose = np.array([body.pose_record() for body in m.bodies.values()])
         bent = [body for body in m.bodies.values() if isinstance(body, ModalBody)]
         q_f = np.concatenate([np.zeros(0), *(body.start for body in bent)])
         v_f = np.concatenate([np.zeros(0), *(body.rate for body in bent)])
         self.index_all_markers()
-        for joint in m.joints.values():
-            for row in joint.rows:
-                self.add_row(row, f"{joint.name}: {row.label}")
-                self.row_names.append(f"{joint.name}: {row.label}")
+        labels = [f"{joint.name}: {row.label}" for joint in m.joints.values() for row in joint.rows]
+        rows = [row for joint in m.joints.values() for row in joint.rows]
+        self.builder.add_rows([self.packed_row(row, label) for row, label in zip(rows, labels)])
+        self.row_names += labels
         for name, text in m.constraints.items():
             tape = self.tape(text, f"general constraint '{name}'", "number")
             if not tape.second_order:
@@ -113,19 +113,19 @@ class _Compiler:
             kinds.append((_state_kind(state), self.add_tape(tape)))
         self.builder.states[: len(kinds)] = kinds
         elements = [*self.force_names, *(f"reaction of {name}" for name in self.measured)]
-        names = Names(tuple(m.bodies), tuple(self.row_names), tuple(elements), tuple(m.state_names))
-        start = [s.start for s in m.every_state]
+        every_state = m.every_state
+        names = Names(tuple(m.bodies), tuple(self.row_names), tuple(elements), tuple(m.names_of(every_state)))
+        start = [s.start for s in every_state]
         system = System(self.builder.build(names), Configuration(pose, q_f, v_f), start, t0, m, self.marker_index)
         system.row_order = row_order(m)
         return system
 
     # --- bodies and markers -------------------------------------------------------------------------
 
-    def add_body(self, body: Body) -> np.ndarray:
-        modal = body.modal if isinstance(body, ModalBody) else None
-        self.body_index[id(body)] = self.builder.add_body(body.mass, body.inertia, modal)
-        position, velocity = body.centre_of_mass()
-        return np.concatenate([position, body.orientation.ravel(), velocity, body.angular_velocity])
+    def add_bodies(self) -> None:
+        for body in self.mechanism.bodies.values():
+            modal = body.modal if isinstance(body, ModalBody) else None
+            self.body_index[id(body)] = self.builder.add_body(body.mass, body.inertia, modal)
 
     def index_all_markers(self) -> None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
@@ -145,14 +145,16 @@ class _Compiler:
 
     # --- constraints --------------------------------------------------------------------------------
 
-    def add_row(self, row: jt.Row, label: str) -> None:
+    def packed_row(self, row: jt.Row, label: str) -> tuple[list[tuple], int]:
+        """Return the terms and the function of a constraint row as `TableBuilder.add_rows` takes them."""
         function = -1 if row.function is None else self.function(row.function, label)
         rotation = -1 if row.rotation is None else self.function(row.rotation, label)
-        packed = [(t.kind, self.index(t.i), self.index(t.j), t.axes, rotation, t.coefficient) for t in row.terms]
-        self.builder.add_row(packed, function)
-        for k, term in enumerate(row.terms):
-            if term.kind == terms.ANGLE:
-                self.builder.reference[len(self.builder.terms) - len(row.terms) + k] = jt.initial_angle(row, term)
+        index = self.marker_index
+        packed = []
+        for t in row.terms:
+            start = jt.initial_angle(row, t) if t.kind == terms.ANGLE else 0.0
+            packed.append((t.kind, index[id(t.i)], index[id(t.j)], t.axes, rotation, t.coefficient, start))
+        return packed, function
 
     def function(self, function: TimeFunction, label: str) -> int:
         if not function.is_expression:
@@ -290,20 +292,20 @@ class _Compiler:
             return
         if not isinstance(element, ForceElement):
             raise ModelError(f"force element {element!r}: its type is unknown to the mechanism")
-        self.force_names += [f"{element.name}[{k}]" for k in range(1, element.wrenches)]
-        made = element.compiled()
+        wrenches, acting, states, made = element.wrenches, element.markers, element.states, element.compiled()
+        self.force_names += [f"{element.name}[{k}]" for k in range(1, wrenches)]
         label = f"{element.kind} '{element.name}'"
         turns = self.mechanism.turns
         self.builder.add_element(
             made.kernel,
-            [self.index(m) for m in element.markers],
+            [self.index(m) for m in acting],
             sees=None if made.sees is None else [self.index(m) for m in made.sees],
             force=element.has_force,
             torque=element.has_torque,
             integers=made.integers,
             reals=made.reals,
             functions=made.functions,
-            states=[_state_kind(state) for state in element.states],
+            states=[_state_kind(state) for state in states],
             unknowns=[self.unknown(("joint", name, c), label) for name in made.reactions for c in range(6)],
             times=[self.function(function, label) for function in made.times],
             angles=[

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,21 +9,23 @@ import numpy as np
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts import joints as jt
-from gearmbs.mechanism.parts.bodies import Body, Marker, Vector, frame_along, vector
+from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, integrated
-from gearmbs.mechanism.parts.quantities import keeps_given, quantity
+from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
 
 if TYPE_CHECKING:
-    pass
+    from gearmbs.mechanism.parts.elements import ForceElement, Load
 
 
 class JointMethods:
     """The part of :class:`gearmbs.mechanism.Mechanism` that adds joints and motions."""
 
     name: str
+    ground: Body
+    bodies: dict[str, Body]
     joints: dict[str, jt.Joint]
-    _check_name: Callable[[str], None]
-    _check_body: Callable[[str, Body], None]
+    elements: dict[str, ForceElement | Load]
+    constraints: dict[str, str]
 
     @keeps_given
     def joint(
@@ -80,37 +81,30 @@ class JointMethods:
                 raise
         return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj)))
 
-    @keeps_given
     def fixed(self, name, i, j, **where) -> jt.Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
         return self.joint("fixed", name, i, j, **where)
 
-    @keeps_given
     def revolute(self, name, i, j, **where) -> jt.Joint:
         """Add a revolute joint: rotation about the common z axis. See :meth:`joint`."""
         return self.joint("revolute", name, i, j, **where)
 
-    @keeps_given
     def spherical(self, name, i, j, **where) -> jt.Joint:
         """Add a spherical joint: a common point. See :meth:`joint`."""
         return self.joint("spherical", name, i, j, **where)
 
-    @keeps_given
     def cylindrical(self, name, i, j, **where) -> jt.Joint:
         """Add a cylindrical joint: rotation about and translation along z_J. See :meth:`joint`."""
         return self.joint("cylindrical", name, i, j, **where)
 
-    @keeps_given
     def translational(self, name, i, j, **where) -> jt.Joint:
         """Add a translational joint along z_J. See :meth:`joint`."""
         return self.joint("translational", name, i, j, **where)
 
-    @keeps_given
     def universal(self, name, i, j, **where) -> jt.Joint:
         """Add a universal joint whose cross arms are z_I and z_J: ``axis`` and ``axis_j``. See :meth:`joint`."""
         return self.joint("universal", name, i, j, **where)
 
-    @keeps_given
     def planar(self, name, i, j, **where) -> jt.Joint:
         """Add a planar joint: motion in the xy plane of J. See :meth:`joint`."""
         return self.joint("planar", name, i, j, **where)
@@ -253,6 +247,20 @@ class JointMethods:
             raise ModelError(f"motion '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
         if joint.kind not in kinds:
             raise ModelError(f"motion '{name}': joint '{joint.name}' is {joint.kind}; it must be {' or '.join(kinds)}")
+
+    def _check_body(self, label: str, body: Body) -> None:
+        if not isinstance(body, Body):
+            raise ModelError(f"{label}: {body!r} is not a body or a marker")
+        if body is not self.ground and self.bodies.get(body.name) is not body:
+            raise ModelError(f"{label}: body '{body.name}' does not belong to mechanism '{self.name}'")
+
+    def _check_name(self, name: str) -> None:
+        if not isinstance(name, str) or not name:
+            raise ModelError(f"name {name!r}: give a text that is not empty")
+        for title, table in (("joint", self.joints), ("load", self.elements), ("constraint", self.constraints)):
+            if name in table:
+                kind = getattr(table[name], "kind", title)
+                raise ModelError(f"name {name!r}: it is in use by a {title} ({kind}); choose another")
 
     def _add_joint(self, joint: jt.Joint) -> jt.Joint:
         self._check_name(joint.name)

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.forces.springs import AxisSpring, Beam, Bushing, Field, LineSpring, MatrixForce, in_si
 from gearmbs.mechanism.parts import elements as el
-from gearmbs.mechanism.parts.bodies import Marker, Vector, vector
+from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import Load
-from gearmbs.mechanism.parts.quantities import expression_text, keeps_given, quantity
+from gearmbs.mechanism.parts.quantities import Vector, expression_text, keeps_given, quantity, vector
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson, SolidContact

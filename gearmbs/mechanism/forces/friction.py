@@ -27,8 +27,8 @@ ADAMS Solver manual.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 INPUTS = ("preload", "reaction_force", "bending_moment", "torsional_moment")
 EFFECTS = ("all", "stiction", "sliding")
 OVERLAPS = {"constant": 0.0, "increasing": 1.0, "decreasing": -1.0}
-KINDS = ("revolute", "translational", "cylindrical", "spherical", "universal")
 TINY = 1e-6
 """Forces, in the unit of force, and slips, in transition velocities, below which lengths of vectors are rounded off."""
 
@@ -159,7 +158,7 @@ class FrictionText:
 def friction_text(name: str, joint: Joint, friction: JointFriction, units: Units) -> FrictionText:
     """Return the friction of a joint in the function language, in the units given."""
     writer = _Writer(name, joint, friction, units)
-    load = getattr(writer, f"_{joint.kind}")()
+    load = KINDS[joint.kind].text(writer)
     return FrictionText(writer.variables, writer.states, load, writer.start)
 
 
@@ -177,14 +176,9 @@ class _Writer:
 
     # --- joints -------------------------------------------------------------------------------------
 
-    def _revolute(self) -> Load:
-        return self._pin(self.j)
-
-    def _universal(self) -> Load:
-        return self._pin(self.i if self.f.yoke == "i" else self.j)
-
-    def _pin(self, frame: Marker) -> Load:
-        """A pin about z of ``frame``: N r = r F_radial + a |F_axial| + (r/b) T_bending."""
+    def pin(self) -> Load:
+        """A pin about z of a frame: N r = r F_radial + a |F_axial| + (r/b) T_bending."""
+        frame = self.i if KINDS[self.joint.kind].yoke and self.f.yoke == "i" else self.j
         radius = float(self.f.pin_radius)
         arm = self._lever("bending_moment", "bending_arm")
         parts = []
@@ -199,7 +193,7 @@ class _Writer:
         text = _at_most(self._resisting(mu, moment, self.f.preload_torque), self.f.max_torque)
         return self._load(el.AXIS_TORQUE, (text,), frame)
 
-    def _translational(self) -> Load:
+    def slide(self) -> Load:
         parts = self._across()
         arm = self._lever("torsional_moment", "reaction_arm")
         if arm:
@@ -210,7 +204,7 @@ class _Writer:
         text = _at_most(self._resisting(mu, normal, self.f.preload_force), self.f.max_force)
         return self._load(el.AXIS_FORCE, (text,), self.j)
 
-    def _cylindrical(self) -> Load:
+    def cylinder(self) -> Load:
         """Slip along and about the axis: one surface, so both share the coefficient."""
         radius = float(self.f.pin_radius)
         normal = self._variable("normal", " + ".join(self._across()) or "0")
@@ -220,7 +214,7 @@ class _Writer:
         torque = _at_most(self._resisting(about, f"{radius!r}*{normal}", self.f.preload_torque), self.f.max_torque)
         return self._load(el.COMPONENTS, (None, None, force, None, None, torque), self.j)
 
-    def _spherical(self) -> Load:
+    def ball(self) -> Load:
         radius = float(self.f.ball_radius)
         used = "reaction_force" in self.f.inputs
         normal = self._variable("normal", self._length(self.j, (2, 3, 4)) if used else "0")
@@ -315,6 +309,72 @@ class _Writer:
         return Load(self.name, "friction", self.i, self.j, frame, mode, expressions)
 
 
+@dataclass(frozen=True, kw_only=True)
+class FrictionKind:
+    """How the surfaces of a kind of joint rub.
+
+    Attributes
+    ----------
+    text : callable
+        ``text(writer)`` returns the load in the function language.
+    kernel : str
+        Which of the kinds of `gearmbs.mechanism.forces.friction_kernel` it is.
+    force, torque : bool
+        Whether it rubs along z of J, and by turning.
+    pressing : dict of str to str or None
+        What presses the surfaces together, and the length that must not be zero for it.
+    lever : str
+        Radius without which there is no friction, "" where nothing turns.
+    arm : str
+        A further length.
+    yoke : bool
+        Whether it rubs in one of two arms.
+    """
+
+    text: Callable[[_Writer], Load]
+    kernel: str
+    force: bool = False
+    torque: bool = True
+    pressing: Mapping[str, str | None]
+    lever: str = ""
+    arm: str = ""
+    yoke: bool = False
+
+    @property
+    def lengths(self) -> tuple[str, ...]:
+        """All lengths that it takes."""
+        return tuple(name for name in (self.lever, self.arm, *reversed(list(self.pressing.values()))) if name)
+
+
+_PIN = FrictionKind(
+    text=_Writer.pin,
+    kernel="PIN",
+    pressing={"reaction_force": None, "bending_moment": "bending_arm"},
+    lever="pin_radius",
+    arm="friction_arm",
+)
+KINDS: dict[str, FrictionKind] = {
+    "revolute": _PIN,
+    "translational": FrictionKind(
+        text=_Writer.slide,
+        kernel="SLIDE",
+        force=True,
+        torque=False,
+        pressing={"reaction_force": None, "bending_moment": "overlap", "torsional_moment": "reaction_arm"},
+    ),
+    "cylindrical": FrictionKind(
+        text=_Writer.cylinder,
+        kernel="CYLINDER",
+        force=True,
+        pressing={"reaction_force": None, "bending_moment": "overlap"},
+        lever="pin_radius",
+    ),
+    "spherical": FrictionKind(text=_Writer.ball, kernel="BALL", pressing={"reaction_force": None}, lever="ball_radius"),
+    "universal": replace(_PIN, yoke=True),
+}
+"""The joints that take friction; that of another kind which rubs as one of these does is one row."""
+
+
 def _at_most(text: str, most: float | None) -> str:
     """Return an expression kept between -most and most."""
     return text if most is None else f"MAX({-float(most)!r}, MIN({float(most)!r}, {text}))"
@@ -359,12 +419,12 @@ class FrictionForce(ForceElement):
     @property
     def has_force(self) -> bool:  # type: ignore[override]
         """Whether F is an unknown."""
-        return self.joint.kind in ("translational", "cylindrical")
+        return KINDS[self.joint.kind].force
 
     @property
     def has_torque(self) -> bool:  # type: ignore[override]
         """Whether N is an unknown."""
-        return self.joint.kind != "translational"
+        return KINDS[self.joint.kind].torque
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -374,16 +434,15 @@ class FrictionForce(ForceElement):
     def compiled(self) -> Compiled:
         from gearmbs.mechanism.forces import friction_kernel as fk
 
-        f, kind = self.friction, self.joint.kind
-        kinds = {"translational": fk.SLIDE, "cylindrical": fk.CYLINDER, "spherical": fk.BALL}
+        f, kind = self.friction, KINDS[self.joint.kind]
         integers = np.zeros(fk.INTEGERS, dtype=np.int64)
-        integers[fk.KIND] = kinds.get(kind, fk.PIN)
-        integers[fk.FRAME] = 0 if kind == "universal" and f.yoke == "i" else 1
+        integers[fk.KIND] = getattr(fk, kind.kernel)
+        integers[fk.FRAME] = 0 if kind.yoke and f.yoke == "i" else 1
         reals = np.zeros(fk.REALS)
         self._pressing(integers, reals)
         length, force, torque = (self.units.factor(d) for d in ("length", "force", "torque"))
         kept = 1.0 / f.mu_dynamic if "preload" in f.inputs else 0.0
-        reals[fk.LEVER] = length * (f.ball_radius if kind == "spherical" else f.pin_radius)
+        reals[fk.LEVER] = length * (getattr(f, kind.lever) if kind.lever else f.pin_radius)
         reals[fk.LIMIT_STATIC] = f.mu_dynamic if f.effect == "sliding" else f.mu_static
         reals[fk.LIMIT_DYNAMIC] = 1e-6 * f.mu_static if f.effect == "stiction" else f.mu_dynamic
         reals[fk.TRANSITION] = self.units.factor("velocity") * f.stiction_transition_velocity
@@ -402,14 +461,14 @@ class FrictionForce(ForceElement):
         """Fill in what presses the surfaces together."""
         from gearmbs.mechanism.forces import friction_kernel as fk
 
-        f, kind = self.friction, self.joint.kind
+        f, kind = self.friction, KINDS[self.joint.kind]
         length, force, torque = (self.units.factor(d) for d in ("length", "force", "torque"))
         by_force = "reaction_force" in f.inputs
         bending, twist = "bending_moment" in f.inputs, "torsional_moment" in f.inputs
         reals[fk.TINY_FORCE] = TINY * force
-        if kind == "spherical":
+        if kind.kernel == "BALL":
             reals[fk.PER_FORCE] = float(by_force)
-        elif kind in ("revolute", "universal"):
+        elif kind.kernel == "PIN":
             reals[fk.PER_RADIAL] = length * f.pin_radius * by_force
             reals[fk.PER_AXIAL] = length * f.friction_arm * by_force
             if bending and f.bending_arm:
@@ -425,7 +484,7 @@ class FrictionForce(ForceElement):
                 integers[fk.CHANGES] = reals[fk.OVERLAP_SLOPE] != 0.0
                 reals[fk.PER_BENDING] = 1.0 if integers[fk.CHANGES] else 1.0 / reals[fk.OVERLAP]
                 reals[fk.START] = self.text.start
-            if kind == "translational" and twist and f.reaction_arm:
+            if "torsional_moment" in kind.pressing and twist and f.reaction_arm:
                 reals[fk.PER_TWIST] = 1.0 / (length * f.reaction_arm)
                 reals[fk.TINY_TWIST] = TINY * f.reaction_arm * torque
         used = (fk.PER_RADIAL, fk.PER_AXIAL, fk.PER_FORCE, fk.PER_BENDING, fk.PER_TWIST)
@@ -434,12 +493,6 @@ class FrictionForce(ForceElement):
     def __repr__(self) -> str:
         return f"FrictionForce({self.name!r} in joint {self.joint.name!r})"
 
-
-NEEDED = {
-    "revolute": ("pin_radius",), "universal": ("pin_radius",), "cylindrical": ("pin_radius",),
-    "spherical": ("ball_radius",),
-}  # fmt: skip
-"""Lengths without which there is no friction, by the kind of joint."""
 
 DIMENSIONS = {
     "stiction_transition_velocity": ("speed", "velocity"),
@@ -491,9 +544,9 @@ def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: JointF
     friction.check(name)
     if joint.kind not in KINDS:
         raise ModelError(f"friction '{name}': joint '{joint.name}' is {joint.kind}; it must be {', '.join(KINDS)}")
-    for field in NEEDED.get(joint.kind, ()):
-        if not getattr(friction, field) > 0.0:
-            raise ModelError(f"friction '{name}': {field} is needed for a {joint.kind} joint")
+    lever = KINDS[joint.kind].lever
+    if lever and not getattr(friction, lever) > 0.0:
+        raise ModelError(f"friction '{name}': {lever} is needed for a {joint.kind} joint")
     text = friction_text(name, joint, friction, mechanism.units)
     for key, expression in text.variables.items():
         mechanism.variable(key, expression)

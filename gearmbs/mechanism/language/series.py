@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
 from gearmbs.dae.equations.expressions.evaluate import angle_rates, eval_request, update_angles
+from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.kernels.jit import njit
 
 
 @njit(
     "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
-    " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
+    " float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[::1], float64[::1], float64[::1])",
     cache=True,
     nogil=True,
 )
@@ -16,7 +22,6 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
     """Evaluate a tape at every time.
 
     Counted angles go on by the mean of their rates at both ends of an output step, to the nearest turn.
-    ``angles`` is scratch: references, present and last rates, a row each.
 
     Parameters
     ----------
@@ -36,8 +41,8 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
         Origin and orientation of each marker in its body.
     y : ndarray, shape (times, unknowns)
         Unknowns.
-    angles : ndarray
-        References of the counted angles, moved along.
+    angles : ndarray, shape (2, times, counted angles)
+        Receives the counted angles and their rates; in its first row, the first angle comes near the given one.
     grad : ndarray
         Scratch of the size of the gradient.
     work : ndarray
@@ -45,12 +50,80 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
     out : ndarray
         Receives the values.
     """
-    ref, rates, last = angles[0], angles[1], angles[2]
     for k in range(t.size):
+        ref, rates = angles[0, k], angles[1, k]
+        if k > 0:
+            ref[:] = angles[0, k - 1]
         angle_rates(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, rates, grad, work)
         if k > 0:
             for a in range(ref.size):
-                ref[a] += 0.5 * (rates[a] + last[a]) * (t[k] - t[k - 1])
+                ref[a] += 0.5 * (rates[a] + angles[1, k - 1, a]) * (t[k] - t[k - 1])
         update_angles(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, work)
-        last[:] = rates
         out[k] = eval_request(ints, floats, t[k], kin[k], acc[k], marker_body, marker_frame, y[k], ref, work)
+
+
+def expression_values(
+    tape: Tape,
+    starts: Sequence[float],
+    t: np.ndarray,
+    kin: np.ndarray,
+    acc: np.ndarray,
+    marker_body: np.ndarray,
+    marker_frame: np.ndarray,
+    y: np.ndarray,
+    marker_named: Callable[[int], str],
+) -> np.ndarray:
+    """Return the values of a tape at every time; warn where its angles may be full turns off.
+
+    Parameters
+    ----------
+    tape : Tape
+    starts : sequence of float
+        Near which its counted angles start, rad.
+    t, kin, acc, marker_body, marker_frame, y : ndarray
+        As of `evaluate_series`.
+    marker_named : callable
+        Name of a marker by its index.
+
+    Returns
+    -------
+    ndarray, shape (times,)
+    """
+    angles = np.zeros((2, t.size, max(1, tape.n_angles)))
+    angles[0, :1, : tape.n_angles] = starts
+    out = np.zeros(t.size)
+    evaluate_series(
+        tape.ints, tape.floats, t, kin, acc, marker_body, marker_frame, y, angles, np.zeros(max(1, tape.gradient_size)),
+        np.zeros(tape.work_size), out,
+    )  # fmt: skip
+    for k, (function, i, j) in enumerate(tape.angles):
+        label = f"{function}({marker_named(i)}, {marker_named(j)})"
+        warn_of_doubtful_turns(t, angles[0, :, k], angles[1, :, k], label)
+    return out
+
+
+SPLINE_POINTS = 4
+"""Outputs from which a cubic spline says more about a speed than its mean between two of them."""
+
+
+def warn_of_doubtful_turns(t: np.ndarray, angle: np.ndarray, speed: np.ndarray, label: str) -> None:
+    """Warn where a spline through the speeds makes another number of turns between two outputs than was counted."""
+    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
+    doubtful = np.flatnonzero(np.round((np.diff(angle) - _finer_steps(t, speed, steps)) / (2 * np.pi)))
+    if doubtful.size:
+        k = int(doubtful[0])
+        warnings.warn(
+            f"{label}: its full turns cannot be counted surely from t = {t[k]:.6g} to {t[k + 1]:.6g} s, where it turns "
+            f"{abs(steps[k]) / (2 * np.pi):.3g} times between two outputs and its speed changes; simulate with a "
+            "higher rate",
+            stacklevel=4,
+        )
+
+
+def _finer_steps(t: np.ndarray, speed: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return the angles (rad) from output to output by a spline through the speeds, where turns could be miscounted."""
+    if t.size < SPLINE_POINTS or abs(steps).max() < np.pi or np.diff(t).min() <= 0.0:
+        return steps
+    from scipy.interpolate import CubicSpline
+
+    return np.diff(CubicSpline(t, speed).antiderivative()(t))

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.parts.bodies import Body, Marker, Vector
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.quantities import Vector
 from gearmbs.units import shown
 
 Shapes = Callable[[np.ndarray], tuple[npt.ArrayLike, npt.ArrayLike]]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.dae.analyses import eigenvalues as _modes
 from gearmbs.dae.analyses import kinematics as _kinematic
+from gearmbs.dae.analyses import modes as _modes
 from gearmbs.dae.analyses import statics as _sequence
 from gearmbs.dae.analyses import statics as _statics
 from gearmbs.dae.analyses.modes import Modes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,18 +23,6 @@ if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
 
-SPLINE_POINTS = 4
-"""Outputs from which a cubic spline says more about a speed than its mean between two of them."""
-
-
-def _finer_steps(t: np.ndarray, speed: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return the angles (rad) from output to output by a spline through the speeds, where turns could be miscounted."""
-    if t.size < SPLINE_POINTS or abs(steps).max() < np.pi or np.diff(t).min() <= 0.0:
-        return steps
-    from scipy.interpolate import CubicSpline
-
-    return np.diff(CubicSpline(t, speed).antiderivative()(t))
-
 
 class Measures:
     """Measurements on a solution of a mechanism; :class:`gearmbs.dae.results.solution.Solution` has them as methods.
@@ -52,6 +39,8 @@ class Measures:
 
     def angle(self, joint: Joint | str) -> np.ndarray:
         """Return the rotation of I about z_J, full turns counted, shape (m,), rad."""
+        from gearmbs.mechanism.language.series import warn_of_doubtful_turns
+
         found = self._joint(joint, kinds_with_angle(), "angle")
         t = self.solution.t
         ai, aj = self._axes(found.i), self._axes(found.j)
@@ -61,16 +50,9 @@ class Measures:
         # each step is the one nearest to what the speeds make of it
         rest = np.diff(wanted) - steps
         turns = np.round(rest / (2 * np.pi))
-        doubtful = np.flatnonzero(np.round((rest + steps - _finer_steps(t, speed, steps)) / (2 * np.pi)) != turns)
-        if doubtful.size:
-            k = int(doubtful[0])
-            warnings.warn(
-                f"joint '{found.name}': its full turns cannot be counted surely from t = {t[k]:.6g} to "
-                f"{t[k + 1]:.6g} s, where it turns {abs(steps[k]) / (2 * np.pi):.3g} times between two outputs and its "
-                "speed changes; simulate with a higher rate",
-                stacklevel=3,
-            )
-        return wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
+        angle = wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
+        warn_of_doubtful_turns(t, angle, speed, f"joint '{found.name}'")
+        return angle
 
     def displacement(self, joint: Joint | str) -> np.ndarray:
         """Return the way of I from J along z_J, shape (m,), m."""
@@ -167,7 +149,7 @@ class Measures:
         """Return the values of an expression, in the mechanism's units, shape (m,)."""
         from gearmbs.mechanism.building.compile import scope_of, starting_angles
         from gearmbs.mechanism.language.library import compile_expression
-        from gearmbs.mechanism.language.series import evaluate_series
+        from gearmbs.mechanism.language.series import expression_values
 
         scope, builder, marker_named = scope_of(self.mechanism)
         try:
@@ -179,17 +161,11 @@ class Measures:
         for q, key in enumerate(tape.algebraic):
             y[:, q] = self._unknown(key)
         tape = tape.bind(tape.algebraic.index)
-        angles = np.zeros((3, max(1, tape.n_angles)))
-        angles[0, : tape.n_angles] = starting_angles(tape, self.mechanism.turns, marker_named)
         bodies = np.array(builder.marker_body, dtype=np.int64)
         frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
         kin, acc = frame_motion(self.solution.evaluated, builder.build(Names()))
-        out = np.zeros(t.size)
-        evaluate_series(
-            tape.ints, tape.floats, t, kin, acc, bodies, frames, y, angles, np.zeros(max(1, tape.gradient_size)),
-            np.zeros(tape.work_size), out,
-        )  # fmt: skip
-        return out
+        starts = starting_angles(tape, self.mechanism.turns, marker_named)
+        return expression_values(tape, starts, t, kin, acc, bodies, frames, y, marker_named)
 
     def _unknown(self, key: tuple) -> np.ndarray:
         if key[0] in ("diff", "variable"):

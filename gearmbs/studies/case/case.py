@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -28,17 +27,21 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from gearmbs._shown import Shown
-from gearmbs.dae.methods import DEFAULT, INTEGRATORS
+from gearmbs.dae.methods import DEFAULT, FORMULATIONS, INTEGRATORS
+from gearmbs.schema.files import read_toml, toml_table
+from gearmbs.schema.quantities import SHOWN, Measure, two
 from gearmbs.studies.case import section as q
-from gearmbs.studies.case.section import SHOWN, CaseError, CaseWarning, Measure, Section, measures_of
+from gearmbs.studies.case.section import CaseError, CaseWarning, Section, measures_of
 from gearmbs.units import to_si
 
 if TYPE_CHECKING:
     from gearmbs.gears import GearPair
 
     IntegratorName = str
+    FormulationName = str
 else:
     IntegratorName = Literal[tuple(INTEGRATORS)]
+    FormulationName = Literal[tuple(FORMULATIONS)]
 
 LEAST_TOLERANCE = 1e-12
 """Lower limit of ``solver.tolerance``; upper ones and defaults are in the table of integrators, see `Solver`."""
@@ -54,11 +57,7 @@ WHEELS = ("driver", "driven")
 
 def _both(value: Any) -> Any:
     """Return one value for both wheels as two."""
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        if len(value) != 2:
-            raise ValueError(f"{len(value)} values; give one for both wheels, or those of driver and driven")
-        return tuple(value)
-    return (value, value)
+    return two(value) if isinstance(value, Sequence) and not isinstance(value, str) else (value, value)
 
 
 def _upper(value: Any) -> Any:
@@ -271,7 +270,7 @@ class Solver(Section):
     section: ClassVar[str] = "solver"
 
     integrator: Annotated[IntegratorName, BeforeValidator(_upper)] = DEFAULT
-    formulation: Annotated[Literal["SI2", "SI1", "I3"], BeforeValidator(_upper)] = "SI2"
+    formulation: Annotated[FormulationName, BeforeValidator(_upper)] = "SI2"
     tolerance: float | None = None
     output_rate: q.SamplingRate = None
     signal_rate: q.SamplingRate = None
@@ -552,18 +551,8 @@ def load_case(path: str | Path) -> Case:
     CaseError
         If the file cannot be read, is not TOML, or has unknown keys, wrong units or impossible values.
     """
-    path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise CaseError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except UnicodeDecodeError as error:
-        raise CaseError(
-            f"{path}: not a text file, so no case in TOML; records are read by `gearmbs analyse`"
-        ) from error
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(f"{path}: not a valid TOML file ({error})") from error
-    data.setdefault("name", path.stem)
+    data = read_toml(path, CaseError)
+    data.setdefault("name", Path(path).stem)
     return make_case(data, str(path))
 
 
@@ -581,13 +570,11 @@ def case_toml(case: Section) -> str:
         section = getattr(case, key)
         if not isinstance(section, Section) or not section.model_fields_set:
             continue
-        values = {k: v for k, v in section.model_dump(exclude_unset=True).items() if v is not None}
+        values = section.model_dump(exclude_unset=True)
         faults = values.pop("teeth", ()) if key == "fault" else ()
-        values |= {k: v for k, v in section.written.items() if k in values}
-        if values:
-            lines += ["", f"[{key}]", *(f"{name} = {_toml(value)}" for name, value in values.items())]
+        lines += toml_table(f"[{key}]", values | {k: v for k, v in section.written.items() if k in values})
         for fault in faults:
-            tables += ["", "[[fault.teeth]]", *(f"{k} = {_toml(v)}" for k, v in fault.items() if v is not None)]
+            tables += toml_table("[[fault.teeth]]", fault)
     return "\n".join([*lines, *tables]) + "\n"
 
 
@@ -596,17 +583,6 @@ def write_case(case: Section, path: str | Path) -> Path:
     from gearmbs.files import write_whole
 
     return write_whole(path, case_toml(case))
-
-
-def _toml(value: Any) -> str:
-    """Return a value as TOML writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return repr(value)
 
 
 def readable(section: Section, key: str) -> str:

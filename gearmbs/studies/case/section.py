@@ -5,134 +5,22 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from gearmbs.units import DIMENSIONS, NUMBER, to_si
-from gearmbs.wording import closest
+from gearmbs.schema.messages import OWN, faults, path_of, remedy
+from gearmbs.schema.quantities import Measure
+from gearmbs.units import NUMBER
+from gearmbs.wording import did_you_mean
 
 # Quantities of a case: texts with units or plain numbers in SI, within a range that gears can have.
 #
 # The ranges are wide. They are there because a plain number is in SI: ``module = 3`` is three metres, and a pair of
 # wheels of that size would be simulated without complaint.
-
-
-SHOWN = {"mm": 1e-3, "deg": math.pi / 180.0, "rpm": math.pi / 30.0, "GPa": 1e9}
-"""Units of messages that are not SI, and what they are in SI."""
-
-
-@dataclass(frozen=True)
-class Measure:
-    """What a field of a case measures, between which limits.
-
-    Attributes
-    ----------
-    dimension : str
-        One of `gearmbs.units.DIMENSIONS`.
-    low, high : float, optional
-        Limits, included, in ``shown``.
-    shown : str
-        Unit of the limits and of messages; default the SI unit.
-    each : bool
-        Whether driver and driven may have values of their own, as a list of two.
-    curve : bool
-        Whether the value may be a curve, as a list of points (time, value); zero is possible there.
-    """
-
-    dimension: str
-    low: float | None = None
-    high: float | None = None
-    shown: str = ""
-    each: bool = False
-    curve: bool = False
-
-    @property
-    def unit(self) -> str:
-        """The SI unit the field holds."""
-        return "1" if self.dimension == "dimensionless" else DIMENSIONS[self.dimension].replace("*", " ")
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
-
-    def read(self, value: Any) -> Any:
-        """Return the value in SI, or for a list of two both.
-
-        Raises
-        ------
-        ValueError
-            For a wrong unit or a value outside the limits.
-        """
-        if value is None:
-            return None
-        if self.each and isinstance(value, Sequence) and not isinstance(value, str):
-            if len(value) != 2:
-                raise ValueError(f"{len(value)} values; give one for both wheels, or those of driver and driven")
-            return tuple(self._one(item) for item in value)
-        if self.curve and isinstance(value, Sequence) and not isinstance(value, str):
-            return self._points(value)
-        return self._one(value)
-
-    def _points(self, value: Sequence) -> tuple[tuple[float, float], ...]:
-        """Return the points of a curve in s and SI."""
-        points: list[tuple[float, float]] = []
-        for place, point in enumerate(value, 1):
-            if isinstance(point, str) or not isinstance(point, Sequence) or len(point) != 2:
-                raise ValueError(
-                    f"a curve is a list of points [time, value] such as [['0 s', '0 {self.shown or self.unit}'], "
-                    f"['2 s', ...]]; point {place} is {point!r}"
-                )
-            try:
-                time = to_si(point[0], "time", "value")
-                zero = to_si(point[1], self.dimension, "value") == 0.0
-            except (TypeError, ValueError) as error:
-                raise ValueError(f"point {place}: {str(error).removeprefix('value: ')}") from None
-            if (
-                not math.isfinite(time)
-                or time < (points[-1][0] if points else 0.0)
-                or (points and time == points[-1][0])
-            ):
-                raise ValueError(f"point {place} is at {time:g} s; give times from 0 on that increase")
-            try:
-                points.append((time, 0.0 if zero else self._one(point[1])))
-            except ValueError as error:
-                raise ValueError(f"point {place}: {error}") from None
-        if len(points) < 2 or not any(number for _, number in points):
-            raise ValueError("a curve needs two points at least, and one that is not zero")
-        return tuple(points)
-
-    def _one(self, value: Any) -> float:
-        try:
-            number = to_si(value, self.dimension, "value")
-        except (TypeError, ValueError) as error:
-            raise ValueError(str(error).removeprefix("value: ")) from None
-        shown = self.shown or self.unit
-        factor = SHOWN.get(shown, 1.0)
-        low, high = (None if limit is None else limit * factor for limit in (self.low, self.high))
-        if (low is None or number >= low * (1.0 - 1e-12)) and (high is None or number <= high * (1.0 + 1e-12)):
-            return float(number)
-        span = (
-            f"{_number(self.low)} to {_number(self.high)}" if self.high is not None else f"{_number(self.low)} or more"
-        )
-        if self.low is None:
-            span = f"up to {_number(self.high)}"
-        if shown == "1":
-            raise ValueError(f"give {span}")
-        text = f"this is {number / factor:.6g} {shown}; give {span} {shown}"
-        if isinstance(value, str):
-            raise ValueError(text)
-        meant = float(value) * factor
-        if shown == self.unit or (low is not None and meant < low) or (high is not None and meant > high):
-            raise ValueError(f"{text} (a plain number is in {self.unit})")
-        raise ValueError(f"{text} (a plain number is in {self.unit}; write '{value} {shown}' if that is meant)")
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:g}"
 
 
 Module = Annotated[float, Measure("length", 0.05, 100, "mm")]
@@ -193,10 +81,8 @@ class _OneError(ModelMetaclass):
     def __call__(cls: Any, *args: Any, **data: Any) -> Any:
         if args:
             raise CaseError(f"{cls.label(data)}: give its fields by name, not by place")
-        try:
+        with told_by(cls, cls.label(data)):
             return super().__call__(**data)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, cls.label(data))) from None
 
 
 class Section(BaseModel, metaclass=_OneError):
@@ -220,26 +106,20 @@ class Section(BaseModel, metaclass=_OneError):
         CaseError
             Naming every wrong field with its value, each in a line.
         """
-        try:
+        with told_by(cls, source):
             return cls.__pydantic_validator__.validate_python(data)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, source)) from None
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Any:
         """Return the section made of a mapping, as pydantic does but with the package's own error."""
-        try:
+        with told_by(cls, cls.label(obj)):
             return super().model_validate(obj, **options)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, cls.label(obj))) from None
 
     @classmethod
     def model_validate_json(cls, json_data: Any, **options: Any) -> Any:
         """Return the section made of JSON, as pydantic does but with the package's own error."""
-        try:
+        with told_by(cls, cls.label({})):
             return super().model_validate_json(json_data, **options)
-        except ValidationError as error:
-            raise CaseError(explained(error, cls, cls.label({}))) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to set a field, in the package's own words.
@@ -324,85 +204,48 @@ def _remark(field: str, value: Any, measure: Measure) -> None:
         )
 
 
-WORDS = {
-    **dict.fromkeys(("int_type", "int_from_float", "int_parsing"), "give a whole number"),
-    **dict.fromkeys(("float_type", "float_parsing"), "give a number"),
-    **dict.fromkeys(("bool_type", "bool_parsing"), "give true or false"),
-    **dict.fromkeys(("tuple_type", "list_type"), "give a list"),
-    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type", "dataclass_type"), "give a table of keys"),
-    "string_type": "give a text",
-    "finite_number": "give a finite number",
-    "missing": "is missing",
-    "literal_error": "choose {expected}",
-    "enum": "choose {expected}",
-    "greater_than": "give more than {gt}",
-    "greater_than_equal": "give {ge} or more",
-    "less_than": "give less than {lt}",
-    "less_than_equal": "give {le} or less",
-    "too_short": "give {min_length} or more values",
-    "too_long": "give {max_length} values at most",
-}
-"""What is said of kinds of faults; all others are told in the words of our own checks."""
-
-OWN = ("value_error", "assertion_error")
-WAYS = ("function-", "tuple[", "float", "constrained", "is-instance", "union[")
-"""How ways to read one value begin in the place of a fault; they name no field."""
+@contextmanager
+def told_by(kind: Any, source: str) -> Iterator[None]:
+    """Turn what pydantic says into a CaseError, each fault in a line of its own that begins with ``source``."""
+    try:
+        yield
+    except ValidationError as error:
+        raise CaseError("\n".join(f"{source}: {_line(items, kind)}" for items in faults(error))) from None
 
 
-def explained(error: ValidationError, kind: Any, source: str) -> str:
-    """Return what is wrong, each fault in a line of its own that begins with ``source``."""
-    found: dict[tuple[str, str], list[Any]] = {}
-    for item in error.errors(include_url=False):
-        # one value given for both wheels is one fault, and so is one that can be read in none of several ways
-        place = [part for part in item["loc"] if not str(part).startswith(WAYS)]
-        both = bool(place) and isinstance(place[-1], int)
-        wide = ".".join(map(str, place[:-1] if both else place))
-        found.setdefault((wide, repr(item["input"])), []).append({**item, "loc": tuple(place)})
-    lines = []
-    for items in found.values():
-        if len({item["loc"] for item in items}) > 1:
-            items = [{**item, "loc": item["loc"][:-1]} for item in items]
-        lines.append(_line(items, kind, source))
-    return "\n".join(lines)
-
-
-def _line(items: list[Any], kind: Any, source: str) -> str:
+def _line(items: list[Any], kind: Any) -> str:
     """Return what is wrong with one value, which may be read in several ways."""
     item = items[0]
     loc = item["loc"]
-    parts = [str(part) for part in loc]
-    field = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", ".".join([*([kind.section] if kind.section else []), *parts]))
+    field = path_of((kind.section, *loc) if kind.section else loc)
     if item["type"] == "extra_forbidden":
-        return f"{source}: {field}: {_unknown(loc, kind)}"
-    if item["type"] in ("model_type", "model_attributes_type", "dataclass_type"):
-        return f"{source}: {field} = {item['input']!r}: give its keys, {', '.join(_owner(loc, kind).model_fields)}"
-    message = " or ".join(dict.fromkeys(_said(one) for one in items)).replace(" or give ", " or ")
+        return f"{field}: {_unknown(loc, kind)}"
+    if item["type"] in ("model_type", "model_attributes_type"):
+        return f"{field} = {item['input']!r}: give its keys, {', '.join(_owner(loc, kind).model_fields)}"
+    message = remedy(items)
     if message.startswith("["):
         # one of several, named by its place
-        return f"{source}: {field}{message}"
+        return f"{field}{message}"
     # what is wrong with a section as a whole begins with the name of the field
     if isinstance(item["input"], (dict, BaseModel)) and item["type"] in OWN:
-        return f"{source}: {field}.{message}" if field else f"{source}: {message}"
-    if item["type"] == "missing":
-        return f"{source}: {field} {message}"
-    return f"{source}: {field} = {item['input']!r}: {message}"
-
-
-def _said(item: Any) -> str:
-    """Return what is wrong in our words."""
-    if item["type"] in OWN:
-        return str(item["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
-    return WORDS.get(item["type"], "cannot be read").format(**item.get("ctx", {}))
+        return f"{field}.{message}" if field else message
+    return f"{field} {message}" if item["type"] == "missing" else f"{field} = {item['input']!r}: {message}"
 
 
 def _owner(loc: tuple, kind: Any) -> Any:
     """Return the section that holds what is at a place."""
     for part in loc:
-        inner = getattr(kind.model_fields.get(part), "annotation", None)
-        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+        inner = sections_of(kind).get(part)
+        if inner is None:
             break
         kind = inner
     return kind
+
+
+def sections_of(kind: Any) -> dict[str, Any]:
+    """Return the sections of a case by name."""
+    kinds = {name: field.annotation for name, field in kind.model_fields.items()}
+    return {name: one for name, one in kinds.items() if isinstance(one, type) and issubclass(one, BaseModel)}
 
 
 def _unknown(loc: tuple, kind: Any) -> str:
@@ -412,15 +255,9 @@ def _unknown(loc: tuple, kind: Any) -> str:
     if key in elsewhere:
         return f"unknown key; {elsewhere[key]}"
     known = list(owner.model_fields)
-    text = f"unknown key; known ones are {', '.join(known)}"
-    near = closest(key, known)
-    if not near:
-        sections = {
-            name: field.annotation.model_fields
-            for name, field in kind.model_fields.items()
-            if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)
-        }
-        places = {f"{name}.{inner}": inner for name, fields in sections.items() for inner in fields}
-        close = closest(key, places.values())
-        near = [place for place, inner in places.items() if close and inner == close[0]]
-    return f"{text}; did you mean {' or '.join(near)}?" if near else text
+    places: dict[str, list[str]] = {}
+    for name, section in sections_of(kind).items():
+        for inner in section.model_fields:
+            places.setdefault(inner, []).append(f"{name}.{inner}")
+    other = did_you_mean(key, places, before="; ", shown=lambda inner: " or ".join(places[inner]))
+    return f"unknown key; known ones are {', '.join(known)}{did_you_mean(key, known, before='; ', otherwise=other)}"

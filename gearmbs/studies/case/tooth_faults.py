@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearmbs.gears import faults
 from gearmbs.gears.tables import tooth_deviations
+from gearmbs.schema.messages import check_keys
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
@@ -50,11 +51,7 @@ def tooth_fault(value: Any) -> faults.Fault:
         hint = did_you_mean(table["kind"].lower(), kinds(), before="; ", alike=0.5)
         raise ValueError(f"kind {table['kind']!r} is unknown; known ones are {', '.join(kinds())}{hint}")
     settings: dict[str, Any] = {str(key): item for key, item in table.items() if key != "kind"}
-    known = [field.name for field in fields(kind)]
-    for key in settings:
-        if key not in known:
-            hint = did_you_mean(key, known, before="; ")
-            raise ValueError(f"{kind.label}: unknown key {key!r}; known ones are {', '.join(known)}{hint}")
+    check_keys(settings, [field.name for field in fields(kind)], kind.label, ValueError, listed=True)
     return kind(**settings)
 
 

@@ -8,11 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
 from gearmbs._shown import Shown, html_table
 from gearmbs.dae.result import SolverStats
+from gearmbs.files import write_whole
+from gearmbs.schema.messages import chosen
 from gearmbs.signals import COMPONENTS, rms_factor
 from gearmbs.studies.case.case import Case, CaseError, make_case
 from gearmbs.studies.paper.preset import (
@@ -27,7 +30,7 @@ from gearmbs.studies.paper.preset import (
 )
 from gearmbs.studies.paper.report import paper_report
 from gearmbs.studies.run.parallel import run_cases
-from gearmbs.studies.run.store import write_dataset, write_text
+from gearmbs.studies.run.store import save_study
 
 TARGET_RMS = 1.0
 """RMS, m/s^2, to which the healthy signal at low load is scaled; the paper's own value is not published."""
@@ -90,22 +93,21 @@ class PaperStudy(Shown):
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write dataset, table, figures and report to a folder; return the paths."""
-        from gearmbs.view import gmf_bars, save_figure
+        texts = {"gmf_rms.csv": self.to_csv, "report.md": lambda: paper_report(self)}
+        return save_study(folder, {"paper.nc": self.records}, texts, self.figures)
 
-        folder = Path(folder)
-        paths = [folder / "paper.nc", folder / "gmf_rms.csv"]
-        write_dataset(paths[0], self.records)
-        write_text(paths[1], self.to_csv())
-        titles = {"low": ("figure_5", "low load"), "high": ("figure_7", "high load")}
-        for load, (stem, label) in titles.items():
+    def figures(self) -> dict[str, Any]:
+        """Return figures 5 and 7 of the paper, the bars at low and at high load, by name."""
+        from gearmbs.view import gmf_bars
+
+        found = {}
+        for load, stem, label in (("low", "figure_5", "low load"), ("high", "figure_7", "high load")):
             torque = float(self.records.torque.sel(load=load))
-            figure = gmf_bars(
+            found[stem] = gmf_bars(
                 self.table().sel(load=load),
                 title=f"Model, {label} ({torque:g} N m): RMS of the GMF harmonics, {self.component.replace('_', ' ')}",
             )
-            paths += save_figure(figure, folder / stem)
-        write_text(folder / "report.md", paper_report(self))
-        return [*paths, folder / "report.md"]
+        return found
 
 
 def run_paper(
@@ -139,8 +141,7 @@ def run_paper(
     >>> study = run_paper(Case(operation={"duration": 0.2}))  # doctest: +SKIP
     >>> study.table()  # doctest: +SKIP
     """
-    if component not in COMPONENTS:
-        raise CaseError(f"component: {component!r} is unknown; choose one of {', '.join(COMPONENTS)}")
+    chosen(COMPONENTS, component, "", CaseError, "component:")
     cases = paper_cases(base=base, torques=torques, misalignment=misalignment)
     records = run_cases(cases, workers=workers, progress=progress, done=done, folder=folder)
     return PaperStudy(combine(cases, records, component), component, cases)
@@ -223,4 +224,4 @@ if __name__ == "__main__":
         "unit": "m/s^2",
         "levels": gmf_levels(),
     }
-    write_text(sys.argv[1], json.dumps(text, indent=1) + "\n")
+    write_whole(sys.argv[1], json.dumps(text, indent=1) + "\n")

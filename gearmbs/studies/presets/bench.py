@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,7 +19,6 @@ import xarray as xr
 from gearmbs._shown import Written
 from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, SpeedDrive
 from gearmbs.gears import ContactLaw
-from gearmbs.progress import told_of_span
 from gearmbs.signals import convert
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
@@ -28,10 +27,10 @@ from gearmbs.studies.case.case import Case
 from gearmbs.studies.paper.paper import PaperStudy, run_paper
 from gearmbs.studies.paper.preset import Claim, judge
 from gearmbs.studies.paper.report import verdict_table
-from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
+from gearmbs.studies.presets.files import BenchChoice, choices, on_mounts, preset_train, with_values
 from gearmbs.studies.run.record import flank_shares
-from gearmbs.studies.run.store import write_dataset, write_text
-from gearmbs.studies.trains.trains import run_train, train_signal
+from gearmbs.studies.run.store import save_study
+from gearmbs.studies.trains.trains import run_trains, train_signal
 from gearmbs.units import Quantity, to_si
 
 PRESSURES = {"low": 1e6, "high": 5e6}
@@ -187,55 +186,22 @@ def _on_joints(train: Drivetrain, pump: float) -> Drivetrain:
     )
 
 
-class BenchChoice(NamedTuple):
-    """One choice of the bench.
-
-    Attributes
-    ----------
-    what, chosen, why : str
-    """
-
-    what: str
-    chosen: str
-    why: str
-
-
 def bench_choices(settings: BenchSettings | None = None) -> list[BenchChoice]:
     """Return every choice of the bench that the paper leaves open, with its reason."""
     s = settings or BenchSettings()
     usual = BenchSettings()
     changed = [f.name for f in fields(s) if getattr(s, f.name) != getattr(usual, f.name)]
     low, high = (s.displacement / (2.0 * math.pi) * p + s.idle for p in PRESSURES.values())
-    rows = [
-        ("the two loads", f"one pump, V_g = {1e6 * s.displacement:.4g} cm^3, T_0 = {s.idle:g} N m: {low:.4g} and "
-         f"{high:.4g} N m", "1 to 5 MPa is a factor of 5, 100 to 200 N m one of 2: no pump whose torque is "
-         "proportional to its pressure has both (1 MPa would need 628 cm^3, 5 MPa 251 cm^3); with an idle torque "
-         "exactly one has"),
-        ("pump ripple", f"{s.pump_teeth} teeth, ideal external gear pump" if s.pump_teeth else "none",
-         "a usual number; its lines lie apart from the mesh's"),
-        ("motor", "induction motor of 22 kW by Kloss's formula on an inverter" if s.motor == "induction" else
-         "prescribed speed", "the bench's control system holds the speed; a motor gives the drive end its damping"),
-        ("inertias", f"motor {s.motor_inertia:g}, pump {s.pump_inertia:g} kg m^2", "usual for this power"),
-        ("clutch", f"{s.clutch:g} N m/rad, relative damping {s.clutch_damping:g}", "an elastomer clutch of this size"),
-        ("shafts", f"diameter 30 mm, {s.shafts:g} N m/rad between the pairs and to the pump", "carries 200 N m"),
-        ("second pair", f"as the first, phase {s.phase:g} pitches", "only one pair is published; equal teeth lock both "
-         "meshes in phase, so that their lines add or cancel with the assembly angle"),
-        ("faults", "on the first pair; everything behind it is placed by it", "the paper does not say which pair"),
-        ("teeth", f"{ContactLaw.impact()}", "the paper's law, eq. (10)-(11); it over-damps the meshes at this depth"),
-        ("bearings", f"{s.bearings}" + (f", {s.bearing_stiffness:.3g} N/m radially" if s.bearings == "elastic" else ""),
-         "a laser on the shaft sees nothing move in rigid bearings"),
-        ("housing", f"{s.housing_mass:g} kg on four mounts of {s.mount_stiffness:.3g} N/m, 5 % damping",
-         "a support that cannot move has no acceleration"),
-        ("laser", "on the shaft of the second wheel, aimed at its axis, along y (along the tangent at the pitch point)",
-         "the line of the mesh force but for the pressure angle"),
-        ("support", "bearing 'two a', along y", "nearest to the laser"),
-        ("backlash", f"{s.backlash}", "as for the pair"),
-        ("start", "at speed, load over 20 ms", "the steady state is what is recorded"),
-    ]  # fmt: skip
-    out = [BenchChoice(*row) for row in rows]
+    found = choices("bench", {
+        **vars(s), "volume": 1e6 * s.displacement, "low": low, "high": high, "law": ContactLaw.impact(),
+        "ripple": f"{s.pump_teeth} teeth, ideal external gear pump" if s.pump_teeth else "none",
+        "engine": "induction motor of 22 kW by Kloss's formula on an inverter" if s.motor == "induction" else
+                  "prescribed speed",
+        "seats": s.bearings + (f", {s.bearing_stiffness:.3g} N/m radially" if s.bearings == "elastic" else ""),
+    })  # fmt: skip
     if changed:
-        out.append(BenchChoice("changed here", ", ".join(f"{n} = {getattr(s, n)}" for n in changed), "by the user"))
-    return out
+        found.append(BenchChoice("changed here", ", ".join(f"{n} = {getattr(s, n)}" for n in changed), "by the user"))
+    return found
 
 
 # The paper's three claims judged on the bench, beside the pair's.
@@ -345,22 +311,15 @@ class BenchStudy:
                 spine.set_visible(False)
         return figure
 
+    def figures(self) -> dict[str, Any]:
+        """Return the bars at each load and the verdicts, by name."""
+        return {f"{load}_load": self.figure(load) for load in PRESSURES} | {"verdicts": self.verdict_figure()}
+
     def save(self, folder: str | Path) -> list[Path]:
         """Write records, table, figures and report to a folder; return the paths."""
-        from gearmbs.view import save_figure
-
-        folder = Path(folder)
-        paths = []
-        for (load, state), record in self.records.items():
-            path = folder / "records" / f"{load}_{state}.nc"
-            write_dataset(path, record)
-            paths.append(path)
-        write_dataset(folder / "bench.nc", self.table.to_dataset(name="gmf_rms"))
-        write_text(folder / "report.md", self.report())
-        paths += [folder / "bench.nc", folder / "report.md"]
-        for load in PRESSURES:
-            paths += save_figure(self.figure(load), folder / f"{load}_load")
-        return [*paths, *save_figure(self.verdict_figure(), folder / "verdicts")]
+        records = {f"records/{load}_{state}.nc": record for (load, state), record in self.records.items()}
+        records["bench.nc"] = self.table.to_dataset(name="gmf_rms")
+        return save_study(folder, records, {"report.md": self.report}, self.figures)
 
 
 def run_bench(
@@ -369,7 +328,7 @@ def run_bench(
     *,
     pair: bool = True,
     workers: int | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
 ) -> BenchStudy:
     """Simulate the bench in its three states at 1 and 5 MPa, and the pair of the paper's model beside it.
 
@@ -381,9 +340,9 @@ def run_bench(
     pair : bool
         Whether to run the pair's study, too, with a record of the same length.
     workers : int, optional
-        Of the pair's study.
-    progress : callable, optional
-        Called with the name of a run and the part of it that is done.
+        Runs at a time; default the cores.
+    progress : bool or callable, optional
+        See `gearmbs.studies.run_trains`.
 
     Raises
     ------
@@ -394,16 +353,14 @@ def run_bench(
     if settings.bearings == "ideal":
         raise ValueError("bearings is 'ideal': a laser sees nothing move in rigid bearings; give 'elastic'")
     run = run or RunSettings(settling=0.2, duration=1.0)
-    records: dict[tuple[str, str], xr.Dataset] = {}
-    for load, pressure in PRESSURES.items():
-        for state in STATES:
-            train = bench_train(pressure, state, settings)
-            name = f"bench, {state}, {load} load"
-            told = told_of_span(progress, name, train.run_up + run.settling + run.duration)
-            with warnings.catch_warnings():
-                # the paper's law over-damps the meshes; the choices and the report say so
-                warnings.filterwarnings("ignore", r"mesh '.*' is damped .* times critically")
-                records[load, state] = run_train(train, run, progress=told)
+    places = list(product(PRESSURES, STATES))
+    runs = {
+        f"bench, {state}, {load} load": (bench_train(PRESSURES[load], state, settings), run) for load, state in places
+    }
+    with warnings.catch_warnings():
+        # the paper's law over-damps the meshes; the choices and the report say so
+        warnings.filterwarnings("ignore", r"mesh '.*' is damped .* times critically")
+        records = dict(zip(places, run_trains(runs, workers=workers, progress=progress).values(), strict=True))
     rows = [[[levels(records[load, state], sensor) for state in STATES] for load in PRESSURES] for sensor in SENSORS]
     table = xr.DataArray(
         np.array(rows), dims=("sensor", "load", "state", "harmonic"),

@@ -7,14 +7,14 @@ changes its sign.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, SpeedSensor, TorqueLoad, Wheel
-from gearmbs.gears import GearSpec
+from gearmbs.drivetrain import Drivetrain
 from gearmbs.mechanism import Mechanism
+from gearmbs.studies.presets.files import preset_train, with_values
 
 
 @dataclass(frozen=True)
@@ -72,22 +72,18 @@ class CrankSlider:
     def train(self) -> Drivetrain:
         """Return the pair with its shafts: the crank's turns with ``speed``."""
         z1, z2 = self.teeth
-        return Drivetrain(
-            "crank-slider",
-            shafts=[Shaft(name="input", length=0.1, radius=0.01), Shaft(name="crank", length=0.1, radius=0.01)],
-            wheels=[
-                Wheel(name="pinion", shaft="input", gear=GearSpec(z1, "2 mm", face_width="15 mm", name="pinion")),
-                Wheel(name="wheel", shaft="crank", gear=GearSpec(z2, "2 mm", face_width="15 mm", name="wheel")),
-            ],
-            meshes=[GearMesh(name="mesh", driver="pinion", driven="wheel",
-                             settings={"backlash": self.backlash, **dict(self.settings)})],
-            bearings=[IdealBearing(name="left", shaft="input"), IdealBearing(name="right", shaft="crank")],
-            drives=[SpeedDrive(name="drive", shaft="input", speed=-self.speed * z2 / z1)],
-            loads=[TorqueLoad(name="load", shaft="crank", torque=self.load)],
-            sensors=[SpeedSensor(name="speed", shaft="crank")],
-            running=True,
-            run_up=0.01,
-        )  # fmt: skip
+        train = preset_train("crank_slider")
+        # the fillet that fits is that of the number of teeth
+        wheels = [
+            replace(wheel, gear=replace(wheel.gear, teeth=z, fillet_radius=None))
+            for wheel, z in zip(train.wheels, self.teeth, strict=True)
+        ]
+        return with_values(train, {
+            **{wheel.name: wheel for wheel in wheels},
+            "mesh": {"settings": {"backlash": self.backlash, **dict(self.settings)}},
+            "drive": {"speed": -self.speed * z2 / z1},
+            "load": {"torque": self.load},
+        })  # fmt: skip
 
     def build(self) -> Mechanism:
         """Return the mechanism: the train, the slider and the rod, which keeps their distance.

@@ -1,12 +1,14 @@
-"""The drivetrains of the presets: TOML files beside this module, which ``gearmbs run`` takes, too."""
+"""The files of the presets: drivetrains in TOML beside this module, which ``gearmbs run`` takes, too, and choices."""
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from gearmbs.drivetrain import Drivetrain, Housing
 from gearmbs.drivetrain.description import read_description
@@ -14,8 +16,10 @@ from gearmbs.drivetrain.part import Part
 
 FOLDER = Path(__file__).parent
 """Where the files are."""
+PRESETS = ("bench", "crank_slider", "gearbox", "rattle", "resonance")
 
 
+@cache
 def preset_train(name: str) -> Drivetrain:
     """Return the drivetrain of ``<name>.toml``, as the file has it."""
     return read_description(FOLDER / f"{name}.toml").train
@@ -51,3 +55,22 @@ def on_mounts(housing: Housing, mass: float, stiffness: float, box: tuple[float,
         for m in housing.mounts
     ]
     return replace(housing, mass=mass, inertia=inertia, mounts=tuple(mounts))
+
+
+class BenchChoice(NamedTuple):
+    """One choice of a preset.
+
+    Attributes
+    ----------
+    what, chosen, why : str
+    """
+
+    what: str
+    chosen: str
+    why: str
+
+
+def choices(name: str, values: Mapping[str, Any]) -> list[BenchChoice]:
+    """Return the choices of a preset, a table of ``choices.toml``, with values filled in."""
+    table = tomllib.loads((FOLDER / "choices.toml").read_text(encoding="utf-8"))[name]
+    return [BenchChoice(what, *(text.format_map(values) for text in texts)) for what, texts in table.items()]

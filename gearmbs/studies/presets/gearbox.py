@@ -24,14 +24,12 @@ from gearmbs.drivetrain import (
     RunSettings,
 )
 from gearmbs.gears import ContactLaw, GearPair, GearSpec
-from gearmbs.progress import told_of_span
 from gearmbs.signals.analysis.report import markdown_table
-from gearmbs.studies.presets.bench import BenchChoice
-from gearmbs.studies.presets.files import on_mounts, preset_train, with_values
-from gearmbs.studies.run.store import write_dataset, write_text
+from gearmbs.studies.presets.files import BenchChoice, choices, on_mounts, preset_train, with_values
+from gearmbs.studies.run.store import save_study
 from gearmbs.studies.trains.modes import mesh_orders, train_modes
 from gearmbs.studies.trains.report import train_report
-from gearmbs.studies.trains.trains import run_train
+from gearmbs.studies.trains.trains import run_trains
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
@@ -156,22 +154,9 @@ def gearbox_choices(settings: GearboxSettings | None = None) -> list[BenchChoice
     pairs = list(zip(gears[::2], gears[1::2], strict=True))
     teeth = ", ".join(f"{one.teeth}/{two.teeth}, m {1e3 * one.module:g} mm" for one, two in pairs)
     widths = " and ".join(f"{1e3 * one.face_width:g} mm" for one, _ in pairs)
-    rows = [
-        ("stages", f"{teeth}, helix 14 degrees", "published: the parallel stages of a wind turbine of 750 kW"),
-        ("sense", "the motor drives the high-speed shaft", "an industrial reducer; the turbine drives the other end"),
-        ("face widths", widths, "about 0.95 and 0.9 of the pinions' diameters"),
-        ("bodies", "rigid shafts and wheels, elastic teeth", "the rigid-elastic model of the literature"),
-        ("teeth", f"ISO 6336-1 stiffness, {100 * s.damping_ratio:g} % damping", "no other is published"),
-        ("hands", "one hand on the lay shaft", "its two axial forces oppose each other"),
-        ("bearings", f"{s.bearing_stiffness:.3g} N/m radially on the high-speed shaft, twice and four times on the "
-         "others; the left ones locate", "8.2e8 N/m is published for the high-speed shaft of a larger gearbox"),
-        ("housing", f"{s.housing_mass:g} kg on four mounts of {s.mount_stiffness:.3g} N/m, walls at 310 and 420 Hz",
-         "mounts at some 50 Hz; a mode a wall, so that a housing shakes where it is measured"),
-        ("motor", "prescribed speed" if s.motor == "speed" else "induction motor, Kloss", "a run-up needs its speed"),
-        ("machine", "60 kg m^2, torque with the square of the speed", "a fan or mill"),
-        ("couplings", "1.5e5 and 2e7 N m/rad, relative damping 0.6", "torsional modes of the ends at 60 to 100 Hz"),
-    ]  # fmt: skip
-    return [BenchChoice(*row) for row in rows]
+    engine = "prescribed speed" if s.motor == "speed" else "induction motor, Kloss"
+    told = {"stages": teeth, "widths": widths, "damping": 100 * s.damping_ratio, "engine": engine}
+    return choices("gearbox", vars(s) | told)
 
 
 # The industrial gearbox, studied: modes, Campbell diagram, steady state and run-up, bearing forces, housing.
@@ -262,16 +247,8 @@ class GearboxStudy:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write records, report and figures to a folder; return the paths."""
-        from gearmbs.view import save_figure
-
-        folder = Path(folder)
-        paths = [folder / "steady.nc", folder / "run_up.nc", folder / "report.md"]
-        for path, record in zip(paths, (self.steady, self.run_up), strict=False):
-            write_dataset(path, record)
-        write_text(paths[2], self.report())
-        for name, figure in self.figures().items():
-            paths += save_figure(figure, folder / name)
-        return paths
+        records = {"steady.nc": self.steady, "run_up.nc": self.run_up}
+        return save_study(folder, records, {"report.md": self.report}, self.figures)
 
 
 def run_gearbox(
@@ -280,7 +257,7 @@ def run_gearbox(
     duration: float = 1.0,
     run_up: float = 4.0,
     tolerance: float = 1e-6,
-    progress: Callable[[str, float], None] | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
 ) -> GearboxStudy:
     """Compute modes, steady state and a run-up of the industrial gearbox.
 
@@ -293,8 +270,8 @@ def run_gearbox(
     run_up : float
         Time from a quarter of the operating speed to it, of which the last tenth holds it, s.
     tolerance : float
-    progress : callable, optional
-        Called with "steady" or "run-up" and the part of it that is done.
+    progress : bool or callable, optional
+        See `gearmbs.studies.run_trains`; the runs are "steady" and "run-up".
 
     Raises
     ------
@@ -312,9 +289,9 @@ def run_gearbox(
     points = ((SETTLING, SLOWEST * speed), (reached, speed), (SETTLING + run_up, speed))
     faster = industrial_gearbox(replace(s, curve=points))
     modes = train_modes(train)
-    records = []
-    for name, one, length in (("steady", train, duration), ("run-up", faster, run_up)):
-        run = RunSettings(settling=SETTLING, duration=length, tolerance=tolerance)
-        told = told_of_span(progress, name, one.run_up + run.settling + length)
-        records.append(run_train(one, run, progress=told))
-    return GearboxStudy(train, modes, records[0], records[1], s)
+    runs = {
+        name: (one, RunSettings(settling=SETTLING, duration=length, tolerance=tolerance))
+        for name, one, length in (("steady", train, duration), ("run-up", faster, run_up))
+    }
+    records = run_trains(runs, progress=progress)
+    return GearboxStudy(train, modes, records["steady"], records["run-up"], s)

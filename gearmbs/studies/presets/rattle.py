@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, ShaftTorque, SpeedDrive, TorqueLoad, Wheel
+from gearmbs.drivetrain import Drivetrain, ShaftTorque
 from gearmbs.drivetrain.backlash import BacklashOscillator
-from gearmbs.gears import GearSpec
 from gearmbs.mechanism import Mechanism, static_equilibrium
 from gearmbs.mechanism.parts.functions import constant
 from gearmbs.progress import waiting
+from gearmbs.studies.presets.files import preset_train, with_values
 
 MODELS = ("equivalent", "torsional", "frequency", "multibody")
 """One degree of freedom; rigid wheels that only turn; linear, in the frequency domain; the whole mechanism."""
-LOOSE = "loose"
+LOOSE, LOOSE_TEETH = "loose", (20, 25)
+"""Shaft of the loose wheel, and the teeth of its pair, as ``rattle.toml`` has them."""
 LINE_SAMPLES = 400
 
 
@@ -71,48 +72,28 @@ class RattleSettings:
     @property
     def acceleration(self) -> float:
         """Amplitude of the input's angular acceleration, rad/s^2."""
-        return self.level * self.threshold * TEETH["loose"][1] / TEETH["loose"][0]
-
-
-TEETH = {"geared": (18, 27), "loose": (20, 25)}
+        return self.level * self.threshold * LOOSE_TEETH[1] / LOOSE_TEETH[0]
 
 
 def rattle_train(settings: RattleSettings | None = None) -> Drivetrain:
     """Return the transmission: input shaft, output shaft in gear, and a loose wheel that runs on the output shaft."""
     s = settings or RattleSettings()
-    mesh = {
-        "backlash": s.backlash, "friction": False,
-        "contact": {"kind": "linear", "stiffness": s.stiffness, "damping": s.damping, "depth": s.depth},
-    }  # fmt: skip
-    # both pairs have the centre distance of 45 teeth of 2 mm
-    wheels = {}
-    for name, (z1, z2) in TEETH.items():
-        wheels[name] = [GearSpec(z, "2 mm", face_width="10 mm", name=f"{name} {k}") for k, z in enumerate((z1, z2), 1)]
+    train = preset_train("rattle")
     w = 2.0 * math.pi * s.frequency
     turned = f"{s.speed!r}*TIME - {s.acceleration / w**2!r}*SIN({w!r}*TIME)"
-    own = s.inertia - wheels["loose"][1].inertia[2]
+    own = s.inertia - train.part("l2").gear.inertia[2]
     if own <= 0.0:
         raise ValueError(f"inertia is {s.inertia:g} kg m^2, less than that of the bare wheel; give more")
-    # at a mean speed of zero the senses are those of a small one
-    return Drivetrain(
-        "transmission",
-        shafts=[Shaft(name="input", length=0.12, radius=0.01), Shaft(name="output", length=0.12, radius=0.01),
-                Shaft(name=LOOSE, length=0.012, radius=0.015, inertia=own)],
-        wheels=[
-            Wheel(name="g1", shaft="input", gear=wheels["geared"][0], station=0.03),
-            Wheel(name="g2", shaft="output", gear=wheels["geared"][1], station=0.03),
-            Wheel(name="l1", shaft="input", gear=wheels["loose"][0], station=0.09),
-            Wheel(name="l2", shaft=LOOSE, gear=wheels["loose"][1]),
-        ],
-        meshes=[GearMesh(name="geared", driver="g1", driven="g2", settings=mesh),
-                GearMesh(name="loose mesh", driver="l1", driven="l2", settings=mesh)],
-        bearings=[IdealBearing(name="in", shaft="input"), IdealBearing(name="out", shaft="output"),
-                  IdealBearing(name="needle", shaft=LOOSE, on="ground")],
-        drives=[SpeedDrive(name="engine", shaft="input", speed=s.speed or 1.0, function=turned)],
-        loads=[TorqueLoad(name="car", shaft="output", torque=s.output_torque),
-               TorqueLoad(name="drag", shaft=LOOSE, torque=s.drag)],
-        run_up=1e-3,
-    )  # fmt: skip
+    contact = {"kind": "linear", "stiffness": s.stiffness, "damping": s.damping, "depth": s.depth}
+    mesh = {"settings": {"backlash": s.backlash, "friction": False, "contact": contact}}
+    return with_values(train, {
+        LOOSE: {"inertia": own},
+        **dict.fromkeys(("geared", "loose mesh"), mesh),
+        # at a mean speed of zero the senses are those of a small one
+        "engine": {"speed": s.speed or 1.0, "function": turned},
+        "car": {"torque": s.output_torque},
+        "drag": {"torque": s.drag},
+    })  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -174,14 +155,17 @@ def rattle_map(
     settings: RattleSettings, levels: Sequence[float], frequencies: Sequence[float], cycles: int = 20
 ) -> xr.DataArray:
     """Return impacts a cycle on both flanks by the equivalent model, dims (level, frequency in Hz)."""
-    hits = [
-        [sum(_hits_of(_oscillator(replace(settings, level=a, frequency=f)), f, cycles, cycles)) for f in frequencies]
-        for a in levels
-    ]
+
+    def hits(level: float, frequency: float) -> float:
+        one = _oscillator(replace(settings, level=level, frequency=frequency))
+        return sum(_hits_of(one, _settled_run(one, frequency, cycles, cycles), cycles))
+
     return xr.DataArray(
-        hits, dims=("level", "frequency"), coords={"level": list(levels), "frequency": list(frequencies)},
+        [[hits(level, frequency) for frequency in frequencies] for level in levels],
+        coords={"level": list(levels), "frequency": list(frequencies)},
+        dims=("level", "frequency"),
         attrs={"long_name": "impacts a cycle on both flanks"},
-    )  # fmt: skip
+    )
 
 
 def _oscillator(s: RattleSettings) -> BacklashOscillator:
@@ -195,10 +179,15 @@ def _oscillator(s: RattleSettings) -> BacklashOscillator:
     )  # fmt: skip
 
 
-def _hits_of(one: BacklashOscillator, frequency: float, cycles: int, settling: int) -> tuple[float, float]:
+def _settled_run(one: BacklashOscillator, frequency: float, cycles: int, settling: int) -> np.ndarray:
+    """Return the rows of so many cycles of the fluctuation after those that are left out."""
     samples = max(64, int(np.ceil(8.0 * one.frequency / frequency)))
     _, state = one.run((frequency, frequency), settling / frequency, samples=samples)
-    rows, _ = one.run((frequency, frequency), cycles / frequency, state, samples=samples)
+    return one.run((frequency, frequency), cycles / frequency, state, samples=samples)[0]
+
+
+def _hits_of(one: BacklashOscillator, rows: np.ndarray, cycles: int) -> tuple[float, float]:
+    """Return the impacts a cycle on the drive and on the coast flank."""
     return _impacts(rows[:, 1] > 0.0, cycles), _impacts(rows[:, 1] < -one.backlash, cycles)
 
 
@@ -209,13 +198,10 @@ def _impacts(touching: np.ndarray, cycles: int) -> float:
 def _equivalent(s: RattleSettings, cycles: int, settling: int) -> RattleResult:
     one = _oscillator(s)
     r2 = rattle_train(s).pairs["loose mesh"].geometry.driven.base_radius
-    samples = max(64, int(np.ceil(8.0 * one.frequency / s.frequency)))
-    _, state = one.run((s.frequency, s.frequency), settling / s.frequency, samples=samples)
-    rows, _ = one.run((s.frequency, s.frequency), cycles / s.frequency, state, samples=samples)
+    rows = _settled_run(one, s.frequency, cycles, settling)
     speed = (r2 * rows[:, 3] - s.drag) / s.inertia
     line = 2.0 * np.mean(speed * np.exp(-1j * rows[:, 0]))
-    hits = _impacts(rows[:, 1] > 0.0, cycles), _impacts(rows[:, 1] < -one.backlash, cycles)
-    return RattleResult("equivalent", float(abs(line)), *hits)
+    return RattleResult("equivalent", float(abs(line)), *_hits_of(one, rows, cycles))
 
 
 def _line_of_speed(t: np.ndarray, speed: np.ndarray, frequency: float, cycles: int) -> float:

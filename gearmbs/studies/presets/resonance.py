@@ -23,18 +23,22 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
+from gearmbs.drivetrain import Drivetrain
 from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.transmission import TransmissionError, loaded_transmission_error
 from gearmbs.mechanism import Mechanism
-from gearmbs.progress import told_of_span
+from gearmbs.schema.described import Described
+from gearmbs.schema.quantities import Measure
 from gearmbs.signals.analysis.report import markdown_table
+from gearmbs.studies.presets.files import preset_train, with_values
+from gearmbs.studies.run.parallel import run_named
+from gearmbs.studies.run.store import save_study
 from gearmbs.units import Quantity, to_si
 
 Direction = Literal["up", "down"]
@@ -52,8 +56,11 @@ SETTLING = 100
 """Mesh cycles at the first frequency that are left out."""
 
 
+Length = Annotated[Quantity, Measure("length", above=0)]
+
+
 @dataclass(frozen=True)
-class ResonanceSettings:
+class ResonanceSettings(Described):
     """Two equal spur wheels, their load and damping, and how the mesh frequency is swept.
 
     Parameters
@@ -82,31 +89,22 @@ class ResonanceSettings:
     """
 
     teeth: int = 50
-    module: Quantity = 3e-3
-    face_width: Quantity = 20e-3
+    module: Length = 3e-3
+    face_width: Length = 20e-3
     addendum: float = 0.85
-    torque: Quantity = 30.0
-    damping_ratio: float = 0.11
-    backlash: Quantity = 1e-4
-    stiffness: Quantity = None
-    span: tuple[float, float] = (0.68, 0.88)
+    torque: Annotated[Quantity, Measure("torque", above=0)] = 30.0
+    damping_ratio: Annotated[Quantity, Measure(above=0)] = 0.11
+    backlash: Length = 1e-4
+    stiffness: Annotated[Quantity, Measure("stiffness", above=0)] = None
+    span: Annotated[tuple[float, float], Measure(above=0, several=2)] = (0.68, 0.88)
     cycles: int = 4000
     window: int = 20
     tolerance: float = 1e-8
 
     def __post_init__(self) -> None:
-        units = {"module": "length", "face_width": "length", "torque": "torque", "backlash": "length",
-                 "stiffness": "stiffness"}  # fmt: skip
-        for name, unit in units.items():
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, to_si(value, unit, name))
-                if not getattr(self, name) > 0.0:
-                    raise ValueError(f"{name} is {value}; it must be positive")
-        if not 0.0 < self.span[0] < self.span[1]:
+        super().__post_init__()
+        if not self.span[0] < self.span[1]:
             raise ValueError(f"span is {self.span}; give a lower and a higher ratio, both positive")
-        if not self.damping_ratio > 0.0:
-            raise ValueError(f"damping_ratio is {self.damping_ratio:g}; it must be positive")
         if not (self.window >= 1 and self.cycles >= SETTLING + 10 * self.window):
             raise ValueError(f"cycles is {self.cycles}; give {SETTLING + 10 * self.window} or more")
 
@@ -181,24 +179,16 @@ def resonance_train(settings: ResonanceSettings | None = None, direction: Direct
     s = settings or ResonanceSettings()
     law = chirp(s, direction)
     turn = 2.0 * math.pi / s.teeth
-    # massless shafts: all inertia is that of the wheels
-    light: dict[str, Any] = {"length": 0.1, "radius": 0.01, "density": 1e-3}
     swept = f"MAX(TIME - {law.settling!r}, 0)"
     turned = f"{turn * law.first!r}*TIME + {0.5 * turn * law.rate!r}*{swept}**2"
-    pair = s.pair
-    return Drivetrain(
-        "mesh resonance",
-        shafts=[Shaft(name="in", **light), Shaft(name="out", **light)],
-        wheels=[Wheel(name="driver", shaft="in", gear=pair.driver),
-                Wheel(name="driven", shaft="out", gear=pair.driven)],
-        meshes=[GearMesh(name="mesh", driver="driver", driven="driven",
-                         settings={"backlash": s.backlash, "contact": pair.contact, "friction": False})],
-        bearings=[IdealBearing(name="left", shaft="in"), IdealBearing(name="right", shaft="out")],
-        drives=[SpeedDrive(name="drive", shaft="in", speed=turn * law.first, function=turned)],
-        loads=[TorqueLoad(name="load", shaft="out", torque=s.torque)],
-        running=True,
-        run_up=10.0 / law.first,
-    )  # fmt: skip
+    train = with_values(preset_train("resonance"), {
+        "driver": {"gear": s.pair.driver},
+        "driven": {"gear": s.pair.driven},
+        "mesh": {"settings": {"backlash": s.backlash, "contact": s.pair.contact, "friction": False}},
+        "drive": {"speed": turn * law.first, "function": turned},
+        "load": {"torque": s.torque},
+    })  # fmt: skip
+    return replace(train, run_up=10.0 / law.first)
 
 
 def resonance_rig(settings: ResonanceSettings | None = None, direction: Direction = "up") -> Mechanism:
@@ -465,32 +455,30 @@ class ResonanceStudy:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write the sweeps, the report and the figure to a folder; return the paths."""
-        from gearmbs.studies.run.store import write_dataset, write_text
-        from gearmbs.view import save_figure
-
-        folder = Path(folder)
-        paths = [folder / f"{model.replace(' ', '_')}_{direction}.nc" for model, direction in self.sweeps]
-        for path, sweep in zip(paths, self.sweeps.values(), strict=True):
-            write_dataset(path, sweep)
-        write_text(folder / "report.md", self.report())
-        return [*paths, folder / "report.md", *save_figure(self.figure(), folder / "resonance")]
+        sweeps = {f"{model.replace(' ', '_')}_{way}.nc": sweep for (model, way), sweep in self.sweeps.items()}
+        return save_study(folder, sweeps, {"report.md": self.report}, lambda: {"resonance": self.figure()})
 
 
 def run_resonance(
-    settings: ResonanceSettings | None = None, *, progress: Callable[[str, float], None] | None = None
+    settings: ResonanceSettings | None = None, *, progress: bool | Callable[[str, float], None] | None = None
 ) -> ResonanceStudy:
     """Sweep a pair up and down through its mesh resonance, by the multibody and by the classical model.
 
     Parameters
     ----------
     settings : ResonanceSettings, optional
-    progress : callable, optional
-        Called with "up" or "down" and the part of that multibody sweep that is done.
+    progress : bool or callable, optional
+        Bars, see `gearmbs.progress`; a callable is told "up" or "down" and the part of that multibody sweep that is
+        done.
     """
     s = settings or ResonanceSettings()
+
+    def work(direction: Any, report: Callable[[float], None]) -> xr.Dataset:
+        span = chirp(s, direction).duration
+        return sweep_resonance(s, direction, MODELS[0], progress=lambda t: report(min(t / span, 1.0)))
+
     sweeps: dict[tuple[str, str], xr.Dataset] = {}
-    for direction in DIRECTIONS:
-        told = told_of_span(progress, direction, chirp(s, direction).duration)
-        sweeps[MODELS[0], direction] = sweep_resonance(s, direction, MODELS[0], progress=told)
-        sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])
+    for direction, whole in run_named(work, DIRECTIONS, progress=progress).items():
+        sweeps[MODELS[0], direction] = whole
+        sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])  # type: ignore[arg-type]
     return ResonanceStudy(s, sweeps, separation_loads(s))

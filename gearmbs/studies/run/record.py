@@ -149,10 +149,11 @@ class Recorder:
 
     def columns(self, part: Solution) -> _Columns:
         """Return what is recorded of one part of a solution."""
-        forces = np.concatenate([part.reaction_force(seat) for seat in rig.SEATS], axis=1)
-        x_axes = np.stack([part.orientation(gear)[:, :, 0] for gear in rig.GEARS], axis=1)
+        forces = np.concatenate([*map(part.reaction_force, rig.SEATS)], axis=1)
+        x_axes = np.stack([*map(part.orientation, rig.GEARS)], axis=1)[..., 0]
         diagnostics = part.contact(rig.MESH)
-        return _Columns(part.t.copy(), forces, x_axes, np.stack([diagnostics[n] for n in (*SMOOTH, *COUNTS)], axis=1))
+        contact = np.stack([*map(diagnostics.__getitem__, (*SMOOTH, *COUNTS))], axis=1)
+        return _Columns(part.t.copy(), forces, x_axes, contact)
 
     def joined(self, columns: list[_Columns]) -> Measured:
         """Return the parts as one, with the transmission error from the wheels' angles."""

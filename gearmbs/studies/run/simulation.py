@@ -46,14 +46,13 @@ ADVICE = {
 
 
 KERNELS = (
-    "gearmbs.dae.model.side_by_side",
     "gearmbs.mechanism.parts.elements",
     "gearmbs.signals.piecewise_cubic",
     "gearmbs.signals.resampling",
 )
 """Modules of kernels that are called late in a run, besides those of the contact."""
 
-LUMPED_KERNELS = ("gearmbs.dae.model.fixed_axes", "gearmbs.dae.model.fixed_axes")
+LUMPED_KERNELS = ("gearmbs.dae.model.fixed_axes",)
 """The same of a run in which gear and shaft turn as one."""
 
 

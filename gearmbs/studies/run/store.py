@@ -6,27 +6,19 @@ full. Where a file cannot be written, the record is kept elsewhere, and the mess
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
 import gearmbs
-from gearmbs.files import KeptElsewhere, check_place, keep, whole_file
-from gearmbs.files import write_whole as write_text
+from gearmbs.files import keep, whole_file, write_whole
 from gearmbs.studies.case.case import Case
 
-__all__ = [
-    "KeptElsewhere",
-    "check_place",
-    "file_stem",
-    "keep",
-    "keep_dataset",
-    "record_size",
-    "stored_record",
-    "whole_file",
-    "write_dataset",
-    "write_text",
-]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 BYTES, COLUMNS, PACKED = 8, 13, 0.6
 """Of a number, numbers an output time holds, and what compression leaves of them at best."""
@@ -49,6 +41,25 @@ def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
     with whole_file(path) as part:
         part.write_bytes(content)
     return Path(path)
+
+
+def save_study(
+    folder: str | Path,
+    datasets: Mapping[str, xr.Dataset],
+    texts: Mapping[str, Callable[[], str]],
+    figures: Callable[[], Mapping[str, Figure]],
+) -> list[Path]:
+    """Write what came of a study to a folder, each by its name; return the paths.
+
+    Datasets come first: what was computed is there whatever becomes of the texts and figures, which are made then.
+    Names of figures have no ending.
+    """
+    from gearmbs.view import save_figure
+
+    folder = Path(folder)
+    paths = [write_dataset(folder / name, dataset) for name, dataset in datasets.items()]
+    paths += [write_whole(folder / name, text()) for name, text in texts.items()]
+    return [*paths, *(path for name, figure in figures().items() for path in save_figure(figure, folder / name))]
 
 
 def keep_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
@@ -81,3 +92,27 @@ def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
     except (OSError, ValueError, KeyError):
         # damaged, or not one of ours: the case is computed again
         return None
+
+
+@dataclass(frozen=True)
+class RecordFolder:
+    """Records of cases in a folder, as the ledger of a run: a case is done if its record is there."""
+
+    path: Path
+
+    def result(self, case: Case) -> tuple[xr.Dataset, str] | None:
+        """Return the record of a case that is done, as `enter` left it."""
+        record = stored_record(self.path, case)
+        return None if record is None else (record, "")
+
+    def claim(self, case: Case) -> Path:
+        """Return the path of a case's claim."""
+        return self.path / f".{file_stem(case.name)}.claim"
+
+    def enter(self, case: Case, record: xr.Dataset) -> str:
+        """Write the record of a case; return what is to be said if it had to be kept elsewhere, or nowhere."""
+        try:
+            keep_dataset(self.path / f"{file_stem(case.name)}.nc", record)
+        except OSError as error:
+            return str(error)
+        return ""

@@ -13,12 +13,13 @@ import xarray as xr
 
 from gearmbs._shown import Shown, html_table
 from gearmbs.files import python_scalar
+from gearmbs.schema.quantities import SHOWN
 from gearmbs.signals.files.simulated import record_signal
 from gearmbs.studies.case.case import Case, CaseError, readable
-from gearmbs.studies.case.section import SHOWN, Section, measures_of
+from gearmbs.studies.case.section import Section, measures_of
 from gearmbs.studies.paper.preset import DEFAULT_COMPONENT
 from gearmbs.studies.run.parallel import run_cases
-from gearmbs.studies.run.store import file_stem, write_dataset, write_text
+from gearmbs.studies.run.store import file_stem, save_study
 from gearmbs.wording import did_you_mean
 
 
@@ -104,12 +105,10 @@ class Sweep(Shown):
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write the records that are there, the table and the figure to a folder; return the paths."""
-        from gearmbs.view import save_figure
-
-        folder = Path(folder)
-        paths = [write_dataset(folder / f"{file_stem(r.attrs['case'])}.nc", r) for r in self.records]
-        table = write_text(folder / "table.csv", self.table().to_csv())
-        return [*paths, table, *save_figure(self.plot(), folder / "figure")]
+        records = {f"{file_stem(r.attrs['case'])}.nc": r for r in self.records}
+        return save_study(
+            folder, records, {"table.csv": lambda: self.table().to_csv()}, lambda: {"figure": self.plot()}
+        )
 
     def _repr_html_(self) -> str:
         table = self.table()

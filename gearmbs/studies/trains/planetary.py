@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import inspect
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -15,21 +14,27 @@ import xarray as xr
 from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.dae import Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.gears import ContactLaw, ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.drivetrain.parts import contact_law
+from gearmbs.gears import ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
 from gearmbs.gears.planetary.rig import PinBearing
 from gearmbs.mechanism import Mechanism
+from gearmbs.schema.described import Described
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import check_keys
+from gearmbs.schema.quantities import Measure
 from gearmbs.signals import fixed_sensor
 from gearmbs.studies.case.section import CaseError
 from gearmbs.studies.case.tooth_faults import tooth_fault
-from gearmbs.units import to_si
+from gearmbs.units import Quantity, to_si
 
 MEMBERS = ("sun", "carrier", "ring")
 OVERSAMPLING = 4
+Time = Annotated[Quantity, Measure("time", 0)]
 SECTIONS = ("planetary", "contact", "friction", "operation", "support", "pins", "rim", "fault")
 
 
 @dataclass(frozen=True)
-class PlanetaryRun:
+class PlanetaryRun(Described):
     """A planetary set and how it runs.
 
     Attributes
@@ -50,16 +55,19 @@ class PlanetaryRun:
         Lets the ring's rim bend.
     """
 
+    error: ClassVar[type[ValueError]] = CaseError
+    section: ClassVar[str] = "operation"
+
     gears: PlanetarySet
     speeds: Mapping[str, Any] = field(default_factory=dict)
     torques: Mapping[str, Any] = field(default_factory=dict)
     held: str | None = "ring"
-    run_up: float = 0.02
-    settling: float = 0.03
-    duration: float = 0.2
-    rate: float = 12_800.0
-    tolerance: float = 1e-6
-    supports: Mapping[str, Support] = field(default_factory=dict)
+    run_up: Time = 0.02
+    settling: Time = 0.03
+    duration: Annotated[Quantity, Measure("time", above=0)] = 0.2
+    rate: Annotated[Quantity, Measure("frequency", above=0)] = 12_800.0
+    tolerance: Annotated[Quantity, Measure(above=0)] = 1e-6
+    supports: Mapping[str, Any] = field(default_factory=dict)
     pins: Support | PinBearing | None = None
     rim: ElasticRim | None = None
 
@@ -86,11 +94,7 @@ def load_planetary(path: str | Path) -> PlanetaryRun:
         For whatever is wrong with it; the message names the file's section and key, the value and the remedy.
     """
     try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError) as error:
-        raise CaseError(f"{path}: {error}") from None
-    try:
-        return planetary_run(data)
+        return planetary_run(read_toml(path, CaseError))
     except (ValueError, TypeError) as error:
         raise CaseError(f"{Path(path).name}: {error}") from None
 
@@ -103,15 +107,14 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
     ValueError
         For unknown sections and keys, and values that do not make a set.
     """
-    unknown = set(data) - set(SECTIONS)
-    if unknown:
-        raise ValueError(f"unknown section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
+    check_keys(data, SECTIONS, "", ValueError, what="section", prefix="")
     if "planetary" not in data:
         raise ValueError("section [planetary] is missing; give teeth and module")
     table = dict(data["planetary"])
     simple = list(inspect.signature(planetary).parameters)[:-1]
     others = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "faults")]
-    _check_keys("planetary", table, {*simple, *others} - {"contact", "friction", "pin_errors"} | {"pin_errors"})
+    known = [key for key in (*simple, *others) if key not in ("contact", "friction")]
+    check_keys(table, known, "", ValueError, prefix="planetary.")
     for name in ("teeth", "module"):
         if name not in table:
             raise ValueError(f"planetary.{name} is missing")
@@ -125,7 +128,7 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
         if name in table:
             table[name] = tuple(table[name])
     if "contact" in data:
-        table["contact"] = _law(dict(data["contact"]))
+        table["contact"] = contact_law(data["contact"], "law")
     if "friction" in data:
         table["friction"] = FlankFriction(**data["friction"])
     places = []
@@ -135,13 +138,10 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
         places.append((where, tooth_fault(one)))
     gears = planetary(faults=places, **table)
     operation = dict(data.get("operation", {}))
-    allowed = {"speeds", "torques", "held", "run_up", "settling", "duration", "rate", "tolerance"}
-    _check_keys("operation", operation, allowed)
+    known = [item.name for item in fields(PlanetaryRun) if item.name not in ("gears", "supports", "pins", "rim")]
+    check_keys(operation, known, "", ValueError, prefix="operation.")
     if operation.get("held") in ("none", ""):
         operation["held"] = None
-    for name, kind in (("run_up", "time"), ("settling", "time"), ("duration", "time"), ("rate", "frequency")):
-        if name in operation:
-            operation[name] = to_si(operation[name], kind, f"operation.{name}")
     supports = {name: Support(**values) for name, values in data.get("support", {}).items()}
     pins = _pins(dict(data["pins"])) if "pins" in data else None
     rim = ElasticRim(**data["rim"]) if "rim" in data else None
@@ -174,24 +174,6 @@ def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
 def _pins(table: dict[str, Any]) -> Support | PinBearing:
     rolling = table.pop("rolling", None)
     return Support(**table) if rolling is None else rolling_pins(rolling, **table)
-
-
-def _check_keys(section: str, table: Mapping[str, Any], known: set[str]) -> None:
-    for key in table:
-        if key not in known:
-            raise ValueError(f"unknown key {section}.{key}; known ones are {', '.join(sorted(known))}")
-
-
-def _law(table: dict[str, Any]) -> ContactLaw:
-    kind = str(table.pop("law", "impact")).replace("-", "_")
-    makers: dict[str, Callable[..., ContactLaw]] = {
-        "impact": ContactLaw.impact,
-        "hunt_crossley": ContactLaw.hunt_crossley,
-        "linear": ContactLaw.linear,
-    }
-    if kind not in makers:
-        raise ValueError(f"contact.law is {kind!r}; choose {', '.join(makers)}")
-    return makers[kind](**table)
 
 
 def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = None) -> xr.Dataset:

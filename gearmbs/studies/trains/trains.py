@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 import gearmbs
+from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
@@ -26,6 +27,8 @@ from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.signals.resampling import MARGIN
 from gearmbs.signals.rotation.orders import MIN_PERIODS, harmonic_amplitudes
 from gearmbs.studies.case.tooth_faults import tooth_fault
+from gearmbs.studies.presets.files import FOLDER, PRESETS
+from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
 from gearmbs.studies.trains.recorder import CONTACT, TrainColumns, TrainRecorder
 from gearmbs.studies.trains.speed import TURN, HeldSpeed, by_angle, held_speeds, speed_attributes, warn_of_speeds
@@ -40,11 +43,23 @@ TRACK_CYCLES = 16.0
 def load_train(path: str | Path) -> Description:
     """Read a drivetrain and its run settings from a TOML file, faults of teeth included.
 
+    Parameters
+    ----------
+    path : path-like
+        A file, or the name of a preset: bench, crank_slider, gearbox, rattle or resonance.
+
     Raises
     ------
     DrivetrainError
         One line that names the file, the part, the key, the value and the remedy.
+
+    Examples
+    --------
+    >>> load_train("gearbox").train.kinematics.ratio("high", "lay")
+    -4.0
     """
+    if path in PRESETS and not Path(path).exists():
+        path = FOLDER / f"{path}.toml"
     return read_description(path, tooth_fault)
 
 
@@ -107,6 +122,37 @@ def run_train(
         partial = None if recorder.is_empty else raw_record(train, recorder.joined(), solution)
         raise kind(f"drivetrain '{train.name}': {solution.message}", solution, None, partial)
     return evaluated(train, run, recorder.joined(), solution)
+
+
+def run_trains(
+    runs: Mapping[str, tuple[Drivetrain, RunSettings]],
+    *,
+    workers: int | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
+) -> dict[str, xr.Dataset]:
+    """Simulate drivetrains side by side and return their records by name.
+
+    Parameters
+    ----------
+    runs : mapping of str to (Drivetrain, RunSettings)
+    workers : int, optional
+        Runs at a time; default the cores, and one if an integrator holds the interpreter.
+    progress : bool or callable, optional
+        Bars, see `gearmbs.progress`; a callable is told ``progress(name, fraction)`` from time to time.
+
+    Raises
+    ------
+    SimulationFailed
+        If a run fails; the others are stopped.
+    """
+
+    def work(name: str, report: Callable[[float], None]) -> xr.Dataset:
+        train, run = runs[name]
+        span = train.run_up + run.settling + run.duration
+        return run_train(train, run, progress=lambda t: report(min(t / span, 1.0)))
+
+    compiled = all(INTEGRATORS[run.integrator].compiled for _, run in runs.values())
+    return run_named(work, list(runs), workers=workers if compiled else 1, progress=progress)
 
 
 def check_record(train: Drivetrain, run: RunSettings) -> None:

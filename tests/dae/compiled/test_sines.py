@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import FARTHEST_ANGLE, LANES, put_turns
+from gearmbs.kernels.lanes import LANES
+from gearmbs.kernels.sines import FARTHEST_ANGLE, put_turns
 
 
 @njit(error_model="numpy")

@@ -11,6 +11,7 @@ from numba import float64, int64, njit
 from gearmbs.kernels.jit import njit as kernel
 from gearmbs.kernels.pointers import direct
 from gearmbs.kernels.structs import LINE, BlockLayout, IntVector, Matrix, Struct, Vector
+from tests.says import says
 
 
 class Sample(Struct):
@@ -72,7 +73,7 @@ def test_a_copy_has_memory_of_its_own():
     "wrong", [np.ones(3, dtype=np.float32), np.ones((3, 1)), np.ones(6)[::2], np.zeros(3, dtype=np.int64)]
 )
 def test_an_array_of_another_kind_is_refused(wrong):
-    with pytest.raises(TypeError, match="y must be a contiguous array of type f8 with 1 dimensions"):
+    with pytest.raises(TypeError, match=says("y", "f8", "1", "contiguous array")):
         sample().y = wrong
 
 

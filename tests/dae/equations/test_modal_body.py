@@ -10,6 +10,7 @@ from gearmbs.dae.equations.residual import residual
 from gearmbs.dae.equations.unknowns import FORMULATIONS
 from gearmbs.dae.model.configuration import Configuration
 from gearmbs.mechanism import Mechanism, Mode, ModelError, ShapeIntegrals, linear_modes, static_equilibrium
+from tests.says import says
 
 POINTS = np.array(
     [[0.3, 0.0, 0.0], [-0.3, 0.05, 0.0], [0.0, 0.2, 0.1], [0.0, -0.2, 0.05], [0.05, 0.0, -0.2], [-0.05, -0.05, 0.05]]
@@ -334,7 +335,7 @@ def test_measures_and_accelerations_of_elastic_markers():
         ([Mode(mass=1.0)], "frequency or its stiffness"),
         ([Mode(stiffness=1.0, frequency=1.0)], "frequency or its stiffness"),
         ([Mode(stiffness=1.0, mass=0.0)], "modal mass"),
-        ([Mode(stiffness=-1.0)], "must not be negative"),
+        ([Mode(stiffness=-1.0)], "not be negative"),
         ([Mode(stiffness=1.0, mass=0.1, momentum=(1.0, 0, 0))], "more momentum"),
     ],
 )
@@ -346,5 +347,5 @@ def test_impossible_modes_are_refused(modes, message):
 def test_shapes_of_a_wrong_size_are_refused():
     m = Mechanism("m")
     m.modal_body("b", 1.0, (1, 1, 1), [Mode(stiffness=1.0)], lambda p: (np.zeros((2, 3)), np.zeros((1, 3)))).marker()
-    with pytest.raises(ModelError, match="they must be 1 finite vectors of 3"):
+    with pytest.raises(ModelError, match=says("1", "3", "finite vectors")):
         m.compile()

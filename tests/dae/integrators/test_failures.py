@@ -12,6 +12,7 @@ from gearmbs.dae.integrators.wstiff import solve_wstiff
 from gearmbs.dae.result import Status
 from gearmbs.dae.solve import solve_dae
 from tests.dae.integrators.problems import pendulum
+from tests.says import says
 
 
 def test_singular_jacobian_names_the_unknown():
@@ -246,12 +247,12 @@ def test_runs_side_by_side_keep_their_messages_apart_and_give_standard_output_ba
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        ({"max_order": 6}, "max_order .KMAX. must be 1 to 5 for IDA"),
-        ({"rtol": -1.0}, "rtol must not be negative"),
-        ({"rtol": float("nan")}, "rtol must not be negative"),
+        ({"max_order": 6}, says("max_order", "KMAX", "1", "5", "IDA")),
+        ({"rtol": -1.0}, says("rtol", "negative")),
+        ({"rtol": float("nan")}, says("rtol", "negative")),
         ({"tol": 0.0}, "tol .ERROR. must be positive"),
-        ({"max_step": -1.0}, "max_step .HMAX. must not be negative"),
-        ({"max_iterations": 0}, "max_iterations .MAXIT. must be at least 1"),
+        ({"max_step": -1.0}, says("max_step", "HMAX")),
+        ({"max_iterations": 0}, says("max_iterations", "MAXIT", "1")),
     ],
 )
 def test_ida_called_directly_checks_its_arguments(change, names):
@@ -361,7 +362,7 @@ def test_a_derivative_that_vanishes_at_the_start_is_named(factor, start):
         out[0] = yp[0] - 1.0
         out[1] = factor(t, y[1]) * yp[1] - 1.0
 
-    with pytest.raises(ValueError, match=r"dG/dy' vanishes at the start for slow: .* Start a little later"):
+    with pytest.raises(ValueError, match=says("dG/dy", "start", "slow", "Start")):
         solve_dae(residual, (0.0, 1.0), [0.0, start], names=["clock", "slow"])
     assert solve_dae(residual, (0.01, 0.02), [0.0, 0.1], names=["clock", "slow"]).success
 
@@ -370,7 +371,7 @@ def test_equations_without_derivatives_are_named():
     def residual(t, y, yp, out):
         out[0] = y[0] - np.sin(t)
 
-    with pytest.raises(ValueError, match="no derivative appears in G"):
+    with pytest.raises(ValueError, match=says("G", "derivative appears")):
         solve_dae(residual, (0.0, 1.0), [0.0])
     assert solve_dae(residual, (0.0, 1.0), [0.0], error_mask=np.ones(1, bool)).success
 

@@ -17,13 +17,22 @@ from gearmbs.cli import app
 from gearmbs.dae import Options, solve_dae
 from gearmbs.dae.integrators.bdf import MAX_ORDER
 from gearmbs.dae.integrators.wstiff import solve_wstiff
-from gearmbs.dae.methods import BDF, DEFAULT, INTEGRATORS, Integrator, integrators_table
+from gearmbs.dae.methods import (
+    BDF,
+    DEFAULT,
+    FORMULATIONS,
+    INTEGRATORS,
+    Integrator,
+    formulations_table,
+    integrators_table,
+)
 from gearmbs.dae.problem import ModelError
 from gearmbs.drivetrain.description import RunSettings
 from gearmbs.drivetrain.errors import DrivetrainError
 from gearmbs.mechanism import Mechanism
 from gearmbs.wording import any_of
 from tests.docs.support import DOCS
+from tests.says import says
 
 PACKAGE = Path(gm.__file__).parent
 CALLS = []
@@ -87,9 +96,7 @@ def test_messages_and_documentation_know_it():
         swinging().simulate(0.1, integrator="ANOTHER", max_order=2)
     with pytest.raises(ValueError, match=r"max_order \(KMAX\) must be 1 to 3"):
         Options(method="ANOTHER", max_order=4)
-    with pytest.raises(
-        ValueError, match="method='ANOTHER' has neither dense output nor events here; use WSTIFF or GSTIFF"
-    ):
+    with pytest.raises(ValueError, match=says("method='ANOTHER'", "dense output", "GSTIFF", "use WSTIFF")):
         solve_dae(decay, (0.0, 1.0), [1.0], method="ANOTHER", options=Options(dense_output=True))
     assert "| `ANOTHER` | another | 3 | no | yes | 1e-06, at most 1e-05 |" in integrators_table()
 
@@ -116,13 +123,14 @@ def test_rows_say_what_integrators_do():
     assert {known.highest_order for known in INTEGRATORS.values() if known.solver == BDF} == {MAX_ORDER}
 
 
-def test_no_other_module_lists_integrators():
-    """No list, set, table or text that is no docstring names two of them elsewhere."""
+@pytest.mark.parametrize("known", [INTEGRATORS, FORMULATIONS], ids=["integrators", "formulations"])
+def test_no_other_module_lists_integrators(known):
+    """No list, set, table or text that is no docstring names two of them, or two formulations, elsewhere."""
     found = []
     for path in sorted(PACKAGE.rglob("*.py")):
         where = path.relative_to(PACKAGE).as_posix()
         source = path.read_text(encoding="utf-8")
-        if where == "dae/methods.py" or sum(name in source for name in INTEGRATORS) < 2:
+        if where == "dae/methods.py" or sum(name in source for name in known) < 2:
             continue
         tree = ast.parse(source)
         prose = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)}
@@ -132,17 +140,33 @@ def test_no_other_module_lists_integrators():
                 texts = [n.value for n in ast.walk(node) if isinstance(n, ast.Constant)]
             elif isinstance(node, ast.Constant) and id(node) not in prose:
                 texts = re.findall(r"\w+", node.value) if isinstance(node.value, str) else []
-            if len({text for text in texts if text in INTEGRATORS}) > 1:
+            if len({text for text in texts if text in known}) > 1:
                 found.append(f"{where}:{node.lineno}")
     # the statement of ADAMS has words of its own
     assert [place for place in found if not place.startswith("adams/parse/data_statements.py")] == []
+
+
+def test_formulations_are_those_of_cases_decks_and_equations():
+    from gearmbs.adams.parse.statements import Integrator as Statement
+    from gearmbs.dae.equations import unknowns
+    from gearmbs.studies.case.case import Solver
+
+    names = tuple(FORMULATIONS)
+    assert get_args(Solver.model_fields["formulation"].annotation) == names
+    assert Statement.__dataclass_fields__["formulation"].metadata["spec"].choices == names
+    assert {name: getattr(unknowns, name) for name in names} == unknowns.FORMULATIONS
+    with pytest.raises(ModelError, match="choose one of I3, SI2, SI1"):
+        swinging().simulate(0.1, formulation="SI4")
+    assert formulations_table().count("\n") == 1 + len(names)
 
 
 def test_the_page_shows_the_table(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS / "scripts"))
     tables = importlib.import_module("tables")
     assert tables.integrators()._repr_markdown_() == integrators_table()
-    assert "tables.integrators()" in (DOCS / "howto" / "integrators.md").read_text(encoding="utf-8")
+    page = (DOCS / "howto" / "integrators.md").read_text(encoding="utf-8")
+    assert "tables.integrators()" in page
+    assert "tables.formulations()" in page
 
 
 def test_the_table_is_light():

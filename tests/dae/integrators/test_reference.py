@@ -118,8 +118,11 @@ def test_chain_passes_its_singular_positions(loops, tol, corrector):
     assert reference.error(result.t, result.y) < 500 * tol**0.8
 
 
+LOOPS = [10, 40, *(pytest.param(loops, marks=pytest.mark.slow) for loops in (80, 160))]
+
+
 @pytest.mark.parametrize("formulation", ["SI2", "SI1"])
-@pytest.mark.parametrize("loops", [10, 40, 80, 160])
+@pytest.mark.parametrize("loops", LOOPS)
 @pytest.mark.parametrize("tol", [1e-8, 1e-9, 1e-10, 1e-11])
 def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
     """An angle d from a singular position rounding moves the velocities by about 1e-14 / d^2: 1e-10 at 1e-2.
@@ -137,7 +140,7 @@ def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
         assert result.stats.noise_limited <= SINGULAR_POSITIONS * HISTORY
 
 
-@pytest.mark.parametrize("loops", [10, 40, 80, 160])
+@pytest.mark.parametrize("loops", LOOPS)
 @pytest.mark.parametrize("tol", [1e-8, 1e-9, 1e-10, 1e-11])
 def test_chain_of_index_three_passes_at_the_level_of_rounding(loops, tol):
     """Velocities are outside error control at index three: they take what rounding does to positions times gamma.

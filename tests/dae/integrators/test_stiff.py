@@ -65,6 +65,7 @@ def test_the_amplifier_does_not_collapse_at_tight_tolerances(method):
     assert steps[1] < 3.0 * steps[0]
 
 
+@pytest.mark.slow
 def test_the_amplifier_at_the_level_of_rounding():
     """Capacity by voltage over step, 5e-6 6 / 1e-6, is wrong by 1e-15 A and moves y[6] by 1e-11 V through 9 kOhm."""
     problem = PROBLEMS["transistor amplifier"]

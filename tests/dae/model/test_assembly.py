@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse import csc_array, diags_array
 
 from benchmarks.iftomm import models
+from gearmbs.dae.equations.unknowns import I3
 from gearmbs.dae.model import initial
 from gearmbs.mechanism import Mechanism, ModelError, static_equilibrium
 
@@ -127,3 +128,22 @@ def test_markers_drawn_opposite_each_other_stay():
     solution = m.simulate(0.5, rate=10)
     np.testing.assert_allclose(solution.orientation("wheel")[0], np.eye(3), atol=1e-9)
     assert np.ptp(solution.joint_angle("pin")) == pytest.approx(0.5)
+
+
+def test_tables_for_the_kernels_are_packed_once_and_handed_out_as_copies():
+    m = Mechanism("pendulum")
+    bar = m.body("bar", 1.0, (1e-2, 1e-2, 1e-2), position=(0.1, 0.0, 0.0))
+    m.revolute("hinge", bar, m.ground, at=(0.0, 0.0, 0.0))
+    model = m.compile().model
+    idata, rdata, size = model.pack(I3)
+    kept = idata.copy(), rdata.copy()
+    idata[:], rdata[:] = -1, np.nan
+    again = model.pack(I3)
+    assert np.array_equal(again[0], kept[0])
+    assert np.array_equal(again[1], kept[1])
+    assert again[2] == size
+    codes = np.array([0, 1])
+    assert (model.pack(I3, codes=codes)[0] != kept[0]).sum() == 1
+    # of fewer rows everything is counted anew
+    assert model.with_rows(np.arange(4)).counts.rows == 4
+    assert model.counts.rows == 5

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from gearmbs.dae.linalg.sparse_lu import factor
+from gearmbs.dae.model.evaluator import assemble
 from gearmbs.mechanism import Mechanism
 
 LENGTH, MASS, G = 0.7, 1.3, 9.81
@@ -45,3 +47,48 @@ def test_acceleration_is_the_second_derivative_of_the_position():
     r, h = solution.com_position("bob"), 1e-3
     second = (-r[4:] + 16 * r[3:-1] - 30 * r[2:-2] + 16 * r[1:-3] - r[:-4]) / (12 * h * h)
     np.testing.assert_allclose(solution.com_acceleration("bob")[2:-2], second, atol=2e-4)
+
+
+def slider_crank() -> Mechanism:
+    """A driven crank, a rod on a ball and a universal joint, a slider: terms of points, axes, offsets and a motion."""
+    m = Mechanism("slider crank", gravity=(0.3, -9.81, 0.5))
+    crank = m.body("crank", 1.0, (0.01, 0.02, 0.015), position=(0.0, 0.1, 0.0))
+    rod = m.body("rod", 0.8, (0.03, 0.002, 0.03), position=(0.3, 0.1, 0.05))
+    slider = m.body("slider", 1.5, (0.01, 0.01, 0.02), position=(0.6, 0.0, 0.1))
+    pin = m.revolute("pin", crank, m.ground, at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    m.spherical("ball", rod, crank, at=(0.0, 0.2, 0.0))
+    m.universal("cross", rod, slider, at=(0.6, 0.0, 0.1), axis=(0.0, 1.0, 0.0), axis_j=(0.0, 0.0, 1.0))
+    m.translational("guide", slider, m.ground, at=(0.6, 0.0, 0.1), axis=(1.0, 0.0, 0.0))
+    m.rotation("drive", pin, "9*TIME + 0.2*SIN(20*TIME)")
+    m.spring_damper("spring", slider.marker((0.0, 0.0, 0.0)), m.ground.marker((1.0, 0.0, 0.1)), stiffness=500.0,
+                    damping=5.0, length=0.3)  # fmt: skip
+    return m
+
+
+def test_outputs_whose_pivots_do_not_fit_get_new_ones():
+    """With a bound on the growth that eleven rows keep and later ones exceed, plans change on the way."""
+    solution = slider_crank().simulate(2.0, rate=60.0)
+    evaluator = solution._evaluator()
+    choose, chosen_at = evaluator._choose_pivots, []
+
+    def growth(row, table):
+        vals, place = np.zeros(evaluator.vals.size), slice(row, row + 1)
+        y = np.ascontiguousarray(solution.result.y[place])
+        tables = evaluator.pattern[2], table, evaluator.rdata.copy(), evaluator.work.size
+        assemble(solution.t[place], y, *tables, vals)
+        return factor(evaluator.plan, evaluator.factors, vals)
+
+    def strictly(t, y, table, *settings):
+        choose(t, y, table, *settings)
+        first = int(np.searchsorted(solution.t, t[0]))
+        growths = np.array([growth(k, table) for k in range(first, min(first + 11, solution.t.size))])
+        # growth is infinite where an entry that was zero at the first row is not
+        evaluator.growth = 1.001 * growths[np.isfinite(growths)].max()
+        chosen_at.append(first)
+
+    evaluator._choose_pivots = strictly
+    out = solution._new_records(solution.t.size)
+    evaluator.fill(solution.t, solution.result.y, solution.result.epochs, out)
+    assert len(chosen_at) > 2
+    for name, a, b in zip(out._fields, out, solution._records, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-10 * max(1.0, np.abs(b).max()), err_msg=name)

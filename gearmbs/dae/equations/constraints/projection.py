@@ -44,7 +44,7 @@ def are_satisfied(phi, tab):
     return satisfied
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def violations(t, y, phi, idata, tab):
     """Write Phi and Phi_q v + Phi_t of each row to ``phi``, as `saddle` does; return the fastest body's |omega|.
 

@@ -17,8 +17,8 @@ from gearmbs.kernels.jit import njit
 
 # Rates of what constraint terms measure: points fixed in bodies, and products of axes fixed in two bodies.
 #
-# Vectors are triples of numbers, or of lanes of `gearmbs.kernels.lanes`. Second rates are without the terms in
-# accelerations; those of points follow from w x (w x r) = (w . r) w - (w . w) r.
+# Vectors are triples of numbers. Second rates are without the terms in accelerations; those of points follow from
+# w x (w x r) = (w . r) w - (w . w) r.
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -30,7 +30,8 @@ from gearmbs.dae.equations.loads.expressions import TIME, time_at
 from gearmbs.dae.equations.loads.forces import FRAME_A, marker_pose
 from gearmbs.dae.problem import HISTORY_CHANGED, HOOK_SIG, KEPT, MATRIX_OUTDATED
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES, put_turns
+from gearmbs.kernels.lanes import LANES
+from gearmbs.kernels.sines import put_turns
 from gearmbs.kernels.structs import vector_at
 
 # Angles of a marker about an axis of another one, counted through full turns: AX, AY and AZ of the elements.

@@ -14,7 +14,7 @@ from gearmbs.dae.equations.loads.elastic import load_at, put_arm, put_chain, put
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, evaluate_element
 from gearmbs.dae.equations.loads.reactions import reaction_wrench
 from gearmbs.dae.equations.residual import S_VECTOR, S_WRENCH, arm_to
-from gearmbs.dae.equations.unknowns import SI1, put
+from gearmbs.dae.equations.unknowns import multipliers_are_rates, put
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
@@ -258,7 +258,7 @@ def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
     else:
         wrench = vector_at(tab.scratch, S_WRENCH, 6)
         if row[T.FORCE_KIND] == T.REACTION:
-            si1 = idata[T.H_FORMULATION] == SI1
+            si1 = multipliers_are_rates(idata[T.H_FORMULATION])
             source = yp if si1 else y
             lam = idata[T.H_LAMBDA]
             room = vector_at(tab.scratch, 0, 64)

@@ -1,22 +1,20 @@
 """Units on the workers of a Dask cluster: on this machine, or of a batch system through dask-jobqueue.
 
-The cluster only moves numbers of units and small reports. A worker that is lost costs its unit, a scheduler that is
-lost
-costs a new start; what is done is in the folder.
+The cluster only moves numbers of units. A worker that is lost costs its unit, a scheduler that is lost costs a new
+start; what is done is in the folder.
 """
 
 from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from gearmbs.campaigns.settings import CampaignError, whole
-from gearmbs.campaigns.work import DIED, UnitReport, work_unit
-from gearmbs.studies.run.processes import ONE_THREAD, one_thread
+from gearmbs.studies.run.workers import DEATH, FAILURE, ONE_THREAD, Message, Work, one_thread, outcome, silent
 
 # Job scripts for Slurm and PBS.
 
@@ -109,8 +107,8 @@ class DaskRunner:
         """Threads of the cluster's workers."""
         return sum(self.client.nthreads().values()) or 1
 
-    def __call__(self, path: str, units: Iterator[int]) -> Iterator[UnitReport]:
-        """Yield the reports of units as they end.
+    def __call__(self, work: Work, units: Iterable[int], _workers: int) -> Iterator[Message]:
+        """Yield the messages of units as they end; see `gearmbs.studies.run.workers`.
 
         Raises
         ------
@@ -120,23 +118,18 @@ class DaskRunner:
         from distributed import wait
         from distributed.comm import CommClosedError
 
-        path = os.path.abspath(path)
-        at_work: dict[Any, int] = {}
-        serial = 0
+        at_work: dict[Any, tuple[int, int]] = {}
+        source = enumerate(units)
         try:
             while True:
-                while len(at_work) < UNITS_A_WORKER * self.workers:
-                    unit = next(units, None)
-                    if unit is None:
-                        break
-                    serial += 1
-                    key = f"unit-{unit}-{os.getpid()}-{id(self)}-{serial}"
-                    at_work[self.client.submit(work_unit, path, unit, key=key, pure=False)] = unit
+                while len(at_work) < UNITS_A_WORKER * self.workers and (taken := next(source, None)) is not None:
+                    key = f"unit-{taken[1]}-{os.getpid()}-{id(self)}-{taken[0]}"
+                    future = self.client.submit(outcome, work, taken[1], silent, key=key, pure=False)
+                    at_work[future] = taken
                 if not at_work:
                     return
                 for future in wait(list(at_work), return_when="FIRST_COMPLETED").done:
-                    unit = at_work.pop(future)
-                    yield self._report(future, unit)
+                    yield *at_work.pop(future), *self._end(future)
                     future.release()
         except CommClosedError as error:
             at_work.clear()
@@ -148,14 +141,15 @@ class DaskRunner:
                 self.client.cancel(list(at_work))
 
     @staticmethod
-    def _report(future: Any, unit: int) -> UnitReport:
+    def _end(future: Any) -> tuple[str, Any]:
+        """Return kind and value of the message about a unit's end."""
         if future.status == "finished":
             return future.result()
         error = future.exception()
         # a worker that dies takes the units of its neighbours' queues with it: all are tried again
         if type(error).__name__ in ("KilledWorker", "CancelledError", "FutureCancelledError"):
-            return UnitReport(unit, DIED, message=str(error))
-        raise error
+            return DEATH, None
+        return FAILURE, error
 
 
 def batch_cluster(system: str, *, walltime: str = "01:00:00", memory: str = "2GB", **settings: Any) -> Any:

@@ -1,0 +1,118 @@
+"""What compiled code calls back, the same in both modes: Python functions, and the four functions of a DAE."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numba import types
+from numba.experimental import structref
+
+from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, JACOBIAN_SIG, RESIDUAL_SIG
+from gearmbs.kernels.jit import njit
+
+VEC = types.float64[::1]
+MAT = types.float64[:, ::1]
+IVEC = types.int64[::1]
+IMAT = types.int64[:, ::1]
+F8 = types.float64
+I8 = types.int64
+
+_C_CALLBACK = ctypes.CFUNCTYPE(
+    None, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p
+)
+
+
+class PythonCallback:
+    """A Python function behind a C function pointer, safe to call from the compiled loop.
+
+    Parameters
+    ----------
+    function : callable
+        Called as ``function(t, y, yp, extra, out)`` with arrays over the integrator's memory.
+    n, n_out : int
+        Lengths of ``y`` and of ``out``.
+    errors : list
+        Exceptions are appended here, and ``out`` becomes NaN, so that the integrator stops.
+    """
+
+    def __init__(self, function: Callable, n: int, n_out: int, errors: list[BaseException]):
+        views: dict[tuple[int, int], np.ndarray] = {}
+
+        def view(address: int, length: int) -> np.ndarray:
+            array = views.get((address, length))
+            if array is None:
+                array = np.ctypeslib.as_array((ctypes.c_double * length).from_address(address))
+                views[address, length] = array
+            return array
+
+        def call(t, y, yp, extra, out):
+            target = view(out, n_out)
+            if errors:
+                target[:] = np.nan
+                return
+            try:
+                function(t, view(y, n), view(yp, n), extra, target)
+            except BaseException as error:
+                errors.append(error)
+                target[:] = np.nan
+
+        self._callback = _C_CALLBACK(call)
+        self.address = ctypes.cast(self._callback, ctypes.c_void_p).value
+
+
+# The four functions of a DAE bound together, so that handing them to compiled code costs next to nothing.
+#
+# Handing a compiled function to another as a typed pointer looks its address up anew each time, tens of microseconds
+# in Python. A short run is over in less; so the addresses are looked up once for each problem.
+
+
+BOUND = 64
+"""Sets of functions kept bound."""
+
+
+@structref.register
+class FunctionsType(types.StructRef):
+    """Numba's type of `Functions`."""
+
+
+class Functions(structref.StructRefProxy):
+    """Residual, Jacobian, hook and events, with the signatures of `gearmbs.dae.problem`."""
+
+    def __new__(cls, residual, jacobian, hook, events):
+        """Return the bound functions."""
+        return structref.StructRefProxy.__new__(cls, residual, jacobian, hook, events)
+
+
+FIELDS = {
+    "residual": types.FunctionType(RESIDUAL_SIG),
+    "jacobian": types.FunctionType(JACOBIAN_SIG),
+    "hook": types.FunctionType(HOOK_SIG),
+    "events": types.FunctionType(EVENTS_SIG),
+}
+structref.define_proxy(Functions, FunctionsType, list(FIELDS))
+FUNCTIONS_TYPE = FunctionsType(list(FIELDS.items()))
+
+
+@njit(FUNCTIONS_TYPE(*FIELDS.values()), cache=True)
+def _bind(residual, jacobian, hook, events):
+    return Functions(residual, jacobian, hook, events)
+
+
+@lru_cache(maxsize=BOUND)
+def bind(residual, jacobian, hook, events):
+    """Return the four compiled functions bound together, the same object for the same functions."""
+    return _bind(residual, jacobian, hook, events)
+
+
+@njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
+def no_hook(t, hist, npast, idata, rdata, work):
+    """Stand in for a problem without a hook."""
+    return 0
+
+
+@njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
+def no_events(t, y, yp, out, idata, rdata, work):
+    """Stand in for a problem without events."""

@@ -1,0 +1,176 @@
+"""Descriptions: one reader of files, fields that say what they may hold, messages with place, value and remedy."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+import pytest
+
+import gearmbs
+from gearmbs.gears import GearSpec
+from gearmbs.schema.described import Described, make, measures_of
+from gearmbs.schema.files import read_toml, toml_table
+from gearmbs.schema.messages import check_keys, chosen
+from gearmbs.schema.quantities import Measure, OneOf, OverTime
+from gearmbs.studies import Case, CaseError
+from gearmbs.units import Given, Quantity
+from tests.generators import cases, seed
+
+GREASES = {"mineral": 1}
+
+
+class MachineError(ValueError):
+    """The error of what is described here."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine(Described):
+    """A description with a field of every kind."""
+
+    error: ClassVar[type[ValueError]] = MachineError
+
+    speed: Annotated[Quantity, Measure("angular speed")]
+    length: Annotated[Quantity, Measure("length", above=0)] = "20 mm"
+    tilt: Annotated[Quantity, Measure("angle", -10, 10, "deg")] = 0.0
+    share: Annotated[Quantity, Measure(low=0, below=1, remedy="give a share such as 0.1")] = 0.0
+    factor: Annotated[Quantity, Measure()] = 1.0
+    count: Annotated[int, Measure(low=1, high=9, whole=True)] = 1
+    gap: Annotated[Quantity, Measure("length", 0)] = None
+    at: Annotated[tuple, Measure("length", several=3)] = (0.0, 0.0, 0.0)
+    levels: Annotated[tuple, Measure("force", several=-2)] = (0.0, 1.0)
+    grease: Annotated[str, OneOf(GREASES)] = "mineral"
+    side: Literal["left", "right"] = "left"
+    torque: Annotated[object, OverTime()] = 0.0
+    wheel: GearSpec | None = None
+    names: tuple[str, ...] = ()
+    closed: bool = False
+
+
+def test_one_place_reads_toml():
+    root = Path(gearmbs.__file__).parent
+    readers = {p.relative_to(root).as_posix() for p in root.rglob("*.py") if "tomllib" in p.read_text(encoding="utf-8")}
+    assert readers == {"schema/files.py"}
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(None, "cannot be read"), (b"\xff\xfe\x00a", "not a text file"), (b"[run\n", "not a valid TOML file")],
+)
+def test_files_that_cannot_be_read_are_named(tmp_path, content, words):
+    path = tmp_path / "machine.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(MachineError, match=words) as caught:
+        read_toml(path, MachineError)
+    assert str(caught.value).startswith(f"{path}: ")
+    path.write_bytes("\ufeffname = 'ö'".encode())
+    assert read_toml(path) == {"name": "ö"}
+
+
+def test_what_is_written_is_read_again():
+    table = {"name": 'a "b" ö', "speed": "20 rpm", "at": (0.1, ["1 mm", True]), "none": None, "small": 1e-300}
+    text = "\n".join(toml_table("[machine]", table))
+    del table["none"]
+    assert tomllib.loads(text)["machine"] == {**table, "at": [0.1, ["1 mm", True]]}
+    assert toml_table("[empty]", {"none": None}) == []
+
+
+def test_fields_are_read_by_what_they_say():
+    machine = Machine(
+        speed="60 rpm", tilt="10 deg", count=np.int64(3), gap=np.array(0.002), at=["1 mm", 0, np.float32(0.5)],
+        names=["a"], torque="2*TIME", wheel=GearSpec(20, 2e-3), closed=np.True_,
+    )  # fmt: skip
+    assert machine.speed == pytest.approx(2.0 * math.pi)
+    assert isinstance(machine.speed, Given)
+    assert machine.at == (0.001, 0.0, 0.5)
+    assert (machine.count, machine.gap, machine.names, machine.closed) == (3, 0.002, ("a",), True)
+    assert machine.length == 0.02
+    assert repr(Machine(speed="60 rpm", count=2.0)) == "Machine(speed='60 rpm', count=2)"
+    assert replace(machine) == machine
+    assert replace(machine, wheel=None, gap=None).gap is None
+    assert measures_of(Machine)["tilt"].unit == "rad"
+    # a plain number without a unit is stored as it was given, so that keys of stored cases stay
+    assert type(Measure(low=0).as_given(3)) is int
+
+
+WRONG = [
+    ({"speed": "3 mm"}, r"Machine\.speed: '3 mm' is in .* a quantity in rad/s is expected"),
+    ({"speed": None}, r"Machine\.speed: got None; give a number in rad/s or text"),
+    ({"speed": math.inf}, r"Machine\.speed is inf; give a finite number"),
+    ({"length": 0}, r"Machine\.length is 0 m; it must be positive"),
+    ({"length": "-2 mm"}, r"Machine\.length is -0\.002 m; it must be positive"),
+    ({"gap": -1}, r"Machine\.gap is -1 m; it must not be negative"),
+    ({"tilt": 11}, r"tilt is 630\.\d+ deg; give -10 to 10 deg \(a plain number is in rad\)"),
+    ({"tilt": 5}, r"tilt is 286\.\d+ deg; .* in rad; write '5 deg' if that is meant\)"),
+    ({"share": 1}, r"share is 1; give a share such as 0\.1"),
+    ({"share": "much"}, r"share is 'much'; give a share such as 0\.1"),
+    ({"count": 2.5}, r"count is 2\.5; give a whole number, 1 to 9"),
+    ({"count": True}, r"count is True; give a whole number"),
+    ({"count": 10}, r"count is 10; give a whole number, 1 to 9"),
+    ({"at": [1, 2]}, r"at is \[1, 2\]; give a list of 3 values"),
+    ({"at": "1 mm"}, r"at is '1 mm'; give a list of 3 values"),
+    ({"levels": ["1 N"]}, r"levels is \['1 N'\]; give a list of 2 or more values"),
+    ({"factor": "3 mm"}, r"factor is '3 mm'; give a number"),
+    ({"grease": "lard"}, r"grease is 'lard'; choose mineral$"),
+    ({"side": "up"}, r"side is 'up'; choose 'left' or 'right'"),
+    ({"torque": math.nan}, r"torque is nan; give a finite number, a quantity or an expression of time"),
+    ({"wheel": "z1"}, r"wheel is 'z1'; give a GearSpec"),
+    ({"names": [1]}, r"names\[0\] is 1; give a text"),
+]
+
+
+@pytest.mark.parametrize(("changes", "words"), WRONG, ids=[str(k) for k in range(len(WRONG))])
+def test_wrong_values_are_told_with_field_value_and_remedy(changes, words):
+    with pytest.raises(MachineError, match=words) as caught:
+        Machine(**{"speed": 1.0, **changes})
+    assert "\n" not in str(caught.value)
+
+
+def test_all_that_is_wrong_is_told_at_once():
+    with pytest.raises(MachineError, match=r"length is 0 m.*; Machine\.side is 'up'"):
+        Machine(speed=1.0, length=0, side="up")
+
+
+def test_a_table_may_get_a_row(monkeypatch):
+    monkeypatch.setitem(GREASES, "lithium", 2)
+    assert Machine(speed=1.0, grease="lithium").grease == "lithium"
+    with pytest.raises(MachineError, match="choose mineral or lithium"):
+        Machine(speed=1.0, grease="lard")
+
+
+def test_tables_of_files_become_objects():
+    assert make(Machine, {"speed": "60 rpm"}, "[machine]", MachineError, side="right").side == "right"
+    for table, words in (
+        ({"sped": 1}, r"^\[machine\]: unknown key 'sped'; did you mean 'speed'\?"),
+        ({"speed": 1, "zzz": 1}, r"^\[machine\]: unknown key 'zzz'; known ones are speed, length"),
+        ({}, r"^\[machine\]: 'speed' is missing"),
+    ):
+        with pytest.raises(MachineError, match=words):
+            make(Machine, table, "[machine]", MachineError)
+    with pytest.raises(MachineError, match=r"^a: kind 'lathee' is unknown; choose one of mill, lathe; did you mean la"):
+        chosen({"mill": 1, "lathe": 2}, "lathee", "a: ", MachineError)
+    with pytest.raises(MachineError, match=r"^unknown key run\.x; known ones are y$"):
+        check_keys({"x": 1}, ["y"], "", MachineError, prefix="run.")
+
+
+@pytest.mark.parametrize("case", range(cases(20)))
+def test_a_limit_is_within_and_what_is_beyond_is_not(case):
+    rng = np.random.default_rng((seed(), case))
+    low, high = np.sort(rng.uniform(-100.0, 100.0, 2)).tolist()
+    measure = Measure("length", low, high, "mm")
+    for limit, beyond in ((low, -1e-9), (high, 1e-9)):
+        for value in (1e-3 * limit, f"{limit!r} mm"):
+            assert measure.as_given(value) == pytest.approx(1e-3 * limit, rel=1e-12)
+        with pytest.raises(ValueError, match="give"):
+            measure.as_given(1e-3 * (limit + beyond * abs(limit)))
+
+
+def test_limits_of_a_case_are_within():
+    assert Case(fault={"misalignment": "-10 deg"}).fault.misalignment == pytest.approx(-math.pi / 18.0)
+    with pytest.raises(CaseError, match="give -10 to 10 deg"):
+        Case(fault={"misalignment": "-10.1 deg"})
