@@ -11,24 +11,7 @@ FUNCTION_WORDS = set(
 )
 """Words that are no names even if a test uses them for something."""
 
-VALUES = {
-    "True",
-    "False",
-    "None",
-    "nan",
-    "inf",
-    "mm",
-    "kg",
-    "Hz",
-    "kHz",
-    "rad",
-    "deg",
-    "ms",
-    "MPa",
-    "GPa",
-    "rpm",
-    "min",
-}
+VALUES = set("True False None nan inf mm kg Hz kHz rad deg ms MPa GPa rpm min".split())
 """Numbers and units that are written as words."""
 
 
