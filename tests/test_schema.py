@@ -20,6 +20,7 @@ from gearmbs.schema.quantities import Measure, OneOf, OverTime
 from gearmbs.studies import Case, CaseError
 from gearmbs.units import Given, Quantity
 from tests.generators import cases, seed
+from tests.says import says
 
 GREASES = {"mineral": 1}
 
@@ -59,7 +60,7 @@ def test_one_place_reads_toml():
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(None, "cannot be read"), (b"\xff\xfe\x00a", "not a text file"), (b"[run\n", "not a valid TOML file")],
+    [(None, "read"), (b"\xff\xfe\x00a", "text"), (b"[run\n", "TOML")],
 )
 def test_files_that_cannot_be_read_are_named(tmp_path, content, words):
     path = tmp_path / "machine.toml"
@@ -99,28 +100,28 @@ def test_fields_are_read_by_what_they_say():
 
 
 WRONG = [
-    ({"speed": "3 mm"}, r"Machine\.speed: '3 mm' is in .* a quantity in rad/s is expected"),
-    ({"speed": None}, r"Machine\.speed: got None; give a number in rad/s or text"),
-    ({"speed": math.inf}, r"Machine\.speed is inf; give a finite number"),
-    ({"length": 0}, r"Machine\.length is 0 m; it must be positive"),
-    ({"length": "-2 mm"}, r"Machine\.length is -0\.002 m; it must be positive"),
-    ({"gap": -1}, r"Machine\.gap is -1 m; it must not be negative"),
-    ({"tilt": 11}, r"tilt is 630\.\d+ deg; give -10 to 10 deg \(a plain number is in rad\)"),
-    ({"tilt": 5}, r"tilt is 286\.\d+ deg; .* in rad; write '5 deg' if that is meant\)"),
-    ({"share": 1}, r"share is 1; give a share such as 0\.1"),
-    ({"share": "much"}, r"share is 'much'; give a share such as 0\.1"),
-    ({"count": 2.5}, r"count is 2\.5; give a whole number, 1 to 9"),
-    ({"count": True}, r"count is True; give a whole number"),
-    ({"count": 10}, r"count is 10; give a whole number, 1 to 9"),
-    ({"at": [1, 2]}, r"at is \[1, 2\]; give a list of 3 values"),
-    ({"at": "1 mm"}, r"at is '1 mm'; give a list of 3 values"),
-    ({"levels": ["1 N"]}, r"levels is \['1 N'\]; give a list of 2 or more values"),
-    ({"factor": "3 mm"}, r"factor is '3 mm'; give a number"),
-    ({"grease": "lard"}, r"grease is 'lard'; choose mineral$"),
-    ({"side": "up"}, r"side is 'up'; choose 'left' or 'right'"),
-    ({"torque": math.nan}, r"torque is nan; give a finite number, a quantity or an expression of time"),
-    ({"wheel": "z1"}, r"wheel is 'z1'; give a GearSpec"),
-    ({"names": [1]}, r"names\[0\] is 1; give a text"),
+    ({"speed": "3 mm"}, says("Machine.speed", "'3 mm'", "rad/s")),
+    ({"speed": None}, says("Machine.speed", "None", "rad/s")),
+    ({"speed": math.inf}, says("Machine.speed", "inf", "finite")),
+    ({"length": 0}, says("Machine.length", "0 m", "positive")),
+    ({"length": "-2 mm"}, says("Machine.length", "-0.002 m", "positive")),
+    ({"gap": -1}, says("Machine.gap", "-1 m", "negative")),
+    ({"tilt": 11}, says("tilt", "630.254 deg", "-10 to 10 deg", "rad")),
+    ({"tilt": 5}, says("tilt", "286.479 deg", "rad", "'5 deg'")),
+    ({"share": 1}, says("share", "1", "0.1")),
+    ({"share": "much"}, says("share", "'much'", "0.1")),
+    ({"count": 2.5}, says("count", "2.5", "whole", "1 to 9")),
+    ({"count": True}, says("count", "True", "whole")),
+    ({"count": 10}, says("count", "10", "whole", "1 to 9")),
+    ({"at": [1, 2]}, says("at", "[1, 2]", "3 values")),
+    ({"at": "1 mm"}, says("at", "'1 mm'", "3 values")),
+    ({"levels": ["1 N"]}, says("levels", "['1 N']", "2 or more")),
+    ({"factor": "3 mm"}, says("factor", "'3 mm'", "number")),
+    ({"grease": "lard"}, says("grease", "'lard'", "mineral")),
+    ({"side": "up"}, says("side", "'up'", "'left'", "'right'")),
+    ({"torque": math.nan}, says("torque", "nan", "finite")),
+    ({"wheel": "z1"}, says("wheel", "'z1'", "GearSpec")),
+    ({"names": [1]}, says("names[0]", "1", "text")),
 ]
 
 
@@ -132,29 +133,29 @@ def test_wrong_values_are_told_with_field_value_and_remedy(changes, words):
 
 
 def test_all_that_is_wrong_is_told_at_once():
-    with pytest.raises(MachineError, match=r"length is 0 m.*; Machine\.side is 'up'"):
+    with pytest.raises(MachineError, match=says("length", "0 m", "side", "'up'")):
         Machine(speed=1.0, length=0, side="up")
 
 
 def test_a_table_may_get_a_row(monkeypatch):
     monkeypatch.setitem(GREASES, "lithium", 2)
     assert Machine(speed=1.0, grease="lithium").grease == "lithium"
-    with pytest.raises(MachineError, match="choose mineral or lithium"):
+    with pytest.raises(MachineError, match=says("mineral", "lithium")):
         Machine(speed=1.0, grease="lard")
 
 
 def test_tables_of_files_become_objects():
     assert make(Machine, {"speed": "60 rpm"}, "[machine]", MachineError, side="right").side == "right"
     for table, words in (
-        ({"sped": 1}, r"^\[machine\]: unknown key 'sped'; did you mean 'speed'\?"),
-        ({"speed": 1, "zzz": 1}, r"^\[machine\]: unknown key 'zzz'; known ones are speed, length"),
-        ({}, r"^\[machine\]: 'speed' is missing"),
+        ({"sped": 1}, says("[machine]", "'sped'", "'speed'")),
+        ({"speed": 1, "zzz": 1}, says("[machine]", "'zzz'", "speed", "length")),
+        ({}, says("[machine]", "'speed'", "missing")),
     ):
         with pytest.raises(MachineError, match=words):
             make(Machine, table, "[machine]", MachineError)
-    with pytest.raises(MachineError, match=r"^a: kind 'lathee' is unknown; choose one of mill, lathe; did you mean la"):
+    with pytest.raises(MachineError, match=says("a", "kind", "'lathee'", "mill", "lathe")):
         chosen({"mill": 1, "lathe": 2}, "lathee", "a: ", MachineError)
-    with pytest.raises(MachineError, match=r"^unknown key run\.x; known ones are y$"):
+    with pytest.raises(MachineError, match=says("run.x", "y")):
         check_keys({"x": 1}, ["y"], "", MachineError, form="unknown key run.{}")
 
 
@@ -172,5 +173,5 @@ def test_a_limit_is_within_and_what_is_beyond_is_not(case):
 
 def test_limits_of_a_case_are_within():
     assert Case(fault={"misalignment": "-10 deg"}).fault.misalignment == pytest.approx(-math.pi / 18.0)
-    with pytest.raises(CaseError, match="give -10 to 10 deg"):
+    with pytest.raises(CaseError, match=says("-10 to 10 deg")):
         Case(fault={"misalignment": "-10.1 deg"})
