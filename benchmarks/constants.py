@@ -30,7 +30,7 @@ from benchmarks.markdown import table
 
 PACKAGE = "gearmbs.dae.integrators"
 FOLDER = Path(__file__).parents[1] / "gearmbs" / "dae" / "integrators"
-MODULES = ("bdf", "controller", "corrector", "driver", "initial_state", "newton_matrix", "step")
+MODULES = ("bdf", "controller", "corrector", "driver", "initial_state", "newton_matrix", "restart", "step")
 """Those that choose steps, orders and when a corrector ends; what the others hold is rounding, or tells failures."""
 LEFT_OUT = {
     "corrector": {"HELD", "ROUNDED_TERMS", "SETTLED_RATE", "GOLDEN_FRACTION"},
@@ -38,7 +38,8 @@ LEFT_OUT = {
     "driver": {"FIRST_MOVE", "FIRST_TRIED", "CHECK_RATIO", "LEAST_DIGITS", "HOPELESS_DIGITS", "UNSATISFIED"},
     "initial_state": {"LARGE_GAMMA"},
     "newton_matrix": {"PLANNED_RANGE", "LEAP"},
-    "step": {"FIRST_TARGET", "LANDED"},
+    "restart": {"FIRST_TARGET", "SETTLED", "BLOCK_ERROR", "SHORT_OF_STOP"},
+    "step": {"FORESEEN", "LANDED"},
 }
 """Constants of these modules that what is said of them fixes."""
 FACTORS = (0.5, 2.0)

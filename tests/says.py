@@ -11,7 +11,8 @@ FUNCTION_WORDS = set(
 )
 """Words that are no names even if a test uses them for something."""
 
-UNITS = {"mm", "kg", "Hz", "kHz", "rad", "deg", "ms", "MPa", "GPa", "rpm", "min"}
+VALUES = set("True False None nan inf mm kg Hz kHz rad deg ms MPa GPa rpm min".split())
+"""Numbers and units that are written as words."""
 
 
 def says(*words: str) -> str:
@@ -60,13 +61,13 @@ def _written(function: ast.FunctionDef, patterns: set[ast.AST]) -> set[str]:
 
 
 def words(pattern: str) -> list[str]:
-    """Return the words of a pattern without names by their looks, units and the syntax of patterns."""
+    """Return the words of a pattern without names by their looks, values and the syntax of patterns."""
     plain = re.sub(r"\\[sSdDwWbBn]|\(\?[a-z:=!<]+", " ", pattern)
     plain = re.sub(r"(?<!\w)'[^']*'|\"[^\"]*\"|`[^`]*`", " ", plain).replace("\\", "")
     found = []
     for token in re.findall(r"[\w./-]+", plain):
         if not re.search(r"[\d_]|[a-z][A-Z]|[A-Z]{2}|\w\.\w|^\.\w", token):
-            found += [word for word in re.findall("[A-Za-z]{2,}", token) if word not in UNITS]
+            found += [word for word in re.findall("[A-Za-z]{2,}", token) if word not in VALUES]
     return found
 
 

@@ -77,7 +77,7 @@ EXCEPTIONS = {
     ("adams", "solids"): "the bodies of a deck's Parasolid file, the type alone",
     ("studies", "gearmbs"): "a result says which version made it",
     ("studies", "dae.analyses"): "the modes of a drivetrain, the type alone",
-    ("studies", "dae.model"): "kernels that a run of many outputs calls, imported ahead of it",
+    ("studies", "dae.model"): "kernels of a run whose bodies turn about fixed axes, imported ahead of it",
     ("campaigns", "gearmbs"): "the card of a data set says which version made it",
     ("cli", "gearmbs"): "the version",
 }

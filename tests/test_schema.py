@@ -20,6 +20,7 @@ from gearmbs.schema.quantities import Measure, OneOf, OverTime
 from gearmbs.studies import Case, CaseError
 from gearmbs.units import Given, Quantity
 from tests.generators import cases, seed
+from tests.says import says
 
 GREASES = {"mineral": 1}
 
@@ -99,28 +100,28 @@ def test_fields_are_read_by_what_they_say():
 
 
 WRONG = [
-    ({"speed": "3 mm"}, r"Machine\.speed: '3 mm' is in .* a quantity in rad/s is expected"),
-    ({"speed": None}, r"Machine\.speed: got None; give a number in rad/s or text"),
-    ({"speed": math.inf}, r"Machine\.speed is inf; give a finite number"),
-    ({"length": 0}, r"Machine\.length is 0 m; it must be positive"),
-    ({"length": "-2 mm"}, r"Machine\.length is -0\.002 m; it must be positive"),
-    ({"gap": -1}, r"Machine\.gap is -1 m; it must not be negative"),
-    ({"tilt": 11}, r"tilt is 630\.\d+ deg; give -10 to 10 deg \(a plain number is in rad\)"),
-    ({"tilt": 5}, r"tilt is 286\.\d+ deg; .* in rad; write '5 deg' if that is meant\)"),
-    ({"share": 1}, r"share is 1; give a share such as 0\.1"),
-    ({"share": "much"}, r"share is 'much'; give a share such as 0\.1"),
-    ({"count": 2.5}, r"count is 2\.5; give a whole number, 1 to 9"),
-    ({"count": True}, r"count is True; give a whole number"),
-    ({"count": 10}, r"count is 10; give a whole number, 1 to 9"),
-    ({"at": [1, 2]}, r"at is \[1, 2\]; give a list of 3 values"),
-    ({"at": "1 mm"}, r"at is '1 mm'; give a list of 3 values"),
-    ({"levels": ["1 N"]}, r"levels is \['1 N'\]; give a list of 2 or more values"),
-    ({"factor": "3 mm"}, r"factor is '3 mm'; give a number"),
-    ({"grease": "lard"}, r"grease is 'lard'; choose mineral$"),
-    ({"side": "up"}, r"side is 'up'; choose 'left' or 'right'"),
-    ({"torque": math.nan}, r"torque is nan; give a finite number, a quantity or an expression of time"),
-    ({"wheel": "z1"}, r"wheel is 'z1'; give a GearSpec"),
-    ({"names": [1]}, r"names\[0\] is 1; give a text"),
+    ({"speed": "3 mm"}, says("Machine.speed", "'3 mm'", "rad/s")),
+    ({"speed": None}, says("Machine.speed", "None", "give a number")),
+    ({"speed": math.inf}, says("Machine.speed", "inf", "give", "finite")),
+    ({"length": 0}, says("Machine.length", "0 m", "positive")),
+    ({"length": "-2 mm"}, says("Machine.length", "-0.002 m", "positive")),
+    ({"gap": -1}, says("Machine.gap", "-1 m", "negative")),
+    ({"tilt": 11}, r"tilt .*630\.\d+ deg; .*-10 to 10 deg"),
+    ({"tilt": 5}, r"tilt is 286\.\d+ deg; .*write '5 deg'"),
+    ({"share": 1}, says("share", "1", "0.1", "give")),
+    ({"share": "much"}, says("share", "'much'", "0.1", "give")),
+    ({"count": 2.5}, says("count", "2.5", "1 to 9", "give")),
+    ({"count": True}, says("count", "True", "give", "whole")),
+    ({"count": 10}, says("count", "10", "1 to 9", "give")),
+    ({"at": [1, 2]}, says("at", "[1, 2]", "3 values", "give")),
+    ({"at": "1 mm"}, says("at", "'1 mm'", "3 values", "give")),
+    ({"levels": ["1 N"]}, says("levels", "['1 N']", "2 or more")),
+    ({"factor": "3 mm"}, says("factor", "'3 mm'", "give a number")),
+    ({"grease": "lard"}, r"grease .*'lard'; choose mineral$"),
+    ({"side": "up"}, says("side", "'up'", "choose 'left'", "'right'")),
+    ({"torque": math.nan}, says("torque", "nan", "expression")),
+    ({"wheel": "z1"}, says("wheel", "'z1'", "give", "GearSpec")),
+    ({"names": [1]}, says("names[0]", "1", "give a text")),
 ]
 
 
@@ -146,16 +147,16 @@ def test_a_table_may_get_a_row(monkeypatch):
 def test_tables_of_files_become_objects():
     assert make(Machine, {"speed": "60 rpm"}, "[machine]", MachineError, side="right").side == "right"
     for table, words in (
-        ({"sped": 1}, r"^\[machine\]: unknown key 'sped'; did you mean 'speed'\?"),
-        ({"speed": 1, "zzz": 1}, r"^\[machine\]: unknown key 'zzz'; known ones are speed, length"),
+        ({"sped": 1}, says("[machine]", "'sped'", "'speed'")),
+        ({"speed": 1, "zzz": 1}, says("[machine]", "'zzz'", "speed, length")),
         ({}, r"^\[machine\]: 'speed' is missing"),
     ):
         with pytest.raises(MachineError, match=words):
             make(Machine, table, "[machine]", MachineError)
-    with pytest.raises(MachineError, match=r"^a: kind 'lathee' is unknown; choose one of mill, lathe; did you mean la"):
+    with pytest.raises(MachineError, match=says("a", "'lathee'", "mill, lathe")):
         chosen({"mill": 1, "lathe": 2}, "lathee", "a: ", MachineError)
-    with pytest.raises(MachineError, match=r"^unknown key run\.x; known ones are y$"):
-        check_keys({"x": 1}, ["y"], "", MachineError, prefix="run.")
+    with pytest.raises(MachineError, match=r"run\.x; .*y$"):
+        check_keys({"x": 1}, ["y"], "", MachineError, form="unknown key run.{}")
 
 
 @pytest.mark.parametrize("case", range(cases(20)))

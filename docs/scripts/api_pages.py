@@ -27,7 +27,7 @@ PACKAGES = {
     "gearmbs.identify": "Identification: parameters from measurements",
     "gearmbs.adams": "ADAMS: decks in, results out",
     "gearmbs.view": "View: figures",
-    "gearmbs.units": "Units, files, progress and compilation",
+    "gearmbs.units": "Units, descriptions, files, progress and compilation",
 }
 
 EVERYTHING = ["*"]
@@ -143,6 +143,9 @@ MORE = {
     },
     "gearmbs.units": {
         "gearmbs.units": ["to_si"],
+        "gearmbs.schema.described": ["Described", "make", "measures_of"],
+        "gearmbs.schema.quantities": ["Measure", "OneOf", "OverTime"],
+        "gearmbs.schema.files": ["read_toml"],
         "gearmbs.kernels.ahead": ["compile_all"],
         "gearmbs.files": ["whole_file", "write_whole"],
         "gearmbs.saving": ["save"],

@@ -11,13 +11,12 @@ from gearmbs.bearings.clearance import ClearanceForce
 from gearmbs.bearings.defects import INNER, OUTER, Defect, LooseFit, as_defects
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
-from gearmbs.bearings.settings import BearingSettings
+from gearmbs.bearings.settings import bearing_settings
 from gearmbs.bearings.tables import pack
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.mechanism.parts.bodies import Body
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
 from gearmbs.mechanism.parts.quantities import Vector, frame_along
-from gearmbs.schema.described import make
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism
@@ -97,7 +96,7 @@ class RollingBearing(ForceElement):
 
     def __init__(self, name: str, i: Any, j: Any, bearing: Bearing, **settings: Any) -> None:
         super().__init__(name, i, j)
-        self.settings = make(BearingSettings, settings, "RollingBearing", BearingError, bearing=bearing)
+        self.settings = bearing_settings(bearing, settings, "RollingBearing")
         self.tables = pack(self.settings)
         angle = self.settings.cage_angle
         self._states = (State(f"{name}.cage", start=angle),) + tuple(

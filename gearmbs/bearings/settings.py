@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from gearmbs.bearings.defects import LooseFit, as_defects
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
-from gearmbs.schema.described import Described
+from gearmbs.schema.described import Described, make
 from gearmbs.schema.quantities import Measure, OneOf
 from gearmbs.units import Quantity
 
@@ -53,3 +54,8 @@ class BearingSettings(Described):
                 "RollingBearing.defects holds a LooseFit: such a ring is a body; use gearmbs.bearings.add_bearing",
             )
             defect.check(self.bearing)
+
+
+def bearing_settings(bearing: Bearing, given: Mapping[str, Any], label: str) -> BearingSettings:
+    """Return the settings of a bearing; ``label`` is what messages about their names begin with."""
+    return make(BearingSettings, given, label, BearingError, "{!r} is unknown", bearing=bearing)

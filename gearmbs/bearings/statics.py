@@ -19,9 +19,8 @@ from gearmbs.bearings import layout as B
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
 from gearmbs.bearings.kinds import KINDS
-from gearmbs.bearings.settings import BearingSettings
+from gearmbs.bearings.settings import bearing_settings
 from gearmbs.bearings.tables import BearingTables, pack
-from gearmbs.schema.described import make
 from gearmbs.units import Quantity, to_si
 
 # Where a load puts the inner ring: the minimum of a convex potential, and which loads have none.
@@ -365,7 +364,7 @@ class BearingStatics:
     """
 
     def __init__(self, bearing: Bearing, *, speed: Quantity = 0.0, **settings: Any) -> None:
-        self.settings = make(BearingSettings, settings, "BearingStatics", BearingError, bearing=bearing)
+        self.settings = bearing_settings(bearing, settings, "BearingStatics")
         try:
             self.speed = to_si(speed, "angular speed", "speed")
         except TypeError as error:

@@ -45,7 +45,7 @@ def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str
     CampaignError
         For unknown names and values that cannot be meant.
     """
-    check_keys(given, [f.name for f in dataclasses.fields(cls)], "plan", CampaignError, what="setting")
+    check_keys(given, [f.name for f in dataclasses.fields(cls)], "plan", CampaignError, form="unknown setting {!r}")
     found = dict(given)
     for name in ("constraints", "reuse"):
         if name in found:

@@ -90,6 +90,7 @@ INTEGRATORS: dict[str, Integrator] = {
             "min_step",
             "max_iterations",
             "max_steps",
+            "breakpoints",
             "progress",
         ),
         highest_order=5,

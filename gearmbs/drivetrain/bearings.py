@@ -13,7 +13,6 @@ from gearmbs.drivetrain.errors import require, told_of
 from gearmbs.drivetrain.part import Part
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement
-from gearmbs.schema.described import make
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
 
@@ -248,14 +247,14 @@ class RollingContactBearing(Bearing):
     def __post_init__(self) -> None:
         super().__post_init__()
         require(self.rolling is not None, f"{self.label}: rolling is missing; give a designation such as '6205'")
-        from gearmbs.bearings import BearingError, LooseFit
+        from gearmbs.bearings import LooseFit
         from gearmbs.bearings.defects import as_defects
-        from gearmbs.bearings.settings import BearingSettings
+        from gearmbs.bearings.settings import bearing_settings
 
         with told_of(f"{self.label}: settings"):
             on_rings = [d for d in as_defects(self.settings.get("defects", ())) if not isinstance(d, LooseFit)]
             checked = {**self.settings, "defects": on_rings}
-            make(BearingSettings, checked, "RollingBearing", BearingError, bearing=self.rolling)
+            bearing_settings(self.rolling, checked, "RollingBearing")
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
         from gearmbs.bearings.element import add_bearing

@@ -452,10 +452,17 @@ class GearPair(PairGeometry, Shown):
 
     def driven_angle(self, driver_angle: float = 0.0) -> float:
         """Angle of the driven wheel at which the drive flanks just touch (kinematic contact, no load), rad."""
-        # the contact kernels are compiled for this only
-        from gearmbs.gears.transmission import touching_angle
+        if driver_angle not in self._driven_angles:
+            # the contact kernels are compiled for this only
+            from gearmbs.gears.transmission import touching_angle
 
-        return touching_angle(self, driver_angle)
+            self._driven_angles[driver_angle] = touching_angle(self, driver_angle)
+        return self._driven_angles[driver_angle]
+
+    @cached_property
+    def _driven_angles(self) -> dict[float, float]:
+        """Angles of the driven wheel found so far, by that of the driver, rad."""
+        return {}
 
     def _backlash_shown(self) -> str:
         """The backlash as it was given where nothing else has changed it."""

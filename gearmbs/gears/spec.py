@@ -27,7 +27,8 @@ def convert_fields(obj: object, units: dict[str, str], owner: str) -> None:
     """Replace text by SI numbers in the named fields of a frozen dataclass."""
     for name, unit in units.items():
         value = getattr(obj, name)
-        if value is not None:
+        # numbers, and texts that have been read, are in SI already
+        if value is not None and (type(value) not in (float, Given) or math.isnan(value)):
             object.__setattr__(obj, name, to_si(value, unit, f"{owner}.{name}"))
 
 

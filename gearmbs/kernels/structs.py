@@ -78,6 +78,7 @@ class Struct:
     scalar_members: ClassVar[Mapping[str, str]]
     array_members: ClassVar[Mapping[str, tuple[str, int]]]
     numba_type: ClassVar[StructType]
+    _numba_type_: ClassVar[StructType]
     _record_type: ClassVar[type[ctypes.Structure]]
     _casts: ClassVar[Mapping[str, Callable[[Any], Any]]]
     _arrays: ClassVar[Mapping[str, tuple[np.dtype, int, int]]]
@@ -93,6 +94,8 @@ class Struct:
             tuple(cls.scalar_members.items()),
             tuple((name, *kind) for name, kind in cls.array_members.items()),
         )
+        # numba asks for it by this name before it looks any further
+        cls._numba_type_ = cls.numba_type
         arrays, words = {}, 0
         for name, (kind, dimensions) in cls.array_members.items():
             arrays[name] = np.dtype(kind), dimensions, words

@@ -151,7 +151,8 @@ def warn_of_stiff_seats(joints: Mapping[str, Joint], elements: Mapping[str, Any]
     worst: dict[ModalBody, dict[str, tuple[float, str, str]]] = {}
     for part, marker, axes in _held(joints, elements):
         body = marker.body
-        if not isinstance(body, ModalBody) or body.lost_turning is None:
+        assert isinstance(body, ModalBody)
+        if body.lost_turning is None:
             continue
         turned = body.shape_at(marker)[1] if axes else None
         for axis in axes:
@@ -181,15 +182,16 @@ def _kind(body: ModalBody, axis: np.ndarray) -> str:
 
 
 def _held(joints: Mapping[str, Joint], elements: Mapping[str, Any]) -> Iterator[tuple[str, Marker, list[np.ndarray]]]:
-    """Yield what turns a marker, the marker, and the axes about which, in its own components."""
+    """Yield what turns a marker of a modal body, the marker, and the axes about which, in its own components."""
     for joint in joints.values():
-        axes = _directions(joint)
         for marker in (joint.i, joint.j):
-            yield joint.name, marker, axes
+            if isinstance(marker.body, ModalBody):
+                yield joint.name, marker, _directions(joint)
     for element in elements.values():
         if getattr(element, "kind", "") in MESHES:
             for marker in (element.i, element.j):
-                yield element.name, marker, [np.array([0.0, 0.0, 1.0])]
+                if isinstance(marker.body, ModalBody):
+                    yield element.name, marker, [np.array([0.0, 0.0, 1.0])]
 
 
 def _directions(joint: Joint) -> list[np.ndarray]:

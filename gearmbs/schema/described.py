@@ -9,7 +9,7 @@ from types import UnionType
 from typing import Any, ClassVar, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from gearmbs._shown import Written
-from gearmbs.schema.messages import check_keys, faults, line, path_of, remedy
+from gearmbs.schema.messages import UNKNOWN, check_keys, faults, line, path_of, remedy
 from gearmbs.schema.quantities import Measure
 
 T = TypeVar("T")
@@ -92,8 +92,23 @@ def measures_of(kind: Any) -> dict[str, Measure]:
     return {name: item for name, hint in _hints(kind).items() for item in get_args(hint) if isinstance(item, Measure)}
 
 
-def make(kind: type[T], table: Mapping[str, Any], where: str, error: type[ValueError], **others: Any) -> T:
+def make(
+    kind: type[T], table: Mapping[str, Any], where: str, error: type[ValueError], form: str = UNKNOWN, **others: Any
+) -> T:
     """Return an object of a class of descriptions from a table of a file and what else is known of it.
+
+    Parameters
+    ----------
+    kind : type
+    table : mapping
+        Fields by name.
+    where : str
+        What messages about its keys begin with, such as "[run]".
+    error : type
+    form : str
+        See `gearmbs.schema.messages.unknown`.
+    **others
+        Fields that the table does not hold.
 
     Raises
     ------
@@ -101,7 +116,7 @@ def make(kind: type[T], table: Mapping[str, Any], where: str, error: type[ValueE
         ``error``, for unknown and missing keys; the class's own for wrong values.
     """
     known = [f for f in fields(kind) if f.init and f.name not in others]  # type: ignore[arg-type]
-    check_keys(table, [f.name for f in known], where, error, shown=repr)
+    check_keys(table, [f.name for f in known], where, error, form=form, shown=repr)
     for field in known:
         if field.default is MISSING and field.default_factory is MISSING and field.name not in table:
             raise error(f"{where}: {field.name!r} is missing")

@@ -33,6 +33,7 @@ WORDS = {
 }
 """What is said of kinds of faults; all others are told in the words of our own checks."""
 
+UNKNOWN = "unknown key {!r}"
 OWN = ("value_error", "assertion_error")
 WAYS = ("function-", "tuple[", "float", "constrained", "is-instance", "union[", "nullable")
 """How ways to read one value begin in the place of a fault; they name no field."""
@@ -77,16 +78,19 @@ def line(field: str, value: Any, cause: Any) -> str:
 
 
 def unknown(
-    key: object,
-    known: Iterable[str],
-    what: str = "key",
-    shown: Callable[[str], str] = str,
-    listed: bool = False,
-    prefix: str | None = None,
+    key: object, known: Iterable[str], form: str = UNKNOWN, shown: Callable[[str], str] = str, listed: bool = False
 ) -> str:
     """Return what is said of an unknown key: what may be meant, else or if ``listed`` what there is.
 
-    The key is quoted, unless there is a ``prefix``, as "operation.", that makes it a place.
+    Parameters
+    ----------
+    key
+    known : iterable of str
+    form : str
+        How the key is named, with a place for it.
+    shown : callable
+        How what may be meant is written.
+    listed : bool
 
     Examples
     --------
@@ -96,8 +100,7 @@ def unknown(
     known = list(known)
     names = f"; known ones are {', '.join(known)}"
     meant = did_you_mean(key, known, before="; ", otherwise="" if listed else names, shown=shown)
-    given = repr(key) if prefix is None else f"{prefix}{key}"
-    return f"unknown {what} {given}{names if listed else ''}{meant}"
+    return f"{form.format(key)}{names if listed else ''}{meant}"
 
 
 def check_keys(

@@ -179,7 +179,7 @@ class Measure:
         return tuple(points)
 
     def _one(self, value: Any) -> Any:
-        number = in_si(value, self.dimension)
+        number: Any = in_si(value, self.dimension)
         if self.unit == "1" and isinstance(value, Real):
             # a whole number stays one
             number = value

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 
 from gearmbs.adams.parse import grammar as g
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import REQUIRED
-from gearmbs.adams.parse.reader import GRAMMARS
+from gearmbs.adams.parse.grammar import grammar_of, specs_of
 from gearmbs.adams.parse.source import CONTINUED, RawStatement, statements
 
 from .mutations import NUMBER
@@ -45,6 +44,8 @@ ADDED = [
     "VTORQUE/{n}, I={m}, RM={m}, JFLOAT=999{d}, TX={e}\\TY=0\\TZ={x}\nMARKER/999{d}, PART=1, FLOATING",
 ]  # fmt: skip
 SIX = ", ".join(str(float(i == j)) for i in range(6) for j in range(6))
+
+REQUIRED = {cls: [name for name, spec in specs_of(cls).items() if spec.required] for cls in st.STATEMENTS.values()}
 
 
 @dataclass
@@ -87,7 +88,7 @@ def pieces(deck: str) -> tuple[str, list[Piece]]:
         head = _HEAD.match(raw.text)
         cls = st.STATEMENTS.get(head.group(1).upper()) if head else None
         if head is not None and cls is not None:
-            reader = _Places(raw, head.end(), GRAMMARS[cls])
+            reader = _Places(raw, head.end(), grammar_of(cls))
             try:
                 reader.read()
             except g.StatementError:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from gearmbs.adams.parse import grammar as g
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import MEASURES
-from gearmbs.adams.parse.reader import GRAMMARS
+from gearmbs.adams.parse.grammar import grammar_of
 from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, UNARY
 
 SPICE = ["/", ",", "=", "\\", "(", ")", "!", "&", ";", "\n", "\n,", "D", "E", "90D", "1E400", "-", "0", "\x00", "\t",
@@ -17,7 +17,7 @@ SPICE = ["/", ",", "=", "\\", "(", ")", "!", "&", ";", "\n", "\n,", "D", "E", "9
 NUMBERS = ["0", "1", "-1", "2", "1E-300", "1E300", "1E12", "-1E9", "1E-9", "0.5", "180D", "99999999",
            "999999999999999999", "3.5", "-0", "1E3D", "7E-3"]  # fmt: skip
 WORDS = sorted(
-    {word for grammar in GRAMMARS.values() for word in grammar.words}
+    {word for grammar in map(grammar_of, st.STATEMENTS.values()) for word in grammar.words}
     | {*st.STATEMENTS, *MEASURES, *ELEMENT_FORCES, *UNARY, *BINARY}
 )
 NUMBER = re.compile(r"(?<![A-Za-z_0-9.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?D?")
@@ -103,7 +103,7 @@ def argument(text: str, rng: random.Random) -> str:
     cls = st.STATEMENTS.get(keyword)
     if cls is None:
         return text
-    name, (_, spec, choice) = rng.choice(list(GRAMMARS[cls].words.items()))
+    name, (_, spec, choice) = rng.choice(list(grammar_of(cls).words.items()))
     rows[at] += ", " + _argument(name, spec, choice, _ids(text), rng)
     return "\n".join(rows)
 
@@ -113,7 +113,7 @@ def statement(text: str, rng: random.Random) -> str:
     ids = _ids(text)
     name = rng.choice(sorted(st.STATEMENTS))
     cls = st.STATEMENTS[name]
-    words = list(GRAMMARS[cls].words.items())
+    words = list(grammar_of(cls).words.items())
     chosen = rng.sample(words, min(len(words), rng.randint(1, 8)))
     head = f"{name}/" if name in st.WITHOUT_ID else f"{name}/{rng.choice([rng.choice(ids), str(rng.randint(1, 9))])},"
     made = head + ", ".join(_argument(word_, spec, choice, ids, rng) for word_, (_, spec, choice) in chosen)

@@ -15,13 +15,15 @@ from gearmbs.adams.builders.flexible import DEFORMING
 from gearmbs.adams.builders.mechanism import MAKERS
 from gearmbs.adams.builders.routines import BINDERS
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS
 from gearmbs.adams.parse.commands import UNSUPPORTED_COMMANDS
 from gearmbs.adams.parse.grammar import specs_of
 from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
 
 from .decks import PENDULUM
 
+UNSUPPORTED_ARGUMENTS = {
+    cls: [name for name, spec in specs_of(cls).items() if spec.instead is not None] for cls in st.STATEMENTS.values()
+}
 PACKAGE = Path(gearmbs.adams.__file__).parent
 ROWS = ("parse/statements.py", "parse/model_statements.py", "parse/data_statements.py")
 """Where the rows of statements are; those of what builds them stand beside the functions that do."""

@@ -12,7 +12,7 @@ from gearmbs.adams import parse_deck, run_deck
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
 from gearmbs.adams.parse.statements import KINDS
-from gearmbs.adams.results.res import ENTITY_TYPES, NAMESPACE
+from gearmbs.adams.results.res import NAMESPACE
 
 from .requests import read_requests
 from .test_run import model
@@ -55,6 +55,9 @@ ELEMENTS = {
     "CVCV/7,ICURVE=1,IRM=21,JCURVE=2,JRM=10",
     "friction": "FRICTION/7,JOINT=1,MU_STATIC=0.3,MU_DYNAMIC=0.2,PIN_RADIUS=0.1",
 }
+
+
+ENTITY_TYPES = {kind: cls.entity for cls, kind in KINDS.items()}
 
 
 def test_every_kind_is_tried():

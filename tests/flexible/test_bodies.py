@@ -35,6 +35,7 @@ def test_a_wheel_has_the_mass_of_its_section_and_a_web_that_gives_way():
     assert 1.5 < ratio < 3.0
 
 
+@pytest.mark.slow
 def test_hub_and_rim_of_a_wheel_are_seats_of_their_own():
     """A torque between them twists hub, web and rim, each T / (4 pi G t) (1/a^2 - 1/b^2) between its radii a and b."""
     steel = ElasticMaterial()
@@ -58,6 +59,7 @@ def test_hub_and_rim_of_a_wheel_are_seats_of_their_own():
         wheel.seat_marker(body, "tooth")
 
 
+@pytest.mark.slow
 def test_a_carrier_is_twisted_by_its_planets():
     """With the slowest modes alone it is rigid in torsion, and says so; all of the reduction have it."""
     twist = {}
@@ -99,6 +101,7 @@ def test_a_carrier_twists_by_its_pins_as_it_is_round():
     np.testing.assert_allclose(lifted, lifted[0], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_housing_of_a_hundred_modes_runs_between_its_bearings_and_mounts():
     """A shaft on two bearings in the end walls, four mounts below: weight and load come out at the mounts."""
     housing = box_housing(

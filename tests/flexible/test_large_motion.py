@@ -176,6 +176,7 @@ cables: 4 elements, implicit Euler of the first order with steps of 0.1 ms.
 """
 
 
+@pytest.mark.slow
 def test_a_very_flexible_pendulum_follows_the_published_one():
     """Hinged at one end, it falls and turns about the vertical; 48 elements instead of 24 change it by 2 mm in 1 s."""
     share, length, elements = 5.0, 1.0, 24
@@ -335,6 +336,7 @@ def falling_rod(stiffness, elements=0):
     return solution.marker_position(tip)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*lack the stiffening by centrifugal force")
 def test_a_flexible_pendulum_parts_from_beams_of_large_rotation_by_the_square_of_its_deflection():
     """Twice as stiff, a rod bends half as far; what modes leave out (foreshortening, stiffening) falls to a quarter."""

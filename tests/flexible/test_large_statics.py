@@ -55,6 +55,7 @@ def test_a_cantilever_bends_as_the_elastica(load):
     np.testing.assert_allclose(np.linalg.norm(found.reactions["clamp"][0]), load * SECTION.bending[0], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_errors_fall_with_the_square_of_the_elements():
     ends = [pulled(3.0, n).com_position(f"rod.{n}")[[0, 2]] * [1, -1] for n in (10, 20, 40)]
     errors = [np.abs(end - elastica(3.0)).max() for end in ends]
@@ -62,6 +63,7 @@ def test_errors_fall_with_the_square_of_the_elements():
     np.testing.assert_allclose((4.0 * ends[2] - ends[1]) / 3.0, elastica(3.0), atol=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turns", [0.25, 1.0])
 def test_a_torque_at_the_end_bends_a_rod_into_a_circle(turns):
     m, beam = rod(32)

@@ -214,6 +214,7 @@ def block_body():
     return block, [Interface("low", low), Interface("top", top, "average")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "method"),
     [(rotor_body, "craig-bampton"), (rotor_body, "free"), (plate_body, "craig-bampton"), (block_body, "craig-bampton")],

@@ -82,6 +82,7 @@ def test_step_of_a_tube_has_both_nominal_stresses():
     np.testing.assert_allclose(largest[0.01], 50 * 0.01 / (np.pi / 4 * 0.01**4), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_block_bends_as_a_beam():
     pytest.importorskip("skfem")
     side, moment = 0.02, 10.0

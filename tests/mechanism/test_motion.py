@@ -288,3 +288,37 @@ def test_flips_of_a_tumbling_body(tol, off):
     times = solution.t[k] - spin[k] * (solution.t[k + 1] - solution.t[k]) / (spin[k + 1] - spin[k])
     assert len(times) >= 6
     assert abs(times[5] - times[0] - 5.0 * flip) < off * flip
+
+
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("lump", [False, True])
+def test_a_pulse_of_a_millisecond_in_a_second_is_not_missed(integrator, lump):
+    """500 N for 1 ms, given by an expression that jumps and its instants as breakpoints: 0.5 N s on 2 kg.
+
+    The pulse may belong to its ends or not; of two bodies one is pushed, and a torque turns the other by as much.
+    """
+    for begins, ends in (("TIME - 0.4", "TIME - 0.401"), ("TIME - 0.4 - 1E-15", "TIME - 0.401 - 1E-15")):
+        m = Mechanism("pushed")
+        push = f"500*(IF({begins}: 0, 1, 1) - IF({ends}: 0, 1, 1))"
+        slide = m.body("slide", 2.0, (1.0, 1.0, 1.0))
+        wheel = m.body("wheel", 2.0, (1.0, 1.0, 2.0))
+        m.translational("rail", slide, m.ground, axis=(0, 0, 1))
+        m.revolute("axle", wheel, m.ground, axis=(0, 0, 1))
+        m.axis_force("push", slide.marker(), m.ground.marker(), push)
+        m.axis_torque("turn", wheel.marker(), m.ground.marker(), push)
+        solution = m.simulate(1.0, integrator=integrator, tol=1e-7, breakpoints=[0.4, 0.401], lump=lump)
+        assert solution.success, solution.message
+        np.testing.assert_allclose(solution.com_velocity("slide")[-1], [0, 0, 0.25], atol=2e-6)
+        np.testing.assert_allclose(solution.angular_velocity("wheel")[-1], [0, 0, 0.25], atol=2e-6)
+
+
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+def test_a_motion_whose_acceleration_jumps_between_breakpoints(integrator):
+    """A crank that is driven faster for 2 ms only: 0.5 a t^2 with a = 2e4 rad/s^2, then on at its speed of 40 rad/s."""
+    m = Mechanism("driven")
+    crank = m.body("crank", 2.0, (1.0, 1.0, 2.0), com=(0.1, 0, 0))
+    axle = m.revolute("axle", crank, m.ground, axis=(0, 0, 1))
+    m.rotation("drive", axle, "1E4*(MAX(0, TIME - 0.4)**2 - MAX(0, TIME - 0.402)**2)")
+    solution = m.simulate(1.0, integrator=integrator, tol=1e-7, breakpoints=[0.4, 0.402])
+    assert solution.success, solution.message
+    assert solution.angular_velocity("crank")[-1, 2] == pytest.approx(40.0, abs=2e-5)

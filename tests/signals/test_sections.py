@@ -52,7 +52,9 @@ def test_texts_keep_all_digits_in_the_legacy_print_mode(tmp_path):
     np.testing.assert_array_equal(read_signal(path).values, record(1.0).values)
 
 
-@pytest.mark.parametrize("format", NAMES)
+@pytest.mark.parametrize(
+    "format", [pytest.param(name, marks=pytest.mark.slow) if name == "csv.gz" else name for name in NAMES]
+)
 def test_sections_put_together_are_the_record(tmp_path, format):
     whole = record()
     path = write_signal(whole, tmp_path / NAMES[format], format=format)

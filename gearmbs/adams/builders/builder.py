@@ -155,7 +155,7 @@ class Builder:
             except (ModelError, ValueError) as error:
                 self.remark(ERROR, statement, str(error))
             except LeftOutError as error:
-                self.left_out.add((st.KEYWORD_OF[type(statement)], statement.id))
+                self.left_out.add((statement.keyword, statement.id))
                 self.unsupported(statement, str(error))
             except ArithmeticError:
                 self.remark(ERROR, statement, "its numbers are too large or too small to compute with")
@@ -170,7 +170,7 @@ class Builder:
 
     def claim(self, statement: st.Statement, kind: str) -> str:
         """Return a unique name for a statement and remember it."""
-        keyword = st.KEYWORD_OF[type(statement)]
+        keyword = statement.keyword
         name = (statement.name or f"{keyword}_{statement.id}").replace('"', "'")
         while name in self._taken:
             name = f"{name}_{keyword}_{statement.id}"
@@ -187,7 +187,7 @@ class Builder:
             for statement in self.deck.of(cls).values():
                 self.model.pairs[kind, statement.id] = marker_pair(self.deck, statement)
                 joint = resting_joint(statement, self.inactive)
-                if joint is not None and (st.KEYWORD_OF[cls], statement.id) not in self.inactive:
+                if joint is not None and (cls.keyword, statement.id) not in self.inactive:
                     self.remark(WARNING, statement, f"rests while JOINT/{joint} is inactive", " ")
 
     def text(self, source: str) -> str:

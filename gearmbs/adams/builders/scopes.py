@@ -38,7 +38,7 @@ def resting_joint(s: st.Statement, inactive: frozenset[tuple[str, int]]) -> int 
 
 def acts(s: st.Statement, inactive: frozenset[tuple[str, int]]) -> bool:
     """Whether an element is active, and the joints it needs are."""
-    return (st.KEYWORD_OF[type(s)], s.id) not in inactive and resting_joint(s, inactive) is None
+    return (s.keyword, s.id) not in inactive and resting_joint(s, inactive) is None
 
 
 def marker_pair(deck: Deck, s: Any) -> tuple[int, int | None]:

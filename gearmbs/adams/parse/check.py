@@ -13,18 +13,11 @@ from gearmbs.mechanism.forces.friction import KINDS
 from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
 
-def _with(fact: Callable[[Spec], bool]) -> dict[type, tuple[str, ...]]:
-    """Return of each statement the arguments of which something holds."""
-    found = {cls: tuple(name for name, spec in specs_of(cls).items() if fact(spec)) for cls in st.STATEMENTS.values()}
-    return {cls: names for cls, names in found.items() if names}
+def arguments(cls: type, fact: Callable[[Spec], object]) -> list[str]:
+    """Return the arguments of a statement of which something holds."""
+    return [name for name, spec in specs_of(cls).items() if fact(spec)]
 
 
-REQUIRED = _with(lambda spec: spec.required)
-POSITIVE = _with(lambda spec: spec.positive)
-"""Arguments that must be positive where they are given."""
-UNSUPPORTED_ARGUMENTS = _with(lambda spec: spec.instead is not None)
-WITHOUT_EFFECT = _with(lambda spec: bool(spec.idle))
-"""Arguments that are read and change nothing: each is remarked on."""
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
     WDTX WDTY WDTZ WDTM""".split()
@@ -56,12 +49,12 @@ def check(deck: Deck) -> list[Diagnostic]:
     _check_ground(deck, errors)
     for statement in deck:
         cls = type(statement)
-        required = REQUIRED.get(cls, ())
+        required = arguments(cls, lambda spec: spec.required)
         if cls is st.Marker and (statement.flex_body or statement.point_mass or statement.fe_part):  # type: ignore[attr-defined]
-            required = ()
+            required = []
         if getattr(statement, "data_file", None) or _by_routine(statement):
             # the file has them, or a routine of the user
-            required = ()
+            required = []
         for name in required:
             if getattr(statement, name) in (None, ()):
                 keyword = _choices(cls, name) if specs_of(cls)[name].kind == CHOICE else name.upper()
@@ -69,7 +62,7 @@ def check(deck: Deck) -> list[Diagnostic]:
         for name in refused_arguments(statement):
             message = refused_message(statement, name)
             deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
-        for name in POSITIVE.get(cls, ()):
+        for name in arguments(cls, lambda spec: spec.positive):
             value = getattr(statement, name)
             if value is not None and not value > 0.0:
                 fail(statement, f"{specs_of(cls)[name].keyword} = {value}; it must be positive", name)
@@ -114,7 +107,7 @@ def _by_routine(statement: st.Statement) -> bool:
 
 def refused_arguments(statement: st.Statement) -> list[str]:
     """Return the arguments of a statement that are not supported, but for those that switch something off."""
-    names = UNSUPPORTED_ARGUMENTS.get(type(statement), ())
+    names = arguments(type(statement), lambda spec: spec.instead is not None)
     return [name for name in names if name in statement.given and getattr(statement, name) != "OFF"]
 
 
@@ -129,7 +122,7 @@ def _remark_idle(deck: Deck) -> None:
         if isinstance(statement, st.CurveStatement) and _by_routine(statement):
             # its routine gives the points from MINPAR to MAXPAR
             continue
-        for name in WITHOUT_EFFECT.get(type(statement), ()):
+        for name in arguments(type(statement), lambda spec: spec.idle):
             # a CURVE's routine is asked from MINPAR to MAXPAR
             ranges = isinstance(statement, st.CurveStatement) and _by_routine(statement)
             if name in statement.given and not ranges:

@@ -19,11 +19,11 @@ from gearmbs.adams.parse.grammar import (
     REAL,
     TEXT,
     ArgumentReader,
-    Grammar,
     StatementError,
     arg,
+    grammar_of,
 )
-from gearmbs.adams.parse.reader import GRAMMARS, read_statement, resolve_statement, unknown_statement
+from gearmbs.adams.parse.reader import read_statement, resolve_statement, unknown_statement
 from gearmbs.adams.parse.source import CONTINUED, RawStatement, read_file, statements
 from gearmbs.wording import did_you_mean
 
@@ -121,7 +121,6 @@ FIXED = tuple(sorted(name for name, cls in st.STATEMENTS.items() if not cls.chan
 IGNORED_COMMANDS = ("PREFERENCES", "HELP", "INFO", "MENU", "SHOW", "TIME", "DEBUG", "ENVIRONMENT", "LSOLVER")
 UNSUPPORTED_COMMANDS = ("SAVE", "RELOAD", "CONTROL", "FLEX_BODY")
 _NAMES = (*COMMANDS, *CHANGEABLE, *IGNORED_COMMANDS, *UNSUPPORTED_COMMANDS)
-_GRAMMARS = {cls: Grammar(cls) for cls in {Simulate, Switch, FileCommand, Linear}}
 
 
 @dataclass
@@ -290,7 +289,7 @@ def _typed(name: str, match: re.Match[str], raw: RawStatement, script: Script) -
     if number:
         raise StatementError(f"{name} has no id")
     cls = COMMANDS[name]
-    reader = ArgumentReader(raw, match.end(), _GRAMMARS[cls])
+    reader = ArgumentReader(raw, match.end(), grammar_of(cls))
     values = reader.read()
     if name == "DEACTIVATE":
         values["on"] = False
@@ -348,4 +347,4 @@ def apply_change(old: st.Statement, change: st.Statement) -> st.Statement:
     return replace(old, **{name: getattr(change, name) for name in change.given})
 
 
-__all__ = ["GRAMMARS", "Script", "apply_change", "parse_script", "read_script"]
+__all__ = ["Script", "apply_change", "parse_script", "read_script"]

@@ -45,7 +45,7 @@ class Deck:
 
     title: str = ""
     file: str = "<deck>"
-    items: dict[type, dict[int, Any]] = field(default_factory=dict)
+    items: dict[type[st.Statement], dict[int, Any]] = field(default_factory=dict)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     unread: dict[tuple[str, int], RawStatement] = field(default_factory=dict)
     functions: dict[str, UserFunction] = field(default_factory=dict)
@@ -87,7 +87,7 @@ class Deck:
     def summary(self) -> str:
         """Return a table of what the deck holds and what was left out."""
         lines = [f"{self.title or '(no title)'}  [{self.file}]"]
-        lines += [f"  {st.KEYWORD_OF[kind]:14s} {len(group)}" for kind, group in self.items.items()]
+        lines += [f"  {kind.keyword:14s} {len(group)}" for kind, group in self.items.items()]
         lines += [f"  {d}" for d in self.diagnostics]
         return "\n".join(lines)
 

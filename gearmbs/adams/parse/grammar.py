@@ -115,6 +115,8 @@ class Statement:
 
     table: ClassVar[dict[str, type[Statement]]] = {}
     """All statements that are read, by name."""
+    kinds: ClassVar[dict[type[Statement], str]] = {}
+    """Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
     keyword: ClassVar[str] = ""
     entity: ClassVar[str] = ""
     subroutine: ClassVar[str] = ""
@@ -181,6 +183,8 @@ class Statement:
         cls.switch = switch or ("acts" if entity else "")
         if read:
             Statement.table[cls.keyword] = cls
+        if entity:
+            Statement.kinds[cls] = cls.keyword.lower()
 
     def label(self) -> str:
         """Return the statement as a modeller names it, for instance JOINT/3."""
@@ -226,6 +230,16 @@ class Grammar:
         """Return that a word is no argument, and which it may have been meant to be; None if it resembles none."""
         meant = did_you_mean(word.upper()[:40], self.words) if word[:1].isalpha() else ""
         return f"unknown argument {word.upper()[:40]}; {meant}" if meant else None
+
+
+_GRAMMARS: dict[type, Grammar] = {}
+
+
+def grammar_of(cls: type) -> Grammar:
+    """Return the keywords of a class of statements or commands."""
+    if cls not in _GRAMMARS:
+        _GRAMMARS[cls] = Grammar(cls)
+    return _GRAMMARS[cls]
 
 
 class ArgumentReader:

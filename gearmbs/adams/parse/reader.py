@@ -10,14 +10,17 @@ from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, remark_defaults
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.grammar import ArgumentReader, Grammar, StatementError
+from gearmbs.adams.parse.grammar import ArgumentReader, StatementError, grammar_of
 from gearmbs.adams.parse.source import RawStatement, read_file, statements
 from gearmbs.progress import waiting
 from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
-GRAMMARS: dict[type, Grammar] = {cls: Grammar(cls) for cls in st.STATEMENTS.values()}
-_NAMES = (*sorted(st.STATEMENTS), *sorted(st.IGNORED), *sorted(st.UNSUPPORTED), "END")
+
+
+def _names() -> list[str]:
+    """Return the names of all statements that are known."""
+    return [*sorted(st.STATEMENTS), *sorted(st.IGNORED), *sorted(st.UNSUPPORTED), "END"]
 
 
 @waiting("reading the deck")
@@ -77,10 +80,10 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
     return deck
 
 
-def resolve_statement(word: str, names: Iterable[str] = _NAMES) -> str | None:
+def resolve_statement(word: str, names: Iterable[str] | None = None) -> str | None:
     """Return the full name of a possibly shortened statement, None when it is unknown or ambiguous."""
     upper = word.upper()
-    names = tuple(names)
+    names = tuple(_names() if names is None else names)
     if upper in names:
         return upper
     found = [n for n in names if n.startswith(upper)]
@@ -104,7 +107,7 @@ def _take(deck: Deck, raw: RawStatement, errors: list[Diagnostic]) -> bool:
         return False
     name = resolve_statement(match.group(1))
     if name is None:
-        fail(unknown_statement(match.group(1), _NAMES))
+        fail(unknown_statement(match.group(1), _names()))
         return False
     if name == "END":
         return True
@@ -171,7 +174,7 @@ def read_statement(name: str, number: int, raw: RawStatement, start: int, file: 
             raise StatementError(f"{name} has no id; write {name}/")
     elif not number:
         raise StatementError(f"an id is missing; write {name}/1")
-    reader = ArgumentReader(raw, start, GRAMMARS[cls])
+    reader = ArgumentReader(raw, start, grammar_of(cls))
     values = reader.read()
     return cls(id=number, file=file, line=raw.line, name=raw.view_name, given=reader.lines, pair=raw.pair, **values)
 

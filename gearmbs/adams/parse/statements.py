@@ -18,9 +18,7 @@ STATEMENTS: dict[str, type[Statement]] = Statement.table
 """What is read, by name."""
 KEYWORD_OF = {cls: keyword for keyword, cls in STATEMENTS.items()}
 
-KINDS: dict[type[Statement], str] = {cls: cls.keyword.lower() for cls in STATEMENTS.values() if cls.entity}
-"""Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
-
+KINDS = Statement.kinds
 WITHOUT_ID = frozenset(name for name, cls in STATEMENTS.items() if cls.once)
 """Statements that stand once and have no id."""
 

@@ -18,7 +18,6 @@ from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMEN
 from gearmbs.adams.results.remarks import TRACK_COLUMNS
 
 NAMESPACE = "http://www.mscsoftware.com/:xrf10"
-ENTITY_TYPES = {kind: cls.entity for cls, kind in st.KINDS.items()}
 PER_LINE = 6
 STEP_TYPES = {"KINEMATICS": "kinematic", "STATICS": "static", "INITIAL_CONDITIONS": "initialConditions"}
 
@@ -55,7 +54,7 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
     for kind, number in result.elements:
         name = deck.of(kinds[kind])[number].name or f"{kind.upper()}_{number}"
         attributes = (
-            f'name={quoteattr(name)} entity={quoteattr(name)} entType="{ENTITY_TYPES[kind]}" objectId="{number}"'
+            f'name={quoteattr(name)} entity={quoteattr(name)} entType="{kinds[kind].entity}" objectId="{number}"'
         )
         yield _Entity(attributes, FORCE_COLUMNS, wrench_units, result.force(kind, number))
         if kind == "contact":

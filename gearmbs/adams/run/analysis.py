@@ -410,7 +410,7 @@ def plant_of(session: Session, command: Linear, build: Callable[[Session], tuple
 
 def _variables(deck: Deck, kind: type[st.Plant], number: int | None, command: Command) -> list[st.Variable]:
     """Return the VARIABLEs of a PINPUT or POUTPUT."""
-    there, keyword = deck.of(kind), st.KEYWORD_OF[kind]
+    there, keyword = deck.of(kind), kind.keyword
     message = ""
     if not there:
         message = f"the deck has no {keyword}; add {keyword}/1, VARIABLES=..."

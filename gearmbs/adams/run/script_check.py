@@ -53,7 +53,7 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
     read, absent = read_variables(deck), left_out(deck)
     told: set[str] = set()
     for statement in sorted(deck, key=lambda s: not isinstance(s, INTO_OTHERS)):
-        if (st.KEYWORD_OF[type(statement)], statement.id) in session.inactive:
+        if (statement.keyword, statement.id) in session.inactive:
             continue
         if absent and isinstance(statement, st.Request):
             needed = sorted(needed_by(statement) & absent.keys())

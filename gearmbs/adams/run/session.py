@@ -132,7 +132,7 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
     """
     new = command.statement
     assert new is not None
-    if (st.KEYWORD_OF[type(new)], new.id) in session.deck.left_out:
+    if (new.keyword, new.id) in session.deck.left_out:
         return
     functions = [message for _, message in refused_functions(new, tuple(new.given))]
     if functions and not allow_unsupported:

@@ -162,7 +162,7 @@ def equations_hold(functions, st):
     Neither the scale of an equation nor that of an unknown matters. ``st.worst_row`` and ``st.violation`` say which
     equation is the furthest from that, and by which factor. ``st.res`` and ``st.y_between`` are overwritten.
     """
-    functions.residual(st.t_new, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
+    functions.residual(st.t_seen, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
     st.residuals += 1
     y, res, weight, matrix, allowed = st.y, st.res, st.weight, st.matrix, st.y_between
     row, col = st.entry_row, st.entry_col
@@ -238,7 +238,7 @@ def correct(functions, st, plan, factors):
     """
     residual = functions.residual
     y, yp, res, delta = st.y, st.yp, st.res, st.delta
-    t, gamma = st.t_new, st.gamma
+    t, gamma = st.t_seen, st.gamma
     damp = 2.0 / (1.0 + gamma / st.gamma_factored) - 1.0
     limit = amount_left(st)
     previous = 0.0

@@ -7,6 +7,7 @@ at the smallest sensible value and the vector of absolute tolerances does the wo
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import io
 import re
@@ -262,6 +263,13 @@ class _Run:
         """What is solved for at outputs, which IDA interpolates."""
         self.epochs = [(0, self.idata.copy())]
         self.t, self.end = float(times[0]), float(times[-1])
+        self.stops = sorted(float(b) for b in options.breakpoints if self.t < b < self.end)
+
+    @property
+    def stop(self) -> float:
+        """Next time beyond which no step may go: a breakpoint, or the end."""
+        k = bisect.bisect_right(self.stops, self.t)
+        return self.stops[k] if k < len(self.stops) else self.end
 
     def drive(self) -> DAEResult:
         """Run to the end, a failure or an interruption, and return everything computed so far."""
@@ -299,7 +307,8 @@ class _Run:
         solver = self._start(y, yp)
         self.branch.know(self.t, y, yp, self.end)
         while self.t < self.end:
-            target = rows.next_time
+            stop = self.stop
+            target = min(rows.next_time, stop)
             if problem.hook_interval is not None and not self.every_step:
                 target = min(target, self.t + problem.hook_interval(self.t, y, yp))
             answer, why = self._advance(solver, target, messages)
@@ -315,7 +324,7 @@ class _Run:
                 messages.text = ""
                 solver = self._start(y, yp)
                 continue
-            self.t, y, yp = float(answer.t) if self.every_step else target, answer.y, answer.yp
+            self.t, y, yp = min(float(answer.t), stop) if self.every_step else target, answer.y, answer.yp
             taken = rows.take(self.t, y, yp)
             self._settle()
             if taken and self.options.progress is not None:
@@ -323,6 +332,8 @@ class _Run:
             changed = self._call_hook(y, yp)
             if changed is not None:
                 y, yp = changed
+            if changed is not None or self.t == stop < self.end:
+                # what was before a possible jump says nothing about what comes
                 solver = self._start(y, yp)
         if self.branch.index_changed(self.t, y, yp):
             told = index_changes(self.branch.t_known, self.t)
@@ -349,7 +360,7 @@ class _Run:
         limit = MAX_STEPS if self.options.max_steps is None else self.options.max_steps
         done, before = 0, self.t
         while True:
-            answer = solver.step(target, method="onestep" if self.every_step else "normal", tstop=self.end)
+            answer = solver.step(target, method="onestep" if self.every_step else "normal", tstop=self.stop)
             why = messages.text or answer.message
             if answer.success or OF_PORTIONS not in why:
                 return answer, why
@@ -379,7 +390,8 @@ class _Run:
         settings = {
             "max_order": o.highest_order if o.max_order is None else o.max_order,
             "max_step": 0.0 if o.max_step is None or np.isinf(o.max_step) else o.max_step,
-            "first_step": o.first_step or 0.0,
+            # at its ends alone an interval between two breakpoints may be as the ones beside it
+            "first_step": min(o.first_step or 0.0, 0.5 * (self.stop - self.t)),
             "min_step": o.min_step or 0.0,
             "max_nonlin_iters": MAX_ITERATIONS if o.max_iterations is None else o.max_iterations,
             "max_num_steps": min(STEPS_AT_ONCE, MAX_STEPS if o.max_steps is None else o.max_steps),

@@ -28,7 +28,7 @@ LEAP = 100.0
 def _watch_leaps(st):
     """Note in ``st.leapt`` an unknown whose own derivative, without that of its rate, has leapt since the last matrix.
 
-    So it does next to a pole, see `gearmbs.dae.integrators.poles`. The note stands as long as the derivative is large.
+    So it does next to a pole, see `branches.passes_pole`. The note stands as long as the derivative is large.
     """
     jac, slope, matrix, before = st.jac, st.jac_slope, st.matrix, st.leapt
     st.leapt = -1
@@ -45,7 +45,7 @@ def _watch_leaps(st):
 def evaluate_matrix(functions, st):
     """Evaluate the Newton matrix at ``st.y``, and now and then its slope dG/dy' by a second evaluation."""
     jacobian = functions.jacobian
-    t, gamma = st.t_new, st.gamma
+    t, gamma = st.t_seen, st.gamma
     jac, slope = st.jac, st.jac_slope
     jacobian(t, st.y, st.yp, gamma, jac, st.idata, st.rdata, st.work)
     st.jacobians += 1

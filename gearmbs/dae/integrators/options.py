@@ -44,8 +44,8 @@ class Options:
     interpolate : bool
         INTERPOLATE: outputs from the interpolating polynomial (True) or by steps that land on them (False).
     breakpoints : sequence of float
-        Possible discontinuities: the run lands on each, and starts afresh at order one if the step beyond shows that it
-        is one.
+        Possible discontinuities: the run lands on each, and starts afresh if the step beyond shows that it is one; IDA
+        starts afresh at each.
     event_direction, event_action : sequence of int, optional
         For each event function: crossings that count (-1 falling, 1 rising, 0 both), and what they do (0 record,
         1 stop, 2 land on the crossing as on a breakpoint).
@@ -104,6 +104,9 @@ class Options:
         if self.max_order is not None and not 1 <= self.max_order <= self.highest_order:
             kind = "" if self.integrator.compiled else f" for {self.method}"
             raise ValueError(f"max_order (KMAX) must be 1 to {self.highest_order}{kind}, is {self.max_order!r}")
+        for b in self.breakpoints:
+            if math.isnan(b):
+                raise ValueError(f"breakpoints has {b!r} among its times; leave it away")
         self._check_steps()
         most = self.integrator.most_iterations
         if self.max_iterations is not None and not 1 <= self.max_iterations <= most:

@@ -138,11 +138,16 @@ class RunState(Struct):
     passing: bool  # whether the open step is the first beyond a stop or an event
     start_tries: int  # attempts of a first step that the error test has refused
     h_tried: float  # size of the last of them
+    rate_jumped: int  # unknown whose rate the first of them has found to have jumped the most, -1 for none
+    rate_before: float  # before the jump
+    blocks: int  # blocks of points tried behind it, see `restart.take_block`
+    h_block: float  # distance of the points of the next one
     since_refused: int  # steps since the error test refused one
     # the open step
     open: bool  # its row is taken
     t_old: float
     t_new: float
+    t_seen: float  # where the equations are evaluated: t_new, or just before where the step lands on a stop
     step: float  # t_new - t_old
     h_wanted: float  # size before it was fitted to a stop
     h_first: float  # size of the first attempt
@@ -375,6 +380,19 @@ def open_row(st):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def resample(rows, k, weights, old):
+    """Replace the rows 1 to k by ``sum_m weights[j, m] rows[m]`` over all rows from 0 to k; ``old`` is scratch."""
+    for i in range(rows.shape[1]):
+        for m in range(k + 1):
+            old[m] = rows[m, i]
+        for j in range(1, k + 1):
+            v = 0.0
+            for m in range(k + 1):
+                v += weights[j, m] * old[m]
+            rows[j, i] = v
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def respace(st):
     """Re-interpolate the history to the open step's size: fixed leading coefficients (GSTIFF).
 
@@ -402,15 +420,7 @@ def respace(st):
                 if l != m:
                     w *= (t - j * h - times[l]) / (times[m] - times[l])
             weights[j, m] = w
-    old = st.nodes
-    for i in range(hist.shape[1]):
-        for m in range(k + 1):
-            old[m] = hist[m, i]
-        for j in range(1, k + 1):
-            v = 0.0
-            for m in range(k + 1):
-                v += weights[j, m] * old[m]
-            hist[j, i] = v
+    resample(hist, k, weights, st.nodes)
     moved = times[1] != t - h
     for j in range(1, k + 1):
         times[j] = t - j * h

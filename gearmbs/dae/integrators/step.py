@@ -14,7 +14,7 @@ from numba import int64
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.algebraic import PART_TYPE
-from gearmbs.dae.integrators.branches import keeps_its_index, kept_its_index, stays_on_branch
+from gearmbs.dae.integrators.branches import keeps_its_index, kept_its_index, passes_pole, stays_on_branch
 from gearmbs.dae.integrators.controller import after_error_failure, after_start, after_success
 from gearmbs.dae.integrators.corrector import (
     CONVERGED,
@@ -32,7 +32,7 @@ from gearmbs.dae.integrators.corrector import (
 )
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, renew_matrix
-from gearmbs.dae.integrators.poles import passes_pole
+from gearmbs.dae.integrators.restart import shorten_first_step, start_afresh, take_block
 from gearmbs.dae.integrators.run_state import (
     STATE_TYPE,
     copy,
@@ -55,9 +55,6 @@ ROUNDED_STEP = 16.0 * EPS
 MAX_FAILS = 16
 NEWTON_SHRINK = 0.25
 """Ratio of a step to the one before it whose corrector failed with a fresh matrix: as in DASSL, IDA and CVODE."""
-RESTART_SHRINK = 0.1
-"""Ratio of the first step without a past to the refused one with it. Where the equations have jumped its error falls
-with its size, and `shorten_first_step` takes it from there. Tuned, see the table of constants."""
 RESTART_AFTER = 6
 DROP_AFTER = 3
 DROP_LEVELS = 3
@@ -72,10 +69,10 @@ Tuned, see the table of constants."""
 JUMP_LIMIT = 100.0
 """Tolerances by which a first step may move an unknown that does not move by less in a shorter one: values of the start
 that are off by more are refused, and a run passes no larger jump. Its error is half of that, as of any first step."""
-FIRST_TARGET = 0.01
-"""Error of the first step after refused attempts, in tolerances: half of what the next ones are meant to have."""
-FIRST_SHRINK = (1e-3, 0.5)
-"""Between which the size of a first step changes after a refusal: its error falls with the square, or less."""
+FORESEEN = 10.0
+"""Tolerances by which the first step beyond a possible discontinuity may miss its prediction: a step that is much
+shorter than its past has so small a constant of the error that it would pass any jump. Smooth solutions miss it by up
+to 7 where the error is one, at order six."""
 LANDED = 0.999
 """Fraction of the size wanted below which a step counts as shortened to land on a stop."""
 
@@ -165,6 +162,9 @@ def choose_end(st):
         return s.FAIL_STEP_TOO_SMALL
     st.t_old = t_old
     st.t_new = t
+    # at a stop the equations may have jumped already
+    lands = st.next_stop < st.stops.shape[0] and t >= st.stops[st.next_stop]
+    st.t_seen = np.nextafter(t, t_old) if lands else t
     st.step = h
     st.h_wanted = st.h
     st.h = h
@@ -306,7 +306,10 @@ def passes_error_test(st, plan, factors):
     times_from(st, 0)[0] = st.t_new
     before = st.error
     st.error = constant * correction_norm(st, row)
-    if st.error <= 1.0 + constant * 2.0 ** (st.order + 1) * st.noise:
+    allowed = 1.0 + constant * 2.0 ** (st.order + 1) * st.noise
+    if st.passing and st.n_past > 1:
+        allowed = min(allowed, constant * (FORESEEN + 2.0 ** (st.order + 1) * st.noise))
+    if st.error <= allowed:
         return True
     if st.n_past == 1 and st.error_fails > 1 and st.error <= constant * JUMP_LIMIT:
         # what steps of any size show is no error of theirs, but what an earlier corrector has left
@@ -316,55 +319,6 @@ def passes_error_test(st, plan, factors):
         return False
     copy(st.y, row)
     return True
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def start_afresh(st):
-    """Forget the past after all, where a step beyond a possible discontinuity was refused; return whether it was that.
-
-    A stop or an event may be no discontinuity, or one of a derivative that the tolerance does not see: the past then
-    foretells the step beyond it as any other, and the run goes on as if nothing had been.
-    """
-    if not st.passing or st.n_past == 1:
-        return False
-    st.passing = False
-    forget(st)
-    st.h = RESTART_SHRINK * st.step
-    return True
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def shorten_first_step(st):
-    """Choose the size of the next attempt of a first step, and from two attempts the rates it starts with.
-
-    Where the equations jump, as at a restart, the rates before the jump are not those after it, and leave an error that
-    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y'' + ..., whatever y'_0 it is
-    predicted with: two attempts give both,
-
-        y'' = (r_1 - r_2)/(h_1 - h_2),   y'_0 = r_2 - h_2 (r_1 - r_2)/(h_1 - h_2),
-
-    and the first step with an error h^2 y''/2 of `FIRST_TARGET` tolerances.
-    """
-    h, rate, start = st.step, st.yp_between, rows_from(st, 1)[0]
-    st.start_tries += 1
-    ratio = np.sqrt(FIRST_TARGET / st.error)
-    if st.start_tries > 1:
-        apart = st.h_tried - h
-        bend = 0.0
-        for i in range(st.y.shape[0]):
-            if st.differential[i] != 0.0:
-                new = (st.y[i] - start[i]) / h
-                slope = (rate[i] - new) / apart
-                rate[i] = new
-                st.yp_start[i] = new - h * slope
-                bend = max(bend, abs(slope) * st.w_error[i])
-        if bend > 0.0:
-            ratio = min(FIRST_SHRINK[1], np.sqrt(FIRST_TARGET / bend) / h)
-    else:
-        for i in range(st.y.shape[0]):
-            rate[i] = (st.y[i] - start[i]) / h
-    st.h_tried = h
-    st.h = h * min(max(ratio, FIRST_SHRINK[0]), FIRST_SHRINK[1])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -536,6 +490,8 @@ def advance(functions, st, part, plan, factors, max_accepted):
     accepted = 0
     while accepted < max_accepted:
         code = open_step(st)
+        if code == s.RUNNING:
+            code = take_block(functions, st, plan, factors)
         if code == s.RUNNING:
             code = choose_end(st)
         if code != s.RUNNING:

@@ -206,7 +206,8 @@ class Solution(Shown):
 
     @property
     def _pose(self) -> np.ndarray:
-        return self._records.by_body
+        poses, bodies = self._records.pose, len(self.system.model.names.bodies)
+        return poses[:, : POSE_COLUMNS * bodies].reshape(len(poses), bodies, POSE_COLUMNS)
 
     @property
     def _acc(self) -> np.ndarray:

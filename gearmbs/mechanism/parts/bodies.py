@@ -9,7 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.parts.quantities import Vector, frame_along, inertia_matrix, quantity, rotation_matrix, vector
+from gearmbs.mechanism.parts.quantities import (
+    Vector,
+    cross,
+    frame_along,
+    inertia_matrix,
+    quantity,
+    rotation_matrix,
+    vector,
+)
 from gearmbs.units import shown
 
 
@@ -46,7 +54,7 @@ class Marker:
     def velocity_at(self, place: np.ndarray) -> np.ndarray:
         """Return the velocity at the start of the point of the marker's body that is at a global place, m/s."""
         body = self.body
-        return body.velocity + np.cross(body.angular_velocity, place - body.position)
+        return body.velocity + cross(body.angular_velocity, place - body.position)
 
     def __repr__(self) -> str:
         return f"Marker({self.name!r} on {self.body.name!r} at {np.array2string(self.position, precision=6)})"
@@ -122,7 +130,7 @@ class Body:
     def centre_of_mass(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position and velocity of the centre of mass at the start, global components, m and m/s."""
         arm = self.orientation @ self.com
-        return self.position + arm, self.velocity + np.cross(self.angular_velocity, arm)
+        return self.position + arm, self.velocity + cross(self.angular_velocity, arm)
 
     def pose_record(self) -> np.ndarray:
         """Return R, A (row-major), v and omega of the centre of mass at the start, global components."""

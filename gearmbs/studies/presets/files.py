@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -13,6 +12,7 @@ from typing import Any, NamedTuple
 from gearmbs.drivetrain import Drivetrain, Housing
 from gearmbs.drivetrain.description import read_description
 from gearmbs.drivetrain.part import Part
+from gearmbs.schema.files import read_toml
 
 FOLDER = Path(__file__).parent
 """Where the files are."""
@@ -72,5 +72,5 @@ class BenchChoice(NamedTuple):
 
 def choices(name: str, values: Mapping[str, Any]) -> list[BenchChoice]:
     """Return the choices of a preset, a table of ``choices.toml``, with values filled in."""
-    table = tomllib.loads((FOLDER / "choices.toml").read_text(encoding="utf-8"))[name]
+    table = read_toml(FOLDER / "choices.toml")[name]
     return [BenchChoice(what, *(text.format_map(values) for text in texts)) for what, texts in table.items()]

@@ -107,14 +107,14 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
     ValueError
         For unknown sections and keys, and values that do not make a set.
     """
-    check_keys(data, SECTIONS, "", ValueError, what="section", prefix="")
+    check_keys(data, SECTIONS, "", ValueError, form="unknown section {}")
     if "planetary" not in data:
         raise ValueError("section [planetary] is missing; give teeth and module")
     table = dict(data["planetary"])
     simple = list(inspect.signature(planetary).parameters)[:-1]
     others = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "faults")]
     known = [key for key in (*simple, *others) if key not in ("contact", "friction")]
-    check_keys(table, known, "", ValueError, prefix="planetary.")
+    check_keys(table, known, "", ValueError, form="unknown key planetary.{}")
     for name in ("teeth", "module"):
         if name not in table:
             raise ValueError(f"planetary.{name} is missing")
@@ -139,7 +139,7 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
     gears = planetary(faults=places, **table)
     operation = dict(data.get("operation", {}))
     known = [item.name for item in fields(PlanetaryRun) if item.name not in ("gears", "supports", "pins", "rim")]
-    check_keys(operation, known, "", ValueError, prefix="operation.")
+    check_keys(operation, known, "", ValueError, form="unknown key operation.{}")
     if operation.get("held") in ("none", ""):
         operation["held"] = None
     supports = {name: Support(**values) for name, values in data.get("support", {}).items()}

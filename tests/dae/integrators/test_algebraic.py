@@ -25,6 +25,7 @@ def solved(problem: Case, method: str, rtol: float, times: np.ndarray) -> DAERes
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_every_output_of_random_problems_is_within_a_hundred_tolerances():
     """The tolerance of an algebraic unknown is its own, and what those of the differential ones make of it."""
     count, messages = cases(35), []

@@ -223,7 +223,55 @@ def test_a_jump_at_a_breakpoint_restarts_at_order_one(method):
     assert result.y[-1] == pytest.approx([place, speed], abs=2e-6)
 
 
+@njit
+def pushed_by_turns(t, y, yp, out, p):
+    """A unit mass on a unit spring; if p[0] is one, the push changes its sign after each period, if p[1] is, at it."""
+    periods = t / (2.0 * np.pi)
+    away = p[0] == 1.0 and int(np.floor(periods) + 1.0 if p[1] == 1.0 else np.ceil(periods)) % 2 == 0
+    out[0] = yp[0] - y[1]
+    out[1] = yp[1] + y[0] - (-1.0 if away else 1.0)
+
+
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+@pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("beyond", [False, True])
+def test_a_restart_at_a_jump_costs_ten_steps_at_most_and_no_digits(beyond, tol, method):
+    """Whether the instant of the jump belongs to what is before it or to what is beyond."""
+    periods = 2.0 * np.pi * np.arange(1, 12)
+    steady, jumping = (
+        solve_dae(pushed_by_turns, (0.0, periods[-1]), [0.0, 1.0], rtol=tol, atol=tol, method=method,
+                  p=[float(jumps), float(beyond)], breakpoints=periods if jumps else ())
+        for jumps in (False, True)
+    )  # fmt: skip
+    assert jumping.success, jumping.message
+    assert jumping.stats.steps - steady.stats.steps <= 10 * (len(periods) - 1)
+    # each period ends where it began, about either place of rest
+    off, off_steady = (np.abs(result.y[-1] - [0.0, 1.0]).max() for result in (jumping, steady))
+    assert off < 1.5 * off_steady + 10.0 * tol
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("rate", [1.0, 1e3])
+def test_jumps_a_fraction_of_a_step_apart_are_seen(rate, method):
+    """So near to each other, or so low an order asked for, that a restart has no room for points of order five."""
+    marks = [1.0, 1.0 + 1e-6 / rate, 2.0, 2.0 + 1e-3 / rate]
+
+    def relaxed(t, y, yp, out):
+        pulse = marks[0] < t <= marks[1] or marks[2] < t <= marks[3]
+        out[0] = yp[0] + rate * (y[0] - (1e3 if pulse else 1.0))
+
+    exact, at = 0.0, 0.0
+    for end, target in zip((*marks, 2.5), (1.0, 1e3, 1.0, 1e3, 1.0)):
+        exact, at = target + (exact - target) * np.exp(-rate * (end - at)), end
+    for order in (5, 3):
+        result = solve_dae(
+            relaxed, (0.0, 2.5), [0.0], rtol=1e-7, atol=1e-7, breakpoints=marks, max_order=order, method=method
+        )
+        assert result.success, result.message
+        assert result.y[-1, 0] == pytest.approx(exact, abs=1e-5)
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
 @pytest.mark.parametrize("width", [1e-4, 1e-2])
 def test_a_pulse_between_two_breakpoints_is_seen_whichever_side_they_belong_to(width, method):
     first, last = 0.5, 0.5 + width

@@ -62,6 +62,7 @@ def test_a_solution_that_stays_on_a_jump_is_noticed(equations, start, named, met
     assert "tanh(y/width)" in result.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
 @pytest.mark.parametrize("width", [1e-3, 1e-4, 1e-5, 1e-6])
 def test_the_same_jump_with_a_width_runs(width, method):
