@@ -23,6 +23,8 @@ NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.
 NEWTON_STEPS = 100
 SHORT_STEPS = 20
 """Steps of at most the deflection of parallel wheels. Tilted ones may touch far from there; then steps grow."""
+STEP_OF_PITCH = 0.125
+"""Part of a pitch that such steps grow to: a tooth and its gap are half a pitch each."""
 PHASE_STEPS = 50
 TOUCH_TOLERANCE = 1e-15  # m
 SEARCHED_FROM = 1e-11  # m
@@ -239,9 +241,12 @@ class StaticMesh:
         side = self.turning
         lag = side * start
         longest = static_lag(self.pair, torque)
+        # steps that grow must not pass a flank and its mate's free way behind it
+        widest = STEP_OF_PITCH * 2.0 * math.pi / self.geometry.driven.teeth
         low, high = -math.inf, math.inf
         for step in range(NEWTON_STEPS):
-            longest *= 2.0 if step >= SHORT_STEPS else 1.0
+            if step >= SHORT_STEPS:
+                longest = max(longest, min(2.0 * longest, widest))
             value, slope = self.torque(driver_angle, side * lag)
             miss = -side * value - torque
             if miss > 0:
@@ -249,12 +254,15 @@ class StaticMesh:
             else:
                 low = lag
             trial = lag + min(max(miss / slope, -longest), longest) if slope < 0 else math.inf
+            # where the correction is rounding, the angle is found, though it lies at the bracket's end
+            if abs(trial - lag) <= LAST_DIGITS * abs(lag) or abs(miss) <= 1e-12 * torque:
+                break
             if not low < trial < high:
                 if math.isfinite(low) and math.isfinite(high):
                     trial = 0.5 * (low + high)
                 else:
                     trial = low + longest if math.isfinite(low) else high - longest
-            if abs(trial - lag) <= 1e-16 or abs(miss) <= 1e-12 * torque:
+            if trial == lag:
                 break
             lag = trial
         self._check_carried(driver_angle, torque, side * lag)

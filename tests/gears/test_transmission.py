@@ -212,3 +212,13 @@ def test_an_axial_shift_of_helical_wheels_is_no_error(ring, rotation, hand, shif
     opposite = loaded_transmission_error(pair.with_changes(axial_shift=0.0), points=12).mean
     # 12 mm of the 20 mm carry
     assert opposite < loaded_transmission_error(pair, points=12).mean < 20 / 12 * opposite
+
+
+def test_light_loads_on_tilted_wheels_are_found_where_the_teeth_are():
+    """The search starts far from where an edge bears; where it had found the angle to rounding it went on from there."""
+    wheels = (GearSpec(20, "2 mm", face_width="20 mm"), GearSpec(60, "2 mm", face_width="20 mm"))
+    pair = GearPair(*wheels, misalignment="1 deg", backlash="0.6 mm").with_own_stiffness()
+    # the edge is 10 mm sin(1 deg) from mid-face, of which the flank's slope leaves a part
+    errors = [loaded_transmission_error(pair, torque, points=4).error for torque in np.geomspace(0.1, 10.0, 40)]
+    assert np.abs(errors).max() < 10e-3 * math.sin(math.radians(1.0))
+    assert (np.diff(np.mean(errors, axis=1)) > 0.0).all()
