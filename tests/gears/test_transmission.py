@@ -215,7 +215,7 @@ def test_an_axial_shift_of_helical_wheels_is_no_error(ring, rotation, hand, shif
 
 
 def test_light_loads_on_tilted_wheels_are_found_where_the_teeth_are():
-    """The search starts far from where an edge bears; where it had found the angle to rounding it went on from there."""
+    """The search starts far from where an edge bears, and ends where its correction is rounding."""
     wheels = (GearSpec(20, "2 mm", face_width="20 mm"), GearSpec(60, "2 mm", face_width="20 mm"))
     pair = GearPair(*wheels, misalignment="1 deg", backlash="0.6 mm").with_own_stiffness()
     # the edge is 10 mm sin(1 deg) from mid-face, of which the flank's slope leaves a part
