@@ -315,7 +315,7 @@ def divided_contact(options, wheels, scratch, law, flanks, own, node, low, high,
     options, wheels, scratch : record
     law : Law
     flanks, own : record
-        As in `pair_strips.pair_sections`.
+        As in `pair_sections`.
     node, low, high : float
         The strip's first node, and the first and last of its nodes that count.
     totals : record

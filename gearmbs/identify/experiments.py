@@ -79,7 +79,7 @@ def rank_experiments(
 
 def _worth(problem: CaseProblem, name: str, changes: Mapping[str, Any], of: str, before: float) -> dict[str, float]:
     """Return what an experiment is worth."""
-    from gearmbs.identify.result import covariance_of
+    from gearmbs.identify.result import errors_of
 
     given = [path for path, value in changes.items() if path not in FACTORS or isinstance(value, str)]
     joint = problem.with_case(name, _changed(problem, changes, of), like=of, known=given)
@@ -89,7 +89,7 @@ def _worth(problem: CaseProblem, name: str, changes: Mapping[str, Any], of: str,
         return {"worst": float("nan"), "gain": float("nan"), "together": float("nan")}
     after = np.linalg.svd(matrix, compute_uv=False)[-1]
     with np.errstate(all="ignore"):
-        largest = float(np.sqrt(np.diag(covariance_of(matrix)[0])).max())
+        largest = float(errors_of(matrix)[0].max())
         return {"worst": float(1.0 / after), "gain": float(after / before), "together": largest}
 
 

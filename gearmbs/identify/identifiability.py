@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.identify.result import covariance_of
+from gearmbs.identify.result import errors_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,23 +56,20 @@ class Identifiability:
     @property
     def correlation(self) -> np.ndarray:
         """Correlations of the estimates."""
-        covariance, _ = covariance_of(self.matrix)
-        error = np.sqrt(np.diag(covariance))
-        with np.errstate(all="ignore"):
-            return covariance / np.outer(error, error)
+        return errors_of(self.matrix)[1]
 
     def table(self) -> pd.DataFrame:
         """Return influence, noise of the differences, standard deviations alone and together, and the worst partner."""
         import pandas as pd
 
-        covariance, _ = covariance_of(self.matrix)
+        together, correlation, _ = errors_of(self.matrix)
         norm = np.linalg.norm(self.matrix, axis=0)
         partners, sizes = [], []
-        c = np.abs(self.correlation) - np.eye(len(self.names))
+        c = np.abs(correlation) - np.eye(len(self.names))
         for k in range(len(self.names)):
             j = int(np.argmax(c[k]))
             partners.append(self.names[j] if len(self.names) > 1 else "")
-            sizes.append(float(self.correlation[k, j]) if len(self.names) > 1 else 0.0)
+            sizes.append(float(correlation[k, j]) if len(self.names) > 1 else 0.0)
         with np.errstate(all="ignore"):
             alone = np.where(norm > 0.0, 1.0 / norm, np.inf)
         return pd.DataFrame(
@@ -80,7 +77,7 @@ class Identifiability:
                 "influence": norm,
                 "noise": self.noise,
                 "alone": alone,
-                "together": np.sqrt(np.diag(covariance)),
+                "together": together,
                 "partner": partners,
                 "correlation": sizes,
             },

@@ -22,6 +22,9 @@ DOUBTFUL = 0.01
 CORRELATED = 0.95
 """Correlation from which two parameters are said to be told apart badly."""
 
+PART_OF_LOST = 1e-6
+"""Part of a unit direction without influence below which a parameter has none in it: far above rounding, 1e-15."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -69,13 +72,10 @@ class Fit:
         scale = problem.scale
         freedom = r.size - problem.lost - z.size
         cost = float(r @ r)
-        covariance, singular = covariance_of(matrix)
+        z_errors, correlation, singular = errors_of(matrix)
         if not problem.known:
-            covariance = covariance * (cost / freedom if freedom > 0 else np.nan)
-        z_errors = np.sqrt(np.diag(covariance))
+            z_errors = z_errors * (np.sqrt(cost / freedom) if freedom > 0 else np.nan)
         values = scale.p(z)
-        with np.errstate(all="ignore"):
-            correlation = covariance / np.outer(z_errors, z_errors)
         return cls(
             scale.names,
             values,
@@ -259,14 +259,25 @@ class Fit:
         return lines
 
 
-def covariance_of(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (J'J)^-1 and the singular values of J; columns are scaled first, so that units do not matter."""
+def errors_of(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return standard errors and correlations of (J'J)^-1 and the singular values of J.
+
+    Columns are scaled first, so that units do not matter to what counts as rounding. Parameters that have a part in a
+    direction without influence have infinite errors and the correlations of that direction; the others' are those they
+    have without it.
+    """
     size = np.linalg.norm(matrix, axis=0)
     size = np.where(size == 0.0, 1.0, size)
-    _, singular, right = np.linalg.svd(matrix / size, full_matrices=False)
-    smallest = np.finfo(float).eps * max(matrix.shape) * singular[0]
-    inverse = np.where(singular > smallest, 1.0 / np.maximum(singular, smallest), np.inf)
-    with np.errstate(all="ignore"):
-        half = right.T * np.where(np.isfinite(inverse), inverse, 1e300)
-        covariance = half @ half.T / np.outer(size, size)
-    return covariance, np.linalg.svd(matrix, compute_uv=False)
+    _, found, right = np.linalg.svd(matrix / size)
+    singular = np.zeros(size.size)
+    singular[: found.size] = found
+    known = singular > np.finfo(float).eps * max(matrix.shape) * singular[0]
+    half = right[known].T / singular[known]
+    covariance, lost = half @ half.T, right[~known].T
+    lost[np.abs(lost) < PART_OF_LOST] = 0.0
+    free = lost.any(axis=1)
+    covariance[free, :] = covariance[:, free] = 0.0
+    covariance += lost @ lost.T
+    deviations = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviations, deviations)
+    return np.where(free, np.inf, deviations / size), correlation, np.linalg.svd(matrix, compute_uv=False)

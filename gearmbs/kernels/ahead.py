@@ -334,7 +334,7 @@ def _started() -> subprocess.Popen:
     if environment.get("XDG_CACHE_HOME"):
         environment["XDG_CACHE_HOME"] = os.path.abspath(environment["XDG_CACHE_HOME"])
     # without -P the folder it runs in would come first
-    command = [sys.executable or "", "-P", "-m", "gearmbs.kernels.ahead", "--helper"]
+    command = [sys.executable or "", "-P", "-c", "from gearmbs.kernels.ahead import main; main()", "--helper"]
     pipe = subprocess.PIPE
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=os.path.abspath(os.sep))
 

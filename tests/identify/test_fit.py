@@ -134,3 +134,20 @@ def test_the_report_tells_bounds_and_failures():
     assert "The interval of a reaches beyond its bounds, 0.5 to 1.5" in held.report()
     blind = fit(model, y, [Free("a", 1.0), slope], sigma=0.02)
     assert "evaluations gave no values" in blind.report()
+
+
+def test_parameters_that_cannot_be_told_apart_leave_the_others_their_errors():
+    """Of (a + b) + c x only the sum is known; c has the error that it has with one constant."""
+    x = np.linspace(0.0, 1.0, 40)
+    y = 3.0 + 2.0 * x + 0.01 * np.random.default_rng(0).normal(size=x.size)
+
+    def line(p):
+        return sum(p[:-1]) + p[-1] * x
+
+    free = [Free(name, 1.0, log=False) for name in "abc"]
+    found, alone = fit(line, y, free, sigma=0.01), fit(line, y, free[1:], sigma=0.01)
+    assert np.isinf(found.errors[:2]).all()
+    assert found.errors[2] == pytest.approx(alone.errors[1], rel=1e-6)
+    assert found.correlation[0, 1] == pytest.approx(-1.0, abs=1e-9)
+    assert abs(found.correlation[0, 2]) < 1e-9
+    assert "a and b are told apart badly" in found.report()

@@ -193,7 +193,7 @@ def level_flanks(side, strip):
 def level_corner(side, corner, strip, kind, start):
     """Fill a tip corner on the mate's involute; False where the involute is too curved to bear on.
 
-    As `corner_sections.corner_starts` and the functions that follow it; the normal needs no iteration.
+    As `gearmbs.contact.gaps.corners.corner_starts` and the functions that follow it; the normal needs no iteration.
 
     Parameters
     ----------

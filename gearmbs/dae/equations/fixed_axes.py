@@ -410,7 +410,7 @@ def axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, val
 
 @njit(JACOBIAN_SIG, cache=True, error_model="numpy")
 def axes_jacobian(t, y, yp, cj, vals, idata, rdata, work):
-    """Evaluate dG/dy + cj dG/dy' into ``vals``, or count the entries or note their places; see `entries.put`."""
+    """Evaluate dG/dy + cj dG/dy' into ``vals``, or count the entries or note their places; see `unknowns.put`."""
     y, vals, idata, rdata = uncounted(y), uncounted(vals), uncounted(idata), uncounted(rdata)
     tab = T.unpack(idata, rdata, work)
     axes, markers, slot, turns = axes_in(idata, rdata)

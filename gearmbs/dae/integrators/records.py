@@ -175,7 +175,7 @@ class Between:
         self.atol, self.rtol = part.atol[self.unknowns], part.rtol
 
     def __call__(self, times, ends, orders, nodes, rows, y, yp) -> None:
-        """Write y and y' at times between steps; arguments are those of `dense_output.evaluate_many`.
+        """Write y and y' at times between steps; arguments are those of `evaluate_many`.
 
         Raises
         ------
