@@ -236,6 +236,11 @@ def _power(base: str, power: float) -> str:
 
 @functools.lru_cache(maxsize=1024)
 def _parse(text: str, target: str, field: str) -> float:
+    if re.search(r"\d,\d", text):
+        # a library would drop it: "3,5 mm" would be 35 mm
+        raise ValueError(
+            f"{field}: {text!r} has a comma in its number; write a point before decimals, and nothing between thousands"
+        )
     clean = re.sub(r"(?<=\d)\s*°", " deg", text.strip()).replace("·", "*").replace("µ", "u").replace("μ", "u")
     for pattern, written in SPELLINGS:
         clean = re.sub(pattern, written, clean)

@@ -102,6 +102,7 @@ def test_fields_are_read_by_what_they_say():
 WRONG = [
     ({"speed": "3 mm"}, says("Machine.speed", "'3 mm'", "rad/s")),
     ({"speed": None}, says("Machine.speed", "None", "give a number")),
+    ({"speed": "inf rad/s"}, says("Machine.speed", "'inf rad/s'", "give", "finite")),
     ({"speed": math.inf}, says("Machine.speed", "inf", "give", "finite")),
     ({"length": 0}, says("Machine.length", "0 m", "positive")),
     ({"length": "-2 mm"}, says("Machine.length", "-0.002 m", "positive")),
@@ -119,6 +120,8 @@ WRONG = [
     ({"factor": "3 mm"}, says("factor", "'3 mm'", "give a number")),
     ({"grease": "lard"}, r"grease .*'lard'; choose mineral$"),
     ({"side": "up"}, says("side", "'up'", "choose 'left'", "'right'")),
+    ({"torque": "100"}, says("torque", "'100'", "unit")),
+    ({"torque": True}, says("torque", "True", "give")),
     ({"torque": math.nan}, says("torque", "nan", "expression")),
     ({"wheel": "z1"}, says("wheel", "'z1'", "give", "GearSpec")),
     ({"names": [1]}, says("names[0]", "1", "give a text")),

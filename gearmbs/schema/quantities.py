@@ -120,12 +120,15 @@ class Measure:
             # an array of one number
             value = value.item()
         number = isinstance(value, Real) and not isinstance(value, bool)
+        asked = self.remedy or "give a finite number"
         if number and not math.isfinite(value):
-            asked = self.remedy or "give a finite number"
             raise OutOfRange(asked, f"{value}; {asked}")
         try:
             if not self.whole:
-                return self._one(value)
+                found = self._one(value)
+                if math.isinf(found):
+                    raise OutOfRange(asked, f"{value!r}; {asked}")
+                return found
             if number and value == int(value):
                 return self._one(int(value))
             raise NoQuantity
@@ -259,10 +262,16 @@ class OverTime:
         return core_schema.no_info_plain_validator_function(self.read)
 
     def read(self, value: Any) -> Any:
-        """Return the value, a number if it is finite."""
-        if isinstance(value, Real) and not math.isfinite(value):
-            asked = "give a finite number, a quantity or an expression of time"
+        """Return the value, a number if it is finite; a text that is a number alone has no unit."""
+        asked = "give a finite number, a quantity with its unit or an expression of time"
+        if isinstance(value, bool) or (isinstance(value, Real) and not math.isfinite(value)):
             raise OutOfRange(asked, f"{value}; {asked}")
+        if isinstance(value, str):
+            try:
+                float(value)
+            except ValueError:
+                return value
+            raise OutOfRange(asked, f"{value!r}; {asked}")
         return value
 
 

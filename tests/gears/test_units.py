@@ -158,3 +158,10 @@ def test_common_units_agree_with_the_registry(text, unit):
 )
 def test_all_else_is_left_to_the_registry(text, unit):
     assert units._quick(text, unit) is None
+
+
+@pytest.mark.parametrize("text", ["3,5 mm", "1,000 rpm", "1.000,5 rpm"])
+def test_commas_in_numbers_are_refused(text):
+    """They were dropped: 35 mm for three and a half."""
+    with pytest.raises(ValueError, match="comma"):
+        to_si(text, text.split()[1], "field")

@@ -265,3 +265,25 @@ def test_a_record_without_an_ending_is_recognised(tmp_path):
     refused = CliRunner().invoke(cli.app, ["compare", "--experiment", f"low:healthy={tmp_path / 'case.toml'}"])
     assert refused.exit_code == 1
     assert "describes a case, not a record" in refused.output
+
+
+def test_names_that_make_the_same_file_are_told(tmp_path):
+    cases = [Case(name=name, operation=SHORT) for name in ("a/b", "a_b")]
+    with pytest.raises(ValueError, match=says("'a/b'", "'a_b'", "the same file")):
+        run_cases(cases, folder=tmp_path)
+
+
+def test_a_case_that_fails_to_be_written_is_not_run_again(tmp_path, monkeypatch):
+    """An OSError of the work is no lack of room for the claim of it."""
+    from gearmbs.studies.run import parallel
+
+    runs = []
+
+    def fails(case, progress=None):
+        runs.append(case.name)
+        raise OSError("no space")
+
+    monkeypatch.setattr(parallel, "run_case", fails)
+    with pytest.raises(OSError, match="no space"):
+        run_cases([Case(name="one", operation=SHORT)], folder=tmp_path, workers=1)
+    assert runs == ["one"]

@@ -33,7 +33,7 @@ from gearmbs.dae.integrators.messages import (
     solution_ends,
     unknown_name,
 )
-from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.options import ROUNDED_STEP, Options
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
@@ -63,8 +63,6 @@ OF_JUMPS = ("error test failed", "convergence failed", "nonlinear solver failed"
 """What SUNDIALS says where it stops at a jump of an algebraic unknown, or where a solution ends."""
 STEPS_AT_ONCE = 1000
 """Steps after which IDA is asked how far it has come."""
-ROUNDED_STEP = 16.0 * EPS
-"""Average step in units of the time below which it does not come any further."""
 SHORTEST = 1e-12
 """Part of the span that the step across such a place takes."""
 STANDSTILL = 1e-6
@@ -263,7 +261,7 @@ class _Run:
         """What is solved for at outputs, which IDA interpolates."""
         self.epochs = [(0, self.idata.copy())]
         self.t, self.end = float(times[0]), float(times[-1])
-        self.stops = sorted(float(b) for b in options.breakpoints if self.t < b < self.end)
+        self.stops = options.stops(self.t, self.end)
 
     @property
     def stop(self) -> float:
@@ -279,7 +277,7 @@ class _Run:
                 status, message = self._loop(messages)
             except KeyboardInterrupt:
                 status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {self.t:.6g} s."
-            except (_NotFiniteError, RuntimeError) as error:
+            except (_NotFiniteError, RuntimeError, KeyError) as error:
                 status, message = self._failure(max(self.t, self.calls.last_t), messages.text or str(error))
         stats = SolverStats(
             steps=self.calls.steps,
@@ -311,6 +309,11 @@ class _Run:
             target = min(rows.next_time, stop)
             if problem.hook_interval is not None and not self.every_step:
                 target = min(target, self.t + problem.hook_interval(self.t, y, yp))
+            if target - self.t <= ROUNDED_STEP * abs(target):
+                # nearer than the shortest step: an output just behind a stop, or the end just behind a jump
+                self.t = target
+                rows.take(self.t, y, yp)
+                continue
             answer, why = self._advance(solver, target, messages)
             if not answer.success:
                 beyond = self._beyond(answer, why)
@@ -391,7 +394,7 @@ class _Run:
             "max_order": o.highest_order if o.max_order is None else o.max_order,
             "max_step": 0.0 if o.max_step is None or np.isinf(o.max_step) else o.max_step,
             # at its ends alone an interval between two breakpoints may be as the ones beside it
-            "first_step": min(o.first_step or 0.0, 0.5 * (self.stop - self.t)),
+            "first_step": max(0.0, min(o.first_step or 0.0, 0.5 * (self.stop - self.t))),
             "min_step": o.min_step or 0.0,
             "max_nonlin_iters": MAX_ITERATIONS if o.max_iterations is None else o.max_iterations,
             "max_num_steps": min(STEPS_AT_ONCE, MAX_STEPS if o.max_steps is None else o.max_steps),

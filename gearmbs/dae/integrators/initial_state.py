@@ -57,7 +57,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     """
     t0 = float(problem.t0)
     n_events = int(problem.n_events) if problem.events is not None else 0
-    stops = sorted(b for b in options.breakpoints if t0 < b < t_end)
+    stops = options.stops(t0, t_end)
     st = _empty_state(problem, outputs, stops, n_events, _rows_of_records(problem.n, keep, options), keep)
     st.stops[:] = stops
     _set_tables(st, problem)
@@ -73,7 +73,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.n_events = n_events
     st.most_crossings = SAMPLES * n_events
     st.fixed_leading = options.method == "GSTIFF"
-    st.interpolate = options.interpolate
+    st.interpolate = options.interpolates(outputs, stops)
     st.has_hook = problem.hook is not None
     st.keep_rows = keep
     st.step_in_weights = bool((st.tested > st.coupled).any())

@@ -11,8 +11,16 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, Integrator
+from gearmbs.dae.problem import EPS
 
 CORRECTORS = ("original", "modified")
+
+CROWDED = 1e-3
+"""Ratio of neighbouring steps up to which differences over both say something: over steps of 1 and 1e-9 they are
+differences of rounding and of what Newton's method left, and errors were 1e4 to 1e6 tolerances."""
+
+ROUNDED_STEP = 16.0 * EPS
+"""Shortest step in units of the time: fewer of its last digits say nothing of a rate."""
 
 Consumer = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
 """Takes t, y of some accepted steps and the integer table valid there; the arrays are valid during the call only."""
@@ -42,7 +50,8 @@ class Options:
     max_steps : int, optional
         Limit on accepted steps; default none. For IDA the limit between two outputs, default 100 000.
     interpolate : bool
-        INTERPOLATE: outputs from the interpolating polynomial (True) or by steps that land on them (False).
+        INTERPOLATE: outputs from the interpolating polynomial (True) or by steps that land on them (False). Where two
+        outputs, or one and a breakpoint, are nearer than `CROWDED` of their mean distance, all are interpolated.
     breakpoints : sequence of float
         Possible discontinuities: the run lands on each, and starts afresh if the step beyond shows that it is one; IDA
         starts afresh at each.
@@ -104,8 +113,10 @@ class Options:
         if self.max_order is not None and not 1 <= self.max_order <= self.highest_order:
             kind = "" if self.integrator.compiled else f" for {self.method}"
             raise ValueError(f"max_order (KMAX) must be 1 to {self.highest_order}{kind}, is {self.max_order!r}")
+        if isinstance(self.breakpoints, str) or not isinstance(self.breakpoints, Iterable):
+            raise ValueError(f"breakpoints is {self.breakpoints!r}; give a list of times")
         for b in self.breakpoints:
-            if math.isnan(b):
+            if isinstance(b, str) or math.isnan(b):
                 raise ValueError(f"breakpoints has {b!r} among its times; leave it away")
         self._check_steps()
         most = self.integrator.most_iterations
@@ -114,6 +125,23 @@ class Options:
             raise ValueError(f"max_iterations (MAXIT) must be {allowed}, is {self.max_iterations!r}")
         if self.max_steps is not None and not self.max_steps >= (0 if self.integrator.compiled else 1):
             raise ValueError(f"max_steps must be at least 1, is {self.max_steps!r}")
+
+    def interpolates(self, outputs: np.ndarray, stops: Sequence[float]) -> bool:
+        """Return whether outputs are interpolated, as asked for or because steps to all of them would be too unlike."""
+        times = np.unique(np.concatenate([np.asarray(outputs, dtype=float), stops]))
+        if self.interpolate or times.size < 3:
+            return self.interpolate
+        distances = np.diff(times)
+        return bool(distances.min() < CROWDED * distances.mean())
+
+    def stops(self, t0: float, t_end: float) -> list[float]:
+        """Return the breakpoints within a run, in order; of several within the shortest step the first."""
+        found: list[float] = []
+        for b in sorted(float(b) for b in self.breakpoints if t0 < b < t_end):
+            least = ROUNDED_STEP * abs(b)
+            if b - (found[-1] if found else t0) > least and t_end - b > least:
+                found.append(b)
+        return found
 
     def _check_steps(self) -> None:
         sizes = {

@@ -223,9 +223,10 @@ def owner(path: Path) -> dict[str, Any] | None:
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        return json.loads(path.read_text())
+        claim = json.loads(path.read_text())
     except (OSError, ValueError):
         return None
+    return claim if isinstance(claim, dict) and {"host", "pid", "started"} <= claim.keys() else None
 
 
 def _age_mark(path: Path) -> float:

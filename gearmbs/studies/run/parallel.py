@@ -18,7 +18,7 @@ from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
 from gearmbs.studies.run.engine import claimed, run_jobs
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
-from gearmbs.studies.run.store import RecordFolder, record_size
+from gearmbs.studies.run.store import RecordFolder, file_stem, record_size
 from gearmbs.studies.run.workers import processes, threads
 
 
@@ -92,6 +92,10 @@ def run_cases(
     names = [case.name for case in cases]
     if len(set(names)) != len(names):
         raise ValueError(f"cases: the names {names} are not all different; name each case")
+    if folder is not None and len({file_stem(name) for name in names}) != len(names):
+        raise ValueError(
+            f"cases: of the names {names} two make the same file; name them apart, as by more than / and _"
+        )
     found: dict[str, Any] = {}
     for case in cases:
         try:
@@ -159,7 +163,11 @@ def _carried_out(
 ) -> tuple[Any, str]:
     """Return the record of a case, or the failure if it is to be kept, and why it is not where it should be."""
 
+    begun = False
+
     def work(_claim: object = None) -> tuple[Any, str]:
+        nonlocal begun
+        begun = True
         try:
             record = run_case(case, lambda t: report(min(t / _span(case), 1.0)))
         except SimulationFailed as failure:
@@ -173,5 +181,7 @@ def _carried_out(
     try:
         return claimed(ledger, case, work)
     except OSError:
+        if begun:
+            raise
         # no room for a claim, which only saves work
         return work()

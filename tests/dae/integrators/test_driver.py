@@ -418,3 +418,46 @@ def test_small_entries_stay_out_of_the_newton_matrix_only_where_the_corrector_co
     assert (driven.plan.left_src.size > 0) == stiff
     np.testing.assert_allclose(result.y[-1, 1:], np.linalg.solve(b, np.full(n, result.y[-1, 0])), rtol=1e-5)
     np.testing.assert_allclose(result.y[-1, 0], np.sin(2.0), atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("breakpoints", [
+    [0.7], [0.7, 0.7], [0.7, np.nextafter(0.7, 1.0)], [np.nextafter(2.0, 1.0)], [k / 30 for k in range(1, 60)],
+])  # fmt: skip
+def test_stops_and_outputs_nearer_than_the_shortest_step(method, breakpoints):
+    """Outputs a unit of the last place beside a breakpoint, and breakpoints as near to each other and to the end."""
+    outputs = [0.0, np.nextafter(0.7, 0.0), 0.7, np.nextafter(0.7, 1.0), 2.0]
+
+    def decay(t, y, yp, out):
+        out[0] = yp[0] + y[0]
+
+    for t_eval in (outputs, None):
+        found = solve_dae(
+            decay, (0.0, 2.0), [1.0], method=method, breakpoints=breakpoints, t_eval=t_eval, rtol=1e-7, atol=1e-9
+        )
+        assert found.success, found.message
+        np.testing.assert_allclose(found.y[:, 0], np.exp(-found.t), rtol=2e-5)
+
+
+def test_breakpoints_are_a_list_of_times():
+    for wrong in (0.5, "abc", [np.nan], ["0.5"]):
+        with pytest.raises(ValueError, match="breakpoints"):
+            Options(breakpoints=wrong)
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+@pytest.mark.parametrize("behind", [1e-16, 1e-9, 1e-6])
+def test_outputs_close_together_are_not_landed_on(method, behind):
+    """Steps of 0.1 s and 1e-9 s beside each other: what differences tell of the past is rounding."""
+
+    def turning(t, y, yp, out):
+        out[0] = yp[0] - (1.0 if t < 0.5 else -1.5) * np.cos(t)
+
+    outputs = np.unique([0.1, 0.3, 0.5 + behind, 0.7, 0.9, 1.0])
+    found = solve_dae(
+        turning, (0.0, 1.0), [0.0], t_eval=outputs, method=method, interpolate=False, breakpoints=[0.5], rtol=1e-8,
+        atol=1e-8,
+    )  # fmt: skip
+    assert found.success, found.message
+    exact = np.where(outputs < 0.5, np.sin(outputs), 2.5 * np.sin(0.5) - 1.5 * np.sin(outputs))
+    np.testing.assert_allclose(found.y[:, 0], exact, atol=1e-6)
