@@ -67,7 +67,12 @@ def _lower_negative(context: Any, builder: Any, sig: Any, args: tuple) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def lanes_of(a, b, c, d, e, f, g, h):
-    """Return lanes that hold eight numbers in turn."""
+    """Return lanes that hold eight numbers in turn.
+
+    Parameters
+    ----------
+    a, b, c, d, e, f, g, h : float
+    """
     return Lanes(a, b, c, d, e, f, g, h)
 
 

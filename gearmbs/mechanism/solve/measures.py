@@ -13,6 +13,7 @@ from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion
+from gearmbs.mechanism.language.turns import warn_of_doubtful_turns
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle, kinds_with_displacement
@@ -39,8 +40,6 @@ class Measures:
 
     def angle(self, joint: Joint | str) -> np.ndarray:
         """Return the rotation of I about z_J, full turns counted, shape (m,), rad."""
-        from gearmbs.mechanism.language.series import warn_of_doubtful_turns
-
         found = self._joint(joint, kinds_with_angle(), "angle")
         t = self.solution.t
         ai, aj = self._axes(found.i), self._axes(found.j)
