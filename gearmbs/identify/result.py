@@ -268,7 +268,8 @@ def errors_of(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     size = np.linalg.norm(matrix, axis=0)
     size = np.where(size == 0.0, 1.0, size)
-    _, found, right = np.linalg.svd(matrix / size)
+    # of many residuals the left vectors, as many as these, are not needed; of few all right ones are
+    _, found, right = np.linalg.svd(matrix / size, full_matrices=len(matrix) < size.size)
     singular = np.zeros(size.size)
     singular[: found.size] = found
     known = singular > np.finfo(float).eps * max(matrix.shape) * singular[0]
