@@ -25,13 +25,17 @@ above rounding, and to leave the unknown where its equations are defined."""
 PROBE_OF_RATE = 1e-3
 """The same of a rate, and of one where the rate is smaller, as most are zero at a start. Equations are linear in their
 rates as a rule: a larger move then has less rounding and no error of its own."""
+GENERIC = (1e-2, 1e-8)
+"""Values, of their scales, that unknowns get in turn where they are zero at the start. Moved by `PROBE`, a product of
+two of the first changes by 1e-10, far above rounding of a weight it is added to; where equations are not defined that
+far from zero the second serves."""
 _VEC = float64[::1]
 _IVEC = int64[::1]
 _BOOLS = types.boolean[:, ::1]
 
 
 @njit(
-    types.void(types.FunctionType(RESIDUAL_SIG), float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
+    types.boolean(types.FunctionType(RESIDUAL_SIG), float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
     cache=True,
 )
 def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
@@ -50,22 +54,30 @@ def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
         Marked where row i changes with unknown, or rate, j; marks that are there stay.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
+
+    Returns
+    -------
+    defined : bool
+        Whether the equations are finite there.
     """
     n = y.shape[0]
     base, moved = np.empty(n), np.empty(n)
     residual(t, y, yp, base, idata, rdata, work)
+    if not np.isfinite(base).all():
+        return False
     y_moved, yp_moved = y.copy(), yp.copy()
     for j in range(n):
         y_moved[j] = y[j] + PROBE * max(abs(y[j]), sizes[j])
         residual(t, y_moved, yp, moved, idata, rdata, work)
         y_moved[j] = y[j]
         for i in range(n):
-            by_y[i, j] |= moved[i] != base[i]
+            by_y[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
         yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
         residual(t, y, yp_moved, moved, idata, rdata, work)
         yp_moved[j] = yp[j]
         for i in range(n):
-            by_rate[i, j] |= moved[i] != base[i]
+            by_rate[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
+    return True
 
 
 def dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -78,10 +90,13 @@ def dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
     idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
     sizes = np.minimum(np.abs(problem.scale), problem.atol_scale / PROBE)
     generic = 1.0 + np.arange(n) / (2.0 * n)
-    y = np.where(problem.y0 == 0.0, PROBE * sizes * generic, problem.y0)
-    yp = np.where(problem.yp0 == 0.0, PROBE_OF_RATE * generic, problem.yp0)
-    for place in ((problem.y0.astype(float), problem.yp0.astype(float)), (y, yp)):
-        _probe(problem.residual, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
+    y, yp = problem.y0.astype(float), problem.yp0.astype(float)
+    away = np.where(yp == 0.0, PROBE_OF_RATE * generic, yp)
+    places = [(y, yp)] + [(np.where(y == 0.0, part * np.abs(problem.scale) * generic, y), away) for part in GENERIC]
+    for k, place in enumerate(places):
+        found = _probe(problem.residual, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
+        if k > 0 and found:
+            break
     return by_y, by_rate
 
 

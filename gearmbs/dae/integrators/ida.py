@@ -33,7 +33,7 @@ from gearmbs.dae.integrators.messages import (
     solution_ends,
     unknown_name,
 )
-from gearmbs.dae.integrators.options import ROUNDED_STEP, Options
+from gearmbs.dae.integrators.options import BESIDE, ROUNDED_STEP, Options, beside
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
@@ -65,6 +65,13 @@ STEPS_AT_ONCE = 1000
 """Steps after which IDA is asked how far it has come."""
 SHORTEST = 1e-12
 """Part of the span that the step across such a place takes."""
+FIRST_OF_PIECE = 1e-3
+"""Part of the way to the next breakpoint that is tried first as the first step behind one: IDA's own largest."""
+FIRST_ERROR = 0.1
+"""Error of that step, in tolerances: IDA's test allows one."""
+FIRST_SHRINK = 1e-3
+"""Least ratio of a step tried to the one before, whose error tells nothing where it is far longer than the motions."""
+FIRST_TRIALS = 12
 STANDSTILL = 1e-6
 """Part of the span within which stops count as at one place."""
 TRIES_AT_A_JUMP = 3
@@ -146,12 +153,15 @@ class _Callbacks:
         self.last_t = np.nan
         self.last_step = 0.0
         self.steps = self.residuals = self.jacobians = 0
+        self.first, self.last = -np.inf, np.inf
+        """Between which the equations are evaluated: on this side of the breakpoints at both ends of a piece."""
         self.bad_count, self.bad_t, self.bad_row = 0, -np.inf, 0
 
     def residual(self, t, y, yp, out):
         self.y[:] = y
         self.yp[:] = yp
-        self.problem.residual(t, self.y, self.yp, out, self.idata, self.rdata, self.work)
+        seen = min(max(t, self.first), self.last)
+        self.problem.residual(seen, self.y, self.yp, out, self.idata, self.rdata, self.work)
         if t != self.last_t:
             self.steps += 1
             self.last_step = abs(t - self.last_t)
@@ -170,7 +180,8 @@ class _Callbacks:
     def jacobian(self, t, y, yp, res, cj, out):
         self.y[:] = y
         self.yp[:] = yp
-        self.problem.jacobian(t, self.y, self.yp, cj, self.vals, self.idata, self.rdata, self.work)
+        seen = min(max(t, self.first), self.last)
+        self.problem.jacobian(seen, self.y, self.yp, cj, self.vals, self.idata, self.rdata, self.work)
         if self.dense:
             out[self.problem.indices, self.columns] = self.vals
         else:
@@ -313,6 +324,9 @@ class _Run:
                 # nearer than the shortest step: an output just behind a stop, or the end just behind a jump
                 self.t = target
                 rows.take(self.t, y, yp)
+                self._settle()
+                if self.t == stop < self.end:
+                    solver, y, yp = self._start_beyond(y, yp)
                 continue
             answer, why = self._advance(solver, target, messages)
             if not answer.success:
@@ -335,8 +349,9 @@ class _Run:
             changed = self._call_hook(y, yp)
             if changed is not None:
                 y, yp = changed
-            if changed is not None or self.t == stop < self.end:
-                # what was before a possible jump says nothing about what comes
+            if self.t == stop < self.end:
+                solver, y, yp = self._start_beyond(y, yp)
+            elif changed is not None:
                 solver = self._start(y, yp)
         if self.branch.index_changed(self.t, y, yp):
             told = index_changes(self.branch.t_known, self.t)
@@ -387,14 +402,22 @@ class _Run:
             return ""
         return self.branch.pass_jump(t, np.array(answer.y), np.array(answer.yp), self.end)
 
-    def _start(self, y: np.ndarray, yp: np.ndarray) -> IDA:
-        """Return IDA, set up at the time reached."""
+    def _start_beyond(self, y: np.ndarray, yp: np.ndarray) -> tuple[IDA, np.ndarray, np.ndarray]:
+        """Return IDA, unknowns and rates behind a breakpoint: what was before it says nothing about what comes."""
+        y, yp, h = self.branch.start_afresh(self.t, np.array(y), np.array(yp), self.stop, self.end)
+        return self._start(y, yp, h), y, yp
+
+    def _start(self, y: np.ndarray, yp: np.ndarray, h: float = 0.0) -> IDA:
+        """Return IDA, set up at the time reached, with a first step of ``h`` where none is asked for."""
         o = self.options
+        first, last = beside(self.t, self.end - self.t), beside(self.stop, self.stop - self.t)
+        self.calls.first = self.t + first if self.t in self.stops else -np.inf
+        self.calls.last = self.stop - last if self.stop < self.end else np.inf
         settings = {
             "max_order": o.highest_order if o.max_order is None else o.max_order,
             "max_step": 0.0 if o.max_step is None or np.isinf(o.max_step) else o.max_step,
             # at its ends alone an interval between two breakpoints may be as the ones beside it
-            "first_step": max(0.0, min(o.first_step or 0.0, 0.5 * (self.stop - self.t))),
+            "first_step": max(0.0, min(o.first_step or h, 0.5 * (self.stop - self.t))),
             "min_step": o.min_step or 0.0,
             "max_nonlin_iters": MAX_ITERATIONS if o.max_iterations is None else o.max_iterations,
             "max_num_steps": min(STEPS_AT_ONCE, MAX_STEPS if o.max_steps is None else o.max_steps),
@@ -498,16 +521,61 @@ class IdaBranch:
         Newton's method with a matrix of its own for each iterate. Unknowns of index one may jump, if their equations
         do: see `gearmbs.dae.integrators.branches.stays_on_branch`.
         """
-        # takes longer to load than many a run, which does not need it
-        from scipy.sparse.linalg import splu
-
-        problem, own = self.problem, self.own
-        assert own is not None
         self.tries = self.tries + 1 if t - self.passed <= STANDSTILL * (end - self.start) else 0
         self.passed = t
         if self.tries >= TRIES_AT_A_JUMP:
             return ""
-        h = max(SHORTEST * (end - self.start), 64.0 * EPS * abs(t))
+        h = self._shortest(t, end)
+        found = self._step(t, y, yp, h)
+        if isinstance(found, str):
+            return found
+        return index_changes(t, t) if self.index_changed(t + h, *found) else (t + h, *found)
+
+    def _shortest(self, t: float, end: float) -> float:
+        """Return the size of the step across a jump."""
+        return max(SHORTEST * (end - self.start), BESIDE * abs(t))
+
+    def start_afresh(
+        self, t: float, y: np.ndarray, yp: np.ndarray, stop: float, end: float
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return unknowns and rates with which to go on behind a breakpoint, and the size of the first step.
+
+        Implicit Euler gives (y - y_0)/h = y'_0 + h y'' + ... and algebraic unknowns z_0 + h z' + ...: steps of h and
+        h/2 give all of them and, from y'', the size with an error of `FIRST_ERROR` tolerances. Where such a step leads
+        nowhere all is left as it was, and the size zero: IDA chooses.
+        """
+        moving = self.problem.differential
+        weight = 1.0 / (self.atol + self.rtol * np.abs(y))
+        h, least, most = FIRST_OF_PIECE * (stop - t), self._shortest(t, end), 0.25 * (stop - t)
+        best = y, yp, 0.0
+        for _ in range(FIRST_TRIALS):
+            if not 2.0 * least <= h <= most:
+                break
+            whole, half = (self._step(t, y, yp, part) for part in (h, 0.5 * h))
+            if isinstance(whole, str) or isinstance(half, str):
+                h *= FIRST_SHRINK
+                continue
+            far, near = ((new[0] - y) / part for new, part in ((whole, h), (half, 0.5 * h)))
+            bend = (far - near) / (0.5 * h)
+            error = float(np.max(np.abs(bend) * weight * moving)) * 0.5 * h**2
+            if not np.isfinite(error):
+                break
+            slope = (whole[0] - half[0]) / (0.5 * h)
+            if error <= 1.0:
+                best = np.where(moving, y, 2.0 * half[0] - whole[0]), np.where(moving, 2.0 * near - far, slope), h
+                if error >= FIRST_ERROR / 10.0:
+                    break
+            elif best[2] > 0.0:
+                break
+            h = min(h * min(max(np.sqrt(FIRST_ERROR / max(error, 1e-30)), FIRST_SHRINK), 1.0 / FIRST_SHRINK), most)
+        return best
+
+    def _step(self, t: float, y: np.ndarray, yp: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray] | str:
+        """Take a step of implicit Euler; return unknowns and rates at its end, or why there are none."""
+        # takes longer to load than many a run, which does not need it
+        from scipy.sparse.linalg import splu
+
+        problem, own = self.problem, self.own
         gamma, after = 1.0 / h, t + h
         moving = problem.differential
         new = y + np.where(moving, h * yp, 0.0)
@@ -529,12 +597,16 @@ class IdaBranch:
                 except RuntimeError:
                     break
                 held = violation <= 1.0 and float(np.max(np.abs(step) * weight)) <= 1.0
-                if held or not np.isfinite(step).all():
+                if not np.isfinite(step).all():
                     break
                 new = new - step
                 rates = np.where(moving, gamma * (new - y), 0.0)
+                if held:
+                    break
         if not held:
             return solution_ends(problem, row, violation) or no_solution(problem, row)
+        if own is None:
+            return new, rates
         d = np.where(own, y - new, 0.0)
         if float(np.max(np.abs(d) * weight)) > UNFORESEEN:
             secant = splu(matrix).solve(self._residual(after, np.where(own, y, new), rates))
@@ -542,9 +614,7 @@ class IdaBranch:
             if not (secant * size) @ (d * size) >= SAME_EQUATION * float((d * size) @ (d * size)):
                 worst = int(np.argmax(np.abs(d) * weight))
                 return branch_ends(problem, worst, float(y[worst]), float(new[worst]))
-        if self.index_changed(after, new, rates):
-            return index_changes(t, t)
-        return after, new, rates
+        return new, rates
 
 
 class _Rows:

@@ -22,8 +22,19 @@ differences of rounding and of what Newton's method left, and errors were 1e4 to
 ROUNDED_STEP = 16.0 * EPS
 """Shortest step in units of the time: fewer of its last digits say nothing of a rate."""
 
+BESIDE = 64.0 * EPS
+"""How far beside a breakpoint, in units of the time, equations may switch that compute the time of it in another way: a
+sum of some hundred periods is off by as much as that."""
+BESIDE_OF_PIECE = 1e-9
+"""That as part of the way to the next breakpoint, at most: in times of 1e9 s the last digits are no rounding."""
+
 Consumer = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
 """Takes t, y of some accepted steps and the integer table valid there; the arrays are valid during the call only."""
+
+
+def beside(t: float, length: float) -> float:
+    """Return how far beside a breakpoint equations that may switch there are looked at, in a piece of ``length``."""
+    return max(min(BESIDE * abs(t), BESIDE_OF_PIECE * length), float(np.spacing(abs(t))))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +65,7 @@ class Options:
         outputs, or one and a breakpoint, are nearer than `CROWDED` of their mean distance, all are interpolated.
     breakpoints : sequence of float
         Possible discontinuities: the run lands on each, and starts afresh if the step beyond shows that it is one; IDA
-        starts afresh at each.
+        starts afresh at each. The jump itself may be `BESIDE` it.
     event_direction, event_action : sequence of int, optional
         For each event function: crossings that count (-1 falling, 1 rising, 0 both), and what they do (0 record,
         1 stop, 2 land on the crossing as on a breakpoint).

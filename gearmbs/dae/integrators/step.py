@@ -32,6 +32,7 @@ from gearmbs.dae.integrators.corrector import (
 )
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, renew_matrix
+from gearmbs.dae.integrators.options import BESIDE, ROUNDED_STEP
 from gearmbs.dae.integrators.restart import shorten_first_step, start_afresh, take_block
 from gearmbs.dae.integrators.run_state import (
     STATE_TYPE,
@@ -45,13 +46,11 @@ from gearmbs.dae.integrators.run_state import (
 )
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
-from gearmbs.dae.problem import EPS, HISTORY_CHANGED
+from gearmbs.dae.problem import HISTORY_CHANGED
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import bits_of, double_of
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE
 
-ROUNDED_STEP = 16.0 * EPS
-"""Smallest step in units of the time, whose last digit is as much as is left of smaller ones."""
 MAX_FAILS = 16
 NEWTON_SHRINK = 0.25
 """Ratio of a step to the one before it whose corrector failed with a fresh matrix: as in DASSL, IDA and CVODE."""
@@ -163,8 +162,10 @@ def choose_end(st):
     st.t_old = t_old
     st.t_new = t
     # at a stop the equations may have jumped already
-    lands = st.next_stop < st.stops.shape[0] and t >= st.stops[st.next_stop]
-    st.t_seen = np.nextafter(t, t_old) if lands else t
+    st.landing = st.next_stop < st.stops.shape[0] and t >= st.stops[st.next_stop]
+    st.t_seen = np.nextafter(t, t_old) if st.landing else t
+    if st.landing and st.withdrawn:
+        st.t_seen = t - min(BESIDE * abs(t), 0.5 * h)
     st.step = h
     st.h_wanted = st.h
     st.h = h
@@ -233,6 +234,20 @@ def solve_step(functions, st, plan, factors):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def withdraw(st):
+    """Try a refused step that lands on a stop once more, with the equations as they are a little before; return so.
+
+    The time at which they jump may be computed in another way than that of the stop, and come before it by rounding.
+    """
+    if not st.landing or st.withdrawn:
+        return False
+    st.withdrawn = True
+    st.matrix_wanted = True
+    st.h = st.h_wanted
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def refuse_by_newton(st, code):
     """Choose how to go on after the corrector failed: with a new matrix, a smaller step, or other pivots.
 
@@ -246,7 +261,7 @@ def refuse_by_newton(st, code):
         st.h = st.h_wanted
         return s.RUNNING
     st.newton_rejections += 1
-    if start_afresh(st):
+    if withdraw(st) or start_afresh(st):
         return s.RUNNING
     st.h = NEWTON_SHRINK * st.step
     if code == NOT_FINITE:
@@ -326,6 +341,8 @@ def refuse_by_error(st):
     """Choose order and size of the next attempt after the error test failed."""
     forget_noise(st)
     st.error_rejections += 1
+    if withdraw(st):
+        return
     st.since_refused = 0
     st.error_fails += 1
     st.worst = weighted_argmax(st.delta, st.w_error)
@@ -392,6 +409,7 @@ def deliver(functions, st, part):
     at_stop = st.next_stop < st.stops.shape[0] and st.t >= st.stops[st.next_stop]
     if at_stop:
         st.next_stop += 1
+        st.withdrawn = False
     afresh = at_stop or action != RECORD
     if afresh:
         st.restarts += 1

@@ -201,3 +201,24 @@ def test_a_recorded_state_of_a_force(integrator, formulation):
     assert solution.success
     x = solution.com_position("ball")[:, 0]
     np.testing.assert_allclose(solution.state("spring.F"), 1000.0 * np.maximum(0.0, x - 0.5) ** 1.5, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("weight", [9.81, -1e3])
+def test_a_multiplier_beside_what_is_zero_at_the_start(weight, method):
+    """A pendulum from rest at right angles to its weight: its force along y is y times the tension, both zero."""
+
+    def pendulum(t, y, yp, out):
+        out[0], out[1] = yp[0] - y[2], yp[1] - y[3]
+        out[2], out[3] = yp[2] + y[0] * y[4], yp[3] + y[1] * y[4] + weight
+        out[4] = y[0] * y[2] + y[1] * y[3]
+
+    end = 2.0 / np.sqrt(abs(weight))
+    found = solve_dae(
+        pendulum, (0.0, end), [1.0, 0.0, 0.0, 0.0, 0.0], method=method, t_eval=np.linspace(0.0, end, 30), rtol=1e-7,
+        atol=1e-9,
+    )  # fmt: skip
+    assert found.success, found.message
+    assert "could not" not in found.message
+    _, y, u, v, tension = found.y.T
+    np.testing.assert_allclose(tension, u**2 + v**2 - weight * y, rtol=1e-5, atol=1e-5 * abs(weight))

@@ -250,6 +250,68 @@ def test_a_restart_at_a_jump_costs_ten_steps_at_most_and_no_digits(beyond, tol, 
     assert off < 1.5 * off_steady + 10.0 * tol
 
 
+@njit
+def pushed(t, y, yp, out, p):
+    """A unit mass on a unit spring; the push changes its sign at each time of ``p``."""
+    push = 1.0
+    for jump in p:
+        if t >= jump:
+            push = -push
+    out[0] = yp[0] - y[1]
+    out[1] = yp[1] + y[0] - push
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8])
+def test_a_jump_some_digits_beside_its_breakpoint_costs_what_one_at_it_does(tol, method):
+    """As where the equations compute the time of the jump in another way than whoever gives the breakpoints."""
+
+    marks = 1.3 * np.arange(1, 6)
+    place, speed, push = 0.0, 0.0, 1.0
+    for _ in range(6):
+        c, s = np.cos(1.3), np.sin(1.3)
+        place, speed = push + (place - push) * c + speed * s, -(place - push) * s + speed * c
+        push = -push
+    steps, errors = [], []
+    for beside in (0, -1, 1, -7, 7, -40, 40):
+        found = solve_dae(
+            pushed, (0.0, 7.8), [0.0, 0.0], rtol=tol, atol=tol, method=method, breakpoints=marks, t_eval=[0.0, 7.8],
+            p=marks + beside * np.spacing(marks),
+        )  # fmt: skip
+        assert found.success, found.message
+        steps.append(found.stats.steps)
+        errors.append(np.abs(found.y[-1] - [place, speed]).max())
+    assert max(steps) - min(steps) <= 2 * len(marks)
+    assert max(errors) < 1.5 * errors[0] + 10.0 * tol
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("beyond", [False, True])
+def test_an_algebraic_unknown_jumps_at_a_breakpoint_with_outputs_next_to_it(beyond, method):
+    """z = 1 + t, from t = 0.7 on 2 + t; x' = z."""
+    jump = 0.7
+    near = [jump + k * np.spacing(jump) for k in (-40, -3, -1, 0, 1, 3, 20, 40)]
+    outputs = np.array([0.0, 0.3, *near, 0.7 + 1e-9, 1.4, 2.0])
+    after = outputs >= jump if beyond else outputs > jump
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = y[1] - t - (2.0 if (t >= jump if beyond else t > jump) else 1.0)
+
+    for controlled in (False, True):
+        mask = np.array([True, controlled])
+        found = solve_dae(
+            residual, (0.0, 2.0), [0.0, 1.0], method=method, breakpoints=[jump], t_eval=outputs, rtol=1e-7, atol=1e-7,
+            error_mask=mask,
+        )  # fmt: skip
+        assert found.success, found.message
+        x = outputs + 0.5 * outputs**2 + np.maximum(outputs - jump, 0.0)
+        np.testing.assert_allclose(found.y[:, 0], x, atol=1e-6)
+        # at the jump itself either side may stand
+        apart = outputs != jump
+        np.testing.assert_allclose(found.y[apart, 1], (1.0 + outputs + after)[apart], atol=2e-5)
+
+
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
 @pytest.mark.parametrize("rate", [1.0, 1e3])
 def test_jumps_a_fraction_of_a_step_apart_are_seen(rate, method):
