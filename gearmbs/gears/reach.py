@@ -99,7 +99,7 @@ distance is good to 1e-5 modules."""
 def fillet_clearance(geometry: PairGeometry, wheel: int, depth: float = 0.0) -> float:
     """Least distance of the tip corner of a wheel, 0 or 1, from the mate's root arc while flanks at work touch.
 
-    Infinite if the corner does not come over the arc; negative if it cuts into it. See `gearmbs.contact.gaps.root` for
+    Infinite if the corner does not come over the arc; negative if it cuts into it. See `gearmbs.contact.root` for
     the arc and where a corner is over it.
 
     Parameters
