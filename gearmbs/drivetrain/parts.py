@@ -12,8 +12,8 @@ import numpy as np
 
 from gearmbs.drivetrain.errors import DrivetrainError, require, told_of
 from gearmbs.drivetrain.part import Part
-from gearmbs.gears.contact_model import ContactLaw, FlankFriction
 from gearmbs.gears.ideal_mesh import IdealMesh
+from gearmbs.gears.mesh import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
 from gearmbs.schema.messages import chosen

@@ -24,7 +24,7 @@ from gearmbs.kernels.jit import njit
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
-    from gearmbs.gears.contact_model import ContactModel
+    from gearmbs.gears.mesh import ContactModel
 
 CURVE_POINTS = 200
 """Along the path of contact, for the mean of a stiffness that varies."""

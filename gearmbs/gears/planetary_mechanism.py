@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from gearmbs._shown import Written
-from gearmbs.gears.planetary.elastic_ring import ElasticRim, ring_meshes
-from gearmbs.gears.planetary.planetary_set import MEMBERS, PlanetarySet
+from gearmbs.gears.elastic_ring import ElasticRim, ring_meshes
+from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement
