@@ -89,8 +89,8 @@ CIRCLES = {
     ("drivetrain.build", "drivetrain.description", "drivetrain.drivetrain", "drivetrain.kinematics",
      "drivetrain.placement", "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
-    ("bearings.catalogue", "bearings.geometry", "bearings.ratings"):
-        "a bearing is found by its designation and tells its ratings; methods, and types only",
+    ("bearings.bearing", "bearings.catalogue"):
+        "a bearing is found by its designation",
     ("mechanism.building.compile", "mechanism.building.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",
