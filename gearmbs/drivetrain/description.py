@@ -54,15 +54,12 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
-from gearmbs.drivetrain.bearings import BEARINGS
-from gearmbs.drivetrain.couplings import COUPLINGS
+from gearmbs.drivetrain.connections import BEARINGS, COUPLINGS
 from gearmbs.drivetrain.drives import DRIVES
 from gearmbs.drivetrain.drivetrain import GROUPS, Drivetrain
-from gearmbs.drivetrain.errors import DrivetrainError, require, told_of
 from gearmbs.drivetrain.loads import LOADS
-from gearmbs.drivetrain.part import Part
-from gearmbs.drivetrain.parts import GearMesh, Housing, HousingMode, Mount, Shaft, Wheel
-from gearmbs.drivetrain.sensors import SENSORS
+from gearmbs.drivetrain.part import DrivetrainError, Part, require, told_of
+from gearmbs.drivetrain.parts import SENSORS, GearMesh, Housing, HousingMode, Mount, Shaft, Wheel
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
 from gearmbs.schema.described import Described, make

@@ -13,10 +13,8 @@ import numpy as np
 
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads.forces import Diagnostic
-from gearmbs.drivetrain.curves import slopes
-from gearmbs.drivetrain.errors import DrivetrainError, require
-from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, share_of
-from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque
+from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value, over_time, require, share_of
+from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term

@@ -8,14 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from gearmbs.drivetrain.bearings import Bearing
-from gearmbs.drivetrain.couplings import Coupling
+from gearmbs.drivetrain.connections import Bearing, Coupling
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
-from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.drivetrain.loads import Load
-from gearmbs.drivetrain.part import Part, parts_html
-from gearmbs.drivetrain.parts import GearMesh, Housing, Shaft, Wheel
-from gearmbs.drivetrain.sensors import Sensor
+from gearmbs.drivetrain.part import DrivetrainError, Part, parts_html, require
+from gearmbs.drivetrain.parts import GearMesh, Housing, Sensor, Shaft, Wheel
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:

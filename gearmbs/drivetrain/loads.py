@@ -11,10 +11,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
-from gearmbs.drivetrain.curves import slopes
-from gearmbs.drivetrain.errors import require
-from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, share_of
-from gearmbs.drivetrain.torque_element import FROM_LOST, FROM_OWN, ShaftTorque
+from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, require, share_of
+from gearmbs.drivetrain.torque_element import FROM_LOST, FROM_OWN, ShaftTorque, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.schema.quantities import Measure, OneOf, OverTime

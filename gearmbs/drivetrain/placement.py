@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.drivetrain.errors import DrivetrainError, require
+from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh, Shaft, turn_z
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Torques about a shaft's axis as force elements."""
+"""Torques about a shaft's axis as force elements, and the curves through points that their laws read."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numba import types
 
 from gearmbs.dae.equations.kinematics.update import angle_gradient, counted_angle
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, DISSIPATED, FORCE_SIG, FRAME_A, FRAME_W, STORED, Diagnostic
+from gearmbs.drivetrain.part import require
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, VEC, caller
 from gearmbs.kernels.structs import vector_at
@@ -118,7 +119,7 @@ class ShaftTorque(ForceElement):
     Attributes
     ----------
     law : str
-        Module and name of the compiled law in `gearmbs.drivetrain.laws`, as "motors.kloss".
+        Kind and name of the compiled law, as "motors.kloss": of `gearmbs.drivetrain.motors_laws`.
     parameters : sequence of float
     times : tuple of TimeFunction
         Functions of time that the law is given.
@@ -164,7 +165,7 @@ class ShaftTorque(ForceElement):
         from importlib import import_module
 
         module, _, name = self.law.partition(".")
-        law: Any = getattr(import_module(f"gearmbs.drivetrain.laws.{module}"), name)
+        law: Any = getattr(import_module(f"gearmbs.drivetrain.{module}_laws"), name)
         return Compiled(
             shaft_torque,
             (len(self.times), int(self.counts_angle), self.first_told),
@@ -177,3 +178,34 @@ class ShaftTorque(ForceElement):
 
     def __repr__(self) -> str:
         return f"ShaftTorque({self.name!r}, {self.kind} on {self.i.body.name!r} about z of {self.j.name!r})"
+
+
+def slopes(
+    label: str, x: Sequence[float], y: Sequence[float], period: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points and slopes of the monotone cubic through them, of a periodic curve of the periodic spline.
+
+    Parameters
+    ----------
+    label : str
+        What messages call the owner of the points.
+    x, y : sequence of float
+        Two points or more, x increasing.
+    period : float
+        Period in x; the first and last points lie one period apart then, with the same value.
+
+    Raises
+    ------
+    DrivetrainError
+    """
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    require(a.shape == b.shape and a.ndim == 1 and a.size >= 2, f"{label}: give as many torques as places, two or more")
+    require(bool(np.all(np.diff(a) > 0.0)), f"{label}: the places of its table must increase")
+    if period > 0.0:
+        require(abs(a[-1] - a[0] - period) < 1e-9 * period, f"{label}: the table must cover one period, {period:g} rad")
+        require(abs(b[-1] - b[0]) <= 1e-9 * np.abs(b).max(), f"{label}: the table's last torque must be its first")
+        b[-1] = b[0]
+        return a, b, CubicSpline(a, b, bc_type="periodic")(a, 1)
+    return a, b, PchipInterpolator(a, b)(a, 1) if a.size > 2 else np.full(2, (b[1] - b[0]) / (a[1] - a[0]))

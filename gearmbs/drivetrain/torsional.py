@@ -17,7 +17,7 @@ import scipy.linalg
 
 from gearmbs.dae.equations.loads.time_functions import smooth_step
 from gearmbs.drivetrain.drives import SpeedDrive
-from gearmbs.drivetrain.errors import require, told_of
+from gearmbs.drivetrain.part import require, told_of
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 from gearmbs.kernels.jit import njit

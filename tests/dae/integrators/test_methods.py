@@ -28,7 +28,7 @@ from gearmbs.dae.methods import (
 )
 from gearmbs.dae.problem import ModelError
 from gearmbs.drivetrain.description import RunSettings
-from gearmbs.drivetrain.errors import DrivetrainError
+from gearmbs.drivetrain.part import DrivetrainError
 from gearmbs.mechanism import Mechanism
 from gearmbs.wording import any_of
 from tests.docs.support import DOCS

@@ -7,6 +7,8 @@ With the twist p = a - a_0, the compression d = |p| - b/2 beyond a dead band b a
 where B rises from 0 to the line d - d_2 over a width (stages join with a continuous tangent) and S is the STEP of the
 damping over a depth behind the dead band. Without a dead band T = -sigma e - c w, which may also damp against the
 spring; with one a side that has let go never pulls.
+
+
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ Pump, with the pressure difference p(t) itself or behind a lag, tau z' = p(t) - 
 resistance of brakes, fans and drag:
 
     T = -[T_0 f(t) tanh(w/w_0) + c w + k w |w|].
+
+
 """
 
 from __future__ import annotations

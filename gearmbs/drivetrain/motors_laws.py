@@ -14,6 +14,8 @@ where sat is the identity up to `LINEAR_SHARE` of the largest torque and rises s
 References
 ----------
 M. Kloss, Drehmoment und Schlüpfung des Drehstrommotors, Archiv für Elektrotechnik 5 (1916) 59-87.
+
+
 """
 
 from __future__ import annotations
