@@ -13,8 +13,9 @@ from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.kinematics import walk
 from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, require, told_of
-from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Shaft, SpeedSensor, TorqueSensor, Wheel, turn_z
+from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Shaft, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
+from gearmbs.gears.geometry import turn_z
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import Body, Marker

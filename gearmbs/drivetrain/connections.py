@@ -1,4 +1,4 @@
-"""What connects shafts: bearings, with a housing, the ground or another shaft; clutches and couplings, with each other."""
+"""What connects shafts: bearings with housings, the ground or other shafts; clutches and couplings with each other."""
 
 from __future__ import annotations
 

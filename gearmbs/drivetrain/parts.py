@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-
 from gearmbs.drivetrain.part import DrivetrainError, Part, require, told_of
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import ContactLaw, FlankFriction
@@ -385,12 +383,6 @@ class Housing(Part):
     at: Annotated[Three, Measure("length", several=3)] = (0.0, 0.0, 0.0)
     mounts: tuple[Mount, ...] = ()
     modes: tuple[HousingMode, ...] = ()
-
-
-def turn_z(angle: float) -> np.ndarray:
-    """Return the rotation about z by an angle, shape (3, 3)."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 Direction = Annotated[tuple[float, float, float], Measure(several=3)]

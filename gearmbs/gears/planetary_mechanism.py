@@ -11,6 +11,7 @@ import numpy as np
 
 from gearmbs._shown import Written
 from gearmbs.gears.elastic_ring import ElasticRim, ring_meshes
+from gearmbs.gears.geometry import turn_z
 from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.mechanism.parts.bodies import Marker
@@ -130,7 +131,7 @@ def planetary_mechanism(
     for member in MEMBERS:
         mass, inertia = masses[member]
         spin = (0.0, 0.0, turning[member])
-        body = m.body(member, mass, inertia, orientation=_about_z(turns[member]), angular_velocity=spin)
+        body = m.body(member, mass, inertia, orientation=turn_z(turns[member]), angular_velocity=spin)
         if member == held and member not in supports:
             m.fixed(f"{member} seat", body, m.ground)
         elif member in supports:
@@ -188,11 +189,6 @@ def _check_loads(loads: Mapping[str, float], held: str | None, speeds: Mapping, 
                 "motion nor meshes; leave it out (the reaction there follows from the torques on the others), or give "
                 f"the torque on {' or '.join(m for m in MEMBERS if m != held and m not in speeds) or 'another member'}"
             )
-
-
-def _about_z(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _masses(gears: PlanetarySet, given: Mapping[str, tuple[float, Any]]) -> dict[str, tuple[float, Any]]:
@@ -263,7 +259,7 @@ def _planets(
             name,
             *weight,
             position=place,
-            orientation=_about_z(start["planets"][k]),
+            orientation=turn_z(start["planets"][k]),
             velocity=(-spin * place[1], spin * place[0], 0.0),
             angular_velocity=(0.0, 0.0, turning["planet"]),
         )
@@ -280,7 +276,7 @@ def _planets(
         m.gear_contact(f"sun-{name}", m.bodies["sun"], planet, to_sun[k])
         wheel: Any = planet
         if gears.planet_at_ring is not None:
-            wheel = planet.marker((0.0, 0.0, 0.0), _about_z(start["steps"][k]), name=f"{name} step")
+            wheel = planet.marker((0.0, 0.0, 0.0), turn_z(start["steps"][k]), name=f"{name} step")
         if rim is None:
             m.gear_contact(f"{name}-ring", wheel, m.bodies["ring"], to_ring[k])
         else:
