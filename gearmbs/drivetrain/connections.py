@@ -329,7 +329,7 @@ class RigidCoupling(Coupling):
 class ElasticClutch(Coupling):
     """An elastic clutch: T = k_1 d + k_3 d^3, a second stage, damping, and a dead band in which it is silent.
 
-    The equations are those of `gearmbs.drivetrain.couplings_laws`.
+    The equations are those of `gearmbs.drivetrain.torque_laws`.
 
     Parameters
     ----------
@@ -392,7 +392,7 @@ class ElasticClutch(Coupling):
         )  # fmt: skip
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "couplings.clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
+                self.name, at.i, at.j, "clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
                 what="clutch",
             )
         )  # fmt: skip
@@ -459,7 +459,7 @@ class TorsionalShaft(Coupling):
         parameters = (0.0, self.tangent, 0.0, self.tangent_damping, 0.0, 1.0, 0.0, 0.0, 1.0)
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "couplings.clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
+                self.name, at.i, at.j, "clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
                 what="torsional shaft",
             )
         )  # fmt: skip

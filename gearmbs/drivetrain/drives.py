@@ -146,7 +146,7 @@ class TorqueDrive(Drive):
     def add(self, at: Attached) -> None:
         given = over_time(self.torque, "torque", self.label, at)
         parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0)
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(given,), what="torque"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(given,), what="torque"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,7 +236,7 @@ class InductionMotor(Drive):
         return self.torque(0.0)
 
     def _law(self) -> tuple[str, tuple[float, ...]]:
-        return "motors.kloss", (self.breakdown_torque, self.breakdown_slip)
+        return "kloss", (self.breakdown_torque, self.breakdown_slip)
 
     def add(self, at: Attached) -> None:
         law, numbers = self._law()
@@ -317,7 +317,7 @@ class CircuitMotor(InductionMotor):
         return gain * r2 * (r2**2 - (r1**2 + x**2) * s**2) / size**2 / self.synchronous
 
     def _law(self) -> tuple[str, tuple[float, ...]]:
-        return "motors.circuit", self.equivalent
+        return "circuit", self.equivalent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -347,7 +347,7 @@ class CurveMotor(Drive):
         on = share_of(at)
         points = slopes(self.label, self.speeds, self.torques)
         parameters = np.concatenate([[at.sense, 0.0, len(points[0])], *points])
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(on,), what="motor"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(on,), what="motor"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -385,7 +385,7 @@ class ControlledDrive(Drive):
             wanted = constant(size) if at.running else step(0.0, 0.0, at.run_up, size)
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "motors.controller",
+                self.name, at.i, at.j, "controller",
                 (at.sense, self.proportional, self.integral, self.largest), times=(wanted,),
                 own_states=(State(f"{self.name}.integral"),), told=(Diagnostic("speed_error", "rad/s"),),
                 first_told=FROM_OWN, what="motor",

@@ -71,7 +71,7 @@ class TorqueLoad(Load):
     def add(self, at: Attached) -> None:
         given = over_time(self.torque, "torque", self.label, at)
         parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, -1.0, -1.0, 0.0, 0.0)
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(given,), what="load"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(given,), what="load"))
 
 
 def gear_pump_ripple(teeth: int, pressure_angle: Quantity = "20 deg", addendum: float = 1.0) -> tuple[float, float]:
@@ -179,7 +179,7 @@ class Pump(Load):
         )  # fmt: skip
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "loads.pump", parameters, times=(pressure,), counts_angle=bool(self.factors),
+                self.name, at.i, at.j, "pump", parameters, times=(pressure,), counts_angle=bool(self.factors),
                 own_states=states, told=(Diagnostic("flow", "m^3/s"),), first_told=FROM_OWN, what="pump",
             )
         )  # fmt: skip
@@ -268,7 +268,7 @@ def _resist(
     parameters = (dry, viscous, square, smoothing)
     at.mechanism.add(
         ShaftTorque(
-            name, at.i, at.j, "loads.resistance", parameters, times=(share,), told=told, first_told=FROM_LOST,
+            name, at.i, at.j, "resistance", parameters, times=(share,), told=told, first_told=FROM_LOST,
             what="load",
         )
     )  # fmt: skip
@@ -326,7 +326,7 @@ class TableLoad(Load):
             times = (share_of(at),)
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "loads.table", parameters, times=times, counts_angle=self.over == "angle",
+                self.name, at.i, at.j, "table", parameters, times=times, counts_angle=self.over == "angle",
                 what="load",
             )
         )  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numba import types
@@ -119,7 +118,7 @@ class ShaftTorque(ForceElement):
     Attributes
     ----------
     law : str
-        Kind and name of the compiled law, as "motors.kloss": of `gearmbs.drivetrain.motors_laws`.
+        Name of the compiled law in `gearmbs.drivetrain.torque_laws`, as "kloss".
     parameters : sequence of float
     times : tuple of TimeFunction
         Functions of time that the law is given.
@@ -162,15 +161,13 @@ class ShaftTorque(ForceElement):
         return self.told
 
     def compiled(self) -> Compiled:
-        from importlib import import_module
+        from gearmbs.drivetrain import torque_laws
 
-        module, _, name = self.law.partition(".")
-        law: Any = getattr(import_module(f"gearmbs.drivetrain.{module}_laws"), name)
         return Compiled(
             shaft_torque,
             (len(self.times), int(self.counts_angle), self.first_told),
             self.parameters,
-            ((law, LAW_SIG),),
+            ((getattr(torque_laws, self.law), LAW_SIG),),
             times=self.times,
             angles=((2, self.i, self.j),) if self.counts_angle else (),
             scratch=WORK,
