@@ -14,7 +14,8 @@ import numpy as np
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque, slopes
+from gearmbs.drivetrain.torque_element import ShaftTorque, slopes
+from gearmbs.drivetrain.torque_laws import TOLD
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term
@@ -247,7 +248,7 @@ class InductionMotor(Drive):
         at.mechanism.add(
             ShaftTorque(
                 self.name, at.i, at.j, law, (at.sense, self.synchronous, lag, *numbers), times=(on,),
-                own_states=states, told=SLIP, first_told=FROM_OWN, what="motor",
+                own_states=states, told=SLIP, first_told=TOLD, what="motor",
             )
         )  # fmt: skip
 
@@ -388,7 +389,7 @@ class ControlledDrive(Drive):
                 self.name, at.i, at.j, "controller",
                 (at.sense, self.proportional, self.integral, self.largest), times=(wanted,),
                 own_states=(State(f"{self.name}.integral"),), told=(Diagnostic("speed_error", "rad/s"),),
-                first_told=FROM_OWN, what="motor",
+                first_told=TOLD, what="motor",
             )
         )  # fmt: skip
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
 from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import FROM_LOST, FROM_OWN, ShaftTorque, slopes
+from gearmbs.drivetrain.torque_element import ShaftTorque, slopes
+from gearmbs.drivetrain.torque_laws import LOST, TOLD
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.schema.quantities import Measure, OneOf, OverTime
@@ -180,7 +181,7 @@ class Pump(Load):
         at.mechanism.add(
             ShaftTorque(
                 self.name, at.i, at.j, "pump", parameters, times=(pressure,), counts_angle=bool(self.factors),
-                own_states=states, told=(Diagnostic("flow", "m^3/s"),), first_told=FROM_OWN, what="pump",
+                own_states=states, told=(Diagnostic("flow", "m^3/s"),), first_told=TOLD, what="pump",
             )
         )  # fmt: skip
 
@@ -268,7 +269,7 @@ def _resist(
     parameters = (dry, viscous, square, smoothing)
     at.mechanism.add(
         ShaftTorque(
-            name, at.i, at.j, "resistance", parameters, times=(share,), told=told, first_told=FROM_LOST,
+            name, at.i, at.j, "resistance", parameters, times=(share,), told=told, first_told=LOST,
             what="load",
         )
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Compiled laws of torques about a shaft's axis; see `gearmbs.drivetrain.torque_element` for their arguments.
+"""Compiled laws of torques about a shaft's axis; `gearmbs.drivetrain.torque_element` calls them.
 
 Induction motors by Kloss [1]_ or by their equivalent circuit, with s = 1 - w/w_s:
 
@@ -36,22 +36,22 @@ References
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs.dae.equations.loads.forces import impact
-from gearmbs.drivetrain.torque_element import (
-    BY_ANGLE,
-    BY_SPEED,
-    BY_STATE,
-    LAW_SIG,
-    LOST,
-    RATE,
-    RATE_BY_SPEED,
-    RATE_BY_STATE,
-    STORED_TORQUE,
-    TOLD,
-    TORQUE,
-)
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import F8, VEC
+
+LAW_SIG = types.void(VEC, F8, F8, F8, VEC, VEC, VEC)
+"""law(parameters, t, angle, speed, times, states, out); angle in rad, speed in rad/s."""
+
+TORQUE, BY_ANGLE, BY_SPEED, BY_STATE = 0, 1, 2, 3
+"""Places in ``out``: the torque on I (N m) and its derivatives."""
+STORED_TORQUE, LOST, TOLD = 4, 5, 6
+"""Energy stored (J), power dissipated (W), and one quantity of the law's own."""
+RATE, RATE_BY_ANGLE, RATE_BY_SPEED, RATE_BY_STATE = 7, 8, 9, 10
+"""The state's rate and its derivatives."""
+OUT_SIZE = 11
 
 LINEAR_SHARE = 0.8
 """Part of the largest torque up to which a controller's torque is what it asks for."""
