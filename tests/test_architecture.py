@@ -86,8 +86,8 @@ EXCEPTIONS = {
 CIRCLES = {
     ("kernels.ahead", "kernels.calls", "kernels.jit"):
         "a kernel that is not there is compiled when it is called",
-    ("drivetrain.build", "drivetrain.description", "drivetrain.drivetrain", "drivetrain.kinematics",
-     "drivetrain.placement", "drivetrain.torsional"):
+    ("drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.placement",
+     "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
     ("bearings.bearing", "bearings.catalogue"):
         "a bearing is found by its designation",

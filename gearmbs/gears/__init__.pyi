@@ -1,8 +1,5 @@
 from . import faults as faults
 from .contact_element import GearContact as GearContact
-from .elastic_ring import ElasticRim as ElasticRim
-from .elastic_ring import RimModes as RimModes
-from .elastic_ring import RingMeshes as RingMeshes
 from .geometry import PairGeometry as PairGeometry
 from .geometry import Placement as Placement
 from .ideal_mesh import IdealMesh as IdealMesh
@@ -11,6 +8,9 @@ from .mesh import ContactModel as ContactModel
 from .mesh import FlankFriction as FlankFriction
 from .mesh import OperatingPoint as OperatingPoint
 from .pair import GearPair as GearPair
+from .planetary_mechanism import ElasticRim as ElasticRim
+from .planetary_mechanism import RimModes as RimModes
+from .planetary_mechanism import RingMeshes as RingMeshes
 from .planetary_mechanism import Support as Support
 from .planetary_mechanism import planetary_mechanism as planetary_mechanism
 from .planetary_set import PlanetarySet as PlanetarySet
