@@ -29,13 +29,11 @@ import numpy as np
 from benchmarks.markdown import table
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.geometry import PairGeometry
+from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness, iso_theoretical_stiffness
 from gearmbs.gears.stiffness import (
     contact_half_width,
     disc_torsion,
     flattening,
-    iso_mesh_stiffness,
-    iso_single_stiffness,
-    iso_theoretical_stiffness,
     mesh_stiffness,
     pair_stiffness,
     rack_root,

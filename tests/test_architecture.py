@@ -86,11 +86,11 @@ EXCEPTIONS = {
 CIRCLES = {
     ("kernels.ahead", "kernels.calls", "kernels.jit"):
         "a kernel that is not there is compiled when it is called",
-    ("drivetrain.build", "drivetrain.description", "drivetrain.drivetrain", "drivetrain.kinematics",
-     "drivetrain.placement", "drivetrain.torsional"):
+    ("drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.placement",
+     "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
-    ("bearings.catalogue", "bearings.geometry", "bearings.ratings"):
-        "a bearing is found by its designation and tells its ratings; methods, and types only",
+    ("bearings.bearing", "bearings.catalogue"):
+        "a bearing is found by its designation",
     ("mechanism.building.compile", "mechanism.building.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",

@@ -92,7 +92,7 @@ def test_packages_are_found_without_importing_them():
 
 
 @pytest.mark.parametrize("module_first", [False, True])
-@pytest.mark.parametrize("name", ["gears.planetary", "identify.fit"])
+@pytest.mark.parametrize("name", ["gears.planetary_mechanism", "identify.fit"])
 def test_modules_do_not_take_the_place_of_functions(name, module_first):
     """`gearmbs.identify.fit` is a function and the module it lives in; importing the module changes nothing."""
     steps = [f"module = importlib.import_module('gearmbs.{name}')", f"function = gm.{name}"]

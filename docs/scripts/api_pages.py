@@ -78,7 +78,7 @@ MORE = {
     },
     "gearmbs.bearings": {
         "gearmbs.bearings.catalogue": EVERYTHING,
-        "gearmbs.bearings.ratings": EVERYTHING,
+        "gearmbs.bearings.bearing": EVERYTHING,
         "gearmbs.bearings.laws_kernel": EVERYTHING,
     },
     "gearmbs.contact": {

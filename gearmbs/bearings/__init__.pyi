@@ -1,3 +1,7 @@
+from .bearing import Bearing as Bearing
+from .bearing import equivalent_load as equivalent_load
+from .bearing import mean_load as mean_load
+from .bearing import rating_life as rating_life
 from .defects import DEFECTS as DEFECTS
 from .defects import Defect as Defect
 from .defects import Line as Line
@@ -10,15 +14,11 @@ from .defects import UnevenSpacing as UnevenSpacing
 from .defects import Waviness as Waviness
 from .element import RollingBearing as RollingBearing
 from .element import add_bearing as add_bearing
-from .errors import BearingError as BearingError
-from .geometry import Bearing as Bearing
+from .element import bearing_lives as bearing_lives
+from .kinds import BearingError as BearingError
 from .laws_kernel import PointContact as PointContact
 from .laws_kernel import groove_contact as groove_contact
 from .layout import spall_depth as spall_depth
-from .life import bearing_lives as bearing_lives
-from .ratings import equivalent_load as equivalent_load
-from .ratings import mean_load as mean_load
-from .ratings import rating_life as rating_life
 from .statics import BearingState as BearingState
 from .statics import BearingStatics as BearingStatics
 from .statics import stiffness_matrix as stiffness_matrix

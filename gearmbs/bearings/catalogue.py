@@ -13,11 +13,10 @@ import warnings
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from gearmbs.bearings.errors import BearingError
-from gearmbs.bearings.kinds import KINDS, Known, known_of
+from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of
 
 if TYPE_CHECKING:
-    from gearmbs.bearings.geometry import Bearing
+    from gearmbs.bearings.bearing import Bearing
 
 
 def dimension_series(designation: str) -> tuple[str, str, str] | None:
@@ -123,7 +122,7 @@ def known() -> list[str]:
 
 def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
     """Return the bearing of a designation; see `gearmbs.bearings.Bearing.from_designation`."""
-    from gearmbs.bearings.geometry import Bearing
+    from gearmbs.bearings.bearing import Bearing
 
     if not isinstance(designation, str) or not designation.strip():
         raise BearingError(f"designation is {designation!r}; give a text such as '6205'")
@@ -182,7 +181,7 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
 
 def _with_fields(text: str) -> tuple[str, dict[str, Any]]:
     """Return a designation and the fields written behind it, "6305, elements=7, element_diameter=13.49 mm"."""
-    from gearmbs.bearings.geometry import Bearing
+    from gearmbs.bearings.bearing import Bearing
 
     head, *parts = [part.strip() for part in text.split(",")]
     if "=" in head:
@@ -259,8 +258,7 @@ def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> N
 
 def _asked(designation: str, fixed: Known, changes: dict[str, Any], named: str | None) -> Bearing:
     """Return a bearing whose designation fixes some fields, the length of rollers by the rating if that is given."""
-    from gearmbs.bearings.geometry import Bearing
-    from gearmbs.bearings.ratings import roller_length_for
+    from gearmbs.bearings.bearing import Bearing, roller_length_for
 
     own = {**fixed.fields, **_class_of(designation, fixed, named), "designation": designation.strip(), **changes}
     missing = [name for name in fixed.asked if own.get(name) is None]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from gearmbs.bearings.errors import BearingError, require
+from gearmbs.bearings.kinds import BearingError, require
 from gearmbs.bearings.layout import angles, drop, node_count, rounded
 from gearmbs.schema.described import Described, make, measures_of
 from gearmbs.schema.messages import chosen
@@ -21,7 +21,7 @@ from gearmbs.schema.quantities import Measure, OneOf
 from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
-    from gearmbs.bearings.geometry import Bearing
+    from gearmbs.bearings.bearing import Bearing
 
 OUTER, INNER, ELEMENT = "outer", "inner", "element"
 PARTS = (OUTER, INNER, ELEMENT)

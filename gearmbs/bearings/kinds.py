@@ -1,4 +1,4 @@
-"""The table of kinds of rolling bearings: one row each, with all by which kinds differ.
+"""The table of kinds of rolling bearings: one row each, with all by which kinds differ; and the error of bearings.
 
 Checks, contacts, ratings, equivalent loads, designations and messages follow from it.
 """
@@ -13,9 +13,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gearmbs.bearings.errors import require
 
-# Bearings are those of `geometry`, which knows this table.
+class BearingError(ValueError):
+    """A bearing cannot be what is meant: a field, a name or a value is wrong; the message says what would do."""
+
+
+def require(condition: bool, message: str) -> None:
+    """Raise BearingError with the message unless the condition holds."""
+    if not condition:
+        raise BearingError(message)
+
+
+# Bearings are those of `bearing`, which knows this table.
 Bearing = Any
 
 

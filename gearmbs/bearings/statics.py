@@ -16,11 +16,9 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 
 from gearmbs.bearings import layout as B
-from gearmbs.bearings.errors import BearingError, require
-from gearmbs.bearings.geometry import Bearing
-from gearmbs.bearings.kinds import KINDS
-from gearmbs.bearings.settings import bearing_settings
-from gearmbs.bearings.tables import BearingTables, pack
+from gearmbs.bearings.bearing import Bearing
+from gearmbs.bearings.kinds import KINDS, BearingError, require
+from gearmbs.bearings.settings import BearingTables, bearing_settings, pack
 from gearmbs.units import Quantity, to_si
 
 # Where a load puts the inner ring: the minimum of a convex potential, and which loads have none.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from numba import types
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.gaps.root import root_contacts
 from gearmbs.contact.loads import add_product, add_transposed_product, clear_sums, mirror
 from gearmbs.contact.pair import side_contacts
 from gearmbs.contact.pose import pose_columns, pose_rate_slopes, pose_rates, pose_wrench, relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
+from gearmbs.contact.root import root_contacts
 from gearmbs.contact.search import open_side, set_twist
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_COLUMNS, FRAME_P, FRAME_V, FRAME_W
 from gearmbs.kernels.jit import njit

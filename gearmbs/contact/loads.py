@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.gaps.face import end_roll, limit_slopes
-from gearmbs.contact.gaps.points import lay_directions, lay_slopes
 from gearmbs.contact.laws import friction_law
+from gearmbs.contact.places import end_roll, lay_directions, lay_slopes, limit_slopes
 from gearmbs.contact.slices import (
     Cut,
     end_force,

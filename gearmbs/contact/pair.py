@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.corners import copy_corner, corner_gaps, set_corner
 from gearmbs.contact.deviations import add_deviations, pair_softness, tip_roll, tooth_flank
-from gearmbs.contact.gaps.corners import copy_corner, corner_gaps, set_corner
-from gearmbs.contact.gaps.face import end_roll, limit_slopes, limit_value, roll_difference
-from gearmbs.contact.gaps.helical_sections import helical_flanks, helical_normals, set_edges
-from gearmbs.contact.gaps.points import contact_points, helical_points
-from gearmbs.contact.gaps.sections import gap_rates, set_sections
+from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edges
 from gearmbs.contact.loads import (
     add_friction,
     add_normal,
@@ -20,6 +17,7 @@ from gearmbs.contact.loads import (
     strip_forces,
     total_force,
 )
+from gearmbs.contact.places import contact_points, end_roll, helical_points, limit_slopes, limit_value, roll_difference
 from gearmbs.contact.records import rows_of, strip_at
 from gearmbs.contact.search import (
     face_pair,
@@ -33,6 +31,7 @@ from gearmbs.contact.search import (
     strips_between,
     teeth_in_reach,
 )
+from gearmbs.contact.sections import gap_rates, set_sections
 from gearmbs.contact.slices import centroid_force, law_of, plane_force
 from gearmbs.kernels.records import inlined, kernel
 

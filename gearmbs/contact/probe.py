@@ -6,16 +6,14 @@ import numpy as np
 from numba import float64, int64
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.deviations import add_deviations, pair_softness, roll_under_corner, tip_roll
-from gearmbs.contact.gaps.corners import corner_gaps, set_corner
-from gearmbs.contact.gaps.face import end_roll, limit_value, roll_difference
-from gearmbs.contact.gaps.helical_sections import helical_flanks, helical_normals, set_edges
-from gearmbs.contact.gaps.points import contact_points, helical_points
-from gearmbs.contact.gaps.sections import flank_normals, flank_sections
-from gearmbs.contact.pair import set_pair
+from gearmbs.contact.deviations import add_deviations, pair_softness, roll_under_corner
+from gearmbs.contact.helical_sections import helical_flanks, helical_normals
+from gearmbs.contact.pair import pair_corners, pair_kinds, set_pair
+from gearmbs.contact.places import contact_points, end_roll, helical_points, limit_value, roll_difference
 from gearmbs.contact.pose import relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.search import face_pair, facing_teeth, open_side, set_twist, teeth_in_reach
+from gearmbs.contact.sections import flank_normals, flank_sections
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.records import CONTRACT, kernel
 
@@ -143,19 +141,10 @@ def pair_rows(options, wheels, scratch, sign, i, sections, rows, count):
 
 
 @kernel
-def beyond_tip(side, scratch, strip, kind):
-    """How far the foot of the corner in the first section is beyond its mate's tip, m."""
-    corner = scratch.corner_1 if kind == L.CORNER_1 else scratch.corner_2
-    roll_under_corner(side, corner, strip, 0, scratch.lookup_1, kind % 2, 0)
-    return scratch.lookup_1.roll - corner.mate_tip[0]
-
-
-@kernel
 def section_of_pair(options, wheels, scratch, zeta):
     """Fill the first section of ``scratch.middle`` with the gap of the pair at work, its deviations included."""
     side, pair = scratch.side, scratch.pair
     strip = scratch.middle
-    teeth = options.flanks != 0
     strip.zeta[0] = zeta
     strip.alpha[0], strip.sin[0], strip.cos[0] = side.alpha_0, side.sin_0, side.cos_0
     if side.twist_1 != 0.0:
@@ -165,33 +154,17 @@ def section_of_pair(options, wheels, scratch, zeta):
     else:
         flank_normals(side, strip, 1)
         flank_sections(side, strip, 1, 0)
+    pair_kinds(options, wheels, scratch, strip, 1, 0, 0)
     strip.roll_1[0] += pair.shift
     strip.roll_2[0] -= pair.shift
-    tip_1, tip_2 = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll
-    if teeth:
-        tip_1 = tip_roll(options, wheels, wheels.wheel_1, 0, int(pair.flank_1), zeta)
-        tip_2 = tip_roll(options, wheels, wheels.wheel_2, 1, int(pair.flank_2), zeta)
-    over_1, over_2 = strip.roll_1[0] - tip_1, strip.roll_2[0] - tip_2
-    kind = L.FLANKS
-    if over_1 > over_2:
-        if over_1 > 0.0:
-            kind = L.CORNER_1
-    elif over_2 > 0.0:
-        kind = L.CORNER_2
-    if kind == L.CORNER_1:
-        set_corner(wheels.wheel_1, scratch.corner_1, 0, pair.f_1, tip_1)
-        if side.twist_1 != 0.0:
-            set_edges(side, scratch.corner_1, strip, 1, True)
-        scratch.corner_1.mate_tip[0] = tip_2
-        corner_gaps(side, wheels, scratch.corner_1, strip, 1, kind, pair.f_2, strip, scratch.lookup_1, 0)
-    elif kind == L.CORNER_2:
-        set_corner(wheels.wheel_2, scratch.corner_2, 0, pair.f_2, tip_2)
-        if side.twist_1 != 0.0:
-            set_edges(side, scratch.corner_2, strip, 1, False)
-        scratch.corner_2.mate_tip[0] = tip_1
-        corner_gaps(side, wheels, scratch.corner_2, strip, 1, kind, pair.f_1, strip, scratch.lookup_1, 0)
-    if kind != L.FLANKS and beyond_tip(side, scratch, strip, kind) > wheels.edge:
-        strip.gap[0] = np.inf
-        return
-    if teeth:
+    kind = int(scratch.loads.kind[0])
+    if kind != L.FLANKS:
+        pair_corners(wheels, scratch, strip, strip, 1, kind, True, 0)
+        corner = scratch.corner_1 if kind == L.CORNER_1 else scratch.corner_2
+        roll_under_corner(side, corner, strip, 0, scratch.lookup_1, kind % 2, 0)
+        # a foot beyond the mate's tip is none
+        if scratch.lookup_1.roll - corner.mate_tip[0] > wheels.edge:
+            strip.gap[0] = np.inf
+            return
+    if options.flanks != 0:
         add_deviations(options, wheels, scratch, strip, 0, 0)

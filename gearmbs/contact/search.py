@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.gaps.face import level, level_flanks
-from gearmbs.contact.gaps.helical_sections import helical_flanks, helical_normals
-from gearmbs.contact.gaps.sections import flank_normals, flank_sections, gap_rates, set_sections
-from gearmbs.contact.gaps.support import GENTLE
+from gearmbs.contact.helical_sections import helical_flanks, helical_normals
+from gearmbs.contact.places import level, level_flanks
 from gearmbs.contact.records import strip_at
+from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
+from gearmbs.contact.support import GENTLE
 from gearmbs.kernels.records import kernel
 
 STEEPEST = 3.0  # how much steeper the corner gap may grow than that bound

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearmbs.drivetrain.errors import require
+from gearmbs.drivetrain.part import require
 from gearmbs.kernels.jit import njit
 
 STEPS_PER_PERIOD = 60

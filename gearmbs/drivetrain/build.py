@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.drivetrain.bearings import Bearing
-from gearmbs.drivetrain.couplings import Coupling
+from gearmbs.drivetrain.connections import Bearing, Coupling
 from gearmbs.drivetrain.drives import Drive
-from gearmbs.drivetrain.errors import DrivetrainError, require, told_of
 from gearmbs.drivetrain.kinematics import walk
 from gearmbs.drivetrain.loads import Load
-from gearmbs.drivetrain.part import Attached, Part
-from gearmbs.drivetrain.parts import Housing, Shaft, Wheel, turn_z
+from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, require, told_of
+from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Shaft, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
-from gearmbs.drivetrain.sensors import Accelerometer, Laser, SpeedSensor, TorqueSensor
+from gearmbs.gears.geometry import turn_z
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import Body, Marker

@@ -13,10 +13,9 @@ import numpy as np
 
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads.forces import Diagnostic
-from gearmbs.drivetrain.curves import slopes
-from gearmbs.drivetrain.errors import DrivetrainError, require
-from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, share_of
-from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque
+from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value, over_time, require, share_of
+from gearmbs.drivetrain.torque_element import ShaftTorque, slopes
+from gearmbs.drivetrain.torque_laws import TOLD
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term
@@ -148,7 +147,7 @@ class TorqueDrive(Drive):
     def add(self, at: Attached) -> None:
         given = over_time(self.torque, "torque", self.label, at)
         parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0)
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(given,), what="torque"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(given,), what="torque"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,7 +237,7 @@ class InductionMotor(Drive):
         return self.torque(0.0)
 
     def _law(self) -> tuple[str, tuple[float, ...]]:
-        return "motors.kloss", (self.breakdown_torque, self.breakdown_slip)
+        return "kloss", (self.breakdown_torque, self.breakdown_slip)
 
     def add(self, at: Attached) -> None:
         law, numbers = self._law()
@@ -249,7 +248,7 @@ class InductionMotor(Drive):
         at.mechanism.add(
             ShaftTorque(
                 self.name, at.i, at.j, law, (at.sense, self.synchronous, lag, *numbers), times=(on,),
-                own_states=states, told=SLIP, first_told=FROM_OWN, what="motor",
+                own_states=states, told=SLIP, first_told=TOLD, what="motor",
             )
         )  # fmt: skip
 
@@ -319,7 +318,7 @@ class CircuitMotor(InductionMotor):
         return gain * r2 * (r2**2 - (r1**2 + x**2) * s**2) / size**2 / self.synchronous
 
     def _law(self) -> tuple[str, tuple[float, ...]]:
-        return "motors.circuit", self.equivalent
+        return "circuit", self.equivalent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -349,7 +348,7 @@ class CurveMotor(Drive):
         on = share_of(at)
         points = slopes(self.label, self.speeds, self.torques)
         parameters = np.concatenate([[at.sense, 0.0, len(points[0])], *points])
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(on,), what="motor"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(on,), what="motor"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -387,10 +386,10 @@ class ControlledDrive(Drive):
             wanted = constant(size) if at.running else step(0.0, 0.0, at.run_up, size)
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "motors.controller",
+                self.name, at.i, at.j, "controller",
                 (at.sense, self.proportional, self.integral, self.largest), times=(wanted,),
                 own_states=(State(f"{self.name}.integral"),), told=(Diagnostic("speed_error", "rad/s"),),
-                first_told=FROM_OWN, what="motor",
+                first_told=TOLD, what="motor",
             )
         )  # fmt: skip
 

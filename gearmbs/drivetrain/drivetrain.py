@@ -1,21 +1,72 @@
-"""The drivetrain: shafts, wheels, meshes, bearings, couplings, housings, drives, loads and sensors by name."""
+"""The drivetrain: shafts, wheels, meshes, bearings, couplings, housings, drives, loads and sensors by name.
+
+In TOML files or nested tables each kind of part is a table of named tables::
+
+    name = "two stages"
+    running = true
+
+    [shafts.input]
+    length = "200 mm"
+    radius = "15 mm"
+
+    [wheels.z1]
+    shaft = "input"
+    teeth = 21
+    module = "3 mm"
+
+    [meshes."stage 1"]
+    driver = "z1"
+    driven = "z2"
+    backlash = "0.1 mm"
+    stiffness = "iso"
+    damping_ratio = 0.05
+
+    [[meshes."stage 1".faults]]
+    kind = "broken tooth"
+    lost = 0.5
+
+    [bearings.a]
+    kind = "elastic"
+    shaft = "input"
+
+    [couplings.clutch]
+    kind = "clutch"
+
+    [drives.motor]
+    kind = "induction motor"
+
+    [loads.pump]
+    kind = "pump"
+
+    [sensors.laser]
+    kind = "laser"
+
+    [run]
+    duration = "1 s"
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
-from gearmbs.drivetrain.bearings import Bearing
-from gearmbs.drivetrain.couplings import Coupling
-from gearmbs.drivetrain.drives import Drive, SpeedDrive
-from gearmbs.drivetrain.errors import DrivetrainError, require
-from gearmbs.drivetrain.loads import Load
-from gearmbs.drivetrain.part import Part, parts_html
-from gearmbs.drivetrain.parts import GearMesh, Housing, Shaft, Wheel
-from gearmbs.drivetrain.sensors import Sensor
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS
+from gearmbs.drivetrain.connections import BEARINGS, COUPLINGS, Bearing, Coupling
+from gearmbs.drivetrain.drives import DRIVES, Drive, SpeedDrive
+from gearmbs.drivetrain.loads import LOADS, Load
+from gearmbs.drivetrain.part import DrivetrainError, Part, parts_html, require, told_of
+from gearmbs.drivetrain.parts import SENSORS, GearMesh, Housing, HousingMode, Mount, Sensor, Shaft, Wheel
+from gearmbs.gears.pair import GearPair
+from gearmbs.gears.spec import GearSpec, Material
+from gearmbs.schema.described import Described, make
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import check_keys, chosen
+from gearmbs.schema.quantities import Measure, OneOf
+from gearmbs.units import Quantity, to_si
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
@@ -269,9 +320,7 @@ class Drivetrain:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Drivetrain:
-        """Read a drivetrain from a TOML file; see `gearmbs.drivetrain.description`."""
-        from gearmbs.drivetrain.description import read_description
-
+        """Read a drivetrain from a TOML file; see `gearmbs.drivetrain.drivetrain`."""
         return read_description(path).train
 
     @property
@@ -312,3 +361,182 @@ KINDS: dict[str, type[Part]] = {
     "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor,
 }  # fmt: skip
 """What each group holds."""
+
+
+FaultReader = Callable[[Any], Any]
+"""Makes a fault of a table."""
+
+BY_KIND: dict[str, tuple[Mapping[str, type[Part]], str]] = {
+    "bearings": (BEARINGS, "ideal"),
+    "couplings": (COUPLINGS, "clutch"),
+    "drives": (DRIVES, "speed"),
+    "loads": (LOADS, "torque"),
+    "sensors": (SENSORS, "speed"),
+}
+"""Kinds of parts by group, and the kind of a part that names none."""
+
+PAIR_KEYS = tuple(
+    f.name for f in fields(GearPair) if f.init and f.name not in ("driver", "driven", "rotation", "torque")
+)
+HARMONICS = Measure(low=1, whole=True, remedy="give a whole number of mesh harmonics from 1 up")
+GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name")
+
+
+@dataclass(frozen=True)
+class RunSettings(Described):
+    """How a drivetrain is simulated and recorded.
+
+    Parameters
+    ----------
+    settling, duration : float or str
+        Time between the run-up and the record, and the record's length, s.
+    tolerance : float
+        Local error allowed a step.
+    rate : float or str, optional
+        Of the record, Hz; default: at least twenty samples in the shortest mesh period, 12 800 Hz or more.
+    integrator : str
+        One of `gearmbs.dae.methods.INTEGRATORS`.
+    harmonics : int
+        Mesh harmonics in the record's table, 1 or more.
+    """
+
+    error: ClassVar[type[ValueError]] = DrivetrainError
+    section: ClassVar[str] = "run"
+
+    settling: Annotated[Quantity, Measure("time", 0)] = 0.05
+    duration: Annotated[Quantity, Measure("time", above=0)] = 1.0
+    tolerance: Annotated[Quantity, Measure(low=1e-12, high=5e-6)] = 1e-7
+    rate: Annotated[Quantity, Measure("frequency", above=0)] = None
+    integrator: Annotated[str, OneOf(INTEGRATORS)] = DEFAULT
+    harmonics: Annotated[int, HARMONICS] = 3
+
+    def output_rate(self, train: Drivetrain) -> float:
+        """Return the rate of the record, Hz."""
+        if self.rate is not None:
+            return float(self.rate)
+        fastest = max((train.kinematics.mesh_frequency(m.name) for m in train.meshes), default=0.0)
+        return max(12800.0, 100.0 * math.ceil(20.0 * fastest / 100.0))
+
+
+@dataclass(frozen=True)
+class Description:
+    """A drivetrain and how it is run.
+
+    Attributes
+    ----------
+    train : Drivetrain
+    run : RunSettings
+    """
+
+    train: Drivetrain
+    run: RunSettings
+
+
+def read_description(path: str | Path, fault: FaultReader | None = None) -> Description:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : path-like
+    fault : callable, optional
+        Makes a fault of a table, see `gearmbs.studies.case.tooth_faults`; without it a file cannot hold faults.
+
+    Raises
+    ------
+    DrivetrainError
+        One line that names the file, the part, the key, the value and the remedy.
+    """
+    data = read_toml(path, DrivetrainError)
+    data.setdefault("name", Path(path).stem)
+    return make_description(data, str(path), fault)
+
+
+def make_description(
+    data: Mapping[str, Any], source: str = "drivetrain", fault: FaultReader | None = None
+) -> Description:
+    """Return the drivetrain that nested tables describe; see `gearmbs.drivetrain.drivetrain` for their form."""
+    try:
+        return _made(data, fault)
+    except ValueError as error:
+        raise DrivetrainError(f"{source}: {error}") from None
+
+
+def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
+    known = ("name", "gravity", "run_up", "running", "run", *GROUPS)
+    check_keys(data, known, "the file", DrivetrainError, shown=repr)
+    parts: dict[str, Any] = {}
+    for group in GROUPS:
+        tables = data.get(group, {})
+        require(isinstance(tables, Mapping), f"{group}: write a table for each, such as [{group}.a]")
+        parts[group] = [_part(group, str(name), table, fault) for name, table in tables.items()]
+    others: dict[str, Any] = {key: data[key] for key in ("name", "running") if key in data}
+    if "gravity" in data:
+        others["gravity"] = tuple(to_si(g, "acceleration", "gravity") for g in data["gravity"])
+    if "run_up" in data:
+        others["run_up"] = to_si(data["run_up"], "time", "run_up")
+    run = make(RunSettings, data.get("run", {}), "[run]", DrivetrainError)
+    return Description(Drivetrain(**parts, **others), run)
+
+
+def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
+    where = f"{group}.{name}"
+    require(isinstance(table, Mapping), f"{where}: write a table, such as [{where}]")
+    given = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+    if group == "wheels":
+        return _wheel(where, name, given)
+    if group == "meshes":
+        return _mesh(where, name, given, fault)
+    if group == "housings":
+        return _housing(where, name, given)
+    if group == "shafts":
+        return _of_kind(where, Shaft, name, given)
+    kinds, usual = BY_KIND[group]
+    return _of_kind(where, chosen(kinds, str(given.pop("kind", usual)), f"{where}: ", DrivetrainError), name, given)
+
+
+def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
+    with told_of(where):
+        return make(kind, given, where, DrivetrainError, name=name)
+
+
+def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
+    own: dict[str, Any] = {key: given.pop(key) for key in ("shaft", "station", "angle") if key in given}
+    material = {key: given.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in given}
+    known = ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"]
+    check_keys(given, known, where, DrivetrainError, shown=repr)
+    for key in ("teeth", "module"):
+        require(key in given, f"{where}: {key} is missing")
+    with told_of(where):
+        if material:
+            given["material"] = Material(**material)
+        radii = [key for key in ("tip_radius", "root_radius") if key in given]
+        if radii:
+            require(len(radii) == 2, f"{where}: give tip_radius and root_radius, or addendum and dedendum")
+            gear = GearSpec.from_radii(name=name, **given)
+        else:
+            gear = GearSpec(name=name, **given)
+    return _of_kind(where, Wheel, name, {**own, "gear": gear})
+
+
+def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | None) -> GearMesh:
+    own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
+    known = ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"]
+    check_keys(given, known, where, DrivetrainError, shown=repr)
+    if "faults" in given:
+        require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
+        assert fault is not None
+        with told_of(f"{where}.faults"):
+            given["faults"] = tuple(fault(table) for table in given["faults"])
+    return _of_kind(where, GearMesh, name, {**own, "settings": given})
+
+
+def _housing(where: str, name: str, given: dict[str, Any]) -> Housing:
+    for key, kind in (("mounts", Mount), ("modes", HousingMode)):
+        tables = given.pop(key, {})
+        require(isinstance(tables, Mapping), f"{where}.{key}: write a table for each, such as [{where}.{key}.a]")
+        made = []
+        for part, table in tables.items():
+            fitted = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
+            made.append(_of_kind(f"{where}.{key}.{part}", kind, f"{name} {part}", fitted))
+        given[key] = tuple(made)
+    return _of_kind(where, Housing, name, given)

@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
-from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.drivetrain.loads import Drag, Load
+from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh, Shaft
 from gearmbs.units import Quantity, to_si
 

@@ -11,10 +11,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
-from gearmbs.drivetrain.curves import slopes
-from gearmbs.drivetrain.errors import require
-from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, share_of
-from gearmbs.drivetrain.torque_element import FROM_LOST, FROM_OWN, ShaftTorque
+from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, require, share_of
+from gearmbs.drivetrain.torque_element import ShaftTorque, slopes
+from gearmbs.drivetrain.torque_laws import LOST, TOLD
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.schema.quantities import Measure, OneOf, OverTime
@@ -73,7 +72,7 @@ class TorqueLoad(Load):
     def add(self, at: Attached) -> None:
         given = over_time(self.torque, "torque", self.label, at)
         parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, -1.0, -1.0, 0.0, 0.0)
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(given,), what="load"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(given,), what="load"))
 
 
 def gear_pump_ripple(teeth: int, pressure_angle: Quantity = "20 deg", addendum: float = 1.0) -> tuple[float, float]:
@@ -181,8 +180,8 @@ class Pump(Load):
         )  # fmt: skip
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "loads.pump", parameters, times=(pressure,), counts_angle=bool(self.factors),
-                own_states=states, told=(Diagnostic("flow", "m^3/s"),), first_told=FROM_OWN, what="pump",
+                self.name, at.i, at.j, "pump", parameters, times=(pressure,), counts_angle=bool(self.factors),
+                own_states=states, told=(Diagnostic("flow", "m^3/s"),), first_told=TOLD, what="pump",
             )
         )  # fmt: skip
 
@@ -270,7 +269,7 @@ def _resist(
     parameters = (dry, viscous, square, smoothing)
     at.mechanism.add(
         ShaftTorque(
-            name, at.i, at.j, "loads.resistance", parameters, times=(share,), told=told, first_told=FROM_LOST,
+            name, at.i, at.j, "resistance", parameters, times=(share,), told=told, first_told=LOST,
             what="load",
         )
     )  # fmt: skip
@@ -328,7 +327,7 @@ class TableLoad(Load):
             times = (share_of(at),)
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "loads.table", parameters, times=times, counts_angle=self.over == "angle",
+                self.name, at.i, at.j, "table", parameters, times=times, counts_angle=self.over == "angle",
                 what="load",
             )
         )  # fmt: skip

@@ -1,13 +1,13 @@
-"""What all parts of a drivetrain share: a name, quantities in SI or as texts with units, checked numbers."""
+"""What all parts of a drivetrain share: a name, quantities in SI or as texts with units, checked numbers, an error."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gearmbs._shown import html_table, readable, settings_of
-from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, step
 from gearmbs.schema.described import Described
@@ -15,6 +15,28 @@ from gearmbs.units import to_si
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
+
+
+class DrivetrainError(ValueError):
+    """A drivetrain that cannot be built or simulated; the message names the part, the value and the remedy."""
+
+
+@contextmanager
+def told_of(part: str) -> Iterator[None]:
+    """Turn errors of what a part is made of into a `DrivetrainError` that names the part."""
+    try:
+        yield
+    except DrivetrainError:
+        raise
+    except (TypeError, ValueError) as error:
+        text = str(error).replace("\n", " ")
+        raise DrivetrainError(text if text.startswith(part) else f"{part}: {text}") from None
+
+
+def require(condition: bool, message: str) -> None:
+    """Raise a DrivetrainError with the message unless the condition holds."""
+    if not condition:
+        raise DrivetrainError(message)
 
 
 @dataclass(frozen=True, kw_only=True)

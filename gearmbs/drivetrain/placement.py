@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.drivetrain.errors import DrivetrainError, require
-from gearmbs.drivetrain.parts import GearMesh, Shaft, turn_z
+from gearmbs.drivetrain.part import DrivetrainError, require
+from gearmbs.drivetrain.parts import GearMesh, Shaft
+from gearmbs.gears.geometry import turn_z
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain

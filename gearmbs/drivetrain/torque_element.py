@@ -1,18 +1,31 @@
-"""Torques about a shaft's axis as force elements."""
+"""Torques about a shaft's axis as force elements, and the curves through points that their laws read."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations.kinematics.update import angle_gradient, counted_angle
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, DISSIPATED, FORCE_SIG, FRAME_A, FRAME_W, STORED, Diagnostic
+from gearmbs.drivetrain import torque_laws
+from gearmbs.drivetrain.part import require
+from gearmbs.drivetrain.torque_laws import (
+    BY_ANGLE,
+    BY_SPEED,
+    BY_STATE,
+    LAW_SIG,
+    OUT_SIZE,
+    RATE,
+    RATE_BY_ANGLE,
+    RATE_BY_SPEED,
+    RATE_BY_STATE,
+    STORED_TORQUE,
+    TORQUE,
+)
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.pointers import F8, VEC, caller
+from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import vector_at
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
 from gearmbs.mechanism.parts.functions import TimeFunction
@@ -26,17 +39,6 @@ from gearmbs.mechanism.parts.functions import TimeFunction
 #     dN = z_J dT + dpi_J x N,    dT = T_a da + T_w dw + T_z dz,
 #     dw = z_J . (dw_I - dw_J) + dpi_J . (z_J x (w_I - w_J)).
 
-
-LAW_SIG = types.void(VEC, F8, F8, F8, VEC, VEC, VEC)
-"""law(parameters, t, angle, speed, times, states, out); angle in rad, speed in rad/s."""
-
-TORQUE, BY_ANGLE, BY_SPEED, BY_STATE = 0, 1, 2, 3
-"""Places in ``out``: the torque on I (N m) and its derivatives."""
-STORED_TORQUE, LOST, TOLD = 4, 5, 6
-"""Energy stored (J), power dissipated (W), and one quantity of the law's own."""
-RATE, RATE_BY_ANGLE, RATE_BY_SPEED, RATE_BY_STATE = 7, 8, 9, 10
-"""The state's rate and its derivatives."""
-OUT_SIZE = 11
 
 TIMES = 1
 """Place among the integers: how many functions of time are inputs."""
@@ -105,8 +107,6 @@ def shaft_torque(ints, reals, t, frames, states, inputs, want, work, wrench, rat
         jac[3 + q2, 15 + q1] -= wrench[0, 3 + q]
 
 
-FROM_STORED, FROM_LOST, FROM_OWN = 4, 5, 6
-"""Values of ``first_told``: all three, without the energy, the law's own quantity alone."""
 ACCOUNTS = (Diagnostic("elastic_energy", "J", STORED), Diagnostic("damping_power", "W", DISSIPATED))
 """What a passive element stores and dissipates."""
 
@@ -118,7 +118,7 @@ class ShaftTorque(ForceElement):
     Attributes
     ----------
     law : str
-        Module and name of the compiled law in `gearmbs.drivetrain.laws`, as "motors.kloss".
+        Name of the compiled law in `gearmbs.drivetrain.torque_laws`, as "kloss".
     parameters : sequence of float
     times : tuple of TimeFunction
         Functions of time that the law is given.
@@ -129,7 +129,7 @@ class ShaftTorque(ForceElement):
     told : tuple of Diagnostic
         Some that follow one another of: energy stored, power dissipated, one quantity of the law's own.
     first_told : int
-        Place of the first of them in what the law writes.
+        Place of the first of them in what the law writes: STORED_TORQUE, LOST or TOLD.
     what : str
         What messages call it.
     """
@@ -140,7 +140,7 @@ class ShaftTorque(ForceElement):
     counts_angle: bool = False
     own_states: tuple[State, ...] = ()
     told: tuple[Diagnostic, ...] = field(default=())
-    first_told: int = FROM_STORED
+    first_told: int = STORED_TORQUE
     what: str = "shaft torque"
 
     has_force = False
@@ -161,15 +161,11 @@ class ShaftTorque(ForceElement):
         return self.told
 
     def compiled(self) -> Compiled:
-        from importlib import import_module
-
-        module, _, name = self.law.partition(".")
-        law: Any = getattr(import_module(f"gearmbs.drivetrain.laws.{module}"), name)
         return Compiled(
             shaft_torque,
             (len(self.times), int(self.counts_angle), self.first_told),
             self.parameters,
-            ((law, LAW_SIG),),
+            ((getattr(torque_laws, self.law), LAW_SIG),),
             times=self.times,
             angles=((2, self.i, self.j),) if self.counts_angle else (),
             scratch=WORK,
@@ -177,3 +173,34 @@ class ShaftTorque(ForceElement):
 
     def __repr__(self) -> str:
         return f"ShaftTorque({self.name!r}, {self.kind} on {self.i.body.name!r} about z of {self.j.name!r})"
+
+
+def slopes(
+    label: str, x: Sequence[float], y: Sequence[float], period: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points and slopes of the monotone cubic through them, of a periodic curve of the periodic spline.
+
+    Parameters
+    ----------
+    label : str
+        What messages call the owner of the points.
+    x, y : sequence of float
+        Two points or more, x increasing.
+    period : float
+        Period in x; the first and last points lie one period apart then, with the same value.
+
+    Raises
+    ------
+    DrivetrainError
+    """
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    require(a.shape == b.shape and a.ndim == 1 and a.size >= 2, f"{label}: give as many torques as places, two or more")
+    require(bool(np.all(np.diff(a) > 0.0)), f"{label}: the places of its table must increase")
+    if period > 0.0:
+        require(abs(a[-1] - a[0] - period) < 1e-9 * period, f"{label}: the table must cover one period, {period:g} rad")
+        require(abs(b[-1] - b[0]) <= 1e-9 * np.abs(b).max(), f"{label}: the table's last torque must be its first")
+        b[-1] = b[0]
+        return a, b, CubicSpline(a, b, bc_type="periodic")(a, 1)
+    return a, b, PchipInterpolator(a, b)(a, 1) if a.size > 2 else np.full(2, (b[1] - b[0]) / (a[1] - a[0]))

@@ -17,14 +17,14 @@ import scipy.linalg
 
 from gearmbs.dae.equations.loads.time_functions import smooth_step
 from gearmbs.drivetrain.drives import SpeedDrive
-from gearmbs.drivetrain.errors import require, told_of
+from gearmbs.drivetrain.part import require, told_of
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 from gearmbs.kernels.jit import njit
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
-    from gearmbs.gears.contact_model import ContactModel
+    from gearmbs.gears.mesh import ContactModel
 
 CURVE_POINTS = 200
 """Along the path of contact, for the mean of a stiffness that varies."""

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gearmbs.flexible.fe_model import FiniteElementModel
-from gearmbs.flexible.files.matrices import from_matrices
 from gearmbs.flexible.interfaces import Interface
 from gearmbs.flexible.material import STEEL, ElasticMaterial, FlexibleError
+from gearmbs.flexible.matrix_files import from_matrices
 from gearmbs.flexible.modal_model import ModalModel
 from gearmbs.flexible.reduction import reduce_model
 from gearmbs.flexible.stress import SolidStresses

@@ -58,7 +58,8 @@ class Placement:
         return (self.origin_1, self.axes_1), (self.origin_2, self.axes_2)
 
 
-def _turn_z(angle: float) -> np.ndarray:
+def turn_z(angle: float) -> np.ndarray:
+    """Return the rotation about z by an angle, shape (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -550,7 +551,7 @@ class PairGeometry(Written):
         arm = np.array([0.0, 0.0, self.pivot])
         return Placement(
             np.zeros(3),
-            _turn_z(driver_angle),
+            turn_z(driver_angle),
             origin + arm - self.tilt @ arm,
-            self.tilt @ _turn_z(driven_angle),
+            self.tilt @ turn_z(driven_angle),
         )

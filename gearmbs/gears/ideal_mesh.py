@@ -11,9 +11,8 @@ import numpy as np
 
 from gearmbs._shown import Written
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED, Diagnostic
-from gearmbs.gears.contact_model import DAMPING_RATIO, ContactLaw, ContactModel, FlankFriction
 from gearmbs.gears.geometry import PairGeometry, Placement
-from gearmbs.gears.mesh import OperatingPoint
+from gearmbs.gears.mesh import DAMPING_RATIO, ContactLaw, ContactModel, FlankFriction, OperatingPoint
 from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import convert_fields
@@ -135,7 +134,7 @@ class IdealMesh(Written):
         stiffness : float or str
             Along the normal, N/m.
         ratio : float, optional
-            zeta; default `gearmbs.gears.contact_model.DAMPING_RATIO`, 0.07.
+            zeta; default `gearmbs.gears.mesh.DAMPING_RATIO`, 0.07.
         **others
             Further fields of `IdealMesh`.
         """

@@ -1,6 +1,7 @@
-"""Stresses of flank and root by ISO 6336-2:2006 and ISO 6336-3:2006 (method B), for all cylindrical wheels.
+"""ISO 6336, method B, for all cylindrical wheels: tooth stiffness (part 1), stresses of flank and root (2 and 3, 2006).
 
-Numbers of teeth, diameters and ratio of an internal wheel are negative, as in the standard. Load factors (application,
+In the stresses numbers of teeth, diameters and ratio of an internal wheel are negative, as in the
+standard. Load factors (application,
 dynamic, face and transverse load) are the user's: multiply the nominal stresses by them.
 """
 
@@ -15,6 +16,54 @@ from gearmbs.gears.spec import GearSpec, involute
 
 ITERATIONS = 60
 LARGEST_HELIX_FACTOR = math.radians(30)
+ISO_STEEL_MODULUS = 206e9
+"""Young's modulus, Pa, that the formulae of ISO 6336-1 are stated for."""
+
+
+def iso_mesh_stiffness(pair: PairGeometry) -> float:
+    """Mesh stiffness c_gamma of ISO 6336-1, (0.75 epsilon_alpha + 0.25) c', N/(m of face width * m)."""
+    return iso_single_stiffness(pair) * (0.75 * pair.contact_ratio + 0.25)
+
+
+def iso_single_stiffness(pair: PairGeometry, web: tuple[float, float] | None = None) -> float:
+    """Single stiffness c' of ISO 6336-1 (method B, high load), N/(m of face width * m).
+
+    Parameters
+    ----------
+    pair : PairGeometry
+    web : (float, float), optional
+        Thickness of the web and of the rim, m, of a wheel that is no solid disc: the factor
+        ``C_R = 1 + ln(b_s / b) / (5 exp(s_R / (5 m_n)))``, within the standard's limits 0.2 <= b_s / b <= 1.2 and
+        s_R >= m_n.
+
+    Notes
+    -----
+    c' = c'_th C_M C_R C_B cos beta with C_M = 0.8 and C_B = (1 + 0.5 (1.2 - h_fP / m_n)) (1 - 0.02 (20 - alpha_n)),
+    where h_fP is the dedendum of the basic rack.
+    """
+    one, two = pair.driver, pair.driven
+    depth = 0.5 * (one.dedendum / one.module + one.profile_shift + two.dedendum / two.module + two.profile_shift)
+    blank = 1.0
+    if web is not None:
+        share = min(max(web[0] / pair.narrower_face_width, 0.2), 1.2)
+        blank = 1 + math.log(share) / (5 * math.exp(max(web[1] / one.module, 1.0) / 5))
+    rack = (1 + 0.5 * (1.2 - depth)) * (1 - 0.02 * (20 - math.degrees(one.pressure_angle)))
+    moduli = [w.material.youngs_modulus for w in (one, two)]
+    material = 2 * moduli[0] * moduli[1] / sum(moduli) / ISO_STEEL_MODULUS
+    return 0.8 * rack * material * blank * math.cos(one.helix_angle) * iso_theoretical_stiffness(pair)
+
+
+def iso_theoretical_stiffness(pair: PairGeometry) -> float:
+    """Theoretical single stiffness c'_th = 1 / q' of ISO 6336-1, N/(m of face width * m).
+
+    Teeth count as those of the equivalent spur wheels; an internal wheel as a rack.
+    """
+    one, two = pair.driver, pair.driven
+    x1, x2 = one.profile_shift, two.profile_shift
+    z1, z2 = one.virtual_teeth, math.inf if two.internal else two.virtual_teeth
+    q = 0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2
+    q += -0.24188 * x2 / z2 + 0.00529 * x1**2 + 0.00182 * x2**2
+    return 1e9 / q
 
 
 @dataclass(frozen=True)

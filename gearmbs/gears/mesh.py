@@ -1,16 +1,312 @@
-"""What an analysis asks of a pair of wheels in mesh."""
+"""How two wheels mesh: law of a tooth pair, friction, slices along the face, load; and what analyses ask of a pair."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import InitVar, dataclass
+import warnings
+from collections.abc import Iterable
+from dataclasses import InitVar, dataclass, field
 from typing import Literal, Protocol
 
 from gearmbs._shown import Written
-from gearmbs.gears.contact_model import ContactModel
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.modifications import Fault
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity, shown, to_si
+
+# Contact and friction laws as users define them; the compiled forms are in ``gearmbs.contact.laws``.
+
+
+LawKind = Literal["impact", "hunt-crossley", "linear", "hertz"]
+
+DAMPING_RATIO = 0.07
+"""Of a mesh where none is given: the geometric mean of 0.03 and 0.17, the range commonly quoted in the literature on
+gear dynamics for meshes of steel gears. It is a convention, no measurement of the gears at hand: their own ratio, if
+known, is the one to give, and amplitudes at a resonance are in inverse proportion to it."""
+RATIO_DEPTH = 2e-6
+"""Penetration, m, at which the damping by a ratio is fully on: what a tooth pair yields under 25 to 30 N/mm, less than
+gears carry; below it damping falls to nothing, so that flanks meet without a blow."""
+
+
+@dataclass(frozen=True)
+class ContactLaw(Written):
+    """Normal force of one tooth pair over its face, against penetration and its rate.
+
+    Use the class methods; each states its own formula. ``stiffness`` and ``damping`` refer to the whole face of a
+    pair of parallel wheels whose faces stand opposite, that of the narrower one, and are distributed evenly over it:
+    what an axial shift takes out of mesh is missing.
+
+    Attributes
+    ----------
+    kind : {"impact", "hunt-crossley", "linear", "hertz"}
+    stiffness : float or str
+        K, N/m^exponent.
+    exponent : float
+    damping : float or str
+        C, N s/m; for Hunt-Crossley the factor on the penetration rate, s/m.
+    depth : float or str
+        Penetration at which the damping is fully on, m.
+    """
+
+    kind: LawKind
+    stiffness: Quantity
+    exponent: float
+    damping: Quantity
+    depth: Quantity
+
+    def __post_init__(self) -> None:
+        rate = "s/m" if self.kind == "hunt-crossley" else "N*s/m"
+        for name, unit in (("stiffness", f"N/m^{self.exponent!r}"), ("damping", rate), ("depth", "length")):
+            object.__setattr__(self, name, to_si(getattr(self, name), unit, f"ContactLaw.{name}"))
+        for name, low in (("stiffness", 0.0), ("exponent", 0.0), ("depth", 0.0)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > low):
+                raise ValueError(f"ContactLaw.{name} is {value}; it must be positive and finite")
+        if not (math.isfinite(self.damping) and self.damping >= 0):
+            raise ValueError(f"ContactLaw.damping is {self.damping}; it must not be negative")
+        if self.exponent < 1:
+            raise ValueError(
+                f"ContactLaw.exponent is {self.exponent}; below 1 the stiffness is infinite at first touch"
+            )
+
+    def __str__(self) -> str:
+        """Law, stiffness and damping in a line, in the units of a drawing."""
+        if self.kind == "hunt-crossley":
+            damping = f"Hunt-Crossley factor {self.damping:.4g} s/m"
+        elif self.damping == 0.0:
+            damping = "no damping"
+        else:
+            damping = f"damping {1e-3 * self.damping:.4g} N s/mm, fully on at {1e6 * self.depth:.4g} um"
+        unit = "N/mm" if self.exponent == 1.0 else f"N/mm^{self.exponent:.4g}"
+        return f"{self.kind}, {self.stiffness * 1e-3**self.exponent:.5g} {unit} a tooth pair, {damping}"
+
+    @classmethod
+    def impact(
+        cls,
+        stiffness: Quantity = "2.9852e5 N/mm^1.3",
+        exponent: float = 1.3,
+        damping: Quantity = None,
+        depth: Quantity = "0.1 mm",
+    ) -> ContactLaw:
+        """ADAMS's IMPACT, the paper's eq. (10)-(11): ``max(0, K x^e + C STEP(x, 0, 0, d, 1) dx/dt)``.
+
+        Parameters
+        ----------
+        stiffness : float or str
+            K in N/m^e, or text such as ``"2.9852e5 N/mm^1.3"``.
+        exponent : float
+            e.
+        damping : float or str, optional
+            C; default 0.001 of the stiffness, taken as the paper and ADAMS do: the number of K in N/mm^e times 0.001
+            is the number of C in N s/mm.
+        depth : float or str
+            d, the penetration of full damping.
+        """
+        k = to_si(stiffness, f"N/m^{exponent!r}", "ContactLaw.stiffness")
+        c = 0.001 * k * 1e-3**exponent * 1e3 if damping is None else to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("impact", k, float(exponent), c, to_si(depth, "length", "ContactLaw.depth"))
+
+    @classmethod
+    def hunt_crossley(
+        cls, stiffness: Quantity = "2.9852e5 N/mm^1.3", exponent: float = 1.3, factor: Quantity = "0.5 s/m"
+    ) -> ContactLaw:
+        """Hunt and Crossley's law ``max(0, K x^e (1 + c dx/dt))``; c is about 1.5 (1 - restitution) / impact speed."""
+        k = to_si(stiffness, f"N/m^{exponent!r}", "ContactLaw.stiffness")
+        return cls("hunt-crossley", k, float(exponent), to_si(factor, "s/m", "ContactLaw.factor"), 1.0)
+
+    @classmethod
+    def linear(cls, stiffness: Quantity, damping: Quantity = 0.0, depth: Quantity = "0.1 mm") -> ContactLaw:
+        """A linear spring per tooth pair with IMPACT's damping."""
+        k = to_si(stiffness, "N/m", "ContactLaw.stiffness")
+        c = to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("linear", k, 1.0, c, to_si(depth, "length", "ContactLaw.depth"))
+
+    @classmethod
+    def hertz_line(
+        cls,
+        face_width: Quantity = "20 mm",
+        youngs_modulus: Quantity = "2.07e5 MPa",
+        poisson_ratio: float = 0.29,
+        damping: Quantity = 0.0,
+        depth: Quantity = "0.1 mm",
+    ) -> ContactLaw:
+        """Line contact of two cylinders by Palmgren's formula, with IMPACT's damping.
+
+        ``x = 3.84e-5 F^0.9 / b^0.8`` (mm, N) for steel of 206 GPa and 0.3, scaled by the reduced modulus to the power
+        -0.9: F = K x^(10/9), independent of the flanks' curvature.
+        """
+        width = to_si(face_width, "length", "ContactLaw.face_width")
+        modulus = to_si(youngs_modulus, "Pa", "ContactLaw.youngs_modulus") / (1 - poisson_ratio**2)
+        relative = modulus / (206e9 / (1 - 0.3**2))
+        k = ((width * 1e3) ** 0.8 / 3.84e-5) ** (10 / 9) * relative * 1e3 ** (10 / 9)
+        c = to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("hertz", k, 10 / 9, c, to_si(depth, "length", "ContactLaw.depth"))
+
+
+@dataclass(frozen=True)
+class FlankFriction(Written):
+    """Coulomb friction between flanks, regularised in the sliding speed.
+
+    Parameters
+    ----------
+    static, dynamic : float
+        Coefficients; the static one is usually the larger.
+    static_speed, dynamic_speed : float or str
+        Speeds of full static and of dynamic friction (ADAMS law); the smooth law uses ``dynamic`` and the first.
+    kind : {"adams", "smooth", "none"}
+
+    Warns
+    -----
+    UserWarning
+        If the static coefficient of the ADAMS law is below the dynamic one.
+    """
+
+    static: float = 0.1
+    dynamic: float = 0.05
+    static_speed: Quantity = "100 mm/s"
+    dynamic_speed: Quantity = "1000 mm/s"
+    kind: Literal["adams", "smooth", "none"] = "adams"
+
+    def __post_init__(self) -> None:
+        for name in ("static_speed", "dynamic_speed"):
+            object.__setattr__(self, name, to_si(getattr(self, name), "speed", f"FlankFriction.{name}"))
+        for name in ("static", "dynamic"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0 <= value <= 2):
+                raise ValueError(f"FlankFriction.{name} is {value}; give 0 to 2")
+        if not 0 < self.static_speed < self.dynamic_speed:
+            raise ValueError(
+                f"FlankFriction.static_speed is {self.static_speed} m/s and dynamic_speed {self.dynamic_speed} m/s; "
+                "the first must be positive and below the second"
+            )
+        if self.kind not in ("adams", "smooth", "none"):
+            raise ValueError(f"FlankFriction.kind is {self.kind!r}; choose 'adams', 'smooth' or 'none'")
+        if self.kind == "adams" and self.static < self.dynamic:
+            warnings.warn(
+                f"FlankFriction.static is {self.static:g}, below dynamic {self.dynamic:g}: friction would grow where "
+                "flanks slide faster; are they exchanged? Give static as much as dynamic, or more",
+                stacklevel=3,
+            )
+
+    @classmethod
+    def none(cls) -> FlankFriction:
+        """No friction."""
+        return cls(kind="none")
+
+
+TILTED_SLICES = 11
+"""Slices along the face where the gap varies linearly along it: tilted axes or faces that are not opposite."""
+
+HELICAL_SLICES = 20
+"""Slices of helical wheels, at least."""
+
+SLICES_PER_OVERLAP = 20
+"""Slices of helical wheels over an axial pitch: neighbouring sections differ by a twentieth of a mesh cycle."""
+
+FAULTY_SLICES = 41
+"""Slices where a fault varies along the face, so that a pit or a chipped corner of a few millimetres has several."""
+
+BOTTOMING_CLEARANCE = 0.1
+"""Tip clearance, in modules, below which contact of tips with roots is looked for by default."""
+
+
+def varying_along_face(geometry: PairGeometry, faults: Iterable[Fault]) -> list[str]:
+    """Return in words what makes the flanks' gap vary along the face."""
+    return [
+        *([f"the misalignment of {shown(geometry.misalignment, 'deg', '.4g')}"] if geometry.misalignment else []),
+        *(["the helix"] if geometry.driver.helix_angle else []),
+        *(fault.label for fault in faults if fault.along_face),
+    ]
+
+
+@dataclass(frozen=True)
+class ContactModel(Written):
+    """Contact of two toothed wheels.
+
+    Parameters
+    ----------
+    law : ContactLaw
+        Normal force of one tooth pair over its whole face.
+    friction : FlankFriction
+    slices : int, optional
+        Slices along the face; default by `face_slices`: 1, 11 or 41.
+    load : {"slices", "adams"}
+        How a tooth pair carries its load. ``slices``: pressure distributed over the face. ``adams``: one force at the
+        centroid of the overlap with the depth found there, as ADAMS does for solids.
+    root_contact : bool, optional
+        Whether tips may also meet the mate's root; default when the tip clearance is below a tenth of the module.
+    stiffness_curve : {"constant", "potential-energy"}
+        How the stiffness of a tooth pair varies along the path of contact; ``law.stiffness`` is its largest value.
+    owner : str
+        What messages call the fields' owner.
+
+    Raises
+    ------
+    ValueError
+        For a setting that is none of these.
+    """
+
+    law: ContactLaw = field(default_factory=ContactLaw.impact)
+    friction: FlankFriction = field(default_factory=FlankFriction)
+    slices: int | None = None
+    load: Literal["slices", "adams"] = "slices"
+    root_contact: bool | None = None
+    stiffness_curve: Literal["constant", "potential-energy"] = "constant"
+    owner: InitVar[str] = "ContactModel"
+
+    # mypy may lose InitVar among modules that import each other for types
+    def __post_init__(self, owner: str) -> None:  # type: ignore[override]
+        if self.load not in ("slices", "adams"):
+            raise ValueError(f"{owner}.load is {self.load!r}; choose 'slices' or 'adams'")
+        if self.stiffness_curve not in ("constant", "potential-energy"):
+            raise ValueError(
+                f"{owner}.stiffness_curve is {self.stiffness_curve!r}; choose 'constant' or 'potential-energy'"
+            )
+        if self.slices is not None and not (isinstance(self.slices, int) and self.slices >= 1):
+            raise ValueError(f"{owner}.slices is {self.slices!r}; give an integer of 1 or more")
+
+    def face_slices(self, geometry: PairGeometry, faults: Iterable[Fault] = ()) -> int:
+        """Slices along the face in use: those asked for, or else as many as the gap's variation needs.
+
+        One for spur wheels on parallel axes with opposite faces, where every section sees the same gap; `TILTED_SLICES`
+        where misalignment or an axial shift make it vary along the face; `FAULTY_SLICES` where a fault does; at least
+        `HELICAL_SLICES` and `SLICES_PER_OVERLAP` for each whole of the overlap ratio of helical wheels.
+        """
+        if self.slices is not None:
+            return self.slices
+        if any(fault.along_face for fault in faults):
+            return FAULTY_SLICES
+        if geometry.driver.helix_angle:
+            return max(HELICAL_SLICES, math.ceil(SLICES_PER_OVERLAP * geometry.overlap_ratio))
+        return 1 if geometry.uniform_along_face else TILTED_SLICES
+
+    def tips_may_bottom(self, geometry: PairGeometry) -> bool:
+        """Whether contact of tips with roots is looked for."""
+        if self.root_contact is not None:
+            return self.root_contact
+        spur = geometry.driver.helix_angle == 0
+        return spur and geometry.tip_clearance < BOTTOMING_CLEARANCE * geometry.driver.module
+
+    def face_share(self, geometry: PairGeometry) -> float:
+        """Share of the law's stiffness and damping that the faces have as they stand, `PairGeometry.face_share`.
+
+        The law is that of faces that stand opposite. With ``load="adams"`` one force carries, whatever the face width.
+        """
+        return 1.0 if self.load == "adams" else geometry.face_share
+
+    def penetration(self, force: float, pairs: int = 1, share: float = 1.0) -> float:
+        """Static penetration when ``pairs`` tooth pairs of parallel wheels share a normal force (N) equally, m.
+
+        ``share`` is that of the face in mesh, `face_share`.
+        """
+        return (force / (pairs * share * self.law.stiffness)) ** (1 / self.law.exponent)
+
+    def tangent_stiffness(self, force: float, pairs: int = 1, share: float = 1.0) -> float:
+        """Tangent stiffness along the line of action of that many tooth pairs under a normal force (N), N/m.
+
+        ``share`` is that of the face in mesh, `face_share`.
+        """
+        return self.law.exponent * force / self.penetration(force, pairs, share)
+
 
 # How a pair of wheels is driven and loaded.
 

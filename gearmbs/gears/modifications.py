@@ -6,14 +6,15 @@ They are described as faults are, and combine with them; see `gearmbs.gears.faul
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
+from numbers import Integral, Real
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
-from gearmbs.gears.settings import choice, real, switch, tooth_numbers, whole
 from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.units import Quantity, shown, to_si
 
@@ -160,15 +161,15 @@ class Fault(Written):
                     raise ValueError(f"{place} is None; give a number")
             elif item.name in CHOICES:
                 value = COAST_ALIASES.get(value, value) if item.name == "flank" and isinstance(value, str) else value
-                value = choice(value, place, CHOICES[item.name])
+                value = _choice(value, place, CHOICES[item.name])
             elif item.name == "teeth":
-                value = tooth_numbers(value, place)
+                value = _tooth_numbers(value, place)
             elif isinstance(item.default, bool):
-                value = switch(value, place)
+                value = _switch(value, place)
             elif isinstance(item.default, int):
-                value = whole(value, place, self.least.get(item.name))
+                value = _whole(value, place, self.least.get(item.name))
             elif isinstance(item.default, float):
-                value = real(value, place)
+                value = _real(value, place)
             object.__setattr__(self, item.name, value)
         try:
             convert_fields(self, self.units, name)
@@ -439,71 +440,89 @@ class FlankMap(Fault):
             deviations.shape[flank, deviations.tooth_list(self.teeth)] += shape
 
 
-# Flank tolerances of ISO 1328-1:2013 and random deviations that just meet them.
-#
-# The tolerances are the standard's formulas for grade A (1 to 11), in metres, unrounded.
+# Settings of faults that are no quantities: numbers of teeth, counts, choices and switches.
 
 
-MICRON = 1e-6
-"""Metres: ISO 1328-1 states its tolerances in micrometres."""
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """Tolerances of one wheel, m.
-
-    Attributes
-    ----------
-    single_pitch, total_pitch : float
-        f_pT and F_pT.
-    profile_slope, profile_form : float
-        f_HalphaT and f_falphaT.
-    lead_slope, lead_form : float
-        f_HbetaT and f_fbetaT.
-    """
-
-    single_pitch: float
-    total_pitch: float
-    profile_slope: float
-    profile_form: float
-    lead_slope: float
-    lead_form: float
-
-
-def tolerances(gear: GearSpec, grade: int) -> Tolerances:
-    """Tolerances of a wheel for an ISO 1328-1:2013 grade.
+def _whole(value: Any, field: str, least: int | None = None) -> int:
+    """Return a whole number as ``int``.
 
     Raises
     ------
     ValueError
-        For grades outside 1 to 11.
+        For fractions, text and truth values, and for numbers below ``least``; the message names the field.
     """
-    if not (isinstance(grade, int) and 1 <= grade <= 11):
-        raise ValueError(f"grade is {grade!r}; ISO 1328-1 has grades 1 to 11")
-    d, m, b = 2e3 * gear.pitch_radius, 1e3 * gear.module, 1e3 * gear.face_width
-    step = math.sqrt(2) ** (grade - 5) * MICRON
-    return Tolerances(
-        single_pitch=(0.001 * d + 0.4 * m + 5) * step,
-        total_pitch=(0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12) * step,
-        profile_slope=(0.001 * d + 0.4 * m + 4) * step,
-        profile_form=(0.55 * m + 5) * step,
-        lead_slope=(0.05 * math.sqrt(d) + 0.35 * math.sqrt(b) + 4) * step,
-        lead_form=(0.07 * math.sqrt(d) + 0.45 * math.sqrt(b) + 4) * step,
-    )
+    wanted = "a whole number" if least is None else f"a whole number from {least} up"
+    good = isinstance(value, Integral) and not isinstance(value, (bool, np.bool_))
+    if not good or (least is not None and value < least):
+        raise ValueError(f"{field} is {value!r}; give {wanted}")
+    return int(value)
 
 
-def random_pitch(gear: GearSpec, grade: int, generator: np.random.Generator) -> np.ndarray:
-    """Index deviations of all teeth (cumulative pitch), m, shape (z,), that use up the grade's pitch tolerances.
+def _real(value: Any, field: str) -> float:
+    """Return a finite number as ``float``.
 
-    A once-per-revolution run-out and a random part, scaled so that neither the single pitch deviations nor the total
-    exceed their tolerances and the nearer of the two is met.
+    Raises
+    ------
+    ValueError
+        For anything else; the message names the field.
     """
-    limit = tolerances(gear, grade)
-    z = gear.teeth
-    angle = 2 * math.pi * np.arange(z) / z
-    index = math.sin(1.0) * np.sin(angle + generator.uniform(0, 2 * math.pi))
-    noise = np.cumsum(generator.normal(size=z)) / math.sqrt(z)
-    index = index + noise - noise[-1] * np.arange(1, z + 1) / z
-    index -= index.mean()
-    single = np.abs(np.diff(np.append(index, index[0]))).max()
-    return index * min(limit.single_pitch / single, limit.total_pitch / np.ptp(index))
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not math.isfinite(value):
+        raise ValueError(f"{field} is {value!r}; give a finite number")
+    return float(value)
+
+
+def _switch(value: Any, field: str) -> bool:
+    """Return a truth value as ``bool``.
+
+    Raises
+    ------
+    ValueError
+        For anything else; the message names the field.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{field} is {value!r}; give true or false")
+    return bool(value)
+
+
+def _choice(value: Any, field: str, choices: tuple[Any, ...]) -> Any:
+    """Return a value that is one of the choices.
+
+    Raises
+    ------
+    ValueError
+        For anything else; the message names the field and the choices.
+    """
+    if isinstance(value, Integral) and not isinstance(value, (bool, np.bool_)):
+        value = int(value)
+    known = isinstance(value, (str, int)) and not isinstance(value, bool) and value in choices
+    if not known:
+        names = [repr(item) for item in choices]
+        raise ValueError(f"{field} is {value!r}; choose {', '.join(names[:-1])} or {names[-1]}")
+    return value
+
+
+def _tooth_numbers(value: Any, field: str) -> Any:
+    """Return ``"all"``, a tooth number, or several, as plain integers.
+
+    Raises
+    ------
+    ValueError
+        For anything else and for no tooth at all; the message names the field.
+    """
+    remedy = "give 'all', a tooth number or several"
+    if isinstance(value, str):
+        if value != "all":
+            raise ValueError(f"{field} is {value!r}; {remedy}")
+        return value
+    if not isinstance(value, Iterable):
+        try:
+            return _whole(value, field)
+        except ValueError:
+            raise ValueError(f"{field} is {value!r}; {remedy}") from None
+    try:
+        numbers = [_whole(item, field) for item in value]
+    except ValueError as error:
+        raise ValueError(f"{error} or several, or 'all'") from None
+    if not numbers:
+        raise ValueError(f"{field} is empty; {remedy}")
+    return tuple(numbers) if isinstance(value, tuple) else numbers

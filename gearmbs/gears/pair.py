@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from gearmbs._shown import Shown
-from gearmbs.gears.contact_model import (
+from gearmbs.gears.geometry import PairGeometry, Placement
+from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness
+from gearmbs.gears.mesh import (
     DAMPING_RATIO,
     RATIO_DEPTH,
     ContactLaw,
     ContactModel,
     FlankFriction,
+    OperatingPoint,
     varying_along_face,
 )
-from gearmbs.gears.geometry import PairGeometry, Placement
-from gearmbs.gears.mesh import OperatingPoint
 from gearmbs.gears.modifications import Fault
-from gearmbs.gears.reach import fillet_clearance
 from gearmbs.gears.show import pair_html, pair_table
 from gearmbs.gears.spec import GearSpec
-from gearmbs.gears.stiffness import compliance_roll_lengths, iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
-from gearmbs.gears.tables import pack
+from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
+from gearmbs.gears.tables import fillet_clearance, pack
 from gearmbs.units import Quantity, shown, to_si
 
 if TYPE_CHECKING:
@@ -334,7 +334,7 @@ class GearPair(PairGeometry, Shown):
             ``iso``: the mean over a mesh cycle is ISO 6336-1's c_gamma. ``iso single``: each tooth pair has c'.
             ``potential-energy``: it varies along the path. Or a number: of a tooth pair, N/m.
         damping_ratio : float, optional
-            See `with_linear_stiffness`; default `gearmbs.gears.contact_model.DAMPING_RATIO`, 0.07.
+            See `with_linear_stiffness`; default `gearmbs.gears.mesh.DAMPING_RATIO`, 0.07.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Tooth and mesh stiffness: the potential-energy method along the profile, and ISO 6336-1.
+"""Tooth and mesh stiffness by the potential-energy method along the profile, with the body or rim below the teeth.
 
 Plane finite elements of whole wheels judge both (``benchmarks/tooth_stiffness.py``, table in the theory pages): the
 energies of the tooth on an elastic half plane with Weber's and Banaschek's flattening are within a few per cent of
@@ -12,10 +12,11 @@ References
    analytical formula. J. Mech. Design 126 (2004) 748-752. Foundation.
 .. [3] Yang, D. C. H., Lin, J. Y.: Hertzian damping, tooth friction and bending elasticity in gear impact dynamics.
    J. Mechanisms, Transmissions and Automation in Design 109 (1987) 189-196. Constant Hertz stiffness.
-.. [4] ISO 6336-1: Calculation of load capacity of spur and helical gears, method B for c' and c_gamma.
-.. [5] Cornell, R. W.: Compliance and stress sensitivity of spur gear teeth. J. Mech. Design 103 (1981) 447-459.
-.. [6] Weber, C., Banaschek, K.: Formaenderung und Profilruecknahme bei gerad- und schraegverzahnten Raedern. Vieweg
+.. [4] Cornell, R. W.: Compliance and stress sensitivity of spur gear teeth. J. Mech. Design 103 (1981) 447-459.
+.. [5] Weber, C., Banaschek, K.: Formaenderung und Profilruecknahme bei gerad- und schraegverzahnten Raedern. Vieweg
    (1953). Flattening of the contact against the tooth's middle line.
+.. [6] Chen, Z., Shao, Y.: Mesh stiffness of an internal spur gear pair with ring gear rim deformation. Mechanism and
+   Machine Theory 69 (2013) 1-12. The rim as a uniformly curved Timoshenko beam between its supports.
 """
 
 from __future__ import annotations
@@ -30,7 +31,6 @@ import numpy as np
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.modifications import COMPLIANCE_POINTS
-from gearmbs.gears.planetary.rim import SHEAR, rim_compliance
 from gearmbs.gears.spec import GearSpec
 
 POINTS = 200  # stations of the beam from root to tip
@@ -41,8 +41,10 @@ SAINSOT = {
     "P": (-50.952e-5, 185.50e-3, 0.0538e-4, 53.300e-3, 0.2895, 0.9236),
     "Q": (-6.2042e-5, 9.0889e-3, -4.0964e-4, 7.8297e-3, -0.1472, 0.6904),
 }
-ISO_STEEL_MODULUS = 206e9
-"""Young's modulus, Pa, that the formulae of ISO 6336-1 are stated for."""
+SHEAR = 1.2
+"""Shear correction of a rectangular section."""
+RIM_STATIONS = 400
+"""Of the integration along a half of a ring's rim between two bolts."""
 SPECIFIC_LOAD = 3e5
 """Load per face width at which the flattening is taken where none is given, N/m: ISO 6336-1 has c'_th at 300 N/mm."""
 FLATTEST = 1e-3
@@ -118,7 +120,7 @@ class ToothCompliance:
         Length of roll of the loaded point, m.
     bending, shear, axial, foundation : ndarray
     rim : ndarray
-        Of a ring's rim between its bolts, 0 where it is held all around; see `gearmbs.gears.planetary.rim`.
+        Of a ring's rim between its bolts, 0 where it is held all around; see `gearmbs.gears.stiffness`.
     depth : ndarray
         Distance of the loaded point from the tooth's middle line along the normal, m.
     """
@@ -262,6 +264,76 @@ def half_plane_foundation(gear: GearSpec, beta: np.ndarray, lever: np.ndarray, t
     slender = lever / thickness
     shape = 5.306 * slender**2 + 2 * (1 - nu) * slender + 1.534 * (1 + 0.4167 * np.tan(beta) ** 2 / (1 + nu))
     return np.cos(beta) ** 2 * shape / (gear.material.youngs_modulus * gear.face_width)
+
+
+def rim_compliance(gear: GearSpec, supports: int, beta: np.ndarray, lever: np.ndarray) -> np.ndarray:
+    """Compliance of a ring's rim under the load of a tooth half-way between two bolts [6]_, m/N.
+
+    Parameters
+    ----------
+    gear : GearSpec
+        Internal wheel.
+    supports : int
+        Evenly spaced bolts, at which the rim is clamped.
+    beta : ndarray
+        Angle of the load against the direction across the tooth, rad; it pushes outwards.
+    lever : ndarray
+        Height above the root where the load meets the tooth's middle line, m.
+
+    Raises
+    ------
+    ValueError
+        For an external wheel, or fewer than two bolts.
+    """
+    if not gear.internal:
+        raise ValueError(f"{gear.name} is external; only the rim of an internal wheel is held by bolts")
+    if not (isinstance(supports, int) and supports >= 2):
+        raise ValueError(f"rim_supports is {supports!r}; give the number of bolts, 2 or more")
+    young = gear.material.youngs_modulus
+    moduli = young, young / (2 * (1 + gear.material.poisson_ratio))
+    thickness = gear.rim_thickness
+    radius = gear.root_radius + 0.5 * thickness
+    stiffness = sum(
+        np.linalg.inv(arc_flexibility(radius, side * math.pi / supports, thickness, gear.face_width, moduli))
+        for side in (1, -1)
+    )
+    beta = np.asarray(beta)
+    inwards = np.asarray(lever) + 0.5 * thickness
+    load = np.stack([np.sin(beta), np.cos(beta), -inwards * np.cos(beta)])
+    return np.einsum("i...,ij,j...->...", load, np.linalg.inv(stiffness), load)
+
+
+def arc_flexibility(radius: float, angle: float, thickness: float, width: float, moduli: tuple[float, float]):
+    """Return the flexibility of a circular cantilever at its free end.
+
+    Parameters
+    ----------
+    radius, thickness, width : float
+        Of the middle line and of the section, m.
+    angle : float
+        From the free end, which is on the x axis, to the clamp, rad; its sign tells on which side.
+    moduli : (float, float)
+        Young's and shear modulus, N/m^2.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Displacements outwards and along the rim, m, and turn, rad, by forces (N) and moment (N m) in these directions.
+    """
+    phi = angle * (np.arange(RIM_STATIONS) + 0.5) / RIM_STATIONS
+    sin, cos, one = np.sin(phi), np.cos(phi), np.ones(RIM_STATIONS)
+    # what a force outwards, one along the rim and a moment at the end make in a section
+    moment = np.stack([radius * sin, radius * (1 - cos), one])
+    normal = np.stack([-sin, cos, 0 * one])
+    shear = np.stack([cos, sin, 0 * one])
+    area = width * thickness
+    young, rigid = moduli
+    per = abs(angle) * radius / RIM_STATIONS
+    return per * (
+        moment @ moment.T / (young * area * thickness**2 / 12)
+        + normal @ normal.T / (young * area)
+        + SHEAR * shear @ shear.T / (rigid * area)
+    )
 
 
 def hertz_stiffness(pair: PairGeometry) -> float:
@@ -438,49 +510,3 @@ def mesh_stiffness(
     single_phase = np.linspace(0, ratio, points)
     single = pair_stiffness(geometry, begin + single_phase * pitch, **bodies)
     return MeshStiffness(phase, stiffness, single, single_phase)
-
-
-def iso_theoretical_stiffness(pair: PairGeometry) -> float:
-    """Theoretical single stiffness c'_th = 1 / q' of ISO 6336-1, N/(m of face width * m).
-
-    Teeth count as those of the equivalent spur wheels; an internal wheel as a rack.
-    """
-    one, two = pair.driver, pair.driven
-    x1, x2 = one.profile_shift, two.profile_shift
-    z1, z2 = one.virtual_teeth, math.inf if two.internal else two.virtual_teeth
-    q = 0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2
-    q += -0.24188 * x2 / z2 + 0.00529 * x1**2 + 0.00182 * x2**2
-    return 1e9 / q
-
-
-def iso_single_stiffness(pair: PairGeometry, web: tuple[float, float] | None = None) -> float:
-    """Single stiffness c' of ISO 6336-1 (method B, high load), N/(m of face width * m).
-
-    Parameters
-    ----------
-    pair : PairGeometry
-    web : (float, float), optional
-        Thickness of the web and of the rim, m, of a wheel that is no solid disc: the factor
-        ``C_R = 1 + ln(b_s / b) / (5 exp(s_R / (5 m_n)))``, within the standard's limits 0.2 <= b_s / b <= 1.2 and
-        s_R >= m_n.
-
-    Notes
-    -----
-    c' = c'_th C_M C_R C_B cos beta with C_M = 0.8 and C_B = (1 + 0.5 (1.2 - h_fP / m_n)) (1 - 0.02 (20 - alpha_n)),
-    where h_fP is the dedendum of the basic rack.
-    """
-    one, two = pair.driver, pair.driven
-    depth = 0.5 * (one.dedendum / one.module + one.profile_shift + two.dedendum / two.module + two.profile_shift)
-    blank = 1.0
-    if web is not None:
-        share = min(max(web[0] / pair.narrower_face_width, 0.2), 1.2)
-        blank = 1 + math.log(share) / (5 * math.exp(max(web[1] / one.module, 1.0) / 5))
-    rack = (1 + 0.5 * (1.2 - depth)) * (1 - 0.02 * (20 - math.degrees(one.pressure_angle)))
-    moduli = [w.material.youngs_modulus for w in (one, two)]
-    material = 2 * moduli[0] * moduli[1] / sum(moduli) / ISO_STEEL_MODULUS
-    return 0.8 * rack * material * blank * math.cos(one.helix_angle) * iso_theoretical_stiffness(pair)
-
-
-def iso_mesh_stiffness(pair: PairGeometry) -> float:
-    """Mesh stiffness c_gamma of ISO 6336-1, (0.75 epsilon_alpha + 0.25) c', N/(m of face width * m)."""
-    return iso_single_stiffness(pair) * (0.75 * pair.contact_ratio + 0.25)

@@ -11,8 +11,7 @@ from numbers import Integral
 import numpy as np
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
-from gearmbs.gears.contact_model import varying_along_face
-from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.mesh import Mesh, varying_along_face
 from gearmbs.gears.modifications import FACE_SECTIONS
 from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting

@@ -411,7 +411,7 @@ def campbell(
         check_targets(out=out)
         import numpy as np
 
-        from gearmbs.drivetrain.description import read_description
+        from gearmbs.drivetrain.drivetrain import read_description
         from gearmbs.signals import critical_speeds
         from gearmbs.studies.trains.modes import train_campbell
         from gearmbs.units import to_si

@@ -10,8 +10,8 @@ import pytest
 
 import gearmbs
 from gearmbs.bearings import Bearing, BearingError, BearingStatics
+from gearmbs.bearings.bearing import dynamic_rating, equivalent_load
 from gearmbs.bearings.kinds import KINDS, Known
-from gearmbs.bearings.ratings import dynamic_rating, equivalent_load
 from tests.says import says
 
 PACKAGE = Path(gearmbs.__file__).parent
@@ -75,4 +75,4 @@ def test_no_other_module_tells_kinds_apart():
         for name in word.findall(path.read_text(encoding="utf-8"))
         if path.name != "kinds.py"
     }
-    assert found <= {"bearings/catalogue.py: angular contact", "bearings/geometry.py: deep groove"}
+    assert found <= {"bearings/catalogue.py: angular contact", "bearings/bearing.py: deep groove"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearmbs.contact.gaps.face import LEVEL
+from gearmbs.contact.places import LEVEL
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.faults import ChippedCorner, Eccentricity
 

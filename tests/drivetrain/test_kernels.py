@@ -13,20 +13,20 @@ from tests.drivetrain.support import differences, evaluate, frame, rotation
 TABLE = (1.0, 0.0, 3.0, -50.0, 10.0, 60.0, 5.0, 2.0, -4.0, 0.1, -0.05, -0.2)
 TURN = (-1.0, 2 * np.pi, 3.0, 0.0, 3.0, 2 * np.pi, 1.0, 2.0, 1.0, 0.5, -0.3, 0.5)
 LAWS = {
-    "kloss": ("motors.kloss", (1.0, 157.0, 0.0, 138.0, 0.18), 1, 0, 0),
-    "kloss with lag": ("motors.kloss", (-1.0, 157.0, 0.02, 138.0, 0.18), 1, 0, 1),
-    "circuit": ("motors.circuit", (1.0, 157.0, 0.0, 900.0, 0.6, 0.5, 2.1), 1, 0, 0),
-    "circuit with lag": ("motors.circuit", (1.0, 157.0, 0.01, 900.0, 0.6, 0.5, 2.1), 1, 0, 1),
-    "controller": ("motors.controller", (1.0, 2.0, 30.0, 500.0), 1, 0, 1),
-    "controller at its limit": ("motors.controller", (1.0, 20.0, 30.0, 300.0), 1, 0, 1),
-    "clutch": ("couplings.clutch", (0.1, 3e3, 2e5, 4.0, 0.0, 1.0, 5e3, 0.05, 0.1), 0, 1, 0),
-    "clutch beyond": ("couplings.clutch", (0.1, 3e3, 2e5, 4.0, 0.0, 1.0, 5e3, 0.05, 0.01), 0, 1, 0),
-    "dead band": ("couplings.clutch", (0.1, 3e3, 2e5, 4.0, 0.05, 0.5, 0.0, 0.0, 0.01), 0, 1, 0),
-    "pump": ("loads.pump", (1.0, 2.5e-1, 7.0, 0.1, 9.0, 3.0, 0.1, 0.0, 0.9, 0.08, -0.02), 1, 1, 0),
-    "pump with lag": ("loads.pump", (-1.0, 2.5e-1, 7.0, 0.1, 9.0, 3.0, 0.1, 0.1, 0.9, 0.08, -0.02), 1, 1, 1),
-    "resistance": ("loads.resistance", (20.0, 0.3, 0.01, 15.0), 1, 0, 0),
-    "table over speed": ("loads.table", TABLE, 1, 0, 0),
-    "table over angle": ("loads.table", TURN, 1, 1, 0),
+    "kloss": ("kloss", (1.0, 157.0, 0.0, 138.0, 0.18), 1, 0, 0),
+    "kloss with lag": ("kloss", (-1.0, 157.0, 0.02, 138.0, 0.18), 1, 0, 1),
+    "circuit": ("circuit", (1.0, 157.0, 0.0, 900.0, 0.6, 0.5, 2.1), 1, 0, 0),
+    "circuit with lag": ("circuit", (1.0, 157.0, 0.01, 900.0, 0.6, 0.5, 2.1), 1, 0, 1),
+    "controller": ("controller", (1.0, 2.0, 30.0, 500.0), 1, 0, 1),
+    "controller at its limit": ("controller", (1.0, 20.0, 30.0, 300.0), 1, 0, 1),
+    "clutch": ("clutch", (0.1, 3e3, 2e5, 4.0, 0.0, 1.0, 5e3, 0.05, 0.1), 0, 1, 0),
+    "clutch beyond": ("clutch", (0.1, 3e3, 2e5, 4.0, 0.0, 1.0, 5e3, 0.05, 0.01), 0, 1, 0),
+    "dead band": ("clutch", (0.1, 3e3, 2e5, 4.0, 0.05, 0.5, 0.0, 0.0, 0.01), 0, 1, 0),
+    "pump": ("pump", (1.0, 2.5e-1, 7.0, 0.1, 9.0, 3.0, 0.1, 0.0, 0.9, 0.08, -0.02), 1, 1, 0),
+    "pump with lag": ("pump", (-1.0, 2.5e-1, 7.0, 0.1, 9.0, 3.0, 0.1, 0.1, 0.9, 0.08, -0.02), 1, 1, 1),
+    "resistance": ("resistance", (20.0, 0.3, 0.01, 15.0), 1, 0, 0),
+    "table over speed": ("table", TABLE, 1, 0, 0),
+    "table over angle": ("table", TURN, 1, 1, 0),
 }
 
 

@@ -20,11 +20,11 @@ from gearmbs.drivetrain import (
     TorsionalModel,
     TorsionalSpring,
 )
-from gearmbs.drivetrain.description import make_description
+from gearmbs.drivetrain.drivetrain import make_description
 from gearmbs.flexible import ShaftSection
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, IdealMesh, loaded_transmission_error, planetary
-from gearmbs.gears.contact_model import DAMPING_RATIO
-from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness
+from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness
+from gearmbs.gears.mesh import DAMPING_RATIO
 from gearmbs.signals import SignalError
 from gearmbs.studies import bench_train, run_train, train_campbell, train_modes, train_report
 from tests.drivetrain.support import stage

@@ -21,8 +21,7 @@ from gearmbs.flexible import (
     reduce_model,
     write_mnf,
 )
-from gearmbs.flexible.files.mnf import COMMENTS, FLAGS, MARK
-from gearmbs.flexible.files.xdr import ints_bytes, record_bytes
+from gearmbs.flexible.mnf import COMMENTS, FLAGS, MARK, ints_bytes, record_bytes
 from tests.flexible import test_nastran as nastran
 from tests.flexible.test_files import cube, write_nodes, write_triplets
 from tests.generators import cases, seed

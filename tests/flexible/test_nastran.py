@@ -20,7 +20,7 @@ from gearmbs.flexible import (
     read_op4,
     reduce_model,
 )
-from gearmbs.flexible.files.nastran import op2_tables
+from gearmbs.flexible.nastran import op2_tables
 from tests.flexible.op2_files import Op2Writer
 from tests.generators import cases, seed
 from tests.says import says

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.gears import GearPair, GearSpec, PairGeometry
-from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness, iso_theoretical_stiffness
+from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness, iso_theoretical_stiffness
 from tests.says import says
 
 

@@ -25,8 +25,8 @@ from gearmbs.gears.faults import (
     Waviness,
     Wear,
     Wobble,
+    tolerances,
 )
-from gearmbs.gears.modifications import tolerances
 from gearmbs.gears.tables import tooth_deviations
 from gearmbs.gears.transmission import StaticMesh, kinematic_transmission_error
 from tests.says import says

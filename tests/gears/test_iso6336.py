@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gearmbs.gears import GearPair, GearSpec, Material, PairGeometry
-from gearmbs.gears.iso6336 import iso_stresses, root_section
-from gearmbs.gears.stiffness import iso_mesh_stiffness, rack_root
+from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_stresses, root_section
+from gearmbs.gears.stiffness import rack_root
 
 STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3)
 

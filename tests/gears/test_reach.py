@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error
-from gearmbs.gears.reach import corner_reach
+from gearmbs.gears.tables import corner_reach
 from gearmbs.gears.transmission import GAP, SIDE, StaticMesh
 from tests.gears.random_pairs import ELASTIC, pairs
 from tests.generators import cases, seed

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearmbs.gears import GearPair, GearSpec, PairGeometry, kinematic_transmission_error, loaded_transmission_error
-from gearmbs.gears.reach import fillet_clearance
+from gearmbs.gears.tables import fillet_clearance
 from tests.says import says
 
 RING = {"driver": GearSpec(23, "3 mm"), "driven": GearSpec.ring(70, "3 mm")}

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.gears import GearPair, GearSpec
-from gearmbs.gears.planetary.rim import SHEAR, arc_flexibility, rim_compliance
-from gearmbs.gears.stiffness import mesh_stiffness, tooth_compliance
+from gearmbs.gears.stiffness import SHEAR, arc_flexibility, mesh_stiffness, rim_compliance, tooth_compliance
 
 RING = GearSpec.ring(70, "3 mm", rim_thickness="8 mm")
 MODULI = (2e11, 8e10)

@@ -8,7 +8,7 @@ import pytest
 
 from gearmbs.dae.problem import ModelError
 from gearmbs.gears import ContactLaw, GearPair, GearSpec, planetary
-from gearmbs.gears.planetary.rig import planetary_mechanism
+from gearmbs.gears.planetary_mechanism import planetary_mechanism
 from gearmbs.mechanism import Mechanism
 from tests.drivetrain.support import rotation, stage
 from tests.generators import cases, seed

@@ -7,12 +7,11 @@ import pytest
 
 from gearmbs.gears import GearPair, GearSpec, Material
 from gearmbs.gears.faults import RootCrack
+from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness
 from gearmbs.gears.stiffness import (
     Crack,
     compliance_roll_lengths,
     hertz_stiffness,
-    iso_mesh_stiffness,
-    iso_single_stiffness,
     mesh_stiffness,
     pair_stiffness,
     rack_root,

@@ -50,8 +50,8 @@ def flex_body_arguments(
     ModelError
         If the body cannot be in such a file, or the deck is not written to one.
     """
-    from gearmbs.flexible.files.mnf import mnf_of, with_seat_nodes, write_mnf
     from gearmbs.flexible.material import FlexibleError
+    from gearmbs.flexible.mnf import mnf_of, with_seat_nodes, write_mnf
     from gearmbs.flexible.modal_model import Seat
 
     label = f"body '{body.name}'"

@@ -26,7 +26,7 @@ class DrivetrainSubject(TablesSubject):
 
     def made(self, tables: dict[str, Any]) -> Any:
         """Return the drivetrain and its run."""
-        from gearmbs.drivetrain.description import make_description
+        from gearmbs.drivetrain.drivetrain import make_description
         from gearmbs.studies.case.tooth_faults import tooth_fault
         from gearmbs.studies.trains.trains import check_record
 

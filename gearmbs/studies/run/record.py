@@ -474,7 +474,7 @@ def bearing_attributes(mechanism: Mechanism | None, title: str = "") -> dict[str
     """
     if mechanism is None or not any(e.kind == "rolling bearing" for e in mechanism.elements.values()):
         return {}
-    from gearmbs.bearings.life import described
+    from gearmbs.bearings.element import described
 
     told = described(mechanism)
     words = {name: [d["label"] for d in one["defects"]] for name, one in told.items()}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.bearings import Bearing, BearingError, RollingBearing, add_bearing
-from gearmbs.bearings.errors import require
+from gearmbs.bearings.kinds import require
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies.case.drive import drive_angle, load_torque

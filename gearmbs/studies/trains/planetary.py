@@ -16,7 +16,7 @@ from gearmbs.dae import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain.parts import contact_law
 from gearmbs.gears import ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
-from gearmbs.gears.planetary.rig import PinBearing
+from gearmbs.gears.planetary_mechanism import PinBearing
 from gearmbs.mechanism import Mechanism
 from gearmbs.schema.described import Described
 from gearmbs.schema.files import read_toml

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
-from gearmbs.drivetrain.parts import turn_z
+from gearmbs.gears.geometry import turn_z
 from gearmbs.signals import spectrum
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import held_speed, holds_speed

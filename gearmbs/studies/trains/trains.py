@@ -16,7 +16,7 @@ from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
-from gearmbs.drivetrain.description import Description, read_description
+from gearmbs.drivetrain.drivetrain import Description, read_description
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.files import plain
 from gearmbs.mechanism import Mechanism

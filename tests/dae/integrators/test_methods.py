@@ -27,8 +27,8 @@ from gearmbs.dae.methods import (
     integrators_table,
 )
 from gearmbs.dae.problem import ModelError
-from gearmbs.drivetrain.description import RunSettings
-from gearmbs.drivetrain.errors import DrivetrainError
+from gearmbs.drivetrain.drivetrain import RunSettings
+from gearmbs.drivetrain.part import DrivetrainError
 from gearmbs.mechanism import Mechanism
 from gearmbs.wording import any_of
 from tests.docs.support import DOCS

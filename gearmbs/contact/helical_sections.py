@@ -1,6 +1,7 @@
 """The gap of two helical flanks, and of a tip edge on a flank, in the sections of a strip; loops as in `sections`.
 
 Wheel 1's middle stands half the axial offset before the origin of zeta, wheel 2's half behind it.
+
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.gaps.sections import (
+from gearmbs.contact.sections import (
     LARGEST_TURN,
     NEWTON_END,
     NEWTON_STEPS,
@@ -18,7 +19,7 @@ from gearmbs.contact.gaps.sections import (
     turned,
     unmark_unsettled,
 )
-from gearmbs.contact.gaps.support import (
+from gearmbs.contact.support import (
     HelicalCurvatures,
     HelicalSlopes,
     edge_curvatures,

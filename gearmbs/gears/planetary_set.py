@@ -2,6 +2,7 @@
 
 Planet k stands at the angle psi_k on the carrier. It meshes with the sun, and with the ring on its other side; a
 stepped planet has a wheel of its own for the ring.
+
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from gearmbs._shown import Written
-from gearmbs.gears.contact_model import ContactLaw, FlankFriction
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.ideal_mesh import IdealMesh
+from gearmbs.gears.mesh import ContactLaw, FlankFriction
 from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, convert_fields

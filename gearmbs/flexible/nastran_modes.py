@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from gearmbs.flexible.files.matrices import FileUnits, Path_
-from gearmbs.flexible.files.mnf_content import SI, ModalNeutralFile
-from gearmbs.flexible.files.nastran import GridTable, block_records, op2_tables, pyyeti_module, word_kinds
 from gearmbs.flexible.material import FlexibleError
+from gearmbs.flexible.matrix_files import FileUnits, Path_
+from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
+from gearmbs.flexible.nastran import GridTable, block_records, op2_tables, pyyeti_module, word_kinds
 from gearmbs.flexible.reduction import nodal_lumps
 from gearmbs.flexible.stress import COMPONENTS, StressModes
 from gearmbs.units import Quantity

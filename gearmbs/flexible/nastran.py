@@ -2,6 +2,7 @@
 
 The files are read by pyyeti (``pip install gearmbs[fem]``). What is added here: records are followed to the end of the
 file before anything is believed, displacement coordinate systems are turned into the basic one, and units become SI.
+
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from gearmbs.flexible.fe_model import FiniteElementModel
-from gearmbs.flexible.files.matrices import FileUnits, Path_
 from gearmbs.flexible.material import FlexibleError
+from gearmbs.flexible.matrix_files import FileUnits, Path_
 from gearmbs.units import Quantity
 
 # Files of Nastran as pyyeti reads them: whole records, tables of grid points, displacement coordinate systems.

@@ -6,9 +6,9 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import roll_under_corner
-from gearmbs.contact.gaps.face import level, level_corner
-from gearmbs.contact.gaps.helical_sections import edge_normals, edge_sections
-from gearmbs.contact.gaps.sections import (
+from gearmbs.contact.helical_sections import edge_normals, edge_sections
+from gearmbs.contact.places import level, level_corner
+from gearmbs.contact.sections import (
     LARGEST_TURN,
     NEAR_BASE,
     NEWTON_END,
@@ -21,7 +21,7 @@ from gearmbs.contact.gaps.sections import (
     turned,
     unmark_unsettled,
 )
-from gearmbs.contact.gaps.support import (
+from gearmbs.contact.support import (
     corner_curvatures,
     corner_slopes,
     involute_curvatures,

@@ -12,15 +12,16 @@ from nodal masses, inertias and shapes.
 from __future__ import annotations
 
 import hashlib
+import struct
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 
-from gearmbs.flexible.files.mnf_content import SI, ModalNeutralFile, check_numbers
-from gearmbs.flexible.files.xdr import Reader, floats_bytes, ints_bytes, record_bytes, text_bytes
 from gearmbs.flexible.material import FlexibleError
+from gearmbs.flexible.mnf_content import SI, ModalNeutralFile, check_numbers
 from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.progress import waiting
 
@@ -37,7 +38,7 @@ BLOCK = 2
 """ADAMS's number of a block from the faces on, less the place of its flag."""
 COMMENTS = 0x504
 """Byte of the comments in the header; the flags end them."""
-MARK = text_bytes("gearmbs SHA-256 ", 16)
+MARK = "gearmbs SHA-256 ".encode("utf-32-be")
 SAME_LENGTH = 1e-6
 """Relative difference of a shape's greatest length from that of the statistics, whose programs round to 4 bytes."""
 NEEDED = {0: "nodes", 2: "global properties", 3: "eigenvalues", 4: "mode shapes", 5: "nodal masses", F_UNITS: "units"}
@@ -45,6 +46,8 @@ UNKNOWN = {
     F_TOPOLOGY: "element topology", 7: "block 7", F_STIFFNESS: "generalised stiffness", 11: "block 11",
     F_MASS: "generalised mass", F_DAMPING: "generalised damping",
 }  # fmt: skip
+LARGEST = 10_000_000
+"""A greater number of nodes, modes or entries is none: what is read there is something else."""
 
 
 @waiting("reading the modes")
@@ -399,3 +402,86 @@ def _same_nodes(r: Reader, nodes: np.ndarray, ids: np.ndarray, block: str) -> No
     wrong = np.setdiff1d(nodes, ids)
     if wrong.size:
         r.wrong(block, f"node {wrong[0]} is not among the nodes", 0)
+
+
+# Big-endian numbers of a file, read with the block and byte in every complaint, and written.
+
+
+class Reader:
+    """Reads numbers from bytes, one block after the other.
+
+    Parameters
+    ----------
+    data : bytes
+    label : str
+        Of the file, for messages.
+    """
+
+    def __init__(self, data: bytes, label: str) -> None:
+        self.data = data
+        self.label = label
+        self.at = 0
+
+    def wrong(self, block: str, what: str, back: int = 0) -> NoReturn:
+        """Raise the error of a block; ``back`` is how many bytes ago it began."""
+        raise FlexibleError(f"{self.label}: byte {self.at - back}, block of {block}: {what}")
+
+    def take(self, size: int, block: str) -> bytes:
+        """Return the next bytes."""
+        if self.at + size > len(self.data):
+            self.wrong(block, f"the file ends after {len(self.data)} bytes, {size} more are needed here; it is cut off")
+        part = self.data[self.at : self.at + size]
+        self.at += size
+        return part
+
+    def ints(self, count: int, block: str) -> tuple[int, ...]:
+        """Return whole numbers."""
+        return struct.unpack(f">{count}i", self.take(4 * count, block))
+
+    def count(self, number: int, block: str, none: bool = False) -> int:
+        """Return a number of things that was just read, if it can be one."""
+        if not (0 if none else 1) <= number <= LARGEST:
+            self.wrong(block, f"{number} is no number of them; another byte order, or a block before it is longer", 4)
+        return number
+
+    def records(self, fields: list[tuple], count: int, block: str) -> np.ndarray:
+        """Return rows of named fields; floats must be finite."""
+        kind = np.dtype(fields)
+        rows = np.frombuffer(self.take(kind.itemsize * count, block), kind)
+        for name in kind.names or ():
+            if kind[name].base.kind == "f" and not np.all(np.isfinite(rows[name])):
+                self.wrong(block, "it has numbers that are not finite", kind.itemsize * count)
+        return rows
+
+    def floats(self, count: int, block: str) -> np.ndarray:
+        """Return finite floats."""
+        return self.records([("v", ">f8")], count, block)["v"].astype(float)
+
+    def text(self, length: int, block: str) -> str:
+        """Return a text of so many characters, 4 bytes each, without what fills it up."""
+        codes = self.ints(length, block)
+        return "".join(chr(c) for c in codes if 32 <= c < 127).strip()
+
+
+def ints_bytes(*numbers: int) -> bytes:
+    """Return whole numbers as bytes."""
+    return np.array([int(k) for k in numbers], dtype=">i4").tobytes()
+
+
+def floats_bytes(*parts: Any) -> bytes:
+    """Return floats as bytes."""
+    return b"".join(np.asarray(part, dtype=">f8").tobytes() for part in parts)
+
+
+def record_bytes(fields: list[tuple], columns: Any) -> bytes:
+    """Return rows of named fields as bytes."""
+    kind = np.dtype(fields)
+    rows = np.zeros(len(columns[0]), kind)
+    for name, column in zip(kind.names or (), columns):
+        rows[name] = column
+    return rows.tobytes()
+
+
+def text_bytes(text: str, length: int) -> bytes:
+    """Return a text as so many characters of 4 bytes each, filled up with zeros."""
+    return text[:length].encode("utf-32-be", "replace").ljust(4 * length, b"\0")

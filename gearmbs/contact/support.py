@@ -10,6 +10,7 @@ Derivation in ``docs/theory/contact.md``.
 
 Derivatives are by alpha, by the tilt in the frame of the normal (A along it, B across it) and by the spin angle F of
 the wheel.
+
 """
 
 from __future__ import annotations

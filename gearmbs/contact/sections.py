@@ -3,6 +3,7 @@
 Each function runs over the sections of a strip side by side. Its loops have no calls and no branches that depend on
 the section, so that the compiler turns them into vector instructions: what differs between sections is chosen, not
 jumped over. Numbers that all sections share are copied out of their records before a loop.
+
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearmbs.contact.gaps.support import involute_curvatures, involute_slopes, normal_turn, tilt_of
+from gearmbs.contact.support import involute_curvatures, involute_slopes, normal_turn, tilt_of
 from gearmbs.kernels.records import inlined, kernel, summing
 
 NEWTON_STEPS = 20

@@ -1,20 +1,26 @@
-"""A planetary set as a mechanism: bodies, supports, pins, meshes, drives and loads."""
+"""A planetary set as a mechanism: bodies, supports, pins, meshes, drives and loads; its ring gear's rim may bend."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from gearmbs._shown import Written
-from gearmbs.gears.planetary.elastic_ring import ElasticRim, ring_meshes
-from gearmbs.gears.planetary.planetary_set import MEMBERS, PlanetarySet
+from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED, Diagnostic
+from gearmbs.gears.geometry import turn_z
+from gearmbs.gears.ideal_mesh import IdealMesh
+from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.pair import GearPair
+from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
+from gearmbs.gears.spec import GearSpec, convert_fields
+from gearmbs.gears.tables import pack
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.mechanism.parts.bodies import Marker
-from gearmbs.mechanism.parts.elements import ForceElement
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
 from gearmbs.units import Quantity, to_si
 
 Z = (0.0, 0.0, 1.0)
@@ -130,7 +136,7 @@ def planetary_mechanism(
     for member in MEMBERS:
         mass, inertia = masses[member]
         spin = (0.0, 0.0, turning[member])
-        body = m.body(member, mass, inertia, orientation=_about_z(turns[member]), angular_velocity=spin)
+        body = m.body(member, mass, inertia, orientation=turn_z(turns[member]), angular_velocity=spin)
         if member == held and member not in supports:
             m.fixed(f"{member} seat", body, m.ground)
         elif member in supports:
@@ -188,11 +194,6 @@ def _check_loads(loads: Mapping[str, float], held: str | None, speeds: Mapping, 
                 "motion nor meshes; leave it out (the reaction there follows from the torques on the others), or give "
                 f"the torque on {' or '.join(m for m in MEMBERS if m != held and m not in speeds) or 'another member'}"
             )
-
-
-def _about_z(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _masses(gears: PlanetarySet, given: Mapping[str, tuple[float, Any]]) -> dict[str, tuple[float, Any]]:
@@ -263,7 +264,7 @@ def _planets(
             name,
             *weight,
             position=place,
-            orientation=_about_z(start["planets"][k]),
+            orientation=turn_z(start["planets"][k]),
             velocity=(-spin * place[1], spin * place[0], 0.0),
             angular_velocity=(0.0, 0.0, turning["planet"]),
         )
@@ -280,7 +281,7 @@ def _planets(
         m.gear_contact(f"sun-{name}", m.bodies["sun"], planet, to_sun[k])
         wheel: Any = planet
         if gears.planet_at_ring is not None:
-            wheel = planet.marker((0.0, 0.0, 0.0), _about_z(start["steps"][k]), name=f"{name} step")
+            wheel = planet.marker((0.0, 0.0, 0.0), turn_z(start["steps"][k]), name=f"{name} step")
         if rim is None:
             m.gear_contact(f"{name}-ring", wheel, m.bodies["ring"], to_ring[k])
         else:
@@ -288,3 +289,234 @@ def _planets(
     if rim is not None:
         ring = m.bodies["ring"].marker(name="ring.wheel")
         m.add(ring_meshes("ring meshes", wheels, ring, to_ring, rim, gears.ring))
+
+
+WORK = 340
+"""Places of the kernel's scratch that do not depend on the number of modes, and those a mode."""
+WORK_A_MODE = 9
+UNIT = 1e-3
+"""Radial displacement by one unit of a state, m: the integrator then controls the rim as finely as contacts need."""
+
+
+@dataclass(frozen=True)
+class ElasticRim:
+    """The rim of a ring gear as a thin elastic ring that bends in its plane and does not stretch.
+
+    Parameters
+    ----------
+    thickness : float or str, optional
+        Of the rim outside the tooth roots, m; default: the ring's ``rim_thickness``.
+    width : float or str, optional
+        m; default: the ring's face width.
+    waves : int
+        Modes have 2, 3 .. ``waves`` lobes, two modes each.
+    youngs_modulus, density : float or str, optional
+        Pa and kg/m^3; default: those of steel, the density that of the ring.
+    damping_ratio : float
+        Of critical damping of each mode of the free rim.
+    bolts : sequence of (float or str), optional
+        Angles at which the rim is held by springs to the ring's body, rad or text.
+    bolt_stiffness : (float, float)
+        Radial and tangential, of each bolt, N/m.
+
+    Raises
+    ------
+    ValueError
+        For values that no rim has.
+    """
+
+    thickness: Quantity = None
+    width: Quantity = None
+    waves: int = 6
+    youngs_modulus: Quantity = 2.1e11
+    density: Quantity = None
+    damping_ratio: float = 0.02
+    bolts: Sequence[float] = ()
+    bolt_stiffness: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        units = {"thickness": "length", "width": "length", "youngs_modulus": "Pa", "density": "kg/m^3"}
+        convert_fields(self, {k: u for k, u in units.items() if getattr(self, k) is not None}, "ElasticRim")
+        for name in units:
+            value = getattr(self, name)
+            known = value is None or (math.isfinite(value) and value > 0)
+            if not known:
+                raise ValueError(f"ElasticRim.{name} is {value}; give more than 0")
+        if not (isinstance(self.waves, int) and 2 <= self.waves <= 30):
+            raise ValueError(f"ElasticRim.waves is {self.waves!r}; give a whole number from 2 to 30")
+        if not (math.isfinite(self.damping_ratio) and self.damping_ratio >= 0):
+            raise ValueError(f"ElasticRim.damping_ratio is {self.damping_ratio}; give 0 or more")
+        if not (len(self.bolt_stiffness) == 2 and min(self.bolt_stiffness) >= 0):
+            raise ValueError(
+                f"ElasticRim.bolt_stiffness is {self.bolt_stiffness!r}; give two numbers of 0 or more, radial, "
+                "tangential"
+            )
+        object.__setattr__(self, "bolts", tuple(to_si(angle, "angle", "ElasticRim.bolts") for angle in self.bolts))
+
+
+@dataclass(frozen=True, eq=False)
+class RimModes:
+    """Modes of a rim: amplitudes are the largest radial displacements, m.
+
+    Attributes
+    ----------
+    radius : float
+        Of the mid-line, m.
+    waves, phase : ndarray, shape (modes,)
+        Lobes n; 0 for cos(n theta), 1 for sin(n theta), theta in the ring's axes.
+    mass : ndarray, shape (modes,)
+        rho A pi R (1 + 1/n^2), kg.
+    stiffness, damping : ndarray, shape (modes, modes)
+        pi E I (n^2 - 1)^2 / R^3 and the bolts' springs, N/m; N s/m.
+    """
+
+    radius: float
+    waves: np.ndarray
+    phase: np.ndarray
+    mass: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+
+    @classmethod
+    def of(cls, rim: ElasticRim, ring: GearSpec) -> RimModes:
+        """Return the modes of the rim of a ring gear."""
+        thickness = float(ring.rim_thickness if rim.thickness is None else rim.thickness)  # type: ignore[arg-type]
+        width = float(ring.face_width if rim.width is None else rim.width)  # type: ignore[arg-type]
+        density = ring.material.density if rim.density is None else float(rim.density)
+        radius = ring.root_radius + 0.5 * thickness
+        n = np.repeat(np.arange(2.0, rim.waves + 1), 2)
+        phase = np.tile([0.0, 1.0], rim.waves - 1)
+        mass = density * thickness * width * math.pi * radius * (1 + 1 / n**2)
+        bending = float(rim.youngs_modulus) * width * thickness**3 / 12
+        free = math.pi * bending * (n**2 - 1) ** 2 / radius**3
+        modes = cls(radius, n, phase, mass, np.diag(free), np.diag(2 * rim.damping_ratio * np.sqrt(free * mass)))
+        radial, tangential = rim.bolt_stiffness
+        for angle in rim.bolts:
+            w, v = modes.shapes(angle)
+            modes.stiffness[:] += radial * np.outer(w, w) + tangential * np.outer(v, v)
+        return modes
+
+    def shapes(self, angle: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return radial and tangential displacement at an angle (rad) by one unit of each mode."""
+        turned = self.waves * angle - 0.5 * np.pi * self.phase
+        return np.cos(turned), -np.sin(turned) / self.waves
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Of the rim with its bolts, without teeth in contact, Hz, ascending."""
+        scale = 1 / np.sqrt(self.mass)
+        return np.sqrt(np.linalg.eigvalsh(scale[:, None] * self.stiffness * scale)) / (2 * np.pi)
+
+
+@dataclass(eq=False, repr=False)
+class RingMeshes(ForceElement):
+    """Meshes of all planets with a ring whose rim bends: see `gearmbs.contact.elastic_ring_kernel`.
+
+    Attributes
+    ----------
+    planets : tuple of Marker
+        Frames of the planets' wheels.
+    pairs : tuple of GearPair
+        Of each planet with the ring.
+    modes : RimModes
+    """
+
+    planets: tuple[Marker, ...] = ()
+    pairs: tuple[GearPair, ...] = ()
+    modes: RimModes = field(default=None)  # type: ignore[assignment]
+
+    kind = "ring meshes"
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """The planets' markers, then the ring's."""
+        return (*self.planets, self.j)
+
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:  # type: ignore[override]
+        """Energy of contacts and rim, powers lost, and the normal force of each mesh."""
+        forces = (Diagnostic(f"normal_force_{k + 1}", "N") for k in range(len(self.planets)))
+        return (
+            Diagnostic("elastic_energy", "J", STORED),
+            Diagnostic("damping_power", "W", DISSIPATED),
+            Diagnostic("friction_power", "W", DISSIPATED),
+            *forces,
+        )
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """Amplitudes of the rim's modes, and their rates, in units of `UNIT`."""
+        labels = [f"{int(n)}{'cs'[int(p)]}" for n, p in zip(self.modes.waves, self.modes.phase)]
+        return tuple(State(f"{self.name}.{kind}{label}") for kind in ("q", "v") for label in labels)
+
+    def compiled(self) -> Compiled:
+        """Return kernel and tables."""
+        from gearmbs.contact import GEAR_CONTACT_SIG, gear_contact
+        from gearmbs.contact.elastic_ring_kernel import ring_meshes
+
+        modes, tables = self.modes, [pack(pair) for pair in self.pairs]
+        m = modes.mass.size
+        unit, square = np.full(m, UNIT), UNIT**2
+        reals = [modes.waves, modes.phase, square * modes.mass, unit, square * modes.stiffness.ravel()]
+        reals += [square * modes.damping.ravel(), np.array([modes.radius])]
+        head: list[int] = [len(self.planets), m]
+        # the address of the contact goes before the integers
+        at_i, at_r = 3 + 4 * len(tables), 4 * m + 2 * m * m + 1
+        for integers, numbers, _ in tables:
+            head += [at_i, integers.size, at_r, numbers.size]
+            at_i, at_r = at_i + integers.size, at_r + numbers.size
+        room = WORK + WORK_A_MODE * m + max(work for _, _, work in tables)
+        return Compiled(
+            ring_meshes,
+            np.concatenate([head, *(i for i, _, _ in tables)]).astype(np.int64),
+            np.concatenate([*reals, *(r for _, r, _ in tables)]),
+            ((gear_contact, GEAR_CONTACT_SIG),),
+            scratch=room,
+        )
+
+    def rim_motion(self, solution: Any, angle: float) -> dict[str, np.ndarray]:
+        """Return how the rim moves at an angle of the ring, as a sensor that is fixed there sees it.
+
+        Parameters
+        ----------
+        solution : Solution
+        angle : float
+            rad, in the ring's axes.
+
+        Returns
+        -------
+        dict
+            ``"radial"`` and ``"tangential"`` displacement, m, ``"radial_velocity"`` and ``"tangential_velocity"``, m/s,
+            each of shape (m,).
+        """
+        count = self.modes.mass.size
+        values = UNIT * np.column_stack([solution.state(state.name) for state in self.states])
+        w, v = self.modes.shapes(angle)
+        q, rates = values[:, :count], values[:, count:]
+        return {"radial": q @ w, "tangential": q @ v, "radial_velocity": rates @ w, "tangential_velocity": rates @ v}
+
+    def __repr__(self) -> str:
+        return f"RingMeshes({self.name!r}, {len(self.planets)} planets, {self.modes.mass.size} modes of the rim)"
+
+
+def ring_meshes(
+    name: str,
+    planets: Sequence[Marker],
+    ring: Marker,
+    meshes: Sequence[Mesh | IdealMesh],
+    rim: ElasticRim,
+    spec: GearSpec,
+) -> RingMeshes:
+    """Return the element of all meshes of planets with a ring whose rim bends.
+
+    Raises
+    ------
+    ValueError
+        For meshes that are no tooth contact.
+    """
+    pairs = tuple(mesh for mesh in meshes if isinstance(mesh, GearPair))
+    if not len(pairs) == len(planets) > 0:
+        raise ValueError(
+            f"{name}: a rim that bends needs tooth contact with every planet; leave ideal meshes or the rim out"
+        )
+    return RingMeshes(name, planets[0], ring, tuple(planets), pairs, RimModes.of(rim, spec))

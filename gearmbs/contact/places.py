@@ -1,12 +1,16 @@
-"""Where the contacts of a strip stand: half-way between the two surfaces, with derivatives by the pose."""
+"""Where a tooth pair touches along and across the face: the ends of the common face, and where contacts stand.
+
+The ends are limits along the mean axis; contacts stand half-way between the two surfaces. All come with their
+derivatives by the pose.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.gaps.face import level, level_point
-from gearmbs.contact.gaps.support import (
+from gearmbs.contact.sections import LARGEST_TURN, NEAR_BASE
+from gearmbs.contact.support import (
     corner_curvatures,
     corner_slopes,
     edge_curvatures,
@@ -21,6 +25,261 @@ from gearmbs.contact.gaps.support import (
     tilt_of,
 )
 from gearmbs.kernels.records import inlined, kernel
+
+
+@kernel
+def roll_difference(side, wheels, f1, f2):
+    """Length of roll on wheel 1 where the two flanks meet half-way between them, axes taken as parallel."""
+    base_1 = side.base_1 * (f1 + wheels.wheel_1.half_angle)
+    base_2 = side.base_2 * (f2 + wheels.wheel_2.half_angle)
+    return 0.5 * (base_1 - base_2 + side.base_difference * side.alpha_0 + side.length)
+
+
+@kernel
+def end_roll(side, wheels, end, roll):
+    """Length of roll on wheel 1 at an end of the face, from that at mid-face; ``end`` is +1 or -1."""
+    zeta = wheels.face_low if end < 0.0 else wheels.face_high
+    return roll - side.twist_1 * (zeta + 0.5 * wheels.axial_shift)
+
+
+@kernel
+def end_value(side, wheel, k, end, sig):
+    """Limit set by one wheel's end face, from the transverse contact point at the length of roll ``sig``.
+
+    ``k`` is 0 for wheel 1 and 1 for wheel 2, ``end`` is +1 or -1.
+    """
+    x = side.x
+    X = side.base_1 * side.cos_0 + sig * side.sin_0
+    Y = -side.base_1 * side.sin_0 + sig * side.cos_0
+    sign = 1.0 if k == 0 else -1.0
+    T = end * 0.5 * wheel.face_width - sign * (x[L.P] * X + x[L.Q] * Y)
+    if k == 1:
+        T -= x[L.P] * x[L.A]
+    return -sign * 0.5 * x[L.H] + T * side.i_w
+
+
+@kernel
+def end_slopes(side, wheel, k, end, sig, limit, want):
+    """Fill the limit of `end_value` with its gradient and, if wanted, its Hessian by the pose."""
+    limit.value = end_value(side, wheel, k, end, sig)
+    a, p, q = side.x[L.A], side.x[L.P], side.x[L.Q]
+    rb1, rb2, length = side.base_1, side.base_2, side.length
+    Rb, difference = side.base_sum, side.base_difference
+    sa, ca = side.sin_0, side.cos_0
+    X = rb1 * ca + sig * sa
+    Y = -rb1 * sa + sig * ca
+    sign = 1.0 if k == 0 else -1.0
+    extra = 1.0 if k == 1 else 0.0
+    T = end * 0.5 * wheel.face_width - sign * (p * X + q * Y) - extra * p * a
+    i_w, i_w3, i_w5 = side.i_w, side.i_w3, side.i_w5
+    k1 = Rb / (a * length)
+    s_a = 0.5 * (difference * k1 + a / length)
+    X_a = Y * k1 + s_a * sa
+    Y_a = -X * k1 + s_a * ca
+    T_a = -sign * (p * X_a + q * Y_a) - extra * p
+    T_p = -sign * X - extra * a
+    T_q = -sign * Y
+    across = p * sa + q * ca
+    grad, hess = limit.grad, limit.hess
+    grad[L.A] = T_a * i_w
+    grad[L.H] = -sign * 0.5
+    grad[L.P] = T_p * i_w + T * p * i_w3
+    grad[L.Q] = T_q * i_w + T * q * i_w3
+    for m in range(2):
+        grad[L.F1 + m] = -sign * across * (0.5 * rb1 if m == 0 else -0.5 * rb2) * i_w
+    if want == 0:
+        return
+    k2 = -Rb * (1.0 / (a * a * length) + 1.0 / (length * length * length))
+    s_aa = 0.5 * (difference * k2 - Rb * Rb / (length * length * length))
+    X_aa = Y_a * k1 + Y * k2 + s_aa * sa + s_a * ca * k1
+    Y_aa = -X_a * k1 - X * k2 + s_aa * ca - s_a * sa * k1
+    for i in range(6):
+        for j in range(6):
+            hess[i, j] = 0.0
+    T_ap = -sign * X_a - extra
+    T_aq = -sign * Y_a
+    hess[L.A, L.A] = -sign * (p * X_aa + q * Y_aa) * i_w
+    hess[L.A, L.P] = T_ap * i_w + T_a * p * i_w3
+    hess[L.A, L.Q] = T_aq * i_w + T_a * q * i_w3
+    hess[L.P, L.P] = 2.0 * T_p * p * i_w3 + T * (i_w3 + 3.0 * p * p * i_w5)
+    hess[L.P, L.Q] = T_p * q * i_w3 + T_q * p * i_w3 + 3.0 * T * p * q * i_w5
+    hess[L.Q, L.Q] = 2.0 * T_q * q * i_w3 + T * (i_w3 + 3.0 * q * q * i_w5)
+    for m in range(2):
+        s_f = 0.5 * rb1 if m == 0 else -0.5 * rb2
+        f = L.F1 + m
+        T_f = -sign * across * s_f
+        hess[L.A, f] = -sign * (p * ca - q * sa) * s_f * k1 * i_w
+        hess[L.P, f] = -sign * sa * s_f * i_w + T_f * p * i_w3
+        hess[L.Q, f] = -sign * ca * s_f * i_w + T_f * q * i_w3
+
+
+@kernel
+def limit_value(side, wheels, end, sig):
+    """Limit of the common face towards ``end``: the nearer end face of the two wheels, blended where they tie."""
+    u = end_value(side, wheels.wheel_1, 0, end, sig)
+    v = end_value(side, wheels.wheel_2, 1, end, sig)
+    blend = wheels.end_blend
+    return 0.5 * (u + v - end * np.sqrt((u - v) * (u - v) + blend * blend))
+
+
+@kernel
+def limit_slopes(side, wheels, end, sig, limit, one, two, want):
+    """Fill the limit of `limit_value` with its gradient and, if wanted, its Hessian.
+
+    Parameters
+    ----------
+    side, wheels : record
+    end : float
+        -1 at the lower end, +1 at the higher.
+    sig : float
+        Length of roll on wheel 1 at the transverse contact point.
+    limit : record
+        Out.
+    one, two : record
+        Scratch.
+    want : int
+        Nonzero to fill the Hessian.
+    """
+    end_slopes(side, wheels.wheel_1, 0, end, sig, one, want)
+    end_slopes(side, wheels.wheel_2, 1, end, sig, two, want)
+    blend = wheels.end_blend
+    u, v = one.value, two.value
+    d = u - v
+    r = np.sqrt(d * d + blend * blend)
+    limit.value = 0.5 * (u + v - end * r)
+    wu = 0.5 * (1.0 - end * d / r)
+    wv = 1.0 - wu
+    for i in range(6):
+        limit.grad[i] = wu * one.grad[i] + wv * two.grad[i]
+    if want == 0:
+        return
+    curve = -0.5 * end * blend * blend / (r * r * r)
+    for i in range(6):
+        di = one.grad[i] - two.grad[i]
+        for j in range(i, 6):
+            dj = one.grad[j] - two.grad[j]
+            value = wu * one.hess[i, j] + wv * two.hess[i, j] + curve * di * dj
+            limit.hess[i, j] = value
+            limit.hess[j, i] = value
+
+
+# The one section at mid-face of spur wheels whose axes are parallel but for rounding: values in closed form.
+#
+# Joints hold wheels parallel to rounding errors, and most evaluations ask for values only. What the tilt does to gaps
+# and normals is of second order there and lost in rounding; gradients keep their first order.
+
+
+LEVEL = 1e-17  # square of the tilt whose effects of second order are lost in rounding
+
+
+@inlined
+def level(side, strip, n, want):
+    """Whether the closed forms of this module hold for the sections of a strip."""
+    p, q = side.x[L.P], side.x[L.Q]
+    return n == 1 and want == 0 and side.twist_1 == 0.0 and strip.zeta[0] == 0.0 and p * p + q * q < LEVEL
+
+
+@inlined
+def put_gradient(side, strip, by_A, by_B, by_1, by_2):
+    """Fill the gap's gradient by the pose from slopes by the tilt along and across the normal, and by the spins."""
+    p, q, sa, ca = side.x[L.P], side.x[L.Q], strip.sin[0], strip.cos[0]
+    A, B = p * sa + q * ca, p * ca - q * sa
+    gA, gB = by_A[0] * A + by_A[1] * B, by_B * A
+    strip.grad[0, 0] = sa
+    strip.grad[1, 0] = 0.0
+    strip.grad[2, 0] = gA * sa + gB * ca
+    strip.grad[3, 0] = gA * ca - gB * sa
+    strip.grad[4, 0] = by_1
+    strip.grad[5, 0] = by_2
+
+
+@kernel
+def level_flanks(side, strip):
+    """Fill flank on flank; as `sections.flank_sections` after `sections.flank_normals`."""
+    rb1, rb2 = side.base_1, side.base_2
+    s1, s2 = rb1 * (side.start_1 + side.alpha_0), rb2 * (side.start_2 + side.alpha_0)
+    half = 0.5 * side.base_sum
+    strip.turn[0] = 0.0
+    strip.roll_1[0] = s1
+    strip.roll_2[0] = s2
+    strip.kind[0] = 0.0
+    strip.gap[0] = side.length - (s1 + s2)
+    put_gradient(side, strip, (-(s1 + s2), -half), -half, -rb1, -rb2)
+
+
+@kernel
+def level_corner(side, corner, strip, kind, start):
+    """Fill a tip corner on the mate's involute; False where the involute is too curved to bear on.
+
+    As `gearmbs.contact.corners.corner_starts` and the functions that follow it; the normal needs no iteration.
+
+    Parameters
+    ----------
+    side, corner : record
+    strip : record
+        Out.
+    kind : int
+        The wheel whose corner bears, 1 or 2.
+    start : float
+        Angle of the mate's tooth from the line of centres, and its half angle at the base circle.
+    """
+    first = kind == 1
+    rb = side.base_2 if first else side.base_1
+    r, rounding, se, ce = corner.radius[0], corner.rounding[0], corner.sin[0], corner.cos[0]
+    X, Y = side.x[L.A] - r * ce, -r * se
+    R2 = X * X + Y * Y
+    square = R2 - rb * rb
+    if not square > NEAR_BASE * NEAR_BASE * rb * rb:
+        return False
+    roll = np.copysign(np.sqrt(square), rb)
+    inverse = 1.0 / R2
+    sa, ca = (roll * X - rb * Y) * inverse, (rb * X + roll * Y) * inverse
+    s0, c0 = side.sin_0, side.cos_0
+    over, beside = sa * c0 - ca * s0, 1.0 + (ca * c0 + sa * s0)
+    if abs(over) > LARGEST_TURN * beside:
+        turn = np.arctan2(over, beside - 1.0)
+    else:
+        # twice the arctangent of the tangent of half the turn
+        t = over / beside
+        u = t * t
+        series = 1.0 / 7.0 - u * (1.0 / 9.0 - u * (1.0 / 11.0 - u * (1.0 / 13.0 - u * (1.0 / 15.0 - u / 17.0))))
+        turn = 2.0 * t * (1.0 - u * (1.0 / 3.0 - u * (0.2 - u * series)))
+    alpha = side.alpha_0 + turn
+    s = rb * (start + alpha)
+    sn, cs = sa * ce + ca * se, ca * ce - sa * se
+    strip.alpha[0], strip.sin[0], strip.cos[0] = alpha, sa, ca
+    strip.turn[0] = 0.0
+    strip.good[0] = 1.0
+    strip.roll_1[0] = corner.roll[0] if first else s
+    strip.roll_2[0] = s if first else corner.roll[0]
+    strip.kind[0] = float(kind)
+    strip.gap[0] = side.x[L.A] * sa - (r * sn + rounding + s)
+    half = 0.5 * (r * cs + rb)
+    by_own, by_mate = -r * cs, -rb
+    by_1, by_2 = (by_own, by_mate) if first else (by_mate, by_own)
+    put_gradient(side, strip, (-(r * sn + rounding + s), -half), -half, by_1, by_2)
+    return True
+
+
+@kernel
+def level_point(side, corner, strip, loads, f):
+    """Fill the place of the contact; as `points.contact_points`.
+
+    Parameters
+    ----------
+    side, corner, strip, loads : record
+    f : float
+        Angle of wheel 1's tooth from the line of centres, and its half angle at the base circle.
+    """
+    sa, ca = strip.sin[0], strip.cos[0]
+    p, q, zp = side.x[L.P], side.x[L.Q], 0.5 * side.x[L.H]
+    normal, tangent = side.base_1 * (f + strip.alpha[0]), side.base_1
+    if strip.kind[0] == 1.0:
+        r, se, ce = corner.radius[0], corner.sin[0], corner.cos[0]
+        normal = r * (sa * ce + ca * se) + corner.rounding[0]
+        tangent = r * (ca * ce - sa * se)
+    loads.normal[0] = normal + (p * sa + q * ca) * zp + 0.5 * strip.gap[0]
+    loads.tangent[0] = tangent + (p * ca - q * sa) * zp
 
 
 @kernel

@@ -12,6 +12,7 @@ do not jump.
 
 Radii and angles of an internal wheel are negative, see `layout.WHEEL`: its root circle is hollow, its root arcs are
 where its flanks go out to it, and the same sums hold.
+
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.gaps.corners import (
+from gearmbs.contact.corners import (
     clear_slopes,
     copy_corner,
     corner_on_plane,
@@ -28,11 +29,11 @@ from gearmbs.contact.gaps.corners import (
     line_offset,
     set_corner,
 )
-from gearmbs.contact.gaps.sections import gap_rates
 from gearmbs.contact.loads import add_normal, strip_forces, total_force
 from gearmbs.contact.pair import count_pair, set_limits, strip_count
 from gearmbs.contact.records import strip_at
 from gearmbs.contact.search import facing_teeth
+from gearmbs.contact.sections import gap_rates
 from gearmbs.contact.slices import elastic_law, law_of, plane_force
 from gearmbs.kernels.records import kernel
 

@@ -1,1 +1,0 @@
-"""Gaps between two flanks in their sections, with derivatives by the pose."""

@@ -1,1 +1,0 @@
-"""Files of flexible bodies: neutral files, Nastran, Ansys, and matrices."""

@@ -1,1 +1,0 @@
-"""Planetary sets: wheels, rims, and the mechanism they make."""
