@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
-from gearmbs.adams.results.msg import message_text
+from gearmbs.adams.results.result import message_text
 from gearmbs.adams.run.runner import run_deck
 from tests.says import says
 

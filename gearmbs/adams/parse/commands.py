@@ -11,6 +11,7 @@ from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnos
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import (
     CHOICE,
+    CONTINUED,
     FLAG,
     ID,
     IDS,
@@ -19,12 +20,12 @@ from gearmbs.adams.parse.grammar import (
     REAL,
     TEXT,
     ArgumentReader,
+    RawStatement,
     StatementError,
     arg,
     grammar_of,
 )
-from gearmbs.adams.parse.reader import read_statement, resolve_statement, unknown_statement
-from gearmbs.adams.parse.source import CONTINUED, RawStatement, read_file, statements
+from gearmbs.adams.parse.reader import read_file, read_statement, resolve_statement, statements, unknown_statement
 from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearmbs.adams.builders.functions import translated
-from gearmbs.adams.builders.scopes import AdamsModel, markers_of
+from gearmbs.adams.builders.scopes import AdamsModel, markers_of, translated
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.analyses.statics import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables

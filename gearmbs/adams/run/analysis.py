@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.adams.builders.functions import MODES, Present
 from gearmbs.adams.builders.mechanism import build_model, part_states, with_initial_motions
-from gearmbs.adams.builders.scopes import AdamsModel, hold_states
+from gearmbs.adams.builders.scopes import MODES, AdamsModel, Present, hold_states
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Linear, Simulate
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.results.record import NEWTON, Segment
-from gearmbs.adams.results.remarks import faceted_touches
+from gearmbs.adams.results.remarks import Doubt, doubt, faceted_touches
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
-from gearmbs.adams.run.convergence import Doubt, doubt
 from gearmbs.adams.run.script_check import check_linear, is_sequence
 from gearmbs.adams.run.sensors import (
     Watch,

@@ -63,7 +63,7 @@ def run_deck(
         (SFOSUB, ...); each takes a `gearmbs.adams.RoutineCall`.
     check : bool, optional
         Whether dynamic analyses are solved again at a hundredth of their error, and remarked if parts then go other
-        ways; without it those are for which this takes about a second, see `gearmbs.adams.run.convergence.CHEAP`.
+        ways; without it those are for which this takes about a second, see `gearmbs.adams.results.remarks.CHEAP`.
 
     Returns
     -------

@@ -10,9 +10,8 @@ import numpy as np
 
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.flexible import SHARE, modal_ratios
-from gearmbs.adams.builders.functions import IN_DYNAMICS, Present, translated
 from gearmbs.adams.builders.mechanism import build_model
-from gearmbs.adams.builders.scopes import deck_scope, markers_of
+from gearmbs.adams.builders.scopes import IN_DYNAMICS, Present, deck_scope, markers_of, translated
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch
