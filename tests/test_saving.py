@@ -13,7 +13,7 @@ from gearmbs.mechanism import Mechanism
 from gearmbs.signals.files.formats import written_endings
 from gearmbs.signals.files.table import known_endings
 from gearmbs.view import gear_scene, spectrum_plot
-from gearmbs.view.figures import animation
+from gearmbs.view.figures import mesh_cycle as animation
 from gearmbs.view.figures.style import new_figure
 from tests.says import says
 
