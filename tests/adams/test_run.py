@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
-from gearmbs.adams.run.runner import run_deck
+from gearmbs.adams.runner import run_deck
 from tests.says import says
 
 from .decks import PENDULUM

@@ -32,8 +32,7 @@ from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import MARKER_FIELDS
 from gearmbs.adams.parse.data import curve_points, spline_data
-from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.readers import read_variables
+from gearmbs.adams.parse.deck import Deck, read_variables
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
 from gearmbs.dae.problem import ModelError

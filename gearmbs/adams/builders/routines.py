@@ -16,8 +16,7 @@ from gearmbs.adams.builders.forces import bind_mforce
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall, callable_with_call
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.readers import without_refused
+from gearmbs.adams.parse.deck import Deck, without_refused
 from gearmbs.mechanism.language.syntax import Call, Negative, Node, Number, parse
 from gearmbs.mechanism.language.user_functions import UserFunction
 

@@ -16,9 +16,8 @@ import numpy as np
 
 from gearmbs.adams.builders.control import diff_name, has_rate, implicit_states, rate_name, state_systems
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import measured_markers
 from gearmbs.adams.parse.data import curve_points, spline_data
-from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.deck import Deck, measured_markers
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.language.syntax import Call, Chain, Name, Node, Number, Power, Scope, parse, unparse

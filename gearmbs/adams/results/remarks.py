@@ -1,5 +1,5 @@
-"""Remarks on an analysis: how far it had to move the parts before it could start, which solids touched by facets, and
-whether the motion depends on the ERROR asked for: it is solved again at a hundredth, and places of parts compared.
+"""Remarks on an analysis: how far it had to move the parts before it could start, which solids touched by facets, which
+points of contact left their curve, and whether the motion depends on the ERROR asked for.
 """
 
 from __future__ import annotations
@@ -374,3 +374,25 @@ def doubt(
     farthest = int(np.argmax(apart.max(axis=0)))
     label, own = model.sources[names[farthest]].label(), apart[:, farthest]
     return Doubt(float(solution.t[off[0]]), options["tol"], label, float(own.max()), float(own[-1]), moved)
+
+
+# Remarks on points of contact that leave an open curve.
+
+
+OFF = 1e-9
+"""Of a curve's length: beyond its end by less than it is at the end."""
+
+
+def off_the_end(model: AdamsModel, solution: Solution) -> list[str]:
+    """Return a remark on each point of contact that is beyond the end of its curve, with the first time of output."""
+    remarks = []
+    for runner, (statement, length) in model.runners.items():
+        travel = solution.com_position(runner)[:, 2]
+        beyond = np.flatnonzero((travel < -OFF * length) | (travel > (1.0 + OFF) * length))
+        if beyond.size:
+            time = solution.t[beyond[0]] / model.deck.units.time
+            remarks.append(
+                f"{statement.label()}: at TIME = {time:.9g} it is off the end of its curve, where the spline goes on "
+                "beyond the points; give points further out, or a SENSOR that ends the analysis before"
+            )
+    return remarks
