@@ -1,5 +1,5 @@
 from .builders.mechanism import build_mechanism as build_mechanism
-from .builders.routines import RoutineCall as RoutineCall
+from .builders.routine_calls import RoutineCall as RoutineCall
 from .builders.routines import load_routines as load_routines
 from .errors import DeckError as DeckError
 from .errors import Diagnostic as Diagnostic

@@ -1,4 +1,4 @@
-"""One analysis of a deck: SIMULATE in parts between sensors, and LINEAR."""
+"""One analysis of a deck: SIMULATE in parts between sensors, and LINEAR; and what its results show of it."""
 
 from __future__ import annotations
 

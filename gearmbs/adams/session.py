@@ -16,7 +16,7 @@ import numpy as np
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.flexible import SHARE, modal_ratios
 from gearmbs.adams.builders.mechanism import build_model
-from gearmbs.adams.builders.scopes import IN_DYNAMICS, BodyState, Present, deck_scope, markers_of, translated
+from gearmbs.adams.builders.scopes import IN_DYNAMICS, BodyState, deck_scope, markers_of, translated
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, refused_arguments
@@ -220,7 +220,7 @@ SOME_MODE = np.array([17.3]), np.array([7.0])
 """A frequency and a number with which CRATIO is tried, before the file with those of the modes is read."""
 
 
-def expression_errors(deck: Deck, session: Session, scope: Scope, present: Present = IN_DYNAMICS) -> list[Diagnostic]:
+def expression_errors(deck: Deck, session: Session, scope: Scope) -> list[Diagnostic]:
     """Return every expression of the active statements that is not understood, with the line that gave it.
 
     Nothing is compiled or evaluated. What a VARIABLE asks for that is not there is only remarked, in the session's
@@ -233,7 +233,6 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
         Which statements are active, and where commands have changed them.
     scope : Scope
         What expressions may name: `gearmbs.adams.builders.scopes.deck_scope`, or that of a mechanism.
-    present : Present
     """
     found = []
     read, absent = read_variables(deck), left_out(deck)
@@ -252,7 +251,7 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
                 continue
             unread, said = False, ""
             try:
-                what = _wrong(deck, statement, text, scope, present)
+                what = _wrong(deck, statement, text, scope)
             except ExpressionError as error:
                 unread = isinstance(error, NotEvaluatedError) and statement.id not in read
                 unread = unread and isinstance(statement, st.Variable)
@@ -311,7 +310,7 @@ def _absent_data(deck: Deck, text: str) -> str:
     return ""
 
 
-def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope, present: Present) -> str:
+def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope) -> str:
     """Return why an expression does not do for its statement, "" when it does.
 
     Raises
@@ -328,7 +327,7 @@ def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope, present
     if isinstance(statement, st.FeLoad):
         text = SHARE.sub("(0.5)", text)
     placed = not isinstance(statement, (st.Motion, st.Gcon))
-    tape = compile_expression(translated(deck, present, text), scope, accelerations=placed, outline=True)
+    tape = compile_expression(translated(deck, IN_DYNAMICS, text), scope, accelerations=placed, outline=True)
     return _misplaced(statement, text, tape)
 
 

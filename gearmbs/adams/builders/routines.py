@@ -347,11 +347,3 @@ def _number(node: Node) -> float:
     if isinstance(node, Negative) and isinstance(node.operand, Number):
         return -node.operand.value
     raise ValueError("has parameters that are no numbers")
-
-
-__all__ = [
-    "BINDERS",
-    "RoutineCall",
-    "bound",
-    "load_routines",
-]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
@@ -343,9 +343,4 @@ def _check(command: Command) -> None:
 
 def apply_change(old: st.Statement, change: st.Statement) -> st.Statement:
     """Return a statement of the deck with the arguments of a command put in."""
-    from dataclasses import replace
-
     return replace(old, **{name: getattr(change, name) for name in change.given})
-
-
-__all__ = ["Script", "apply_change", "parse_script", "read_script"]

@@ -245,14 +245,12 @@ def _without_comment(line: str) -> tuple[str, str]:
     return (line, "") if at < 0 else (line[:at], line[at + 1 :])
 
 
-def statements(text: str, first_line: int = 1, skip: int = 0) -> Iterator[RawStatement]:
+def statements(text: str, skip: int = 0) -> Iterator[RawStatement]:
     """Yield the statements of a deck or commands of a script.
 
     Parameters
     ----------
     text : str
-    first_line : int
-        Number of the first line of ``text``.
     skip : int
         Lines to leave out at the start (the title).
     """
@@ -278,10 +276,9 @@ def statements(text: str, first_line: int = 1, skip: int = 0) -> Iterator[RawSta
         pieces.append(piece)
         length += len(piece)
 
-    for offset, line in enumerate(re.split(r"\r\n|\r|\n", text)):
-        if offset < skip:
+    for number, line in enumerate(re.split(r"\r\n|\r|\n", text), 1):
+        if number <= skip:
             continue
-        number = first_line + offset
         body, comment = _without_comment(line)
         found = _VIEW_NAME.search(comment) if comment else None
         if found:

@@ -297,6 +297,3 @@ def _gradient_series(ints, floats, t, kin, marker_body, marker_frame, y, ref, wo
     """
     for k in range(t.size):
         eval_gradient(ints, floats, t[k], kin[k], marker_body, marker_frame, y, ref, grad[k], work)
-
-
-__all__ = ["RequestEvaluator", "RequestSeries", "column_names", "request_texts"]

@@ -249,16 +249,9 @@ def unit_line(result: RunRecord) -> tuple[str, float]:
     return f"{length}{mass}{names['time'][:1]}_{names['force'][:1]}_RACA", factor
 
 
-def request_text(result: RunRecord, now: datetime | None = None) -> str:
-    """Return the content of the request file.
-
-    Parameters
-    ----------
-    result : RunRecord
-    now : datetime, optional
-        Time stamp in the header.
-    """
-    stamp = (now or datetime.now()).strftime("%Y-%m-%d %H:%M:%S")
+def request_text(result: RunRecord) -> str:
+    """Return the content of the request file."""
+    stamp = datetime.now().strftime("%Y-%m-%d %H:%M:%S")
     requests = result.deck.of(st.Request)
     name, factor = unit_line(result)
     lines = [f" A.R3    {stamp}               0         0  3D", f"{result.deck.title[:80]:<80}"]
