@@ -13,7 +13,7 @@ from gearmbs._command import case_bars
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals import analyse, make_signal
 from gearmbs.studies import Case, run_cases
-from gearmbs.view.figures.animation import write_film
+from gearmbs.view.figures.style import write_film
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from gearmbs.mechanism import Mechanism
 from gearmbs.signals.files.formats import written_endings
 from gearmbs.signals.files.table import known_endings
 from gearmbs.view import gear_scene, spectrum_plot
-from gearmbs.view.figures import animation
+from gearmbs.view.figures import style
 from gearmbs.view.figures.style import new_figure
 from tests.says import says
 
@@ -102,7 +102,7 @@ def test_other_things_are_refused(tmp_path):
 
 
 def test_a_film_without_ffmpeg_says_what_to_do(tmp_path, monkeypatch):
-    monkeypatch.setattr(animation.shutil, "which", lambda name: None)
+    monkeypatch.setattr(style.shutil, "which", lambda name: None)
     with pytest.raises(ValueError, match=says("ffmpeg", ".html", ".gif")):
         gm.mesh_animation(gm.GearPair.paper(), frames=2).save(tmp_path / "mesh.mp4")
     assert not list(tmp_path.iterdir())
@@ -122,7 +122,7 @@ def test_films_play(tmp_path):
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_what_ffmpeg_refuses_is_told(tmp_path):
     with pytest.raises(RuntimeError, match="ffmpeg failed: "):
-        animation.write_film(tmp_path / "broken.mp4", [b"no picture"], 1)
+        style.write_film(tmp_path / "broken.mp4", [b"no picture"], 1)
     assert not list(tmp_path.iterdir())
 
 

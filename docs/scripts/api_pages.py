@@ -139,7 +139,7 @@ MORE = {
     "gearmbs.identify": {
         "gearmbs.identify.fit": EVERYTHING,
         "gearmbs.identify.identifiability": ["make_surrogate"],
-        "gearmbs.identify.study": ["load_problem"],
+        "gearmbs.identify.measured": ["load_problem"],
     },
     "gearmbs.units": {
         "gearmbs.units": ["to_si"],

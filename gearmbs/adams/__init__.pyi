@@ -1,5 +1,5 @@
 from .builders.mechanism import build_mechanism as build_mechanism
-from .builders.routines import RoutineCall as RoutineCall
+from .builders.routine_calls import RoutineCall as RoutineCall
 from .builders.routines import load_routines as load_routines
 from .errors import DeckError as DeckError
 from .errors import Diagnostic as Diagnostic
@@ -13,7 +13,7 @@ from .results.res import ResultSet as ResultSet
 from .results.res import ResultsFile as ResultsFile
 from .results.res import read_results as read_results
 from .results.result import AdamsResult as AdamsResult
-from .run.runner import linear_plant as linear_plant
-from .run.runner import run_deck as run_deck
+from .runner import linear_plant as linear_plant
+from .runner import run_deck as run_deck
 from .support import support_table as support_table
 from .write.deck_writer import write_deck as write_deck

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from gearmbs.adams.parse import commands as acf
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.deck import READ_IN_DECKS
 from gearmbs.adams.parse.grammar import CHOICE, specs_of
-from gearmbs.adams.parse.readers import READ_IN_DECKS
 from gearmbs.adams.parse.statements import INSTEAD, INSTEAD_OF_ARGUMENTS, INSTEAD_OF_FUNCTIONS
 from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, FUNCTIONS, UNARY
 from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS

@@ -1,12 +1,12 @@
 from .cases import CaseProblem as CaseProblem
 from .cases import compare_models as compare_models
 from .cases import identify as identify
-from .experiments import rank_experiments as rank_experiments
+from .cases import rank_experiments as rank_experiments
 from .fit import fit as fit
 from .identifiability import Identifiability as Identifiability
 from .identifiability import Surrogate as Surrogate
 from .identifiability import posterior as posterior
 from .measured import harmonic_table as harmonic_table
+from .parameters import Fit as Fit
 from .parameters import Free as Free
 from .parameters import IdentifyError as IdentifyError
-from .result import Fit as Fit

@@ -1,10 +1,8 @@
-"""Parameters of cases from measured mesh harmonics.
+"""Parameters of cases from measured mesh harmonics, and which further measurement would tell what those at hand cannot.
 
 The residual is (ln model - ln measured) / sigma, so that all harmonics count by their relative deviations. Sensors
-with unknown
-gains shift the logarithms of a channel by the same amount: such shifts are projected out, which is the fit of a free
-gain
-without its being a parameter of the search.
+with unknown gains shift the logarithms of a channel by the same amount: such shifts are projected out, which is the fit
+of a free gain without its being a parameter of the search.
 """
 
 from __future__ import annotations
@@ -18,9 +16,8 @@ import numpy as np
 
 from gearmbs.identify.fit import SIMULATION_STEP, central, fit, noise_of_columns, steps
 from gearmbs.identify.identifiability import LIMIT, Identifiability
-from gearmbs.identify.measured import check_table
-from gearmbs.identify.parameters import Free, IdentifyError, Scale
-from gearmbs.identify.result import Fit
+from gearmbs.identify.parameters import Fit, Free, IdentifyError, Scale
+from gearmbs.progress import staged
 from gearmbs.units import to_si
 
 if TYPE_CHECKING:
@@ -31,10 +28,23 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-8
 """Of the integrator, so that differences over a step of 1e-2 are right to a few percent."""
 
+COLUMNS = ("case", "channel", "harmonic", "value", "sigma")
+"""Columns of a table of harmonics: which case, channel or component, harmonic, RMS, relative standard deviation."""
 WAYS = ("band", "orders")
 """How levels are taken."""
 
 Gains = Literal["none", "one", "channel", "case", "line"]
+
+EXPERIMENTS: dict[str, dict[str, Any]] = {
+    "speed x 1.5": {"operation.speed": 1.5},
+    "speed x 0.5": {"operation.speed": 0.5},
+    "torque x 2": {"operation.torque": 2.0},
+    "misaligned by 0.5 deg": {"fault.misalignment": "0.5 deg"},
+    "centre distance + 0.3 mm": {"fault.centre_distance_error": "0.3 mm"},
+}
+"""What most benches can do: by field a factor for speed and torque, else the new value."""
+
+FACTORS = ("operation.speed", "operation.torque")
 
 
 class CaseProblem:
@@ -410,3 +420,117 @@ def _field(path: str, cases: Mapping[str, Case]) -> tuple[float, str]:
         return to_si(getattr(holder, field), unit, path), unit
     except (ValueError, TypeError):
         raise IdentifyError(f"{path} is {getattr(holder, field)!r}, which is no number that could be fitted") from None
+
+
+def check_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of harmonics with its columns checked; ``sigma`` is 2 % where it is missing.
+
+    Raises
+    ------
+    IdentifyError
+        For missing columns and values that have no logarithm.
+    """
+    import pandas as pd
+
+    if not isinstance(table, pd.DataFrame):
+        raise IdentifyError(f"measured is a {type(table).__name__}; give a DataFrame with {', '.join(COLUMNS)}")
+    missing = [c for c in COLUMNS[:4] if c not in table.columns]
+    if missing:
+        raise IdentifyError(f"measured: columns {', '.join(missing)} are missing; give {', '.join(COLUMNS)}")
+    if table.empty:
+        raise IdentifyError("measured: the table has no rows")
+    table = table.copy()
+    if "sigma" not in table.columns:
+        table["sigma"] = 0.02
+    for name in ("harmonic", "value", "sigma"):
+        try:
+            table[name] = pd.to_numeric(table[name])
+        except (ValueError, TypeError) as error:
+            raise IdentifyError(f"measured: column {name}: {error}") from None
+    if not ((table["harmonic"] >= 1) & (table["harmonic"] % 1 == 0)).all():
+        raise IdentifyError("measured: harmonic must be a whole number, 1 or more, in every row")
+    if not ((table["value"] > 0.0) & (table["sigma"] > 0.0)).all():
+        raise IdentifyError("measured: value and sigma must be positive in every row")
+    return table.reset_index(drop=True)
+
+
+@staged("ranking experiments")
+def rank_experiments(
+    problem: CaseProblem,
+    candidates: Mapping[str, Mapping[str, Any]] | None = None,
+    *,
+    of: str | None = None,
+    progress: Callable[[float, str], None] | None = None,
+) -> pd.DataFrame:
+    """Rank further measurements by how much better the worst known combination would be known.
+
+    Each candidate is simulated about the starts and added to what was measured, with the same channels, harmonics,
+    standard deviations and gains. What is unknown of the case that is changed is so of the candidate, too: twice an
+    unknown torque is unknown. What a candidate gives as a value with its unit is known.
+
+    Parameters
+    ----------
+    problem : CaseProblem
+    candidates : mapping, optional
+        By name what is changed of a case: fields with values in any unit, of speed and torque numbers are factors.
+        Default `EXPERIMENTS`.
+    of : str, optional
+        Case that is changed; default the first.
+    progress : callable, optional
+        Called as progress(fraction, experiment); without it a bar is shown where somebody watches.
+
+    Returns
+    -------
+    DataFrame
+        By experiment, best first: ``worst``, the standard deviation of the worst known combination of logarithms with
+        it; ``gain``, the factor by which that is better than without; ``together``, the largest of the parameters' own.
+        Experiments that cannot be simulated are last, with NaN.
+
+    Raises
+    ------
+    IdentifyError
+        For fields that a case does not have.
+    """
+    import pandas as pd
+
+    before = np.linalg.svd(problem.derivatives(), compute_uv=False)[-1]
+    rows = {}
+    asked = EXPERIMENTS if candidates is None else candidates
+    for k, (name, changes) in enumerate(asked.items()):
+        if progress is not None:
+            progress((k + 1) / (len(asked) + 1), name)
+        rows[name] = _worth(problem, name, changes, of or next(iter(problem.cases)), before)
+    table = pd.DataFrame.from_dict(rows, orient="index").sort_values("worst", na_position="last")
+    table.index.name = "experiment"
+    return table
+
+
+def _worth(problem: CaseProblem, name: str, changes: Mapping[str, Any], of: str, before: float) -> dict[str, float]:
+    """Return what an experiment is worth."""
+    from gearmbs.identify.parameters import errors_of
+
+    given = [path for path, value in changes.items() if path not in FACTORS or isinstance(value, str)]
+    joint = problem.with_case(name, _changed(problem, changes, of), like=of, known=given)
+    try:
+        matrix = joint.derivatives()
+    except IdentifyError:
+        return {"worst": float("nan"), "gain": float("nan"), "together": float("nan")}
+    after = np.linalg.svd(matrix, compute_uv=False)[-1]
+    with np.errstate(all="ignore"):
+        largest = float(errors_of(matrix)[0].max())
+        return {"worst": float(1.0 / after), "gain": float(after / before), "together": largest}
+
+
+def _changed(problem: CaseProblem, changes: Mapping[str, Any], of: str) -> Any:
+    case = problem.cases[of]
+    sections: dict[str, dict[str, Any]] = {}
+    for path, value in changes.items():
+        section, _, field = path.partition(".")
+        holder = getattr(case, section, None)
+        if holder is None or field not in type(holder).model_fields:
+            raise IdentifyError(f"experiment: a case has no field {path!r}; write section.field")
+        if path in FACTORS and not isinstance(value, str):
+            value = float(value) * float(getattr(holder, field))
+        sections.setdefault(section, {})[field] = value
+    # rates follow the mesh frequency unless they are given
+    return case.changed(**sections)

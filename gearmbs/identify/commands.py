@@ -27,14 +27,14 @@ def identify(
     """Find parameters of cases from recordings, with their errors; tell what cannot be found."""
     with guarded():
         from gearmbs.files import write_whole
-        from gearmbs.identify.study import load_problem
+        from gearmbs.identify.measured import load_problem
 
         problem, settings = load_problem(file)
         found = problem.identifiability()
         text = ["# What the measurement can tell", "", *_rows(found.table()), ""]
         text += [f"* {line}" for line in found.remarks()] or ["* every parameter is determined"]
         if experiments:
-            from gearmbs.identify.experiments import rank_experiments
+            from gearmbs.identify.cases import rank_experiments
 
             ranked = rank_experiments(problem, settings["experiments"])
             text += ["", "# What further measurements would add", "", *_rows(ranked), ""]

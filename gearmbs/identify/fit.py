@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gearmbs.identify.parameters import Free, IdentifyError, Scale
-from gearmbs.identify.result import Fit
+from gearmbs.identify.parameters import Fit, Free, IdentifyError, Scale
 from gearmbs.progress import staged
 
 # Derivatives of a noisy simulation by central differences, with a step that fits its noise, and what noise is left

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.identify.result import errors_of
+from gearmbs.identify.parameters import errors_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from gearmbs.identify.result import Fit
+    from gearmbs.identify.parameters import Fit
 
 LIMIT = 0.3
 """Standard deviation of a combination of logarithms from which it counts as undetermined: a third of the value."""

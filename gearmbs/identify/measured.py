@@ -1,21 +1,29 @@
-"""From recordings to tables of mesh harmonics with their scatter, through the band-pass and window of the
-simulations."""
+"""From recordings to what is fitted: tables of mesh harmonics with their scatter, through the band-pass and window of
+the cases, and fits described in files: recordings, the cases that model them, what is free.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gearmbs.identify.parameters import IdentifyError
+from gearmbs.identify.cases import COLUMNS, CaseProblem
+from gearmbs.identify.parameters import Free, IdentifyError
+from gearmbs.schema.described import make
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import check_keys
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-COLUMNS = ("case", "channel", "harmonic", "value", "sigma")
-"""Columns of a table of harmonics: which case, channel or component, harmonic, RMS, relative standard deviation."""
+    from gearmbs.studies import Case
+
+SECTIONS = ("recording", "case", "free", "measured", "gains", "channels", "starts", "workers", "experiment")
+LEVELS = ("harmonics", "way", "sections", "floor")
 
 
 def harmonic_table(
@@ -84,33 +92,101 @@ def harmonic_table(
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def check_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of harmonics with its columns checked; ``sigma`` is 2 % where it is missing.
+def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
+    """Read a fit in TOML; return its problem and the settings of the search.
+
+    ``[recording]`` names a file for each case, ``[case.NAME]`` the case that models it, with what all have in common
+    under
+    ``[case.all]``; ``[measured]`` says how recordings are read and cut; each ``[[free]]`` is a parameter;
+    ``channels`` says which
+    component of the force stands for which channel; ``[experiment.NAME]`` may list changes of the first case for
+    `rank_experiments`. A recording may be a CSV table of harmonics, too.
 
     Raises
     ------
     IdentifyError
-        For missing columns and values that have no logarithm.
+        For unknown keys, missing parts, and whatever is wrong with them.
     """
+    path = Path(path)
+    tree = read_toml(path, IdentifyError)
+    check_keys(tree, SECTIONS, str(path), IdentifyError)
+    for key in ("recording", "free"):
+        if not tree.get(key):
+            raise IdentifyError(f"{path}: [{key}] is missing")
+    measured = dict(tree.get("measured", {}))
+    way = str(measured.get("way", "band"))
+    table = _table(tree["recording"], measured, path.parent, tuple(tree.get("channels", {})))
+    free = [_free(item, path) for item in tree["free"]]
+    problem = CaseProblem(
+        table,
+        _cases(tree.get("case", {}), tree["recording"]),
+        free,
+        gains=tree.get("gains", "channel"),
+        channels=tree.get("channels"),
+        way=way,
+        workers=int(tree.get("workers", 1)),
+    )
+    return problem, {"starts": int(tree.get("starts", 1)), "experiments": tree.get("experiment")}
+
+
+def _free(item: dict[str, Any], path: Path) -> Free | str:
+    """Return a parameter of the file; a path alone starts at its case's value."""
+    settings = dict(item)
+    if "path" not in settings:
+        raise IdentifyError(f"{path}: [[free]]: path is missing; write for instance contact.depth")
+    name = settings.pop("path")
+    return make(Free, settings, f"{path}: [[free]]: {name}", IdentifyError, name=name) if settings else name
+
+
+def _cases(given: dict[str, Any], recordings: dict[str, str]) -> dict[str, Case]:
+    """Return the case of each recording: what all have in common, changed by its own."""
+    from gearmbs.studies import make_case
+
+    common = given.get("all", {})
+    for name in given:
+        if name != "all" and name not in recordings:
+            raise IdentifyError(f"[case.{name}]: no recording has this name; write all, {', '.join(recordings)}")
+    cases = {}
+    for name in recordings:
+        data = {section: dict(values) if isinstance(values, dict) else values for section, values in common.items()}
+        for section, values in given.get(name, {}).items():
+            data[section] = {**data.get(section, {}), **values} if isinstance(values, dict) else values
+        cases[name] = make_case({**data, "name": name}, name)
+    return cases
+
+
+def _table(
+    recordings: dict[str, str], measured: dict[str, Any], folder: Path, channels: tuple[str, ...]
+) -> pd.DataFrame:
+    """Return the harmonics of all recordings."""
     import pandas as pd
 
-    if not isinstance(table, pd.DataFrame):
-        raise IdentifyError(f"measured is a {type(table).__name__}; give a DataFrame with {', '.join(COLUMNS)}")
-    missing = [c for c in COLUMNS[:4] if c not in table.columns]
-    if missing:
-        raise IdentifyError(f"measured: columns {', '.join(missing)} are missing; give {', '.join(COLUMNS)}")
-    if table.empty:
-        raise IdentifyError("measured: the table has no rows")
-    table = table.copy()
-    if "sigma" not in table.columns:
-        table["sigma"] = 0.02
-    for name in ("harmonic", "value", "sigma"):
+    from gearmbs.signals import estimate_speed
+    from gearmbs.signals.files.simulated import read_any
+    from gearmbs.units import to_si
+
+    levels = {key: measured.pop(key) for key in LEVELS if key in measured}
+    if "speed" in measured:
+        measured["speed"] = to_si(measured["speed"], "angular speed", "measured.speed")
+    if isinstance(measured.get("teeth"), list):
+        measured["teeth"] = tuple(measured["teeth"])
+    parts = []
+    for name, file in recordings.items():
+        place = folder / file
+        if place.suffix == ".csv" and place.exists():
+            with place.open(encoding="utf-8") as lines:
+                head = lines.readline()
+            if "harmonic" in head:
+                parts.append(pd.read_csv(place).assign(case=name))
+                continue
         try:
-            table[name] = pd.to_numeric(table[name])
-        except (ValueError, TypeError) as error:
-            raise IdentifyError(f"measured: column {name}: {error}") from None
-    if not ((table["harmonic"] >= 1) & (table["harmonic"] % 1 == 0)).all():
-        raise IdentifyError("measured: harmonic must be a whole number, 1 or more, in every row")
-    if not ((table["value"] > 0.0) & (table["sigma"] > 0.0)).all():
-        raise IdentifyError("measured: value and sigma must be positive in every row")
-    return table.reset_index(drop=True)
+            signal = read_any(place, **measured)
+        except TypeError as error:
+            word = str(error).rpartition("argument ")[2]
+            raise IdentifyError(
+                f"[measured]: unknown key {word}; see gearmbs.read_signal for those there are"
+            ) from None
+        if "speed" not in signal.attrs:
+            signal.attrs["speed"] = estimate_speed(signal).speed
+        parts.append(harmonic_table({name: signal}, channels=channels or None, **levels))
+    return pd.concat(parts, ignore_index=True)

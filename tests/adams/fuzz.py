@@ -21,7 +21,7 @@ from functools import cache
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.builders.routines import bound
-from gearmbs.adams.run.script_check import check_script
+from gearmbs.adams.session import check_script
 
 from . import (
     test_accelerations,

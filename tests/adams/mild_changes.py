@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 from gearmbs.adams.parse import grammar as g
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.grammar import grammar_of, specs_of
-from gearmbs.adams.parse.source import CONTINUED, RawStatement, statements
+from gearmbs.adams.parse.grammar import CONTINUED, RawStatement, grammar_of, specs_of
+from gearmbs.adams.parse.reader import statements
 
 from .mutations import NUMBER
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from gearmbs.adams.parse import grammar as g
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import MEASURES
+from gearmbs.adams.parse.deck import MEASURES
 from gearmbs.adams.parse.grammar import grammar_of
 from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, UNARY
 

@@ -17,7 +17,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearmbs.adams import parse_deck
-from gearmbs.adams.run.runner import run_deck
+from gearmbs.adams.runner import run_deck
 
 FOLDER = os.environ.get("GEARMBS_ADAMS_CASES")
 MODELS = json.loads(Path(__file__).with_name("adams_tables.json").read_text(encoding="utf-8"))["cases"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gearmbs.adams import parse_deck, run_deck
-from gearmbs.adams.run import convergence
+from gearmbs.adams.results import remarks as convergence
 
 DECK = """pendulum
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND

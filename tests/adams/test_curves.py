@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
-from gearmbs.adams.builders.curve_data import matrix_values
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import matrix_values
 from gearmbs.mechanism import ModelError
 from gearmbs.mechanism.parts.curves import Curve
 from tests.says import says

@@ -9,9 +9,8 @@ import pytest
 
 from gearmbs.adams import DeckError, parse_deck
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.grammar import joined_expression
-from gearmbs.adams.parse.source import CONTINUED
-from gearmbs.adams.parse.units import FORCE, LENGTH, MASS, deck_units
+from gearmbs.adams.parse.deck import FORCE, LENGTH, MASS, deck_units
+from gearmbs.adams.parse.grammar import CONTINUED, joined_expression
 
 from .decks import EVERYTHING, PENDULUM
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
-from gearmbs.adams.run.runner import run_deck
+from gearmbs.adams.runner import run_deck
 
 from .test_run import model, run
 

@@ -7,7 +7,7 @@ import pytest
 
 from gearmbs.adams import DeckError, parse_deck, run_deck
 from gearmbs.adams.parse.commands import parse_script
-from gearmbs.adams.parse.readers import read_variables
+from gearmbs.adams.parse.deck import read_variables
 from gearmbs.mechanism import Mechanism
 from tests.adams.decks import PENDULUM
 from tests.says import says

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearmbs.adams import Deck, DeckError, Script, parse_deck, parse_script
-from gearmbs.adams.parse.source import read_text
+from gearmbs.adams.parse.reader import read_text
 
 from . import fuzz
 from .decks import EVERYTHING, PENDULUM, SCRIPT

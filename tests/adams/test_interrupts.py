@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from gearmbs import cli
 from gearmbs.adams import DeckError, parse_deck, parse_script, read_results, run_deck
-from gearmbs.adams.run import analysis as analyses
+from gearmbs.adams import analysis as analyses
 from gearmbs.dae.integrators import driver
 from tests.adams.decks import PENDULUM
 

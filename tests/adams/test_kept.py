@@ -42,7 +42,7 @@ def test_interrupted_scripts_keep_what_ran(tmp_path, monkeypatch):
     def stop(*_, **__):
         raise KeyboardInterrupt("stopped by hand")
 
-    monkeypatch.setattr("gearmbs.adams.run.analysis.linear_modes", stop)
+    monkeypatch.setattr("gearmbs.adams.analysis.linear_modes", stop)
     script = parse_script("SIM/DYN, END=0.1, STEPS=10\nLINEAR/EIGENSOL\n")
     with pytest.raises(KeyboardInterrupt, match="stopped by hand"):
         run_deck(parse_deck(model(FREE)), script, tmp_path / "run")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import parse_deck, run_deck
-from gearmbs.adams.results.msg import message_text
+from gearmbs.adams.results.result import message_text
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from tests.says import says

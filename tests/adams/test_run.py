@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
-from gearmbs.adams.run.runner import run_deck
+from gearmbs.adams.runner import run_deck
 from tests.says import says
 
 from .decks import PENDULUM
@@ -185,7 +185,7 @@ def test_redundant_four_bar_runs_and_names_them():
     report = result.segments[0].solution.system.report
     assert report.degrees_of_freedom == 1
     assert len(report.redundant) == 3
-    from gearmbs.adams.results.msg import message_text
+    from gearmbs.adams.results.result import message_text
 
     text = message_text(result)
     assert "Degree-of-freedom analysis identified redundant constraints in the model:" in text

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
-from gearmbs.adams.results.msg import message_text
-from gearmbs.adams.run.sensors import in_unit
+from gearmbs.adams.results.result import message_text
+from gearmbs.adams.sensors import in_unit
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.solve.simulate import StopAt
 from tests.says import says

@@ -9,7 +9,7 @@ import pytest
 
 from gearmbs.adams import parse_deck
 from gearmbs.adams.results.res import NAMESPACE
-from gearmbs.adams.run.runner import run_deck
+from gearmbs.adams.runner import run_deck
 from gearmbs.adams.write.deck_writer import write_deck
 from gearmbs.adams.write.text import wrapped
 from gearmbs.dae.problem import ModelError

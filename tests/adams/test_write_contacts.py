@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, read_deck, run_deck, write_deck
-from gearmbs.adams.pairs import MARK, pair_comments, pair_of
+from gearmbs.adams.write.contacts import MARK, pair_comments, pair_of
 from gearmbs.dae.problem import ModelError
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair
 from gearmbs.gears.faults import BrokenTooth, Crowning, Fault, FlankMap, PitchError, TipRelief

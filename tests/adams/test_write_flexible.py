@@ -5,7 +5,7 @@ import pytest
 
 from gearmbs.adams import parse_script, read_deck, run_deck, write_deck
 from gearmbs.adams.builders.flexible import modal_ratios
-from gearmbs.adams.write.flexible import damping_text
+from gearmbs.adams.write.elements import damping_text
 from gearmbs.flexible import Shaft, ShaftSection, mnf_of, read_mnf, write_mnf
 from gearmbs.mechanism import Mechanism, ModelError, add_modal_force
 from tests.says import says

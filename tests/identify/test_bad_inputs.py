@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from gearmbs.identify import CaseProblem, Free, IdentifyError, fit, harmonic_table
-from gearmbs.identify.study import load_problem
+from gearmbs.identify.measured import load_problem
 from gearmbs.studies import Case
 from tests.says import says
 

@@ -7,8 +7,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts import Box, Cylinder, Frustum, Mesh, Sphere, Torus, read_solid
 from gearmbs.mechanism.contacts.shapes import volume
 from gearmbs.solids import read_bodies
-from gearmbs.solids.bodies import primitive
-from gearmbs.solids.facets import faceted
+from gearmbs.solids.bodies import faceted, primitive
 from tests.says import says
 from tests.solids.transmit_files import Solid, block, circle, cylinder, drilled, line, plane, transmit, turned
 

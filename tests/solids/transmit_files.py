@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from gearmbs.solids.layouts import BASE
+from gearmbs.solids.transmit import BASE
 
 HEADER = (
     "**ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz**************************\n"

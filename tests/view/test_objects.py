@@ -13,7 +13,7 @@ from gearmbs.gears import GearPair, GearSpec
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import Case, gear_rig
 from gearmbs.view import mechanism_plot, solution_plot
-from gearmbs.view.figures.transverse import edges_of, layers
+from gearmbs.view.figures.drawings import edges_of, layers
 from tests.view.looking import assert_readable
 
 

@@ -19,7 +19,7 @@ from gearmbs.view import (
     time_plot,
     transmission_error_plot,
 )
-from gearmbs.view.figures.curves import path_ends
+from gearmbs.view.figures.mesh_cycle import path_ends
 from gearmbs.view.figures.records import thinned
 from tests.generators import cases, seed
 from tests.says import says

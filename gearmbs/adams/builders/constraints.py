@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder, Maker
-from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import curve_points
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.curves import Curve, curve_on_curve, point_on_curve
 from gearmbs.mechanism.parts.functions import expression

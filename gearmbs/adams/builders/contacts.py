@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder, Maker
-from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import curve_points
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
 from gearmbs.mechanism.contacts.shapes import (
@@ -61,7 +61,7 @@ def add_contact(b: Builder, s: st.Contact) -> None:
 
 def _add_gears(b: Builder, s: st.Contact) -> None:
     """Build the contact of a gear pair again, with the laws that the statement has now."""
-    from gearmbs.adams.pairs import pair_of, with_laws
+    from gearmbs.adams.write.contacts import pair_of, with_laws
 
     pair = pair_of(s.pair)
     law, friction = law_of(b, s), friction_of(b, s)

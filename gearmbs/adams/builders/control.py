@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearmbs.adams.builders.curve_data import matrix_values
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import matrix_values
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 from gearmbs.mechanism.parts.elements import State

@@ -1,24 +1,26 @@
-"""FLEX_BODY of a deck as a modal body, and the markers on its nodes."""
+"""Bodies of a deck that deform: FLEX_BODY as a modal body with markers on its nodes, FE_PART as a chain of beams."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder, LeftOutError, Maker
-from gearmbs.adams.builders.curve_data import flexible_body
-from gearmbs.adams.builders.frames import hold, marker_orientation, part_orientation
+from gearmbs.adams.builders.builder import Builder, LeftOutError, Maker, hold, marker_orientation, part_orientation
 from gearmbs.adams.builders.scopes import Beam, BodyState
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import matrix_values
+from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Call, Scope, parse, walk
 
 if TYPE_CHECKING:
-    from gearmbs.flexible import BeamSection, ModalModel
+    from gearmbs.flexible import BeamSection, ModalModel, ModalNeutralFile
     from gearmbs.flexible.material import Damping
     from gearmbs.mechanism.parts.bodies import Body
 
@@ -31,6 +33,8 @@ FREQUENCY, NUMBER = (re.compile(rf"\b{name}\b(\s*\(\s*\w*\s*\))?", re.IGNORECASE
 """What CRATIO may ask for: the frequency of a mode in Hz, and its number."""
 ON_NODE = 1e-6
 """Distance from its node, in sizes of the body, up to which a marker is on it."""
+
+SELECTED, LOADS = "SELMOD", "MODLOAD"
 
 
 def add_flex_body(b: Builder, s: st.FlexBody) -> None:
@@ -397,3 +401,123 @@ DEFORMING: dict[type, Maker] = {st.FlexBody: add_flex_body, st.FePart: add_fe_pa
 ON_NODES: dict[str, Maker] = {"FLEX_BODY": add_flexible_marker, "FE_PART": add_node_marker}
 """What adds their markers."""
 LINE_LOADS: dict[type, Maker] = {st.FeLoad: add_fe_load}
+
+
+# What a FLEX_BODY is made of: its modal neutral file, and what of its MATRICES has a meaning that can be checked.
+#
+# ADAMS/View writes the matrices from the neutral file. Those that choose modes (SELMOD) and hold load cases (MODLOAD)
+# are read. The modes chosen are believed when their frequencies are those of the file.
+
+
+SAME = 1e-3
+"""Relative difference of a frequency of SELMOD from that of the file."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleBody:
+    """A FLEX_BODY of a deck.
+
+    Attributes
+    ----------
+    model : ModalModel
+        With the modes that are used.
+    numbers : ndarray of int
+        Of these modes in their file.
+    loads : ndarray, shape (6 + n, cases), or None
+        Load cases in the deck's units: force and torque about the body's origin, in its axes, and the forces on modes.
+    remark : str
+        What was not read, or empty.
+    """
+
+    model: ModalModel
+    numbers: np.ndarray
+    loads: np.ndarray | None
+    remark: str
+
+
+def flexible_body(deck: Deck, s: st.FlexBody) -> FlexibleBody:
+    """Return what a FLEX_BODY is made of.
+
+    Raises
+    ------
+    ValueError
+        If it has no file, or the file or its matrices cannot be.
+    """
+    mnf = _neutral_file(deck, s)
+    model = mnf.modal_model(s.name or s.label())
+    numbers = mnf.mode_ids[mnf.elastic]
+    selected = _matrix(deck, s, SELECTED)
+    remark = ""
+    if selected is not None:
+        chosen = _selected(selected, numbers, model.frequencies * deck.units.time)
+        if chosen is not None:
+            model, numbers = model.selected(chosen), numbers[chosen]
+        else:
+            remark = (
+                f"{SELECTED} does not hold modes of the MNF with their frequencies; all {model.modes} elastic are taken"
+            )
+    elif s.matrices:
+        remark = f"all {model.modes} elastic modes of the MNF are taken; which of them MATRICES select is not read"
+    loads = _matrix(deck, s, LOADS)
+    if loads is not None and loads.shape[0] != 6 + model.modes:
+        raise ValueError(
+            f"{LOADS} has {loads.shape[0]} rows; force, torque and {model.modes} modes that are used make "
+            f"{6 + model.modes}"
+        )
+    return FlexibleBody(model, numbers, loads, remark)
+
+
+def _neutral_file(deck: Deck, s: st.FlexBody) -> ModalNeutralFile:
+    """Read the body's MNF, once a deck."""
+    from gearmbs.flexible import FlexibleError, read_mnf
+
+    if s.mnf_file is None:
+        raise ValueError(
+            "MNF_FILE is missing; bodies from MATRICES alone, whose order and layout are not published, MD DB and BDF "
+            "files are not read. Write MNF_FILE = the body's modal neutral file; of matrices with a table of nodes one "
+            "is made by gearmbs.flexible: write_mnf(path, mnf_of(reduce_model(from_matrices(k, m, positions), faces)))"
+        )
+    path = Path(s.mnf_file.replace("\\", "/"))
+    if "://" in s.mnf_file:
+        raise ValueError(f"MNF_FILE = {s.mnf_file}: no database of ADAMS/Car is looked up; give the path of the file")
+    if not path.is_absolute():
+        path = Path(deck.file).parent / path
+    key = str(path)
+    if key not in deck.modal_files:
+        if not path.exists():
+            raise ValueError(f"MNF_FILE = {s.mnf_file}: No such file or directory; looked for {path}")
+        try:
+            deck.modal_files[key] = read_mnf(path)
+        except FlexibleError as error:
+            raise ValueError(str(error)) from error
+    return deck.modal_files[key]
+
+
+def _matrix(deck: Deck, s: st.FlexBody, name: str) -> np.ndarray | None:
+    """Return one of the body's matrices by its name, None if it has none that can be read."""
+    for ref in s.matrices:
+        statement = deck.of(st.Matrix).get(ref)
+        if statement is None:
+            raise ValueError(f"there is no MATRIX/{ref} for MATRICES")
+        given = (statement.matrix_name or statement.name or "").upper()
+        if given != name and not given.endswith(f"_{name}"):
+            continue
+        try:
+            return matrix_values(statement)
+        except ValueError as error:
+            if name == LOADS:
+                raise ValueError(f"{LOADS}: {error}") from error
+    return None
+
+
+def _selected(matrix: np.ndarray, numbers: np.ndarray, frequencies: np.ndarray) -> np.ndarray | None:
+    """Return the places of the modes that a matrix lists with their frequencies, None if it does not."""
+    rows = matrix if matrix.shape[1] == 2 else matrix.T
+    if rows.ndim != 2 or rows.shape[1] != 2:
+        return None
+    place = {int(number): k for k, number in enumerate(numbers)}
+    chosen = [place.get(int(number), -1) for number in rows[:, 0]]
+    if not chosen or min(chosen) < 0 or len(set(chosen)) != len(chosen):
+        return None
+    known = frequencies[chosen]
+    return np.array(chosen) if np.all(np.abs(rows[:, 1] - known) <= SAME * known) else None

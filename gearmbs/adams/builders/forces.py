@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder, Maker
-from gearmbs.adams.builders.curve_data import LOADS, flexible_body
+from gearmbs.adams.builders.flexible import LOADS, flexible_body
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck

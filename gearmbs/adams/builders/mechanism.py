@@ -12,9 +12,8 @@ from gearmbs.adams.builders.constraints import CONSTRAINTS, CURVES
 from gearmbs.adams.builders.contacts import CONTACTS
 from gearmbs.adams.builders.flexible import DEFORMING, LINE_LOADS, ON_NODES
 from gearmbs.adams.builders.forces import FORCES
-from gearmbs.adams.builders.functions import IN_DYNAMICS, Present
 from gearmbs.adams.builders.routines import bound
-from gearmbs.adams.builders.scopes import AdamsModel, BodyState
+from gearmbs.adams.builders.scopes import IN_DYNAMICS, AdamsModel, BodyState, Present
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck

@@ -16,8 +16,7 @@ from gearmbs.adams.builders.forces import bind_mforce
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall, callable_with_call
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.readers import without_refused
+from gearmbs.adams.parse.deck import Deck, without_refused
 from gearmbs.mechanism.language.syntax import Call, Negative, Node, Number, parse
 from gearmbs.mechanism.language.user_functions import UserFunction
 
@@ -348,11 +347,3 @@ def _number(node: Node) -> float:
     if isinstance(node, Negative) and isinstance(node.operand, Number):
         return -node.operand.value
     raise ValueError("has parameters that are no numbers")
-
-
-__all__ = [
-    "BINDERS",
-    "RoutineCall",
-    "bound",
-    "load_routines",
-]

@@ -7,10 +7,9 @@ from collections.abc import Callable, Sequence
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic, labels_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
-from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.deck import Deck, measured_markers
 from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, Spec, specs_of
 from gearmbs.mechanism.forces.friction import KINDS
-from gearmbs.mechanism.language.syntax import Call, Number, parse, walk
 
 
 def arguments(cls: type, fact: Callable[[Spec], object]) -> list[str]:
@@ -18,11 +17,6 @@ def arguments(cls: type, fact: Callable[[Spec], object]) -> list[str]:
     return [name for name, spec in specs_of(cls).items() if fact(spec)]
 
 
-MEASURES = frozenset(
-    """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
-    WDTX WDTY WDTZ WDTM""".split()
-)
-"""Functions of the places and motions of markers."""
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
 MESH_FILES = (".stl", ".obj", ".shl", ".slp")
@@ -331,18 +325,6 @@ def _check_floating(deck: Deck, fail: Fail) -> None:
             for ref in measured_markers(text):
                 if ref in floating:
                     fail(statement, f"MARKER/{ref} is FLOATING; measure at the force's I marker instead", name)
-
-
-def measured_markers(text: str) -> list[int]:
-    """Return the markers whose place or motion an expression asks for, in order of appearance."""
-    found: list[int] = []
-    for node in walk(parse(text)):
-        if isinstance(node, Call) and node.name in MEASURES:
-            refs = node.args[2:] if node.name == "ORIENT" else node.args
-            for a in refs:
-                if isinstance(a, Number) and a.integer and a.integer not in found:
-                    found.append(a.integer)
-    return found
 
 
 # What to write instead of arguments that are refused.

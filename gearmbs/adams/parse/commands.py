@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import (
     CHOICE,
+    CONTINUED,
     FLAG,
     ID,
     IDS,
@@ -19,12 +20,12 @@ from gearmbs.adams.parse.grammar import (
     REAL,
     TEXT,
     ArgumentReader,
+    RawStatement,
     StatementError,
     arg,
     grammar_of,
 )
-from gearmbs.adams.parse.reader import read_statement, resolve_statement, unknown_statement
-from gearmbs.adams.parse.source import CONTINUED, RawStatement, read_file, statements
+from gearmbs.adams.parse.reader import read_file, read_statement, resolve_statement, statements, unknown_statement
 from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
@@ -342,9 +343,4 @@ def _check(command: Command) -> None:
 
 def apply_change(old: st.Statement, change: st.Statement) -> st.Statement:
     """Return a statement of the deck with the arguments of a command put in."""
-    from dataclasses import replace
-
     return replace(old, **{name: getattr(change, name) for name in change.given})
-
-
-__all__ = ["Script", "apply_change", "parse_script", "read_script"]

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_right
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
-from gearmbs.adams.parse.source import CONTINUED, RawStatement
 from gearmbs.mechanism.language.syntax import ExpressionError, parse
 from gearmbs.wording import did_you_mean
+
+CONTINUED = "\x01"
 
 REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE, PATH = range(14)
 """Kinds of arguments; a PATH is a text in which a backslash is part of the name."""
@@ -24,6 +26,40 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?\Z")
 _SEPARATORS = "," + CONTINUED
 LARGEST = 1e100
 """Number of an argument: squares and cubes of it can still be computed."""
+
+
+@dataclass(frozen=True)
+class RawStatement:
+    """The text of one statement and where its parts stand.
+
+    Attributes
+    ----------
+    text : str
+        Joined lines; continuation commas are ``CONTINUED``.
+    starts : tuple of int
+        Offset in ``text`` where each source line begins.
+    lines : tuple of int
+        The source line numbers.
+    view_name : str or None
+        Name from an ``adams_view_name`` comment in front.
+    pair : str
+        What comments in front say of a gear pair.
+    """
+
+    text: str
+    starts: tuple[int, ...]
+    lines: tuple[int, ...]
+    view_name: str | None = None
+    pair: str = ""
+
+    @property
+    def line(self) -> int:
+        """First source line."""
+        return self.lines[0]
+
+    def line_at(self, offset: int) -> int:
+        """Return the source line of a place in the text."""
+        return self.lines[max(0, bisect_right(self.starts, offset) - 1)]
 
 
 class StatementError(ValueError):
@@ -110,7 +146,7 @@ class Statement:
     given : mapping of str to int
         Source line of every argument that was given.
     pair : str
-        A gear pair in comments in front, see `gearmbs.adams.pairs`.
+        A gear pair in comments in front, see `gearmbs.adams.write.contacts`.
     """
 
     table: ClassVar[dict[str, type[Statement]]] = {}

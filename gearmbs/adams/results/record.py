@@ -12,8 +12,7 @@ from gearmbs.adams.builders.scopes import AdamsModel
 from gearmbs.adams.errors import Diagnostic, folded
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Script, Simulate
-from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
+from gearmbs.adams.parse.deck import RESULT_NAMES, Deck, unit_names
 from gearmbs.adams.results.remarks import (
     TRACK_COLUMNS,
     TRACK_DIMENSIONS,
@@ -34,7 +33,7 @@ from gearmbs.mechanism.parts.modal import ModalBody
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.adams.run.convergence import Doubt
+    from gearmbs.adams.results.remarks import Doubt
 
 NEWTON = "Newton"
 """What solves analyses in which nothing is integrated."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearmbs.adams.builders.functions import translated
-from gearmbs.adams.builders.scopes import AdamsModel, markers_of
+from gearmbs.adams.builders.scopes import AdamsModel, markers_of, translated
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.analyses.statics import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
@@ -298,6 +297,3 @@ def _gradient_series(ints, floats, t, kin, marker_body, marker_frame, y, ref, wo
     """
     for k in range(t.size):
         eval_gradient(ints, floats, t[k], kin[k], marker_body, marker_frame, y, ref, grad[k], work)
-
-
-__all__ = ["RequestEvaluator", "RequestSeries", "column_names", "request_texts"]

@@ -129,18 +129,12 @@ def _package_version() -> str:
         return "0"
 
 
-def results_text(result: RunRecord, now: datetime | None = None) -> str:
+def results_text(result: RunRecord) -> str:
     """Return the content of the results file.
 
     Forces act on the I marker's part, in global components; angles are in radians.
-
-    Parameters
-    ----------
-    result : RunRecord
-    now : datetime, optional
-        Time stamp in the header.
     """
-    stamp = (now or datetime.now()).strftime("%Y-%m-%d %H:%M:%S")
+    stamp = datetime.now().strftime("%Y-%m-%d %H:%M:%S")
     out = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<Results xmlns="{NAMESPACE}">',

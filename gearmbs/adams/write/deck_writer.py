@@ -10,20 +10,21 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gearmbs.adams.parse.units import TABLES
+from gearmbs.adams.parse.deck import TABLES
 from gearmbs.adams.write.contacts import is_gear_contact
 from gearmbs.adams.write.elements import (
     as_expressions,
     constraint_statements,
     data_statements,
     element_statements,
+    flex_body_arguments,
     hidden,
     joint_statement,
     kept,
     load_statement,
+    nearest_node,
     states_of,
 )
-from gearmbs.adams.write.flexible import flex_body_arguments, nearest_node
 from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
 from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
 from gearmbs.dae.methods import FORMULATIONS, INTEGRATORS

@@ -12,8 +12,7 @@ import numpy as np
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.shapes import Box, Cylinder, Frustum, Mesh, Shape, Sphere, Torus
 from gearmbs.mechanism.parts.quantities import quantity
-from gearmbs.solids.bodies import PART_NUMBER, Body, primitive, read_bodies
-from gearmbs.solids.facets import faceted
+from gearmbs.solids.bodies import PART_NUMBER, Body, faceted, primitive, read_bodies
 
 # Meshes from files: STL (text and binary), OBJ and the SHELL files of ADAMS.
 

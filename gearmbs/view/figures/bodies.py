@@ -17,7 +17,6 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.flexible import Campbell, ModalModel, StressModes
 from gearmbs.signals import campbell
 from gearmbs.signals.signal.any_data import in_si
-from gearmbs.view.figures.animation import RATE, write_film
 from gearmbs.view.figures.changing_speed import (
     RANGE_DB,
     RPM,
@@ -33,6 +32,7 @@ from gearmbs.view.figures.style import (
     BLUE,
     COLOURS,
     GREY,
+    RATE,
     VERMILLION,
     drawn_on,
     label,
@@ -40,6 +40,7 @@ from gearmbs.view.figures.style import (
     look,
     new_figure,
     png_bytes,
+    write_film,
 )
 
 SHOWN = 0.1

@@ -1,9 +1,9 @@
-"""The figures that go with an analysis and with a comparison."""
+"""The figures that go with the analysis of a record, of a bearing or planetary set, and with a comparison."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -11,20 +11,32 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearmbs.progress import waiting
-from gearmbs.signals import AnalysisReport, BearingReport, ComparisonReport, VibrationReport, shaft_phase, spectrum
+from gearmbs.signals import (
+    AnalysisReport,
+    BearingReport,
+    ComparisonReport,
+    PlanetaryReport,
+    VibrationReport,
+    shaft_phase,
+    spectrum,
+)
 from gearmbs.view.figures.changing_speed import changing_speed_figures
+from gearmbs.view.figures.charts import comparison_bars
 from gearmbs.view.figures.records import average_plot, spectrum_plot
 from gearmbs.view.figures.style import (
+    BLUE,
     COLOURS,
     GREY,
     VERMILLION,
-    comparison_bars,
     drawn_on,
     label,
     legend_below,
     look,
     new_figure,
 )
+
+if TYPE_CHECKING:
+    pass
 
 ENVELOPE_TOP, ENVELOPE_ORDERS, LEAKED = 1000.0, 20.0, 2
 SEGMENT = 2.0
@@ -249,3 +261,42 @@ def bearing_plot(
         panel.set_title(title or f"{report.source}, {channel}: squared envelope", wrap=True)
         legend_below(panel, 4)
     return figure
+
+
+def planetary_plot(report: PlanetaryReport, channel: str | None = None, *, title: str | None = None) -> Figure:
+    """Draw the energy over a turn of sun, planet and ring, tooth by tooth; the parts that are named stand out.
+
+    Parameters
+    ----------
+    report : PlanetaryReport
+        From `gearmbs.signals.diagnose_planetary`.
+    channel : str, optional
+        Default the first.
+    title : str, optional
+
+    Raises
+    ------
+    ValueError
+        If there is no such channel.
+    """
+    names = list(dict.fromkeys(f.channel for f in report.findings))
+    if channel is not None and channel not in names:
+        raise ValueError(f"channel: there is no {channel!r}; choose one of {', '.join(names)}")
+    kept = [f for f in report.findings if f.channel == (channel or names[0])]
+    with look():
+        figure = new_figure(7.0, 2.0 * len(kept))
+        axes = figure.subplots(len(kept), 1)
+        for ax, finding in zip(np.ravel(axes), kept):
+            teeth = np.arange(finding.profile.size) * _teeth(report, finding.part) / finding.profile.size
+            colour = BLUE if finding.grade == "none" else VERMILLION
+            ax.bar(teeth, finding.profile, width=0.9 * (teeth[1] - teeth[0]), align="edge", color=colour)
+            ax.axhline(1.0, color=GREY, linewidth=0.8)
+            ax.set_title(f"{finding.part}: {finding.found:.2f} Hz, {finding.grade}", loc="left")
+            ax.set_ylabel("energy by mean")
+        np.ravel(axes)[-1].set_xlabel(label("tooth of the part, from where the record begins", ""))
+        figure.suptitle(title or report.source)
+    return figure
+
+
+def _teeth(report: PlanetaryReport, part: str) -> int:
+    return dict(zip(("sun", "planet", "ring"), report.lines.teeth))[part]

@@ -1,20 +1,21 @@
-"""Figures without global state: colours everyone can tell apart, one look for all plots, whole files only."""
+"""Figures without global state: colours everyone can tell apart, one look for all plots, whole files and films only."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+import shutil
+import subprocess
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
-import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearmbs.files import whole_file
+from gearmbs.progress import waiting
 
 BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 SKY, PURPLE, YELLOW, BLACK = "#56B4E9", "#CC79A7", "#F0E442", "#222222"
@@ -57,6 +58,9 @@ UNITS = {
     "mixed": "",
     "unknown": "unknown unit",
 }
+
+
+STATE_COLOURS = {"healthy": BLUE, "misaligned": ORANGE, "distance": GREEN}
 
 
 class Picture(Figure):
@@ -118,6 +122,11 @@ def legend_below(ax: Axes, columns: int = 3) -> None:
         ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=fitting)
 
 
+def state_colour(state: str, index: int) -> str:
+    """Return the colour of a state, the same in every figure."""
+    return STATE_COLOURS.get(state, COLOURS[index % len(COLOURS)])
+
+
 def png_bytes(figure: Figure, dpi: float = DPI) -> bytes:
     """Return a figure as a PNG image."""
     buffer = io.BytesIO()
@@ -150,191 +159,79 @@ def save_figure(figure: Figure, stem: str | Path, *, dpi: float = DPI) -> list[P
     return paths
 
 
-# Bar charts of the mesh harmonics: the paper's Figures 5 and 7, and experiment beside model.
+# Films of pictures, by ffmpeg where it is installed, and moving pictures.
 
 
-STATE_COLOURS = {"healthy": BLUE, "misaligned": ORANGE, "distance": GREEN}
-HATCHES = ("", "///", "...", "xxx", "\\\\\\", "++")
-GROUP = 0.8
-"""Width of a group of bars; groups stand 1 apart."""
+RATE = 20
+"""Pictures a second."""
+ENDINGS = (".gif", ".mp4")
 
 
-def gmf_bars(
-    table: xr.DataArray,
-    *,
-    title: str | None = None,
-    ax: Axes | None = None,
-    unit: str | None = None,
-    values: bool = True,
-    log: bool = False,
-) -> Figure:
-    """Draw the RMS of the gear mesh harmonics of several states, as the paper's Figures 5 and 7 do.
+def write_film(path: str | Path, pictures: Iterable[bytes], count: int, rate: int = RATE) -> Path:
+    """Write PNG pictures of one size as an H.264 film or as a moving picture, with a bar where somebody watches.
 
     Parameters
     ----------
-    table : xarray.DataArray, dims (state, harmonic)
-        RMS; the unit is taken from ``attrs["units"]``. Coordinates ``fault_misalignment`` (rad) and
-        ``fault_centre_distance_error`` (m) along ``state``, if there, are written into the legend.
-    title : str, optional
-    ax : matplotlib axes, optional
-        Where to draw; default a new figure.
-    unit : str, optional
-        Instead of the table's own.
-    values : bool
-        Write the number over each bar.
-    log : bool
-        Logarithmic RMS axis.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    path : path
+        Ends in ``.mp4`` or ``.gif``.
+    pictures : iterable of bytes
+        Drawn one by one as they are written.
+    count : int
+        How many there are.
+    rate : int
+        Pictures a second.
 
     Raises
     ------
     ValueError
-        If dimensions are missing or a value is negative or not finite.
+        For another ending, or if ffmpeg is not installed; the message says what to do instead.
+    RuntimeError
+        If ffmpeg fails.
     """
-    table = checked_table(table, "table", ("state", "harmonic"))
-    with look():
-        figure, ax = drawn_on(ax, 6.4, 4.2)
-        states = [str(s) for s in table.state.values]
-        bars(ax, table, "state", [state_colour(s, k) for k, s in enumerate(states)], state_labels(table), values, log)
-        harmonic_axis(ax, table)
-        ax.set_ylabel(label(rms_name(table), unit or table.attrs.get("units", "")))
-        if title:
-            ax.set_title(title, wrap=True)
-        legend_below(ax)
-    return figure
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise ValueError(f"path is {str(path)!r}; a film ends in {' or '.join(ENDINGS)}")
+    with waiting(f"saving {path.name}") as tell:
+        drawn = _counted(pictures, count, tell)
+        return _write_gif(path, drawn, rate) if ending == ".gif" else _write_mp4(path, drawn, rate)
 
 
-def comparison_bars(
-    data: xr.Dataset | Any, *, title: str | None = None, unit: str | None = None, log: bool = False
-) -> Figure:
-    """Draw experiment and model side by side: a row of panels for each load, experiment left, model right.
-
-    Parameters
-    ----------
-    data : xarray.Dataset or ComparisonReport
-        Variables ``experiment`` and ``model``, dims (load, state, harmonic), as `gearmbs.signals.compare` returns.
-        Without ``model`` only the experiment is drawn.
-    title : str, optional
-    unit : str, optional
-    log : bool
-        Logarithmic RMS axis.
-
-    Raises
-    ------
-    ValueError
-        If ``experiment`` or a dimension is missing, or there is more than one channel.
-    """
-    tables: xr.Dataset = data if isinstance(data, xr.Dataset) else data.data
-    if "experiment" not in tables:
-        raise ValueError(f"data: no variable 'experiment', only {list(tables.data_vars)}; pass the result of compare()")
-    sides = [side for side in ("experiment", "model") if side in tables]
-    first = tables["experiment"]
-    if "channel" in first.dims:
-        if first.sizes["channel"] > 1:
-            names = ", ".join(str(c) for c in first.channel.values)
-            raise ValueError(f"data: several channels ({names}); select one, e.g. report.data.isel(channel=0)")
-        tables = tables.isel(channel=0)
-    checked = {side: checked_table(tables[side], side, ("load", "state", "harmonic")) for side in sides}
-    loads = checked["experiment"]["load"].values
-    with look():
-        figure = new_figure(4.6 * len(sides) + 0.6, 2.9 * len(loads) + 0.7)
-        axes = figure.subplots(len(loads), len(sides), squeeze=False, sharey="row")
-        for row, load in enumerate(loads):
-            for column, side in enumerate(sides):
-                ax, table = axes[row][column], checked[side].sel(load=load)
-                colours = [state_colour(str(s), k) for k, s in enumerate(table.state.values)]
-                bars(ax, table, "state", colours, state_labels(table), True, log)
-                harmonic_axis(ax, table)
-                ax.set_title(f"{side}, {load} load" if "load" not in str(load) else f"{side}, {load}")
-                if not log:
-                    ax.set_ylim(0.0, 1.12 * max(1e-300, *(float(t.sel(load=load).max()) for t in checked.values())))
-                if column == 0:
-                    own = unit or tables.attrs.get("units") or checked[side].attrs.get("units", "")
-                    ax.set_ylabel(label("RMS", own))
-        handles, names = axes[0][0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncols=4)
-        if title:
-            figure.suptitle(title)
-    return figure
+def _counted(pictures: Iterable[bytes], count: int, tell: Callable[[float], None]) -> Iterator[bytes]:
+    for k, picture in enumerate(pictures):
+        tell((k + 1) / (count + 1))
+        yield picture
 
 
-def checked_table(table: xr.DataArray, name: str, dims: tuple[str, ...]) -> xr.DataArray:
-    """Return the table with its dimensions in order, or say what is wrong with it."""
-    if not isinstance(table, xr.DataArray):
-        raise ValueError(f"{name}: a {type(table).__name__}; give an xarray.DataArray with dims {dims}")
-    if set(table.dims) != set(dims):
-        raise ValueError(f"{name}: dims are {tuple(table.dims)}, needed are {dims}; select the others away with .sel()")
-    if table.size == 0:
-        raise ValueError(f"{name}: empty, shape {table.shape}")
-    table = table.transpose(*dims)
-    bad = ~(np.nan_to_num(np.asarray(table.values, dtype=float), nan=0.0, posinf=-1.0) >= 0.0)
-    if bad.any():
-        where = {d: table[d].values[i].item() for d, i in zip(dims, np.argwhere(bad)[0])}
-        raise ValueError(f"{name}: {float(table.values[bad][0])} at {where}; an RMS is finite and not negative")
-    return table
+def _write_gif(path: Path, pictures: Iterable[bytes], rate: int) -> Path:
+    from PIL import Image
+
+    images = [Image.open(io.BytesIO(p)).convert("P", palette=Image.Palette.ADAPTIVE) for p in pictures]
+    with whole_file(path) as part:
+        images[0].save(part, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0)
+    return path
 
 
-def bars(
-    ax: Axes, table: xr.DataArray, dim: str, colours: list[str], labels: list[str], values: bool, log: bool
-) -> None:
-    """Draw one bar for each ``dim`` in each group along the other dimension; missing values are left out."""
-    data = np.asarray(table.transpose(dim, ...).values, dtype=float)
-    count, groups = data.shape
-    width = GROUP / count
-    top = np.nanmax(data) if np.isfinite(data).any() else 1.0
-    for k in range(count):
-        at = np.arange(groups) + (k - 0.5 * (count - 1)) * width
-        drawn = ax.bar(at, data[k], width, label=labels[k], color=colours[k], edgecolor="white", linewidth=0.8)
-        for patch in drawn:
-            patch.set_hatch(HATCHES[k % len(HATCHES)])
-        if values:
-            texts = [f"{v:.3g}" if np.isfinite(v) else "" for v in data[k]]
-            ax.bar_label(drawn, texts, padding=2, fontsize=max(5.5, min(8.5, 10.5 - 0.8 * count)))
-        for x in at[~np.isfinite(data[k])]:
-            ax.text(x, 0.02, "no data", rotation=90, ha="center", fontsize=8, transform=ax.get_xaxis_transform())
-    if log:
-        ax.set_yscale("log")
-        if top > 0:
-            ax.set_ylim(top=1.6 * top)
-    else:
-        ax.set_ylim(0.0, 1.12 * top if top > 0 else 1.0)
-    ax.grid(visible=False, axis="x")
-
-
-def harmonic_axis(ax: Axes, table: xr.DataArray) -> None:
-    """Name the groups after the harmonics and, when known, their frequencies."""
-    names = [f"{h}× GMF" for h in table.harmonic.values]
-    if "frequency" in table.coords and table.frequency.dims == ("harmonic",):
-        names = [f"{n}\n{f:.0f} Hz" for n, f in zip(names, table.frequency.values)]
-    ax.set_xticks(np.arange(table.sizes["harmonic"]), names)
-    ax.tick_params(axis="x", length=0)
-
-
-def state_colour(state: str, index: int) -> str:
-    """Return the colour of a state, the same in every figure."""
-    return STATE_COLOURS.get(state, COLOURS[index % len(COLOURS)])
-
-
-def state_labels(table: xr.DataArray) -> list[str]:
-    """Return legend texts of the states, with the size of the fault where the table knows it."""
-    out = []
-    for k, state in enumerate(table.state.values):
-        text = str(state)
-        for name, unit, factor, form in (
-            ("fault_misalignment", "°", 180.0 / np.pi, "{:.3g}"),
-            ("fault_centre_distance_error", " mm", 1e3, "{:+.3g}"),
-        ):
-            if name in table.coords and table[name].dims == ("state",) and float(table[name][k]) != 0.0:
-                text += " " + form.format(float(table[name][k]) * factor) + unit
-        out.append(text)
-    return out
-
-
-def rms_name(table: xr.DataArray) -> str:
-    """Return what the RMS is of, as far as the table says."""
-    kind = {"m/s^2": "RMS of acceleration", "m/s": "RMS of velocity", "m": "RMS of displacement", "N": "RMS of force"}
-    name = kind.get(str(table.attrs.get("units", "")), "RMS")
-    return f"{name}, scaled" if "scaled" in str(table.attrs.get("long_name", "")) else name
+def _write_mp4(path: Path, pictures: Iterable[bytes], rate: int) -> Path:
+    program = shutil.which("ffmpeg")
+    if program is None:
+        raise ValueError(
+            f"path is {str(path)!r}; films need the program ffmpeg, which is not installed here (apt install ffmpeg, "
+            "conda install ffmpeg, or ffmpeg.org); save as .html or .gif instead"
+        )
+    even = "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white"
+    with whole_file(path) as part:
+        command = [program, "-loglevel", "error", "-y", "-f", "image2pipe", "-framerate", str(rate), "-c:v", "png"]
+        command += ["-i", "-", "-vf", even, "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+        process = subprocess.Popen([*command, str(part)], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert process.stdin is not None
+        try:
+            for picture in pictures:
+                process.stdin.write(picture)
+        except BrokenPipeError:
+            # what ffmpeg says is told below
+            pass
+        _, said = process.communicate()
+        if process.returncode != 0:
+            raise RuntimeError(f"{path}: ffmpeg failed: {said.decode(errors='replace').strip()[:300]}")
+    return path

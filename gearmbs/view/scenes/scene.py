@@ -1,9 +1,9 @@
-"""A scene and the ways to show it: a shaded figure, a page to turn and play, a plotly figure."""
+"""A scene, solids that move, and the ways to show it: a shaded figure, a page to turn and play, a plotly figure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,20 +13,98 @@ from matplotlib.figure import Figure
 
 from gearmbs.files import whole_file
 from gearmbs.progress import waiting
-from gearmbs.view.figures.animation import ENDINGS, write_film
-from gearmbs.view.figures.style import DPI, VERMILLION, look, new_figure, png_bytes
-from gearmbs.view.geometry.mesh import Mesh, corner_normals
-from gearmbs.view.scenes.pages import Page, scene_page
-from gearmbs.view.scenes.plotly_scene import plotly_figure
+from gearmbs.view.figures.style import DPI, ENDINGS, VERMILLION, look, new_figure, png_bytes, unit_text, write_film
+from gearmbs.view.geometry.mesh import Mesh, corner_normals, feature_edges, feature_ends
+from gearmbs.view.scenes.pages import (
+    Page,
+    packed,
+    rounded,
+)
 from gearmbs.view.scenes.render import Camera, render
-from gearmbs.view.scenes.solids import AZIMUTH, ELEVATION, Deflection, Part, SceneData
+
+AZIMUTH, ELEVATION = 38.0, 22.0
+UP = (0.0, 1.0, 0.0)
 
 BORDER = 1.0
 """Height of heading and legend, inches."""
+ARROW = 0.22
+"""Length of the arrow of the largest force, in sizes of the scene."""
+
+
+LIGHT = {"ambient": 0.55, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6}
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """How a solid bends: the sum of shapes times coordinates.
+
+    Attributes
+    ----------
+    shapes : ndarray, shape (n, vertices, 3)
+        In the part's own frame, m.
+    coordinates : ndarray, shape (instants, n)
+    """
+
+    shapes: np.ndarray
+    coordinates: np.ndarray
+
+    def at(self, instant: int) -> np.ndarray:
+        """Return the displacements of the vertices at an instant, shape (vertices, 3), m."""
+        return np.tensordot(self.coordinates[instant], self.shapes, axes=1)
+
+    def reduced(self, accuracy: float = 1e-3) -> Deflection:
+        """Return nearly the same by fewer shapes, as far off as a share of the largest displacement at most."""
+        sizes = np.maximum(np.linalg.norm(self.shapes, axis=2).max(axis=1), 1e-300)
+        left, values, right = np.linalg.svd(self.coordinates * sizes, full_matrices=False)
+        if not values.size or values[0] == 0.0:
+            return Deflection(self.shapes[:0], self.coordinates[:, :0])
+        # what is left out is no larger than the sum of its singular values
+        kept = int(np.sum(np.cumsum(values[::-1])[::-1] > accuracy * np.abs(self.coordinates * sizes).max()))
+        shapes = np.tensordot(right[:kept] / sizes, self.shapes, axes=1)
+        return Deflection(shapes, left[:, :kept] * values[:kept])
+
+
+@dataclass(frozen=True)
+class Part:
+    """A solid and where it is.
+
+    Attributes
+    ----------
+    name : str
+    mesh : Mesh
+        In the part's own frame.
+    colour : str
+        As matplotlib understands it.
+    origins, axes : ndarray, shape (n, 3) and (n, 3, 3)
+        Frame at each instant, global, m.
+    deflection : Deflection, optional
+        Of a solid that bends.
+    opacity : float
+        Above 0 to 1; a housing is seen through.
+    """
+
+    name: str
+    mesh: Mesh
+    colour: str
+    origins: np.ndarray
+    axes: np.ndarray
+    deflection: Deflection | None = None
+    opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.opacity <= 1.0:
+            raise ValueError(f"opacity of part {self.name!r} is {self.opacity}; give above 0 to 1")
+
+    def placed(self, instant: int) -> Mesh:
+        """Return the mesh where it is at an instant, global, m."""
+        mesh = self.mesh
+        if self.deflection is not None:
+            mesh = Mesh(mesh.vertices + self.deflection.at(instant), mesh.triangles)
+        return mesh.placed(self.origins[instant], self.axes[instant])
 
 
 @dataclass
-class Scene(SceneData):
+class Scene:
     """Parts, forces and lines over n instants.
 
     Attributes
@@ -43,6 +121,49 @@ class Scene(SceneData):
     up : tuple of float
         Direction drawn upwards.
     """
+
+    parts: list[Part]
+    title: str = "view"
+    label: str = ""
+    unit: str = ""
+    value: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    forces: list[np.ndarray] = field(default_factory=list)
+    lines: list[tuple[str, str, np.ndarray]] = field(default_factory=list)
+    up: tuple[float, float, float] = UP
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise ValueError("parts: a scene needs at least one part; the mechanism has no body to draw")
+        for part in self.parts:
+            if len(part.origins) != self.value.size or len(part.axes) != self.value.size:
+                raise ValueError(f"part {part.name!r} has {len(part.origins)} poses for {self.value.size} instants")
+            bend = part.deflection
+            if bend is not None and (
+                len(bend.coordinates) != self.value.size or bend.shapes.shape[1] != len(part.mesh.vertices)
+            ):
+                raise ValueError(
+                    f"part {part.name!r} has deflections of {bend.shapes.shape[1]} vertices at {len(bend.coordinates)} "
+                    f"instants; it has {len(part.mesh.vertices)} vertices and {self.value.size} instants"
+                )
+
+    def __len__(self) -> int:
+        return self.value.size
+
+    def corners(self, instant: int = 0) -> np.ndarray:
+        """Return all vertices at an instant, global, shape (n, 3), m."""
+        return np.concatenate([part.placed(instant).vertices for part in self.parts])
+
+    @property
+    def size(self) -> float:
+        """Largest extent at the start, m."""
+        points = self.corners(0)
+        return float(np.ptp(points, axis=0).max())
+
+    @property
+    def force_scale(self) -> float:
+        """Length of the arrow of a force, m/N."""
+        sizes = (float(np.linalg.norm(f[:, 1], axis=1).max(initial=0.0)) for f in self.forces)
+        return ARROW * self.size / (max(sizes, default=0.0) or 1.0)
 
     def still(
         self,
@@ -152,7 +273,25 @@ class Scene(SceneData):
     @waiting("preparing the page")
     def page(self) -> Page:
         """Return the scene as a page to turn, zoom and play, which stands alone as an HTML file."""
-        return scene_page(self)
+        points = np.concatenate([self.corners(0), *(ends.reshape(-1, 3) for _, _, ends in self.lines)])
+        low, high = points.min(axis=0), points.max(axis=0)
+        scale = np.array([1.0, self.force_scale])[:, None]
+        data = {
+            "parts": [_part(part) for part in self.parts],
+            "lines": [{"colour": to_rgb(colour), "ends": rounded(ends)} for _, colour, ends in self.lines],
+            "forces": [[rounded(row * scale) for row in rows] for rows in self.forces],
+            "values": rounded(self.value, 9),
+            "label": self.label,
+            "unit": unit_text(self.unit),
+            "up": list(self.up),
+            "centre": rounded(0.5 * (low + high)),
+            "hull": [rounded(p) for p in _hull(points - 0.5 * (low + high))],
+            "span": float(np.linalg.norm(high - low)),
+            "azimuth": AZIMUTH,
+            "elevation": ELEVATION,
+        }
+        note = f"{len(self)} instants" if len(self) > 1 else ""
+        return Page(self.title, note, ("player.js", "viewer3d.js"), data)
 
     def save_html(self, path: str | Path) -> Path:
         """Write the page; it opens in any browser without a network."""
@@ -169,12 +308,150 @@ class Scene(SceneData):
     def _arrows(self, ax, camera: Camera, instant: int, columns: int, rows: int) -> None:
         if not self.forces or len(self.forces[instant]) == 0:
             return
-        largest = max(float(np.linalg.norm(f[:, 1], axis=1).max(initial=0.0)) for f in self.forces) or 1.0
-        scale = 0.22 * self.size / largest
+        scale = self.force_scale
         for start, force in self.forces[instant]:
             ends = camera.project(np.stack([start, start + scale * force]), columns, rows)
             style = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0}
             ax.annotate("", ends[1, :2], ends[0, :2], arrowprops=style, zorder=5)
 
 
-__all__ = ["Deflection", "Part", "Scene"]
+# What the page shows, for its script over WebGL.
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Return points on the outside, enough to see how far a scene reaches from any direction."""
+    k = np.arange(60)
+    z = 1.0 - 2.0 * (k + 0.5) / k.size
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * k
+    ways = np.column_stack([np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z])
+    return points[np.unique(np.argmax(points @ ways.T, axis=0))]
+
+
+def _part(part: Part) -> dict:
+    """Return a part with one vertex for each point and normal."""
+    normals = np.rint(corner_normals(part.mesh).reshape(-1, 3) * 127.0).astype(np.int8)
+    owners = part.mesh.triangles.reshape(-1, 1)
+    rows, index = np.unique(np.hstack([owners, normals.astype(np.int64)]), axis=0, return_inverse=True)
+    padded = np.zeros((len(rows), 4), dtype=np.int8)
+    padded[:, :3] = rows[:, 1:]
+    poses = np.concatenate([part.axes.reshape(-1, 9), part.origins], axis=1)
+    ends = feature_ends(part.mesh)
+    bending = {}
+    if part.deflection is not None and len(part.deflection.shapes):
+        bend = part.deflection.reduced()
+        where = np.empty(len(part.mesh.vertices), dtype=np.int64)
+        where[rows[:, 0]] = np.arange(len(rows))
+        bending = {
+            "shapes": packed(bend.shapes[:, rows[:, 0]]),
+            "coordinates": packed(bend.coordinates),
+            "ends": packed(where[ends], "<u4"),
+        }
+    return {
+        "name": part.name,
+        "colour": [round(c, 4) for c in to_rgb(part.colour)],
+        "opacity": part.opacity,
+        "points": packed(part.mesh.vertices[rows[:, 0]]),
+        "normals": packed(padded, "i1"),
+        "index": packed(index.reshape(-1), "<u4"),
+        "edges": packed(part.mesh.vertices[ends]),
+        "poses": packed(poses),
+        **bending,
+    }
+
+
+# A scene as a plotly figure, for notebooks that use plotly (extra ``view``).
+
+
+def plotly_figure(scene: Scene, frames: int = 24) -> Any:
+    """Return a plotly figure of a scene, animated over at most ``frames`` of its instants.
+
+    Raises
+    ------
+    ImportError
+        If plotly is not installed; the message says how to get it.
+    """
+    try:
+        import plotly.graph_objects as go
+    except ImportError as error:
+        raise ImportError("plotly is not installed; pip install 'gearmbs[view]', or use Scene.page()") from error
+    if frames < 1:
+        raise ValueError(f"frames is {frames}; give 1 or more")
+    chosen = np.unique(np.linspace(0, len(scene) - 1, min(frames, len(scene))).round().astype(int))
+    fixed = [_line(go, name, colour, ends) for name, colour, ends in scene.lines]
+    figure = go.Figure(data=[*_moving(go, scene, int(chosen[0])), *fixed])
+    every = np.concatenate([scene.corners(int(k)) for k in chosen] + [e.reshape(-1, 3) for _, _, e in scene.lines])
+    spans = np.ptp(every, axis=0)
+    axes = {
+        f"{a}axis": {"visible": False, "range": [float(every[:, i].min()), float(every[:, i].max())]}
+        for i, a in enumerate("xyz")
+    }
+    x, y, z = scene.up
+    figure.update_layout(
+        title=scene.title,
+        height=620,
+        scene={
+            **axes,
+            "aspectmode": "manual",
+            "aspectratio": {a: float(s / spans.max()) + 1e-3 for a, s in zip("xyz", spans)},
+            "camera": {"up": {"x": x, "y": y, "z": z}, "eye": {"x": 0.7, "y": 0.4, "z": 0.9}},
+        },
+        margin={"l": 10, "r": 30, "t": 80, "b": 40},
+        legend={"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom"},
+    )
+    if chosen.size > 1:
+        moving = list(range(len(figure.data) - len(fixed)))
+        figure.frames = [
+            go.Frame(data=_moving(go, scene, int(k)), traces=moving, name=f"{scene.value[k]:.5g}") for k in chosen
+        ]
+        _controls(figure, scene)
+    return figure
+
+
+def _moving(go: Any, scene: Scene, instant: int) -> list:
+    traces = []
+    for part in scene.parts:
+        mesh = part.placed(instant)
+        x, y, z = mesh.vertices.T
+        i, j, k = mesh.triangles.T
+        shape = {"x": x, "y": y, "z": z, "i": i, "j": j, "k": k, "flatshading": True, "lighting": LIGHT}
+        shape["opacity"] = part.opacity
+        traces.append(go.Mesh3d(**shape, color=part.colour, name=part.name, showlegend=True, hoverinfo="name"))
+        traces.append(_line(go, part.name, "#222222", feature_edges(mesh), legend=False))
+    if scene.forces:
+        rows = scene.forces[instant]
+        ends = np.stack([rows[:, 0], rows[:, 0] + scene.force_scale * rows[:, 1]], axis=1)
+        traces.append(_line(go, "force on driven", VERMILLION, ends, width=6))
+    return traces
+
+
+def _line(go: Any, name: str, colour: str, ends: np.ndarray, width: float = 2.0, legend: bool = True) -> Any:
+    """Return separate strokes as one trace; rows of NaN part them."""
+    broken = np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1).reshape(-1, 3)
+    x, y, z = broken.T
+    style = {"color": colour, "width": width}
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=style, name=name, showlegend=legend, hoverinfo="name")
+
+
+def _controls(figure: Any, scene: Scene) -> None:
+    timing = {"frame": {"duration": 60, "redraw": True}, "transition": {"duration": 0}, "fromcurrent": True}
+    pause = {"frame": {"duration": 0, "redraw": False}, "mode": "immediate", "transition": {"duration": 0}}
+    steps = [
+        {"label": f.name, "method": "animate", "args": [[f.name], {**pause, "frame": {"duration": 0, "redraw": True}}]}
+        for f in figure.frames
+    ]
+    shown = {"prefix": f"{scene.label} ", "suffix": f" {scene.unit}"}
+    figure.update_layout(
+        updatemenus=[
+            {
+                "type": "buttons",
+                "direction": "left",
+                "x": 0.0,
+                "y": 0.0,
+                "buttons": [
+                    {"label": "Play", "method": "animate", "args": [None, timing]},
+                    {"label": "Pause", "method": "animate", "args": [[None], pause]},
+                ],
+            }
+        ],
+        sliders=[{"steps": steps, "currentvalue": shown, "x": 0.15, "len": 0.85}],
+    )

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from gearmbs.gears import GearPair, PlanetarySet
-from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism import Mechanism, ModalBody
 from gearmbs.progress import waiting
-from gearmbs.signals import PlanetaryReport
-from gearmbs.view.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, VERMILLION, label, look, new_figure
+from gearmbs.view.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE
 from gearmbs.view.geometry.mesh import Mesh, ball, body_mesh, box, cylinder, joined
 from gearmbs.view.geometry.solid import pair_solids
 from gearmbs.view.scenes.motion import (
@@ -25,12 +23,11 @@ from gearmbs.view.scenes.motion import (
     mechanism_of,
     static_motion,
 )
-from gearmbs.view.scenes.scene import Part, Scene
-from gearmbs.view.scenes.solids import UP, Bending, bodies_bent
+from gearmbs.view.scenes.scene import UP, Deflection, Part, Scene
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
-    from gearmbs.mechanism import Mechanism
+
 
 TOLERANCE = 8e-6
 """Chords of the drawn profile, m; finer than a pixel."""
@@ -327,7 +324,7 @@ def _contact_forces(solution: Solution, chosen: np.ndarray) -> list[np.ndarray]:
     return [np.array(rows).reshape(-1, 2, 3) for rows in total] if any(total) else []
 
 
-# Planetary sets: the scene, and the energy over a turn of each part that tells faulty teeth.
+# Planetary sets.
 
 
 PART_COLOURS = {"sun": BLUE, "planet": ORANGE, "ring": GREEN, "carrier": SHAFT}
@@ -374,40 +371,56 @@ def carrier_mesh(gears: PlanetarySet) -> Mesh:
     return joined(pieces)
 
 
-def planetary_plot(report: PlanetaryReport, channel: str | None = None, *, title: str | None = None) -> Figure:
-    """Draw the energy over a turn of sun, planet and ring, tooth by tooth; the parts that are named stand out.
+# Bodies that deform as parts of a scene: their surfaces, bent by modal coordinates and a factor.
+
+
+SHOWN = 0.1
+"""Largest deflection drawn by default, as a part of the body's size."""
+
+
+@dataclass(frozen=True)
+class Bending:
+    """Meshes and deflections of bodies by name, and what the title of a scene says of them."""
+
+    parts: dict[str, tuple[Mesh, Deflection]] = field(default_factory=dict)
+    remark: str = ""
+
+
+def bodies_bent(mechanism: Mechanism, coordinates: Mapping[str, np.ndarray], factor: float | None) -> Bending:
+    """Return what is drawn of the modal bodies of a mechanism.
 
     Parameters
     ----------
-    report : PlanetaryReport
-        From `gearmbs.signals.diagnose_planetary`.
-    channel : str, optional
-        Default the first.
-    title : str, optional
+    mechanism : Mechanism
+    coordinates : mapping of body name to ndarray, shape (instants, n)
+        Modal coordinates.
+    factor : float, optional
+        Deflections are drawn that many times as large; default such that the largest is a tenth of its body's size. All
+        bodies have the same, so that what touches keeps touching as far as it can.
 
     Raises
     ------
     ValueError
-        If there is no such channel.
+        If the factor is not a finite number from 0 on.
     """
-    names = list(dict.fromkeys(f.channel for f in report.findings))
-    if channel is not None and channel not in names:
-        raise ValueError(f"channel: there is no {channel!r}; choose one of {', '.join(names)}")
-    kept = [f for f in report.findings if f.channel == (channel or names[0])]
-    with look():
-        figure = new_figure(7.0, 2.0 * len(kept))
-        axes = figure.subplots(len(kept), 1)
-        for ax, finding in zip(np.ravel(axes), kept):
-            teeth = np.arange(finding.profile.size) * _teeth(report, finding.part) / finding.profile.size
-            colour = BLUE if finding.grade == "none" else VERMILLION
-            ax.bar(teeth, finding.profile, width=0.9 * (teeth[1] - teeth[0]), align="edge", color=colour)
-            ax.axhline(1.0, color=GREY, linewidth=0.8)
-            ax.set_title(f"{finding.part}: {finding.found:.2f} Hz, {finding.grade}", loc="left")
-            ax.set_ylabel("energy by mean")
-        np.ravel(axes)[-1].set_xlabel(label("tooth of the part, from where the record begins", ""))
-        figure.suptitle(title or report.source)
-    return figure
-
-
-def _teeth(report: PlanetaryReport, part: str) -> int:
-    return dict(zip(("sun", "planet", "ring"), report.lines.teeth))[part]
+    if factor is not None and not (np.isfinite(factor) and factor >= 0.0):
+        raise ValueError(f"factor is {factor}; give a finite number, 1 for deflections as they are, or None")
+    found: dict[str, tuple[Mesh, Deflection]] = {}
+    largest = 0.0
+    for name, q in coordinates.items():
+        body = mechanism.bodies[name]
+        assert isinstance(body, ModalBody)
+        surface = body.surface() if body.surface is not None else None
+        if surface is None:
+            continue
+        bend = Deflection(surface.moved - body.mean[:, None], np.asarray(q, dtype=float))
+        found[name] = (Mesh(surface.vertices, surface.triangles), bend)
+        size = float(np.ptp(surface.vertices, axis=0).max())
+        least = bend.reduced()
+        far = max((float(np.linalg.norm(least.at(k), axis=1).max()) for k in range(len(q))), default=0.0)
+        largest = max(largest, far / size)
+    if not found or largest == 0.0:
+        return Bending(found)
+    times = SHOWN / largest if factor is None else factor
+    scaled = {n: (mesh, Deflection(b.shapes, times * b.coordinates)) for n, (mesh, b) in found.items()}
+    return Bending(scaled, "" if times == 1.0 else f", deflections {times:.3g} times")

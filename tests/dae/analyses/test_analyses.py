@@ -363,8 +363,8 @@ END
 
 def test_script_with_statics_then_dynamics_and_modes():
     from gearmbs.adams import parse_deck, parse_script
-    from gearmbs.adams.results.msg import message_text
-    from gearmbs.adams.run.runner import run_deck
+    from gearmbs.adams.results.result import message_text
+    from gearmbs.adams.runner import run_deck
 
     commands = "model\nout\nSIMULATE/STATICS\nLINEAR/EIGENSOL\nSIMULATE/DYNAMICS, END=1, STEPS=4\nSTOP\n"
     result = run_deck(parse_deck(DECK), parse_script(commands))

@@ -19,7 +19,7 @@ from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.results.record import Segment
 from gearmbs.adams.results.requests import RequestEvaluator
-from gearmbs.adams.run.session import Session
+from gearmbs.adams.session import Session
 from gearmbs.dae.analyses.statics import quasi_static
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.language.syntax import Number, parse

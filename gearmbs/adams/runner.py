@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from gearmbs.adams.analysis import failed, linear, simulate
 from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -14,9 +15,7 @@ from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simula
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import read_deck
 from gearmbs.adams.results.result import AdamsResult
-from gearmbs.adams.run.analysis import failed, linear, simulate
-from gearmbs.adams.run.script_check import check_script
-from gearmbs.adams.run.session import Session, change, switch
+from gearmbs.adams.session import Session, change, check_script, switch
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.problem import ModelError
 
@@ -63,7 +62,7 @@ def run_deck(
         (SFOSUB, ...); each takes a `gearmbs.adams.RoutineCall`.
     check : bool, optional
         Whether dynamic analyses are solved again at a hundredth of their error, and remarked if parts then go other
-        ways; without it those are for which this takes about a second, see `gearmbs.adams.run.convergence.CHEAP`.
+        ways; without it those are for which this takes about a second, see `gearmbs.adams.results.remarks.CHEAP`.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The meshing teeth seen along the axis, with contact points and forces."""
+"""Flat drawings: teeth in mesh seen along the axis, with contact points and forces; a wheel; a mechanism as a graph."""
 
 from __future__ import annotations
 

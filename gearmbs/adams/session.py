@@ -1,40 +1,226 @@
-"""Go through a script without computing anything, so that its mistakes show before a long run: ``check_script``."""
+"""What a script changes, and its mistakes found before a long run.
+
+The deck, which elements act, the state analyses go on from, and the time are a `Session`; `check_script` goes through a
+script without computing anything.
+"""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.flexible import SHARE, modal_ratios
-from gearmbs.adams.builders.functions import IN_DYNAMICS, Present, translated
 from gearmbs.adams.builders.mechanism import build_model
-from gearmbs.adams.builders.scopes import deck_scope, markers_of
+from gearmbs.adams.builders.scopes import IN_DYNAMICS, BodyState, deck_scope, markers_of, translated
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch
-from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.check import check, refused_arguments
+from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch, apply_change
+from gearmbs.adams.parse.deck import READ_IN_DECKS, Deck, left_out, needed_by, read_variables, refused_functions
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.adams.parse.readers import READ_IN_DECKS, left_out, needed_by, read_variables
-from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch, unsupported
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME, ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Call, Number, Scope, parse, shown, walk
+
+MOST_OUTPUTS = 10_000_000
+"""Output steps of an analysis: more would not fit into memory."""
+
+INTO_OTHERS = (st.Variable, st.Diff)
+"""Statements whose expressions are written into those of others, with what is wrong there: they come first."""
+
+
+SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")
+"""Analyses that need no span of time."""
+
+
+@dataclass
+class Session:
+    """What changes while a script is carried out.
+
+    Attributes
+    ----------
+    deck : Deck
+        As commands have left it.
+    inactive : set of (statement name, id)
+    state, states, turns
+        Where the last analysis ended: parts by statement name and id, DIFFs by id, counted angles; ``state`` is None
+        before the first.
+    time : float
+        In the deck's unit.
+    places : dict
+        (statement class, id, argument) -> (file, line) of the command that gave it.
+    sensed : dict of int to float
+        What sensors have evaluated, by id.
+    pending : dict
+        Of GSEs by id: number of the next sample and the discrete states from then on.
+    tol : float or None
+        Local error instead of INTEGRATOR's ERROR.
+    allow_unsupported : bool
+        Whether what is not supported is left out.
+    progress : bool, callable or None
+        As in :func:`gearmbs.mechanism.simulate`.
+    redundancy : str
+        Which redundant rows are kept, see `gearmbs.mechanism.checks`.
+    check : bool or None
+        Whether dynamic analyses are solved again with a smaller error; None: if that costs little.
+    interrupted : bool
+        Whether somebody interrupted such a second solution: the run is to end where the first has.
+    unasked : set of int
+        REQUESTs that are left out with what they ask for, by id.
+    """
+
+    deck: Deck
+    inactive: set[tuple[str, int]] = field(default_factory=set)
+    state: dict[tuple[str, int], BodyState] | None = None
+    states: dict[str, float] = field(default_factory=dict)
+    turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
+    time: float = 0.0
+    places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
+    sensed: dict[int, float] = field(default_factory=dict)
+    pending: dict[int, tuple[int, tuple[float, ...]]] = field(default_factory=dict)
+    tol: float | None = None
+    allow_unsupported: bool = False
+    progress: bool | Callable[[float], None] | None = None
+    redundancy: str = "adams"
+    check: bool | None = None
+    interrupted: bool = False
+    unasked: set[int] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, deck: Deck) -> Session:
+        """Return the start of a session; what it changes leaves ``deck`` as it is."""
+        return cls(replace(deck, items={kind: dict(group) for kind, group in deck.items.items()}))
+
+
+def active_sensors(session: Session) -> list[st.Sensor]:
+    """Return the sensors that watch."""
+    return [s for s in session.deck.of(st.Sensor).values() if ("SENSOR", s.id) not in session.inactive]
+
+
+def unsupported(command: Any, message: str) -> DeckError:
+    """Return the error that a command is not supported."""
+    return DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line)])
+
+
+def switch(session: Session, command: Switch) -> None:
+    """Activate or deactivate an element, or all elements of its kind within a range of ids.
+
+    Of a kind that is not supported nothing acts: to switch it changes nothing, whether or not it is left out.
+
+    Raises
+    ------
+    DeckError
+        If the deck does not have it.
+    """
+    keyword, number = command.element or "", command.id or 0
+    if keyword in st.UNSUPPORTED or (keyword, number) in session.deck.left_out:
+        return
+    there = session.deck.of(st.STATEMENTS[keyword])
+    low, high = command.range or (number, number)
+    numbers = [n for n in there if low <= n <= high]
+    if not numbers and not any(name == keyword and low <= n <= high for name, n in session.deck.left_out):
+        label = f"{keyword}/{number}" if number else keyword
+        label += f" from {low} to {high}" if command.range else ""
+        raise DeckError([Diagnostic(ERROR, f"there is no {label} in the deck", command.file, command.line)])
+    for n in numbers:
+        (session.inactive.discard if command.on else session.inactive.add)((keyword, n))
+
+
+def change(session: Session, command: Change, allow_unsupported: bool) -> None:
+    """Put a command's arguments into the session's deck.
+
+    Raises
+    ------
+    DeckError
+        If there is nothing to change, or the deck does not hold together with the new arguments.
+    """
+    new = command.statement
+    assert new is not None
+    if (new.keyword, new.id) in session.deck.left_out:
+        return
+    functions = [message for _, message in refused_functions(new, tuple(new.given))]
+    if functions and not allow_unsupported:
+        raise DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line) for message in functions])
+    if functions:
+        for message in functions:
+            _remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
+        return
+    late = {name for name in new.given if specs_of(type(new))[name].start}
+    if late and session.state is not None and not allow_unsupported:
+        what = ", ".join(sorted(name.upper() for name in late))
+        raise unsupported(
+            command,
+            f"{new.label()}: {what} after the first analysis; the mechanism goes on from where it is",
+        )
+    refused = refused_arguments(new)
+    if refused and not allow_unsupported:
+        raise unsupported(command, f"{new.label()}: {', '.join(refused).upper()} is not supported")
+    group = session.deck.items.setdefault(type(new), {})
+    old = group.get(new.id)
+    if old is None:
+        if new.id:
+            message = f"there is no {new.label()} to change"
+            raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+        group[0] = new
+    else:
+        group[new.id] = apply_change(old, new)
+    session.deck.__dict__.pop("units", None)
+    trial = replace(session.deck, diagnostics=[])
+    wrong = check(trial)
+    if wrong:
+        # the deck stays as it was
+        if old is None:
+            del group[new.id]
+        else:
+            group[new.id] = old
+        session.deck.__dict__.pop("units", None)
+        raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
+    session.places.update({(type(new), new.id, name): (command.file, line) for name, line in new.given.items()})
+
+
+def _remark(session: Session, remark: Diagnostic) -> None:
+    if remark not in session.deck.diagnostics:
+        session.deck.diagnostics.append(remark)
+
+
+def output_times(session: Session, command: Simulate) -> np.ndarray:
+    """Return the output times in the deck's unit.
+
+    Raises
+    ------
+    DeckError
+        If the analysis would end before it starts.
+    """
+    end = command.end if command.end is not None else session.time + (command.duration or 0.0)
+    if not end > session.time:
+        message = f"END = {end}, but the model is at time {session.time} already"
+        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+    span = end - session.time
+    asked = (command.steps or 100) if command.dtout is None else span / command.dtout
+    if asked > MOST_OUTPUTS:
+        message = f"{asked:.3g} output steps are asked for; more than {MOST_OUTPUTS:.0e} are not kept: give fewer"
+        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+    if command.dtout is None:
+        return session.time + span * np.arange((command.steps or 100) + 1) / (command.steps or 100)
+    count = int(np.floor(span / command.dtout * (1.0 + 1e-12) + 1e-9))
+    times = session.time + command.dtout * np.arange(count + 1)
+    return times if end - times[-1] < 1e-9 * command.dtout else np.append(times, end)
+
 
 # Check all expressions of a deck: that they can be read, and that what they name is there.
 
 
 SOME_MODE = np.array([17.3]), np.array([7.0])
 """A frequency and a number with which CRATIO is tried, before the file with those of the modes is read."""
-INTO_OTHERS = (st.Variable, st.Diff)
-"""Statements whose expressions are written into those of others, with what is wrong there: they come first."""
 
 
-def expression_errors(deck: Deck, session: Session, scope: Scope, present: Present = IN_DYNAMICS) -> list[Diagnostic]:
+def expression_errors(deck: Deck, session: Session, scope: Scope) -> list[Diagnostic]:
     """Return every expression of the active statements that is not understood, with the line that gave it.
 
     Nothing is compiled or evaluated. What a VARIABLE asks for that is not there is only remarked, in the session's
@@ -47,7 +233,6 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
         Which statements are active, and where commands have changed them.
     scope : Scope
         What expressions may name: `gearmbs.adams.builders.scopes.deck_scope`, or that of a mechanism.
-    present : Present
     """
     found = []
     read, absent = read_variables(deck), left_out(deck)
@@ -66,7 +251,7 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
                 continue
             unread, said = False, ""
             try:
-                what = _wrong(deck, statement, text, scope, present)
+                what = _wrong(deck, statement, text, scope)
             except ExpressionError as error:
                 unread = isinstance(error, NotEvaluatedError) and statement.id not in read
                 unread = unread and isinstance(statement, st.Variable)
@@ -82,9 +267,7 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
             message = f"{statement.label()}: {spec.keyword}: {what}"
             if unread:
                 message += "; nothing that is computed here reads it, so it is left out"
-                remark = Diagnostic(WARNING, message, file, line)
-                if remark not in session.deck.diagnostics:
-                    session.deck.diagnostics.append(remark)
+                _remark(session, Diagnostic(WARNING, message, file, line))
                 continue
             told |= {what, said}
             found.append(Diagnostic(ERROR, message, file, line))
@@ -112,9 +295,7 @@ def _leave_out(session: Session, request: st.Request, need: str) -> None:
     """Say that a REQUEST is left out with what it asks for."""
     session.unasked.add(request.id)
     message = f"{request.label()}: it needs {need}, which is left out"
-    remark = Diagnostic(UNSUPPORTED, message, session.deck.file, request.line)
-    if remark not in session.deck.diagnostics:
-        session.deck.diagnostics.append(remark)
+    _remark(session, Diagnostic(UNSUPPORTED, message, session.deck.file, request.line))
 
 
 def _absent_data(deck: Deck, text: str) -> str:
@@ -129,7 +310,7 @@ def _absent_data(deck: Deck, text: str) -> str:
     return ""
 
 
-def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope, present: Present) -> str:
+def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope) -> str:
     """Return why an expression does not do for its statement, "" when it does.
 
     Raises
@@ -146,7 +327,7 @@ def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope, present
     if isinstance(statement, st.FeLoad):
         text = SHARE.sub("(0.5)", text)
     placed = not isinstance(statement, (st.Motion, st.Gcon))
-    tape = compile_expression(translated(deck, present, text), scope, accelerations=placed, outline=True)
+    tape = compile_expression(translated(deck, IN_DYNAMICS, text), scope, accelerations=placed, outline=True)
     return _misplaced(statement, text, tape)
 
 
@@ -156,10 +337,6 @@ def _misplaced(statement: st.Statement, text: str, tape: Tape) -> str:
     if isinstance(statement, st.Gcon) and not tape.second_order:
         return f"{text!r} must depend on positions and TIME only; velocities and forces cannot enter a constraint"
     return ""
-
-
-SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")
-"""Analyses that need no span of time."""
 
 
 def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) -> set[int]:

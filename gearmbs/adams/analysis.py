@@ -1,43 +1,32 @@
-"""One analysis of a deck: SIMULATE in parts between sensors, and LINEAR."""
+"""One analysis of a deck: SIMULATE in parts between sensors, and LINEAR; and what its results show of it."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.builders.functions import MODES, Present
 from gearmbs.adams.builders.mechanism import build_model, part_states, with_initial_motions
-from gearmbs.adams.builders.scopes import AdamsModel, hold_states
+from gearmbs.adams.builders.scopes import MODES, AdamsModel, Present, hold_states
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Linear, Simulate
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.results.record import NEWTON, Segment
-from gearmbs.adams.results.remarks import faceted_touches
+from gearmbs.adams.results.remarks import Doubt, assembly_of, doubt, faceted_touches, off_the_end, tracks_of
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
-from gearmbs.adams.run.convergence import Doubt, doubt
-from gearmbs.adams.run.script_check import check_linear, is_sequence
-from gearmbs.adams.run.sensors import (
-    Watch,
-    act,
-    after,
-    equilibria_to_passage,
-    in_unit,
-    parts,
-    renew,
-    take_samples,
-    up_to,
-)
-from gearmbs.adams.run.session import Session, active_sensors, kept_until, output_times, segment_of
+from gearmbs.adams.sensors import Watch, act, after, equilibria_to_passage, in_unit, parts, renew, take_samples, up_to
+from gearmbs.adams.session import Session, active_sensors, check_linear, is_sequence, output_times
 from gearmbs.dae.analyses import plant as _plant
 from gearmbs.dae.analyses.kinematics import kinematic
 from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult, initial_conditions, quasi_static, static_equilibrium
+from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError
@@ -47,10 +36,6 @@ from gearmbs.mechanism.checks import singular_passage
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.solve.analyses import frozen_friction, linear_modes
 from gearmbs.mechanism.solve.simulate import StopAt
-
-if TYPE_CHECKING:
-    from gearmbs.adams.builders.scopes import AdamsModel
-    from gearmbs.dae.model.system import System
 
 DEFAULT_TOLERANCE = 1e-8
 """Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""
@@ -422,3 +407,52 @@ def _variables(deck: Deck, kind: type[st.Plant], number: int | None, command: Co
         raise DeckError([Diagnostic(ERROR, f"LINEAR/STATEMAT: {message}", command.file, command.line)])
     plant = there[number if number is not None else next(iter(there))]
     return [deck.of(st.Variable)[v] for v in plant.variables]
+
+
+# From the solution of an analysis to what its results show: ``segment_of``, ``kept_until``.
+
+
+def segment_of(
+    session: Session,
+    command: Simulate,
+    kind: str,
+    model: AdamsModel,
+    solution: Solution,
+    options: dict[str, Any],
+    note: str | None,
+    equilibrium: StaticResult | None = None,
+) -> tuple[Segment, RequestEvaluator]:
+    """Return an analysis with its requests, forces, tracks and variables, and what evaluates more of it.
+
+    Raises
+    ------
+    DeckError
+        If a REQUEST cannot be evaluated.
+    """
+    evaluator = RequestEvaluator(model, solution)
+    segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
+    if kind != "STATICS":
+        segment.assembly = assembly_of(model, solution)
+    for request in session.deck.of(st.Request).values():
+        try:
+            segment.requests[request.id] = evaluator.request(request)
+        except ExpressionError as error:
+            raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
+    for kind_id in model.pairs:
+        segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
+    segment.tracks = tracks_of(model, solution)
+    segment.variables = evaluator.variables()
+    segment.note = "\n".join(filter(None, [note, *off_the_end(model, solution)])) or None
+    return segment, evaluator
+
+
+def kept_until(
+    session: Session, command: Simulate, kind: str, model: AdamsModel | None, error: Exception, options: dict[str, Any]
+) -> Segment | None:
+    """Return what an analysis computed before a routine of the user failed in it, None where there is nothing."""
+    solution = getattr(error, "solution", None)
+    if model is None or solution is None or solution.t.size == 0:
+        return None
+    with contextlib.suppress(ModelError, DeckError, ArithmeticError):
+        return segment_of(session, command, kind, model, solution, options, None)[0]
+    return None
