@@ -323,7 +323,8 @@ class _Compiler:
         names = list(self.mechanism.joints)
         before = sum(len(self.mechanism.joints[n].rows) for n in names[: names.index(joint.name)])
         first = self.offsets()["lambda"] + before
-        bodies = {self.body_index[id(m.body)] for row in joint.rows for t in row.terms for m in (t.i, t.j)} - {0}
+        own = self.builder.marker_body
+        bodies = {own[self.index(m)] for row in joint.rows for t in row.terms for m in (t.i, t.j)} - {0}
         self.builder.add_force(
             T.REACTION,
             self.index(joint.i),
@@ -351,7 +352,7 @@ class _Compiler:
             at, n_bodies, n_unknowns = self.builder.tape_rows[-1][T.TAPE_BODIES : T.TAPE_ADDRESS]
             unknowns.extend(self.builder.extra_i[at + n_bodies : at + n_bodies + n_unknowns])
         directions = [load.i, load.j] if load.mode == el.LINE else [load.rm]
-        bodies.extend(self.body_index[id(marker.body)] for marker in directions)
+        bodies.extend(self.builder.marker_body[self.index(marker)] for marker in directions)
         self.builder.add_force(
             T.EXPRESSION,
             self.index(load.i),
