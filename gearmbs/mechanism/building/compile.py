@@ -125,14 +125,15 @@ class _Compiler:
     def add_bodies(self) -> None:
         for body in self.mechanism.bodies.values():
             modal = body.modal if isinstance(body, ModalBody) else None
-            self.body_index[id(body)] = self.builder.add_body(body.mass, body.inertia, modal)
+            self.body_index[id(body)] = self.builder.add_body(
+                body.mass, body.inertia, modal, kind=body.kind, numbers=body.numbers
+            )
 
     def index_all_markers(self) -> None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
             for marker in body.markers:
-                shape = body.shape_at(marker) if isinstance(body, ModalBody) else None
                 self.marker_index[id(marker)] = self.builder.add_marker(
-                    self.body_index[id(body)], marker.position - body.com, marker.orientation, shape
+                    self.body_index[id(body)], marker.position - body.com, marker.orientation, body.shape_at(marker)
                 )
                 self.marker_names.append(marker.name)
 
@@ -274,6 +275,7 @@ class _Compiler:
         """Offsets of the blocks of y; the numbers of rows, elements and states are known before they are added."""
         m = self.mechanism
         counts = Counts(
+            angles=tuple(kind.angles for kind in self.builder.kinds[1:]),
             modes=tuple(self.builder.modes[1:]),
             rows=sum(len(j.rows) for j in m.joints.values()) + len(m.constraints),
             forces=sum(e.wrenches * e.has_force for e in m.elements.values()) + len(self.measured),
