@@ -249,7 +249,7 @@ class Builder:
             hold(self.mechanism, body, "planar")
 
     def add_point_mass(self, s: st.PointMass) -> None:
-        """POINT_MASS: a body of any inertia that does not turn."""
+        """POINT_MASS."""
         name = self.claim(s, "point_mass")
         units = self.units
         cm = self.deck.of(st.Marker).get(s.cm or 0)
@@ -258,18 +258,15 @@ class Builder:
         if start is None:
             velocity = units.factor("velocity") * np.array([s.vx, s.vy, s.vz])
             start = BodyState(units.length * np.array(s.qg), part_orientation(s), velocity, np.zeros(3))
-        mass = units.mass * s.mass
-        body = self.mechanism.body(
+        body = self.mechanism.point_mass(
             name,
-            mass,
-            (mass, mass, mass),
-            com=com,
-            position=start.position,
-            orientation=start.orientation,
+            units.mass * s.mass,
+            at=start.position,
             velocity=start.velocity,
+            com=com,
+            orientation=start.orientation,
         )
         self.model.sources[body.name] = s
-        hold(self.mechanism, body, "orientation")
 
     def direction(
         self, ref: int | None, part: st.Part | st.FlexBody, axes: np.ndarray, cm: st.Marker | None

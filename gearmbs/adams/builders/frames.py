@@ -74,10 +74,7 @@ def inertia_about_cm(part: st.Part, cm: st.Marker, im: st.Marker) -> np.ndarray:
     return tensor - part.mass * ((d @ d) * np.eye(3) - np.outer(d, d))
 
 
-# Bodies with fewer than six freedoms: PART with PLANAR, POINT_MASS; constraints of the deck's own kind hold them.
-#
-# A planar part keeps the plane it starts in, parallel to xy of the ground; a point mass keeps its orientation, so that
-# its moments of inertia have no effect.
+# PART with PLANAR: it keeps the plane it starts in, parallel to xy of the ground, by a joint.
 
 
 def hold(mechanism: Mechanism, body: Body, kind: str, normal: int = 2) -> None:
