@@ -28,6 +28,7 @@ from .parts.joints import Joint as Joint
 from .parts.modal import ModalBody as ModalBody
 from .parts.modal import Mode as Mode
 from .parts.modal import ShapeIntegrals as ShapeIntegrals
+from .parts.point_mass import PointMass as PointMass
 from .solve.analyses import kinematic as kinematic
 from .solve.analyses import linear_modes as linear_modes
 from .solve.analyses import quasi_static as quasi_static

@@ -49,7 +49,8 @@ def locked_bodies(mechanism: Mechanism, system: System) -> list[str]:
     free = right[rank:].T
     if not np.all(np.isfinite(free)):
         return []
-    still = [name for k, name in enumerate(names) if not np.any(np.abs(free[6 * k : 6 * k + 6]) > STILL)]
+    places = [slice(6 * k, 6 * k + 3 + kind.angles) for k, kind in enumerate(system.model.kinds[1:])]
+    still = [name for name, place in zip(names, places) if not np.any(np.abs(free[place]) > STILL)]
     return [name for name in still if name not in _fixed_to_ground(mechanism)]
 
 

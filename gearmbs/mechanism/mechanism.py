@@ -23,6 +23,7 @@ from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
+from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
 
 E = TypeVar("E", bound=ForceElement)
@@ -126,9 +127,47 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         ModelError
             For a name in use, a negative mass, an impossible inertia or a malformed vector.
         """
-        if name in self.bodies or name == "ground":
-            raise ModelError(f"body '{name}': the name is in use; choose another")
+        self._check_body_name(name)
         body = make_body(name, mass, inertia, com, position, orientation, velocity, angular_velocity)
+        self.bodies[name] = body
+        return body
+
+    @keeps_given
+    def point_mass(
+        self,
+        name: str,
+        mass: float,
+        *,
+        at: Vector = (0.0, 0.0, 0.0),
+        velocity: Vector = (0.0, 0.0, 0.0),
+        com: Vector = (0.0, 0.0, 0.0),
+        orientation: npt.ArrayLike | None = None,
+    ) -> PointMass:
+        """Add a point mass: a body with three coordinates, which moves and does not turn (ADAMS's POINT_MASS).
+
+        Forces act at its markers; joints hold its place: spherical, at_point, inline, inplane, distance. Those that
+        hold an orientation, and loads with torques, need a body with an inertia.
+
+        Parameters
+        ----------
+        name : str
+            Unique in the mechanism.
+        mass : float
+            kg, positive.
+        at, velocity : array_like
+            Of its frame at the start, global components, m and m/s.
+        com : array_like
+            Where the mass is in the frame, m.
+        orientation : array_like, optional
+            Axes of the frame, which stay: 3x3 matrix or 3-1-3 Euler angles in rad.
+
+        Raises
+        ------
+        ModelError
+            For a name in use, a mass that is not positive or a malformed vector.
+        """
+        self._check_body_name(name)
+        body = make_point_mass(name, mass, at, velocity, com, orientation)
         self.bodies[name] = body
         return body
 
@@ -238,6 +277,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
             if not isinstance(marker, Marker):
                 raise ModelError(f"{label}: {marker!r} is not a marker; make one with body.marker(...)")
             self._check_body(label, marker.body)
+            marker.body.check(element)
         self.elements[element.name] = element
         return element
 
@@ -449,18 +489,25 @@ class Mechanism(JointMethods, LoadMethods, Shown):
 
     # --- checks -----------------------------------------------------------------------------------
 
+    def _check_body_name(self, name: str) -> None:
+        if name in self.bodies or name == "ground":
+            raise ModelError(f"body '{name}': the name is in use; choose another")
+
     def _add_load(self, load: Load) -> Load:
         self._check_name(load.name)
         for marker in (load.i, load.j, load.rm):
             if not isinstance(marker, Marker):
                 raise ModelError(f"load '{load.name}': {marker!r} is not a marker; make one with body.marker(...)")
             self._check_body(f"load '{load.name}'", marker.body)
+        for marker in load.markers:
+            marker.body.check(load)
         self.elements[load.name] = load
         return load
 
     def __repr__(self) -> str:
         rows = sum(len(joint.rows) for joint in self.joints.values())
-        lines = [f"Mechanism({self.name!r}: {6 * len(self.bodies)} coordinates, {rows} constraint rows)"]
+        coordinates = sum(body.coordinates for body in self.bodies.values())
+        lines = [f"Mechanism({self.name!r}: {coordinates} coordinates, {rows} constraint rows)"]
         for part in (*self.bodies.values(), *self.joints.values(), *self.elements.values()):
             lines.append(f"  {part!r}")
         return "\n".join(lines)

@@ -254,7 +254,7 @@ class Builder:
             hold(self.mechanism, body, "planar")
 
     def add_point_mass(self, s: st.PointMass) -> None:
-        """POINT_MASS: a body of any inertia that does not turn."""
+        """POINT_MASS."""
         name = self.claim(s, "point_mass")
         units = self.units
         cm = self.deck.of(st.Marker).get(s.cm or 0)
@@ -263,18 +263,15 @@ class Builder:
         if start is None:
             velocity = units.factor("velocity") * np.array([s.vx, s.vy, s.vz])
             start = BodyState(units.length * np.array(s.qg), part_orientation(s), velocity, np.zeros(3))
-        mass = units.mass * s.mass
-        body = self.mechanism.body(
+        body = self.mechanism.point_mass(
             name,
-            mass,
-            (mass, mass, mass),
-            com=com,
-            position=start.position,
-            orientation=start.orientation,
+            units.mass * s.mass,
+            at=start.position,
             velocity=start.velocity,
+            com=com,
+            orientation=start.orientation,
         )
         self.model.sources[body.name] = s
-        hold(self.mechanism, body, "orientation")
 
     def direction(
         self, ref: int | None, part: st.Part | st.FlexBody, axes: np.ndarray, cm: st.Marker | None
@@ -427,10 +424,7 @@ def inertia_about_cm(part: st.Part, cm: st.Marker, im: st.Marker) -> np.ndarray:
     return tensor - part.mass * ((d @ d) * np.eye(3) - np.outer(d, d))
 
 
-# Bodies with fewer than six freedoms: PART with PLANAR, POINT_MASS; constraints of the deck's own kind hold them.
-#
-# A planar part keeps the plane it starts in, parallel to xy of the ground; a point mass keeps its orientation, so that
-# its moments of inertia have no effect.
+# PART with PLANAR: it keeps the plane it starts in, parallel to xy of the ground, by a joint.
 
 
 def hold(mechanism: Mechanism, body: Body, kind: str, normal: int = 2) -> None:

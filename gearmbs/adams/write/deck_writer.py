@@ -35,6 +35,7 @@ from gearmbs.mechanism.language.library import ELEMENT_FORCES
 from gearmbs.mechanism.language.syntax import Call, Name, Node, Number, parse, shown, unparse
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.parts.point_mass import PointMass
 
 # What a written deck asks for: REQUESTs, the files of results, the integrator.
 
@@ -283,6 +284,11 @@ def write_deck(
     return text
 
 
+def _owner(body: Body) -> str:
+    """Return the statement that a rigid body or a point mass is written as, which its markers name."""
+    return "POINT_MASS" if isinstance(body, PointMass) else "PART"
+
+
 class DeckWriter(DeckNames):
     """Writes the statements of a mechanism."""
 
@@ -331,7 +337,7 @@ class DeckWriter(DeckNames):
             )
         number_ = self._next_marker
         self._next_marker += 1
-        arguments = [f"PART = {self.bodies[id(body)]}"]
+        arguments = [f"{_owner(body)} = {self.bodies[id(body)]}"]
         if floating:
             arguments.append("FLOATING")
         else:
@@ -376,22 +382,22 @@ class DeckWriter(DeckNames):
             else:
                 self._part(body, n)
             for marker in body.markers:
-                arguments = [f"PART = {n}", *self._frame("QP", marker.position, marker.orientation)]
+                arguments = [f"{_owner(body)} = {n}", *self._frame("QP", marker.position, marker.orientation)]
                 self.statement(f"MARKER/{self.markers[id(marker)]}", arguments, marker.name)
 
     def _part(self, body: Body, n: int) -> None:
         units = self.units
         own = self._center(body)
         cm = self.centers[id(body)] = self.markers[id(own)] if own is not None else self._next_marker
-        i = body.inertia / units.factor("inertia")
-        inertia = [i[0, 0], i[1, 1], i[2, 2], -i[0, 1], -i[0, 2], -i[1, 2]]
-        if not any(inertia[3:]):
-            inertia = inertia[:3]
-        arguments = [f"MASS = {number(body.mass / units.mass)}", f"CM = {cm}", f"IP = {listed(inertia)}"]
-        self.statement(f"PART/{n}", [*arguments, *self._start(body)], body.name)
+        arguments = [f"MASS = {number(body.mass / units.mass)}", f"CM = {cm}"]
+        if not isinstance(body, PointMass):
+            i = body.inertia / units.factor("inertia")
+            inertia = [i[0, 0], i[1, 1], i[2, 2], -i[0, 1], -i[0, 2], -i[1, 2]]
+            arguments.append(f"IP = {listed(inertia if any(inertia[3:]) else inertia[:3])}")
+        self.statement(f"{_owner(body)}/{n}", [*arguments, *self._start(body)], body.name)
         if own is None:
             self._next_marker += 1
-            self.statement(f"MARKER/{cm}", [f"PART = {n}", *self._frame("QP", body.com, np.eye(3))])
+            self.statement(f"MARKER/{cm}", [f"{_owner(body)} = {n}", *self._frame("QP", body.com, np.eye(3))])
 
     def _start(self, body: Body) -> list[str]:
         """Return where a body starts, and the velocity of its centre of mass."""

@@ -163,8 +163,9 @@ def _free(instant: Instant, constraint: np.ndarray) -> np.ndarray:
     """Return a basis of the motions that constraints allow, lengths and angles weighed against each other."""
     arm = max(min(instant.system.length, 1.0), 1e-3)
     sizes = instant.system.model.modal_sizes[:, 0]
-    half = (constraint.shape[1] - sizes.size) // 2
-    weight = np.concatenate([np.ones(half), np.full(half, arm), arm / sizes])
+    moves = instant.at["theta"] - instant.at["R"]
+    turns = constraint.shape[1] - sizes.size - moves
+    weight = np.concatenate([np.ones(moves), np.full(turns, arm), arm / sizes])
     return allowed_motions(constraint / weight) / weight[:, None]
 
 

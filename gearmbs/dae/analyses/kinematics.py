@@ -104,7 +104,7 @@ class Instant:
         return Configuration.of(out, counts.bodies)
 
     def axes(self) -> np.ndarray:
-        """Return the axes of the Euler angles, shape (bodies, 3, 3): row k turns with angle k."""
+        """Return the axes of the Euler angles, shape (bodies, 3, 3): row k turns with angle k, zero without angles."""
         self.pose()
         kin = T.kinematics_in(self.idata, self.work)
         return kin[1 : len(self.system.model.bodies), KIN_AXES : KIN_AXES + 9].reshape(-1, 3, 3).copy()
@@ -114,7 +114,8 @@ class Instant:
         bodies, first = len(self.system.body_names), self.at["R"]
         angle, mode = self.at["theta"] - first, self.at["q_f"] - first
         moved = coordinates[:angle].reshape(bodies, 3, coordinates.shape[1])
-        angles = coordinates[angle:mode].reshape(bodies, 3, coordinates.shape[1])
+        angles, turning = np.zeros_like(moved), self.system.model.counts.turning
+        angles[turning] = coordinates[angle:mode].reshape(turning.size, 3, coordinates.shape[1])
         turned = np.einsum("bmc,bmk->bck", self.axes(), angles)
         return np.moveaxis(np.concatenate([moved, turned], axis=1), 2, 0)
 
@@ -258,7 +259,7 @@ class _Walk:
             if solver is None:
                 return f"the mechanism locks {where}: its constraints are dependent there, {name} among them"
             step = solver.solve(phi)
-            turn = np.abs(step[step.size // 2 :]).max(initial=0.0)
+            turn = np.abs(step[self.angles - self.q[0]]).max(initial=0.0)
             self.instant.y[self.q] -= step * min(1.0, 0.5 / max(turn, 1e-300))
             self.iterations += 1
             last = size

@@ -209,10 +209,9 @@ class Relaxation:
 
 def unbalanced_body(model: Model, row: int) -> str:
     """Return the name of the body that row ``row`` of the balance of forces belongs to."""
-    names, three = model.names.bodies, 3 * len(model.names.bodies)
-    if row < 2 * three:
-        return names[(row % three) // 3]
-    return names[int(np.repeat(np.arange(len(names)), model.modes[1:])[row - 2 * three])]
+    counts = model.counts
+    owners = [np.repeat(np.arange(counts.bodies), n) for n in (3, counts.angles, counts.modes)]
+    return model.names.bodies[int(np.concatenate(owners)[row])]
 
 
 def describe(shape: np.ndarray, names: list[str], length: float) -> tuple[str, str]:

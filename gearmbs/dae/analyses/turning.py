@@ -217,23 +217,25 @@ def _rate(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _axes(instant: Instant, y: np.ndarray) -> np.ndarray:
-    """Return B of each body, shape (bodies, 3, 3): its columns are the axes of the angles."""
+    """Return B of each body with angles, shape (turning, 3, 3): its columns are the axes of the angles."""
     instant.y = y
-    return np.swapaxes(instant.axes(), 1, 2)
+    return np.swapaxes(instant.axes()[instant.system.model.counts.turning], 1, 2)
 
 
 def angular_velocities(instant: Instant) -> np.ndarray:
     """Return the global angular velocities, rad/s, shape (bodies, 3)."""
-    bodies, y = len(instant.system.body_names), instant.y
-    zeta = y[instant.at["eps"] : instant.at["eps"] + 3 * bodies].reshape(bodies, 3)
-    return np.einsum("bck,bk->bc", _axes(instant, y), zeta)
+    counts, y = instant.system.model.counts, instant.y
+    zeta = y[instant.block("eps", "v_f")].reshape(-1, 3)
+    velocities = np.zeros((counts.bodies, 3))
+    velocities[counts.turning] = np.einsum("bck,bk->bc", _axes(instant, y), zeta)
+    return velocities
 
 
 def _moved(instant: Instant, y: np.ndarray, velocities: np.ndarray, time: float) -> np.ndarray:
     """Return y after every body has turned for a time about its angular velocity, by a Runge-Kutta step."""
-    bodies = velocities.shape[0]
-    angles = slice(instant.at["theta"], instant.at["theta"] + 3 * bodies)
-    rates = slice(instant.at["eps"], instant.at["eps"] + 3 * bodies)
+    angles = slice(instant.at["theta"], instant.at["q_f"])
+    rates = slice(instant.at["eps"], instant.at["v_f"])
+    velocities = velocities[instant.system.model.counts.turning]
     start = y[angles].copy()
 
     def rate(theta: np.ndarray) -> np.ndarray:

@@ -79,7 +79,7 @@ H_PF = 53
 H_VF = 54
 H_QF = 55
 H_COORDINATES = 56
-"""Number of coordinates: spatial displacements of the bodies, then modal coordinates."""
+"""Number of spatial displacements, six a body, and modal coordinates."""
 H_FRAMES = 57
 """Rows of the kinematics table: the bodies, then the elastic frames of modal bodies."""
 H_R_MODAL = 58
@@ -97,7 +97,8 @@ HEAD_OF_BLOCK = {
 """Where the header holds the offset of a block of y."""
 
 AT_U = 0
-"""Index in y of a body's first velocity; likewise the next four. Each is the first of three entries."""
+"""Index in y of a body's first velocity; likewise the next four. Each is the first of three entries; a body without
+Euler angles has no places for p, eps and theta."""
 AT_P = 1
 AT_EPS = 2
 AT_R = 3
@@ -119,8 +120,10 @@ AT_SHAPE = 12
 AT_PARTIAL = 13
 """Offset of an elastic frame's partial derivatives, or of a modal body's present state."""
 AT_MODAL = 14
-"""Offset of a modal body's integrals among the modal reals; -1 of a rigid body."""
-AT_COLUMNS = 15
+"""Offset of a modal body's integrals, or of a point mass's orientation, among the modal reals; -1 of a rigid body."""
+AT_ANGLES = 15
+"""Number of Euler angles of a body; without them it does not turn."""
+AT_COLUMNS = 16
 
 BODY_MASS = 0
 BODY_INERTIA = 1

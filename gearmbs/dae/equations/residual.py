@@ -25,16 +25,13 @@ import numpy as np
 from numba import types
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies.body import add_wrench, body_residual
 from gearmbs.dae.equations.bodies.frames import is_elastic, own_rate
-from gearmbs.dae.equations.bodies.inertia import modal_residual
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.constraints.terms import add_dot_term, add_point_term
 from gearmbs.dae.equations.kinematics.rotation import (
-    KIN_ADOT,
-    KIN_AXES,
     KIN_COLUMNS,
     KIN_FORCE,
-    KIN_H,
     KIN_MOMENT,
     KIN_R,
     KIN_SHIFT,
@@ -126,13 +123,7 @@ def add_wrenches(bodies, at, modal, kin, partial, scratch, out):
     for f in range(bodies, at.shape[0]):
         bring_to_body(f, at, modal, kin, partial, scratch, out)
     for b in range(1, bodies):
-        row, place = kin[b], at[b]
-        u, p, r, th = place[T.AT_U], place[T.AT_P], place[T.AT_R], place[T.AT_THETA]
-        for c in range(3):
-            out[u + c] += row[KIN_FORCE + c]
-            out[r + c] -= row[KIN_SHIFT + c]
-            out[p + c] += terms.dot3(row, KIN_AXES + 3 * c, row, KIN_MOMENT)
-            out[th + c] -= terms.dot3(row, KIN_AXES + 3 * c, row, KIN_TURN)
+        add_wrench(at[b], kin[b], out)
 
 
 @njit(types.UniTuple(F8, 2)(I8, F8, F8, F8, VEC, T.TABLES, VEC), cache=True, late=True, error_model="numpy")
@@ -241,17 +232,7 @@ def residual(t, y, yp, out, idata, rdata, work):
     update_tables(t, y, tab, False)
     begin_wrenches(tab.kin)
     for b in range(1, idata[T.H_BODIES]):
-        kin, at = tab.kin[b], tab.at[b]
-        u, p, e, r, th = at[T.AT_U], at[T.AT_P], at[T.AT_EPS], at[T.AT_R], at[T.AT_THETA]
-        mass = tab.body[b, T.BODY_MASS]
-        for c in range(3):
-            out[u + c] = mass * (yp[u + c] - tab.gravity[c])
-            out[p + c] = yp[p + c] - terms.dot3(kin, KIN_ADOT + 3 * c, kin, KIN_H)
-            out[e + c] = y[p + c] - terms.dot3(kin, KIN_AXES + 3 * c, kin, KIN_H)
-            out[r + c] = y[u + c] - yp[r + c]
-            out[th + c] = y[e + c] - yp[th + c]
-        if at[T.AT_MODES] > 0:
-            modal_residual(y, yp, at, tab.modal, tab.partial, kin, out)
+        body_residual(y, yp, tab.at[b], tab.body[b], tab.gravity, tab.modal, tab.partial, tab.kin[b], out)
     add_constraints(t, y, yp, idata, tab, out)
     room = vector_at(tab.scratch, 0, 64)
     lam0 = idata[T.H_LAMBDA]

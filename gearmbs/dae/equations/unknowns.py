@@ -2,9 +2,10 @@
 
     y = [u, p, p_f, eps, v_f, R, theta, q_f, lambda, F, N, z, mu]
 
-Rigid bodies have u, p, eps, R and theta, three entries each. A body with modal coordinates q_f also has their
-velocities v_f and momenta p_f = dT/dv_f; without such bodies these blocks are empty and y is that of eq. (9), extended
-by the user-defined states z and the multipliers mu of the stabilisation.
+Every body has u and R, three entries each; one that turns has p, eps and theta, three each. A body with modal
+coordinates q_f also has their velocities v_f and momenta p_f = dT/dv_f; without such bodies these blocks are empty and
+y is that of eq. (9), extended by the user-defined states z and the multipliers mu of the stabilisation. How many
+coordinates a body has is a matter of its kind, see `gearmbs.dae.equations.bodies.kinds`.
 
 Nothing else in the package computes an offset: Python asks `offsets` and `places`, kernels read the header of the
 tables and their table ``at``, which are filled from these two.
@@ -53,6 +54,7 @@ BLOCKS = {
 
 COMPONENTS = {"u": "xyz", "p": ("psi", "theta", "phi"), "eps": ("psi", "theta", "phi"), "R": "xyz"}
 COMPONENTS["theta"] = COMPONENTS["eps"]
+ANGULAR = ("p", "eps", "theta")
 MODAL = ("p_f", "v_f", "q_f")
 LIGHTEST = 1e-12
 """Smallest inertia, kg m^2, by which a momentum is scaled."""
@@ -79,8 +81,8 @@ class Counts:
 
     Attributes
     ----------
-    modes : tuple of int
-        Number of modal coordinates of each moving body, 0 of a rigid one.
+    angles, modes : tuple of int
+        Number of Euler angles and of modal coordinates of each moving body.
     rows : int
         Constraint rows.
     forces, torques : int
@@ -89,6 +91,7 @@ class Counts:
         User-defined states.
     """
 
+    angles: tuple[int, ...]
     modes: tuple[int, ...]
     rows: int
     forces: int
@@ -102,21 +105,31 @@ class Counts:
 
     @property
     def coordinates(self) -> int:
-        """Number of coordinates: six of a rigid body, and the modal ones."""
+        """Number of coordinates: displacements, Euler angles and modal ones."""
+        return 3 * self.bodies + sum(self.angles) + sum(self.modes)
+
+    @property
+    def spatial(self) -> int:
+        """Number of places for displacements and rotations, six a body, and for modal coordinates."""
         return 6 * self.bodies + sum(self.modes)
+
+    @property
+    def turning(self) -> np.ndarray:
+        """Numbers of the moving bodies that have Euler angles."""
+        return np.flatnonzero(self.angles)
 
 
 def offsets(counts: Counts, formulation: int) -> dict[str, int]:
     """Return the index in y of the first entry of each block, and the length of y as ``n``."""
-    three, modal = 3 * counts.bodies, sum(counts.modes)
+    three, angles, modal = 3 * counts.bodies, sum(counts.angles), sum(counts.modes)
     sizes = {
         "u": three,
-        "p": three,
+        "p": angles,
         "p_f": modal,
-        "eps": three,
+        "eps": angles,
         "v_f": modal,
         "R": three,
-        "theta": three,
+        "theta": angles,
         "q_f": modal,
         "lambda": counts.rows,
         "F": 3 * counts.forces,
@@ -151,27 +164,27 @@ def places(counts: Counts, formulation: int) -> np.ndarray:
     -------
     ndarray of int, shape (1 + bodies, AT_COLUMNS)
         Columns ``AT_*`` of `gearmbs.dae.equations.layout`; -1 in the ground's row, which has none. Columns about
-        elastic frames and modal integrals are left at -1.
+        elastic frames and modal integrals are left at -1. Without Euler angles the place of theta is that of R: sines
+        are taken of two bodies' angles at a time, whether they have some or not.
     """
     at = offsets(counts, formulation)
     table = np.full((1 + counts.bodies, T.AT_COLUMNS), -1, dtype=np.int64)
+    table[:, T.AT_ANGLES] = (0, *counts.angles)
     table[:, T.AT_MODES] = (0, *counts.modes)
     table[:, T.AT_BODY] = np.arange(1 + counts.bodies)
-    mode = 0
-    for b, modes in enumerate(counts.modes):
+    angle = mode = 0
+    for b, (angles, modes) in enumerate(zip(counts.angles, counts.modes, strict=True)):
         row = table[1 + b]
-        for column, block in (
-            (T.AT_U, "u"),
-            (T.AT_P, "p"),
-            (T.AT_EPS, "eps"),
-            (T.AT_R, "R"),
-            (T.AT_THETA, "theta"),
-        ):
-            row[column] = at[block] + 3 * b
+        row[T.AT_U], row[T.AT_R] = at["u"] + 3 * b, at["R"] + 3 * b
+        row[T.AT_THETA] = row[T.AT_R]
+        if angles:
+            for column, block in ((T.AT_P, "p"), (T.AT_EPS, "eps"), (T.AT_THETA, "theta")):
+                row[column] = at[block] + angle
         for column, block in ((T.AT_PF, "p_f"), (T.AT_VF, "v_f"), (T.AT_QF, "q_f")):
             row[column] = at[block] + mode
         row[T.AT_V] = 6 * b
         row[T.AT_V_MODES] = 6 * counts.bodies + mode
+        angle += angles
         mode += modes
     return table
 
@@ -261,8 +274,8 @@ def scales(
     scale = np.ones(at["n"])
     scale[at["u"] : at["p"]] = length
     scale[at["R"] : at["theta"]] = length
-    for b, row in enumerate(bodies):
-        first = at["p"] + 3 * b
+    for k, row in enumerate(bodies[counts.turning]):
+        first = at["p"] + 3 * k
         largest = np.abs(row[T.BODY_INERTIA :]).max()
         scale[first : first + 3] = max(largest, row[T.BODY_MASS] * 1e-8, LIGHTEST)
     for k, (size, mass) in enumerate(modes):
@@ -297,7 +310,8 @@ def named(
         if block in MODAL:
             names = [f"{block}_{k + 1}({body})" for body, n in zip(bodies, counts.modes) for k in range(n)]
         elif block in COMPONENTS:
-            names = [f"{block}_{part}({body})" for body in bodies for part in COMPONENTS[block]]
+            every = counts.angles if block in ANGULAR else counts.bodies * (3,)
+            names = [f"{block}_{part}({body})" for body, n in zip(bodies, every) for part in COMPONENTS[block][:n]]
         elif block in ("F", "N"):
             names = [f"{block}_{part}({owner})" for owner in owners[block] for part in "xyz"]
         else:

@@ -11,6 +11,7 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.frames import shape_table
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
+from gearmbs.dae.equations.bodies.kinds import RIGID, BodyKind
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.loads.forces import FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.equations.unknowns import Counts
@@ -26,6 +27,7 @@ class TableBuilder:
     def __init__(self) -> None:
         self.gravity = np.zeros(3)
         self.bodies: list[np.ndarray] = []
+        self.kinds: list[BodyKind] = []
         self.modes: list[int] = []
         self.modal: list[float] = []
         self.modal_at: list[int] = []
@@ -58,14 +60,28 @@ class TableBuilder:
         self._ground_marker: int | None = None
         self.add_body(0.0, np.zeros((3, 3)))
 
-    def add_body(self, mass: float, inertia: np.ndarray, modal: ModalInertia | None = None) -> int:
-        """Add a body; its inertia is about the centre of mass, undeformed. All bodies go before the first marker."""
+    def add_body(
+        self,
+        mass: float,
+        inertia: np.ndarray,
+        modal: ModalInertia | None = None,
+        *,
+        kind: BodyKind = RIGID,
+        numbers: Sequence[float] = (),
+    ) -> int:
+        """Add a body; its inertia is about the centre of mass, undeformed. All bodies go before the first marker.
+
+        ``numbers`` are those that its kind needs beside, as the kernels read them.
+        """
+        # the acceleration system has rotations of every body: one that does not turn has inertia there, and no moment
+        inertia = inertia if kind.angles else np.eye(3)
+        self.kinds.append(kind)
         self.bodies.append(np.concatenate([[mass], np.asarray(inertia, dtype=float).ravel()]))
         self.modes.append(0 if modal is None else modal.modes)
         self.modal_inertia.append(modal)
-        self.modal_at.append(-1 if modal is None else len(self.modal))
-        if modal is not None:
-            self.modal.extend(modal.table(inertia).tolist())
+        own = list(numbers) if modal is None else modal.table(inertia).tolist()
+        self.modal_at.append(len(self.modal) if own else -1)
+        self.modal.extend(own)
         return len(self.bodies) - 1
 
     def add_marker(
@@ -77,10 +93,10 @@ class TableBuilder:
     ) -> int:
         """Add a marker, given from the centre of mass in body components.
 
-        ``shape`` holds displacements and rotations of a modal body there, a row a mode.
+        ``shape`` holds displacements and rotations of a modal body there, a row a mode; of a point mass it has none.
         """
         if shape is not None:
-            # a modal body's marker is the origin of an elastic frame
+            # the marker of such a body is the origin of a frame of its own
             self.frame_body.append(body)
             self.shape_at.append(len(self.modal))
             self.modal.extend(shape_table(position, *shape).tolist())
@@ -257,6 +273,7 @@ class TableBuilder:
     def counts(self) -> Counts:
         """Return what the length of y depends on."""
         return Counts(
+            angles=tuple(kind.angles for kind in self.kinds[1:]),
             modes=tuple(self.modes[1:]),
             rows=len(self.rows),
             forces=sum(f[T.FORCE_F] for f in self.forces),
@@ -269,6 +286,7 @@ class TableBuilder:
         return Model(
             gravity=_reals(self.gravity),
             bodies=_reals(self.bodies),
+            kinds=tuple(self.kinds),
             modes=tuple(self.modes),
             marker_body=_integers(self.marker_body),
             marker_frame=_reals(np.array(self.marker_frame).reshape(-1, T.MARKER_COLUMNS)),

@@ -10,24 +10,14 @@ import numpy as np
 import scipy
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.bodies.inertia import add_momentum, set_modal_momenta, update_inertia
-from gearmbs.dae.equations.constraints.terms import dot3
+from gearmbs.dae.equations.bodies.body import body_from_pose
 from gearmbs.dae.equations.kinematics.rotation import (
-    KIN_A,
-    KIN_AXES,
-    KIN_H,
-    KIN_W,
     POSE_A,
     POSE_COLUMNS,
     POSE_R,
     POSE_V,
-    POSE_W,
-    axes_and_velocity,
     best_reference,
-    euler_angles,
-    euler_rates,
 )
-from gearmbs.dae.equations.kinematics.update import inertia_times
 from gearmbs.dae.equations.unknowns import I3
 from gearmbs.dae.model import evaluator
 from gearmbs.dae.model.model import Model
@@ -131,33 +121,13 @@ class Assembled(NamedTuple):
 def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
     """Fill positions, velocities and momenta of y from a configuration."""
     tab = T.unpack(idata, rdata, work)
-    kin = tab.kin
-    s = tab.scratch
     for b in range(1, idata[T.H_BODIES]):
         row, at = pose[b - 1], tab.at[b]
         first = at[T.AT_V_MODES] - POSE_PLACES * pose.shape[0]
         for m in range(at[T.AT_MODES]):
             y[at[T.AT_QF] + m] = q_f[first + m]
             y[at[T.AT_VF] + m] = v_f[first + m]
-        if at[T.AT_MODES] > 0:
-            update_inertia(y, at, tab.modal, tab.partial, tab.body[b])
-        th, e, p = at[T.AT_THETA], at[T.AT_EPS], at[T.AT_P]
-        for c in range(3):
-            y[at[T.AT_R] + c] = row[POSE_R + c]
-            y[at[T.AT_U] + c] = row[POSE_V + c]
-        for c in range(9):
-            kin[b, KIN_A + c] = row[POSE_A + c]
-        euler_angles(row, POSE_A, tab.code[b], y, th)
-        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
-        euler_rates(kin, b, row, POSE_W, y, e)
-        inertia_times(kin[b], tab.body[b], row, POSE_W, kin[b], KIN_H, s)
-        if at[T.AT_MODES] > 0:
-            for c in range(3):
-                kin[b, KIN_W + c] = row[POSE_W + c]
-            add_momentum(y, at, tab.partial, kin[b])
-            set_modal_momenta(y, at, tab.modal, tab.partial, kin[b])
-        for m in range(3):
-            y[p + m] = dot3(kin[b], KIN_AXES + 3 * m, kin[b], KIN_H)
+        body_from_pose(b, row, y, at, tab.code[b], tab.body[b], tab.modal, tab.partial, tab.kin, tab.scratch)
 
 
 def euler_references(pose: np.ndarray) -> np.ndarray:

@@ -105,7 +105,7 @@ def free_massless_body(model: Model, matrix: scipy.sparse.csc_array) -> str | No
     """Return a body that the constraints let move without any inertia, None when there is none."""
     from scipy.linalg import null_space
 
-    base = model.counts.coordinates
+    base = model.counts.spatial
     matrix = _by_own_inertia(matrix, base)
     if base > DENSE_COORDINATES:
         return _free_massless_body_of_many(model, matrix)
@@ -138,7 +138,7 @@ def _by_own_inertia(matrix: scipy.sparse.csc_array, base: int) -> scipy.sparse.c
 
 def _free_massless_body_of_many(model: Model, matrix: scipy.sparse.csc_array) -> str | None:
     """Look for a motion without inertia by inverse iteration, on masses raised by a trace that keeps it regular."""
-    base = model.counts.coordinates
+    base = model.counts.spatial
     heaviest = abs(matrix[:base, :base]).max()
     raised = np.zeros(matrix.shape[0])
     raised[:base] = 1e-15 * heaviest

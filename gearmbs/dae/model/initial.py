@@ -238,7 +238,7 @@ def assemble_position(
         raise _not_finite(system, phi, t)
     drawn = turning.prescribed_turns(system, place, jacobian, phi)
     kept = independent_rows(jacobian, weights, order=system.row_order)
-    report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
+    report = InitialReport(degrees_of_freedom=system.model.counts.coordinates - kept.size)
     before = place
     place, jacobian, phi, kept = _assembled(system, before, t, kept, report)
     off = {turn.row for turn in _half_turned(system, place, jacobian, phi, drawn)}
@@ -277,7 +277,7 @@ def _assembled(
         if np.array_equal(others, kept):
             raise _conflict(system, dropped, phi)
         kept = others
-        report.degrees_of_freedom = jacobian.shape[1] - kept.size
+        report.degrees_of_freedom = system.model.counts.coordinates - kept.size
     raise _conflict(system, dropped, phi)
 
 

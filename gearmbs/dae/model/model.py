@@ -13,6 +13,7 @@ import numpy.typing as npt
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.frames import partials_size
 from gearmbs.dae.equations.bodies.inertia import ModalInertia, present_size
+from gearmbs.dae.equations.bodies.kinds import BodyKind
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.kinematics.rotation import KIN_COLUMNS
 from gearmbs.dae.equations.loads.forces import FORCE_SIG, Diagnostic
@@ -53,6 +54,8 @@ class Model:
         m/s^2.
     bodies : ndarray, shape (1 + moving bodies, BODY_COLUMNS)
         Mass and inertia about the centre of mass; the ground comes first.
+    kinds : tuple of BodyKind
+        Of each body.
     modes : tuple of int
         Number of modal coordinates of each body.
     marker_body, marker_frame : ndarray
@@ -78,13 +81,14 @@ class Model:
     modal : ndarray
         Integrals of modal bodies and shapes of elastic frames, as the kernels read them.
     modal_at, modal_inertia : tuple
-        For each body the offset of its integrals there, -1 of a rigid one, and the integrals; None of a rigid one.
+        For each body the offset of its own numbers there, -1 of a rigid one, and the integrals; None without modes.
     frame_body, shape_at : tuple of int
         Of each elastic frame its body and the offset of its shapes; frames are numbered on from the bodies.
     """
 
     gravity: np.ndarray
     bodies: np.ndarray
+    kinds: tuple[BodyKind, ...]
     modes: tuple[int, ...]
     marker_body: np.ndarray
     marker_frame: np.ndarray
@@ -125,6 +129,7 @@ class Model:
     def counts(self) -> Counts:
         """What the length of y depends on."""
         return Counts(
+            angles=tuple(kind.angles for kind in self.kinds[1:]),
             modes=self.modes[1:],
             rows=len(self.rows),
             forces=int(np.sum(self.forces[:, T.FORCE_F])),
@@ -317,7 +322,7 @@ class Model:
         head[T.H_ROWS], head[T.H_TERMS] = len(self.rows), len(self.terms)
         head[T.H_FORCES], head[T.H_FUNCTIONS] = len(self.forces), len(self.functions)
         head[T.H_STATES], head[T.H_TAPES] = len(self.states), len(self.tapes)
-        head[T.H_FORMULATION], head[T.H_UNKNOWNS], head[T.H_COORDINATES] = formulation, at["n"], counts.coordinates
+        head[T.H_FORMULATION], head[T.H_UNKNOWNS], head[T.H_COORDINATES] = formulation, at["n"], counts.spatial
         for column, block in T.HEAD_OF_BLOCK.items():
             head[column] = at[block]
         head[T.H_ANGLES] = len(self.angles)

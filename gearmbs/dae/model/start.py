@@ -9,8 +9,8 @@ import scipy
 
 from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies.body import turning_rates
 from gearmbs.dae.equations.constraints.terms import ANGLE
-from gearmbs.dae.equations.kinematics.rotation import KIN_ADOT, euler_rates
 from gearmbs.dae.equations.kinematics.update import hook
 from gearmbs.dae.equations.loads.reactions import reactions_from
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, multipliers_are_rates
@@ -275,9 +275,7 @@ def _rates(y, yp, acc: np.ndarray, t: float, idata, rdata, work) -> None:
     yp[r:th] = y[u:p]
     _momentum_rates(t, y, yp, idata, rdata, work)
     for b, at in enumerate(places, start=1):
-        e, alpha = at[T.AT_EPS], at[T.AT_V] + 3
-        adot = kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
-        euler_rates(kin, b, acc[alpha : alpha + 3] - y[e : e + 3] @ adot, 0, yp, e)
+        turning_rates(b, acc[at[T.AT_V] : at[T.AT_V] + 6], y, yp, at, kin)
 
 
 def _momentum_rates(t: float, y, yp, idata, rdata, work) -> None:

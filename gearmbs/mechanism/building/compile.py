@@ -125,14 +125,15 @@ class _Compiler:
     def add_bodies(self) -> None:
         for body in self.mechanism.bodies.values():
             modal = body.modal if isinstance(body, ModalBody) else None
-            self.body_index[id(body)] = self.builder.add_body(body.mass, body.inertia, modal)
+            self.body_index[id(body)] = self.builder.add_body(
+                body.mass, body.inertia, modal, kind=body.kind, numbers=body.numbers
+            )
 
     def index_all_markers(self) -> None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
             for marker in body.markers:
-                shape = body.shape_at(marker) if isinstance(body, ModalBody) else None
                 self.marker_index[id(marker)] = self.builder.add_marker(
-                    self.body_index[id(body)], marker.position - body.com, marker.orientation, shape
+                    self.body_index[id(body)], marker.position - body.com, marker.orientation, body.shape_at(marker)
                 )
                 self.marker_names.append(marker.name)
 
@@ -274,6 +275,7 @@ class _Compiler:
         """Offsets of the blocks of y; the numbers of rows, elements and states are known before they are added."""
         m = self.mechanism
         counts = Counts(
+            angles=tuple(kind.angles for kind in self.builder.kinds[1:]),
             modes=tuple(self.builder.modes[1:]),
             rows=sum(len(j.rows) for j in m.joints.values()) + len(m.constraints),
             forces=sum(e.wrenches * e.has_force for e in m.elements.values()) + len(self.measured),
@@ -323,7 +325,8 @@ class _Compiler:
         names = list(self.mechanism.joints)
         before = sum(len(self.mechanism.joints[n].rows) for n in names[: names.index(joint.name)])
         first = self.offsets()["lambda"] + before
-        bodies = {self.body_index[id(m.body)] for row in joint.rows for t in row.terms for m in (t.i, t.j)} - {0}
+        own = self.builder.marker_body
+        bodies = {own[self.index(m)] for row in joint.rows for t in row.terms for m in (t.i, t.j)} - {0}
         self.builder.add_force(
             T.REACTION,
             self.index(joint.i),
@@ -351,7 +354,7 @@ class _Compiler:
             at, n_bodies, n_unknowns = self.builder.tape_rows[-1][T.TAPE_BODIES : T.TAPE_ADDRESS]
             unknowns.extend(self.builder.extra_i[at + n_bodies : at + n_bodies + n_unknowns])
         directions = [load.i, load.j] if load.mode == el.LINE else [load.rm]
-        bodies.extend(self.body_index[id(marker.body)] for marker in directions)
+        bodies.extend(self.builder.marker_body[self.index(marker)] for marker in directions)
         self.builder.add_force(
             T.EXPRESSION,
             self.index(load.i),

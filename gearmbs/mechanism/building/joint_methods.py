@@ -70,16 +70,17 @@ class JointMethods:
             kinds = " and ".join(k for k, v in jt.JOINTS.items() if v.crossed)
             raise ModelError(f"{label}: axis_j is for {kinds} joints; others have one axis")
         mi, mj = self._markers(label, name, i, j, at, axis, axis_j)
-        if crossed:
-            try:
+        made = jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj))
+        try:
+            if crossed:
                 jt.check_crossed(label, mi, mj)
-            except ModelError:
-                # markers made for it would be in the way of the next attempt
-                for marker in (mi, mj):
-                    if marker is not i and marker is not j:
-                        marker.body.markers.remove(marker)
-                raise
-        return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj)))
+            return self._add_joint(made)
+        except ModelError:
+            # markers made for it would be in the way of the next attempt
+            for marker in (mi, mj):
+                if marker is not i and marker is not j:
+                    marker.body.markers.remove(marker)
+            raise
 
     def fixed(self, name, i, j, **where) -> jt.Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
@@ -266,6 +267,7 @@ class JointMethods:
         self._check_name(joint.name)
         for marker in (joint.i, joint.j):
             self._check_body(f"joint '{joint.name}'", marker.body)
+            marker.body.check(joint)
         self.joints[joint.name] = joint
         return joint
 

@@ -51,7 +51,7 @@ def hinges(bodies: Mapping[str, Body], joints: Collection[Joint], rows: Collecti
     """
     kept = {joint.name: sum(f"{joint.name}: {row.label}" in rows for row in joint.rows) for joint in joints}
     acting = [joint for joint in joints if kept[joint.name]]
-    if sum(kept.values()) < len(rows) or any(type(body) is not Body for body in bodies.values()):
+    if sum(kept.values()) < len(rows) or any(not body.kind.lumps for body in bodies.values()):
         # a general constraint has rows, too
         return None
     found: dict[str, Hinge] = {}
@@ -219,7 +219,7 @@ def _joints_inside(mechanism: Mechanism, whole: System) -> list[Joint]:
             joint.kind == "fixed"
             and all(f"{joint.name}: {row.label}" in kept for row in joint.rows)
             and f"reaction of {joint.name}" not in whole.force_names
-            and all(type(body) is Body and body.name not in constrained for body in bodies)
+            and all(body.kind.lumps and body.name not in constrained for body in bodies)
         ):
             found.append(joint)
     return found
@@ -303,6 +303,10 @@ class _Lumping:
 
     def _composite(self, group: list[int]) -> Body:
         """Return the composite of bodies: its frame has the axes of the first and its origin in the centre of mass."""
+        alone = self.bodies[group[0]]
+        if not alone.kind.lumps:
+            place, velocity = alone.centre_of_mass()
+            return replace(alone, com=np.zeros(3), position=place, velocity=velocity, markers=[])
         first = self.pose[group[0]]
         axes = first[POSE_A:POSE_V].reshape(3, 3)
         masses = np.array([self.bodies[k].mass for k in group])

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from gearmbs.dae.equations.bodies.kinds import RIGID, BodyKind
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.quantities import (
     Vector,
@@ -89,6 +90,25 @@ class Body:
     angular_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     is_ground: bool = False
     markers: list[Marker] = field(default_factory=list)
+
+    kind: ClassVar[BodyKind] = RIGID
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates."""
+        return 3 + self.kind.angles
+
+    @property
+    def numbers(self) -> list[float]:
+        """What the equations know of the body beside mass, inertia and modes."""
+        return []
+
+    def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return displacements and rotations of a marker that is a frame of its own, a row a mode; else None."""
+        return None
+
+    def check(self, part: Any) -> None:
+        """Raise a ModelError if a joint or load on the body is none that its kind can have; a rigid body has all."""
 
     def marker(
         self,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
+from gearmbs.dae.equations.bodies.kinds import MODAL
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.quantities import Vector
@@ -292,6 +293,13 @@ class ModalBody(Body):
     lost_turning: Callable[..., tuple[str, float]] | None = None
     origin: Any = None
 
+    kind = MODAL
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates."""
+        return 6 + self.modal.modes
+
     def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:
         """Return displacements, less the mean, and rotations at a marker by one unit of each mode, each (n, 3).
 
@@ -383,9 +391,9 @@ def make_modal_body(
             "angular momenta, about the centre of mass and in the units of the shapes"
         )
     modal = ModalInertia(own.mass, stiffness, damping, own.angular_momentum, own.cross, own.first, own.second)
-    fields: dict[str, Any] = {name: getattr(rigid, name) for name in Body.__dataclass_fields__}
+    of_rigid: dict[str, Any] = {part.name: getattr(rigid, part.name) for part in fields(Body)}
     return ModalBody(
-        **fields,
+        **of_rigid,
         modal=modal,
         shapes=shapes,
         mean=given.momentum / rigid.mass,

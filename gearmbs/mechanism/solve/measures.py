@@ -193,7 +193,8 @@ def mechanism_html(mechanism: Mechanism) -> str:
     """Return the bodies, joints and forces of a mechanism as tables."""
     rows = sum(len(joint.rows) for joint in mechanism.joints.values())
     gravity = np.array2string(np.asarray(mechanism.gravity), precision=5, separator=", ")
-    head = f"Mechanism {mechanism.name}: {6 * len(mechanism.bodies)} coordinates, {rows} constraint rows"
+    coordinates = sum(body.coordinates for body in mechanism.bodies.values())
+    head = f"Mechanism {mechanism.name}: {coordinates} coordinates, {rows} constraint rows"
     given = mechanism.given
     bodies = [
         (

@@ -68,6 +68,13 @@ def joined(kind: str) -> Mechanism:
     elif kind == "load":
         m.load("l", i, j, rm=k, fx="3*DX(I,J,K)*TIME", fy="VM(I,J)", tz="2*AZ(I,J)+WY(I,J,J)")
         m.load("back", j, i, fz="DM(I,J)")
+    elif kind == "load along a marker that it does not ask for":
+        m.load("l", i, j, rm=k, fx="3*TIME", tz="DM(J,G)")
+        m.line_force("line", k, g, "2*TIME")
+    elif kind == "reaction":
+        m.joint("inline", "slide", i, j)
+        m.distance("rod", k, g)
+        m.load("l", j, g, fx="JOINT(slide,0,2,0)", fy="GCON(rod,0,2,0)")
     elif kind == "expression":
         m.general_constraint("g", "DX(I,J)*DM(I,G)-0.3*DY(K,G)+SIN(TIME)")
         m.differential_state("w", "DM(I,K)+VZ(K,G)")
@@ -87,8 +94,8 @@ def joined(kind: str) -> Mechanism:
 
 
 KINDS = [
-    "spring", "bushing", "load", "expression", "distance", "rotation", "screw", "both ends", "fixed", "revolute",
-    "spherical", "cylindrical", "translational", "planar",
+    "spring", "bushing", "load", "load along a marker that it does not ask for", "expression", "reaction", "distance",
+    "rotation", "screw", "both ends", "fixed", "revolute", "spherical", "cylindrical", "translational", "planar",
 ]  # fmt: skip
 
 
@@ -122,7 +129,7 @@ def test_jacobian_equals_central_differences(kind, formulation):
     np.testing.assert_allclose(found, np.array(columns).T, atol=5e-8 * max(1.0, np.abs(found).max()))
 
 
-@pytest.mark.parametrize("kind", KINDS[3:])
+@pytest.mark.parametrize("kind", KINDS[4:])
 def test_quadratic_part_is_the_second_derivative_along_a_motion(kind):
     """d2(phi)/dt2 along a motion without accelerations of the coordinates, by differences of phi."""
     system = joined(kind).compile()

@@ -1,5 +1,7 @@
 """Elastic frames: where the markers of a body with modal coordinates are, and the chain rule to its coordinates.
 
+Of a point mass they are the same without modes and angles: a constant arm and a constant orientation.
+
 All that joins bodies (constraint terms, force elements, expressions) sees frames: rows of the kinematics table with a
 position, an orientation and their velocities, and gives derivatives by the frames' own six displacements. The frame of
 a rigid body is the body. Each marker of a modal body has an elastic frame of its own, with displacement shapes phi_k
@@ -347,7 +349,7 @@ def coordinates(b, at):
     """Return the number of coordinates that a frame's position depends on: none of the ground."""
     if b == 0:
         return 0
-    return 6 + at[b, T.AT_MODES] if is_elastic(b, at) else 6
+    return 3 + at[b, T.AT_ANGLES] + at[b, T.AT_MODES]
 
 
 @njit(cache=True, error_model="numpy")

@@ -260,7 +260,8 @@ def put_spatial(mode, slot, vals, k, row, f, g, h, coef, at, kin, partial):
     v = at[f, T.AT_V]
     for c in range(3):
         k = put_pair(mode, slot, vals, k, row, v + c, coef * g[h + c])
-        k = put_pair(mode, slot, vals, k, row, v + 3 + c, coef * (s[3 + c] + g[h + 3 + c]))
+        if at[f, T.AT_ANGLES] > 0:
+            k = put_pair(mode, slot, vals, k, row, v + 3 + c, coef * (s[3 + c] + g[h + 3 + c]))
     d = partials(f, at, partial)
     for m in range(at[f, T.AT_MODES]):
         slope = dot3(d[3 + m], DP, g, h) + dot3(d[3 + m], DX, g, h + 3)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies.body import displace_body
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.constraints.terms import OFFSET, RATE, RELATIVE, dot_motion, relative_motion
-from gearmbs.dae.equations.kinematics.rotation import KIN_V, KIN_W, axes_and_velocity, euler_rates
+from gearmbs.dae.equations.kinematics.rotation import KIN_V, KIN_W
 from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.outputs.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD, tape_row_rates
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR
@@ -101,21 +102,5 @@ def displace(y, d, w, idata, tab):
 
     The kinematics table must be up to date; conjugate momenta are left alone.
     """
-    s = tab.scratch
     for b in range(1, idata[T.H_BODIES]):
-        at = tab.at[b]
-        i, e, th = at[T.AT_V], at[T.AT_EPS], at[T.AT_THETA]
-        for c in range(3):
-            y[at[T.AT_R] + c] += d[i + c]
-            y[at[T.AT_U] + c] += w[i + c]
-            s[c] = d[i + 3 + c]
-            s[3 + c] = tab.kin[b, KIN_W + c] + w[i + 3 + c]
-        euler_rates(tab.kin, b, s, 0, s, 6)
-        for c in range(3):
-            y[th + c] += s[6 + c]
-        for m in range(at[T.AT_MODES]):
-            y[at[T.AT_QF] + m] += d[at[T.AT_V_MODES] + m]
-            y[at[T.AT_VF] + m] += w[at[T.AT_V_MODES] + m]
-        # the new rates give the corrected velocity about the displaced axes
-        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, tab.kin, b)
-        euler_rates(tab.kin, b, s, 3, y, e)
+        displace_body(b, y, d, w, tab.at[b], tab.kin, tab.scratch)

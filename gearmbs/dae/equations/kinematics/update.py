@@ -5,23 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies.body import has_angles, update_body, update_ground
 from gearmbs.dae.equations.bodies.frames import update_frame
-from gearmbs.dae.equations.bodies.inertia import add_momentum, update_inertia
 from gearmbs.dae.equations.constraints.terms import ANGLE, dot3, gradient
 from gearmbs.dae.equations.kinematics.rotation import (
     KIN_A,
     KIN_AXES,
-    KIN_H,
-    KIN_R,
-    KIN_V,
     KIN_W,
     SWITCH_SINE,
     axes_and_velocity,
-    axes_of,
     best_reference,
     euler_angles,
     euler_rates,
-    matrix_of,
     momentum_from_conjugate,
     rotation_matrix,
 )
@@ -112,29 +107,6 @@ TURNS_OF_TWO = 2 * LANES
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def inertia_times(kin_row, body_row, v, i, out, k, s):
-    """Write J_global v to ``out[k:k+3]``; ``s`` has three scratch places."""
-    for c in range(3):
-        s[c] = kin_row[KIN_A + c] * v[i] + kin_row[KIN_A + 3 + c] * v[i + 1] + kin_row[KIN_A + 6 + c] * v[i + 2]
-    q = T.BODY_INERTIA
-    x = dot3(body_row, q, s, 0)
-    y = dot3(body_row, q + 3, s, 0)
-    z = dot3(body_row, q + 6, s, 0)
-    for c in range(3):
-        a = KIN_A + 3 * c
-        out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def update_ground(kin):
-    """Set the ground's row: the global frame at rest, with no Euler axes."""
-    row = kin[0]
-    for c in range(row.size):
-        row[c] = 0.0
-    row[KIN_A] = row[KIN_A + 4] = row[KIN_A + 8] = 1.0
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
 def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
     """Fill the kinematics table from the positions and velocities in y.
 
@@ -156,24 +128,10 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
     update_ground(kin)
     moment = vector_at(scratch, TURNS_OF_TWO, 3)
     for b in range(1, code.size):
-        if at[b, T.AT_MODES] > 0:
-            update_inertia(y, at[b], modal, partial, body[b])
         place = 3 * ((b - 1) % 2)
         if place == 0:
             put_turns(y, at[b, T.AT_THETA], at[min(b + 1, code.size - 1), T.AT_THETA], scratch)
-        u, e, r = at[b, T.AT_U], at[b, T.AT_EPS], at[b, T.AT_R]
-        row = kin[b]
-        for c in range(3):
-            row[KIN_R + c] = y[r + c]
-            row[KIN_V + c] = y[u + c]
-        turn_1 = scratch[LANES + place], scratch[place]
-        turn_2 = scratch[LANES + place + 1], scratch[place + 1]
-        turn_3 = scratch[LANES + place + 2], scratch[place + 2]
-        matrix_of(turn_1, turn_2, turn_3, code[b], row, KIN_A)
-        axes_of(turn_1, turn_2, y[e], y[e + 1], y[e + 2], row)
-        inertia_times(row, body[b], row, KIN_W, row, KIN_H, moment)
-        if at[b, T.AT_MODES] > 0:
-            add_momentum(y, at[b], partial, row)
+        update_body(y, at[b], code[b], body[b], modal, partial, scratch, place, kin[b], moment)
     for f in range(code.size, at.shape[0]):
         update_frame(f, y, at, modal, kin, partial, scratch, derivatives)
 
@@ -358,7 +316,7 @@ def hook(t, hist, npast, idata, rdata, work):
     told = KEPT
     for b in range(1, idata[T.H_BODIES]):
         th = tab.at[b, T.AT_THETA]
-        if abs(np.sin(hist[0, th + 1])) >= SWITCH_SINE:
+        if not has_angles(tab.at[b]) or abs(np.sin(hist[0, th + 1])) >= SWITCH_SINE:
             continue
         old = tab.code[b]
         rotation_matrix(hist[0, th], hist[0, th + 1], hist[0, th + 2], old, tab.kin[b], KIN_A)

@@ -144,6 +144,7 @@ def apply_frame_load(f, s, at, kin, partial, rhs):
     cross3(t, 0, s, 3, t, 3)
     for c in range(3):
         rhs[v + c] += s[3 + c]
+    for c in range(at[f, T.AT_ANGLES]):
         rhs[v + 3 + c] += t[3 + c] + s[6 + c]
     d = partials(f, at, partial)
     for m in range(at[f, T.AT_MODES]):
@@ -177,7 +178,7 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
     for i in range(3):
         if force >= 0:
             k = put(mode, slot, vals, k, place(f, i, FORCE, at), force + i, -sign)
-    for c in range(3 + at[f, T.AT_MODES]):
+    for c in range(coordinates(f, at) - 3):
         i = c + 3
         row = place(f, i, FORCE, at)
         if is_idle(f, i, False, at, partial):
@@ -281,7 +282,7 @@ def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, f
         return k
     # markers of a modal body are at the origins of their frames
     d, first = partials(b, at, partial), at[b, T.AT_QF]
-    for c in range(d.shape[0]):
+    for c in range(coordinates(b, at) - 3):
         p = d[c]
         if c >= 3 and is_idle(b, c + 3, True, at, partial):
             continue
