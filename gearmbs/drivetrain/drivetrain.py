@@ -78,7 +78,11 @@ if TYPE_CHECKING:
 
 P = TypeVar("P", bound=Part)
 
-GROUPS = ("shafts", "wheels", "meshes", "bearings", "couplings", "housings", "drives", "loads", "sensors")
+KINDS: dict[str, type[Part]] = {
+    "shafts": Shaft, "wheels": Wheel, "meshes": GearMesh, "bearings": Bearing, "couplings": Coupling,
+    "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor,
+}  # fmt: skip
+"""What each group holds."""
 
 
 @dataclass(frozen=True)
@@ -146,13 +150,10 @@ class Drivetrain:
 
     def __post_init__(self) -> None:
         known: dict[str, Part] = {}
-        for group in GROUPS:
+        for group, kind in KINDS.items():
             object.__setattr__(self, group, tuple(getattr(self, group)))
             for part in getattr(self, group):
-                require(
-                    isinstance(part, KINDS[group]),
-                    f"{self.name}: {group} holds {part!r}; give objects of {KINDS[group].__name__}",
-                )
+                require(isinstance(part, kind), f"{self.name}: {group} holds {part!r}; give objects of {kind.__name__}")
                 require(
                     part.name not in known and part.name != "ground",
                     f"{part.label}: the name is in use; choose another",
@@ -166,9 +167,9 @@ class Drivetrain:
 
     def with_parts(self, *parts: Part) -> Drivetrain:
         """Return a drivetrain with these parts; parts whose names are there take the place of those."""
-        groups: dict[str, Any] = {group: list(getattr(self, group)) for group in GROUPS}
+        groups: dict[str, Any] = {group: list(getattr(self, group)) for group in KINDS}
         for part in parts:
-            group = next((g for g in GROUPS if isinstance(part, KINDS[g])), None)
+            group = next((g for g, kind in KINDS.items() if isinstance(part, kind)), None)
             require(group is not None, f"{part!r} is no part of a drivetrain")
             assert group is not None
             names = [p.name for p in groups[group]]
@@ -343,24 +344,17 @@ class Drivetrain:
         return max([1.0, *(fastest or map(abs, self.speeds.values()))])
 
     def _repr_html_(self) -> str:
-        parts = (part for group in GROUPS for part in getattr(self, group))
+        parts = (part for group in KINDS for part in getattr(self, group))
         return parts_html(self.name, parts, self._laws()) + self.kinematics.to_html()
 
     def __repr__(self) -> str:
-        counts = [(len(getattr(self, g)), g) for g in GROUPS if getattr(self, g)]
+        counts = [(len(getattr(self, g)), g) for g in KINDS if getattr(self, g)]
         said = [f"{n} {KINDS[g].title if n == 1 else g}" for n, g in counts]
         by_law: dict[str, list[str]] = {}
         for name, law in self._laws().items():
             by_law.setdefault(law, []).append(name)
         said += [f"{', '.join(names)}: {law}" for law, names in by_law.items()]
         return f"Drivetrain({self.name!r}: {'; '.join([', '.join(said[: len(counts)]), *said[len(counts) :]])})"
-
-
-KINDS: dict[str, type[Part]] = {
-    "shafts": Shaft, "wheels": Wheel, "meshes": GearMesh, "bearings": Bearing, "couplings": Coupling,
-    "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor,
-}  # fmt: skip
-"""What each group holds."""
 
 
 FaultReader = Callable[[Any], Any]
@@ -462,10 +456,10 @@ def make_description(
 
 
 def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
-    known = ("name", "gravity", "run_up", "running", "run", *GROUPS)
+    known = ("name", "gravity", "run_up", "running", "run", *KINDS)
     check_keys(data, known, "the file", DrivetrainError, shown=repr)
     parts: dict[str, Any] = {}
-    for group in GROUPS:
+    for group in KINDS:
         tables = data.get(group, {})
         require(isinstance(tables, Mapping), f"{group}: write a table for each, such as [{group}.a]")
         parts[group] = [_part(group, str(name), table, fault) for name, table in tables.items()]
