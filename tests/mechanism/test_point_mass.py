@@ -122,6 +122,9 @@ def test_a_point_mass_has_three_coordinates():
     assert names[:9] == [f"u_{c}({b})" for b in ("one", "block", "two") for c in "xyz"]
     assert [n for n in names if n.startswith("theta_")] == [f"theta_{c}(block)" for c in ("psi", "theta", "phi")]
     assert len(names) == len(system.problem("I3").y0)
+    counts = system.model.counts
+    assert counts.coordinates == 12
+    assert counts.owners.tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2, 1, 1, 1]
     assert system.report.degrees_of_freedom == 12
     assert "12 coordinates" in repr(m)
     assert repr(m.bodies["one"]) == "PointMass('one', mass=1.5 kg, 1 markers)"
@@ -359,9 +362,10 @@ def test_bodies_fixed_to_each_other_are_one_beside_a_point_mass():
     np.testing.assert_allclose(runs[0].reaction_force("weld"), runs[1].reaction_force("weld"), atol=1e-5)
 
 
-def test_it_is_drawn():
+def test_it_is_drawn_and_kept():
     m = two_masses()
     s = m.simulate(0.1)
+    assert s.to_dataset()["position"].sel(body="right").shape == (s.t.size, 3)
     assert {part.name for part in mechanism_scene(m).parts} >= {"left", "right"}
     assert {part.name for part in solution_scene(s).parts} >= {"left", "right"}
 
@@ -374,6 +378,8 @@ def test_a_deck_and_back():
     ball = m.point_mass("ball", 2.0, at=(1, 0, 0), velocity=(0, 0.5, 0), com=(0.1, 0, 0.2), orientation=TURNED)
     hook = ball.marker((0.2, 0.1, 0), (0.1, 0.2, 0.3), name="hook")
     m.load("pull", ball.marker(name="J"), m.ground.marker(name="G"), rm=hook, fx=1.0, fz='-8*DZ("hook")', kind="vforce")
+    # the reaction acts on the ball where the force does, beside it: the moment does nothing
+    m.load("push", m.ground.marker((0, 0, 1), name="P"), ball.marker(name="Q"), fy="2*TIME", kind="vforce")
     text = write_deck(m)
     assert "POINT_MASS/" in text
     assert "IP =" not in text
@@ -397,8 +403,14 @@ def test_joints_that_hold_an_orientation_are_refused(kind):
     for pair in ((ball, block), (m.ground, ball)):
         with pytest.raises(ModelError, match=says("pin", "'ball'", "spherical", "m.body")):
             m.joint(kind, "pin", *pair)
+    with pytest.raises(ModelError, match=says("pin", "'ball'", "spherical", "m.body")):
+        m.screw("pin", ball, block, pitch=0.1)
     # the name is free again, and so are those of its markers
     m.spherical("pin", ball, block)
+    with pytest.raises(ModelError, match=says("friction", "'ball'", "torque", "m.body")):
+        m.friction("friction", m.joints["pin"], 0.3, 0.2, ball_radius=0.01)
+    with pytest.raises(ModelError, match=says("turn", "'ball'", "m.body")):
+        m.rotation("turn", m.joint("self_aligning", "eye", ball, m.ground), 1.0)
 
 
 def test_torques_are_refused_and_forces_of_the_same_kind_are_not():
