@@ -15,6 +15,7 @@ from gearmbs.dae.equations.residual import residual
 from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.model.system import FORMULATIONS
 from gearmbs.mechanism import Mechanism, ModelError, PointMass, kinematic, quasi_static, static_equilibrium
+from gearmbs.mechanism.checks import singular_passage
 from gearmbs.view import mechanism_scene, solution_scene
 from tests.says import says
 
@@ -257,6 +258,24 @@ def test_a_piston_follows_its_crank(way):
     np.testing.assert_allclose(s.com_acceleration("piston")[:, 0], (near[0] - 2 * near[1] + near[2]) / h**2, atol=1e-5)
 
 
+@pytest.mark.parametrize("rate", [37, 10])
+def test_a_position_of_change_passed_between_outputs_is_found(rate):
+    """Of a rod as long as the crank: at a quarter turn the piston could stay in the middle."""
+    found = []
+    for point in (True, False):
+        m = Mechanism("equal")
+        crank = m.body("crank", 1.0, (0.01, 0.01, 0.01), orientation=[[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+        piston = m.point_mass("piston", 2.0, at=(0.32, 0, 0)) if point else m.body("piston", 2.0, (1, 1, 1),
+                                                                                   position=(0.32, 0, 0))  # fmt: skip
+        m.rotation("motor", m.revolute("pin", crank, m.ground, axis=(0, 1, 0)), "1.5*TIME")
+        m.distance("rod", crank.marker((0.2, 0, 0)), piston.marker())
+        m.joint("inline" if point else "translational", "rail", piston, m.ground, axis=(1, 0, 0))
+        found.append(singular_passage(m.simulate(1.0, rate=rate)))
+    assert found[0] is not None
+    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-6)
+    assert "rod: distance 0.2 m" in found[0][1]
+
+
 def test_a_force_acts_along_the_axes_a_marker_was_given():
     """x of a marker turned with the body's frame: both stay, so the acceleration is constant."""
     m = Mechanism("thrust")
@@ -437,6 +456,13 @@ def test_torques_are_refused_and_forces_of_the_same_kind_are_not():
 def test_a_mass_that_is_none_is_refused(mass):
     with pytest.raises(ModelError, match=says("ball", "mass", "kg")):
         Mechanism("none").point_mass("ball", mass)
+
+
+def test_an_angular_velocity_is_refused():
+    m = two_masses()
+    m.bodies["left"].angular_velocity = np.array([0.0, 0.0, 1.0])
+    with pytest.raises(ModelError, match=says("left", "angular_velocity", "inertia")):
+        m.simulate(0.1)
 
 
 def test_a_name_in_use_is_refused():
