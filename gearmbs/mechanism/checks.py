@@ -54,8 +54,8 @@ def locked_bodies(mechanism: Mechanism, system: System) -> list[str]:
 
 
 def _directions_of(system: System) -> list[np.ndarray]:
-    """Return for each body which of all spatial displacements it has: without angles no rotations."""
-    return [np.arange(6 * k, 6 * k + 3 + kind.angles) for k, kind in enumerate(system.model.kinds[1:])]
+    """Return for each body which of all spatial displacements it has."""
+    return [6 * k + np.array(kind.directions) for k, kind in enumerate(system.model.kinds[1:])]
 
 
 def locking_remark(mechanism: Mechanism, system: System) -> str:
