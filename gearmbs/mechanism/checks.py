@@ -49,9 +49,13 @@ def locked_bodies(mechanism: Mechanism, system: System) -> list[str]:
     free = right[rank:].T
     if not np.all(np.isfinite(free)):
         return []
-    places = [slice(6 * k, 6 * k + 3 + kind.angles) for k, kind in enumerate(system.model.kinds[1:])]
-    still = [name for name, place in zip(names, places) if not np.any(np.abs(free[place]) > STILL)]
+    still = [name for name, own in zip(names, _directions_of(system)) if not np.any(np.abs(free[own]) > STILL)]
     return [name for name in still if name not in _fixed_to_ground(mechanism)]
+
+
+def _directions_of(system: System) -> list[np.ndarray]:
+    """Return for each body which of all spatial displacements it has."""
+    return [6 * k + np.array(kind.directions) for k, kind in enumerate(system.model.kinds[1:])]
 
 
 def locking_remark(mechanism: Mechanism, system: System) -> str:
@@ -264,10 +268,11 @@ def singular_passage(solution: Solution) -> tuple[float, str] | None:
     if poses.shape[1] * 6 != scale.size:
         # bodies with modes have coordinates of their own
         return None
+    own = np.concatenate(_directions_of(system))
     first = sign = 0.0
     before: tuple[float, float, np.ndarray, np.ndarray] | None = None
     for k in np.unique(np.linspace(0, solution.t.size - 1, SAMPLES).astype(int)):
-        jacobian = system.constraint_jacobian(poses[k], float(solution.t[k]))[0].toarray() * scale
+        jacobian = (system.constraint_jacobian(poses[k], float(solution.t[k]))[0].toarray() * scale)[:, own]
         left, values, right = np.linalg.svd(jacobian, full_matrices=False)
         here = (float(solution.t[k]), float(values[-1]), left[:, -1], right[-1])
         now = float(np.linalg.slogdet(jacobian)[0]) if jacobian.shape[0] == jacobian.shape[1] else 0.0
