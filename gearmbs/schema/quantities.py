@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -83,7 +84,7 @@ class Measure:
     each: bool = False
     curve: bool = False
 
-    @property
+    @cached_property
     def unit(self) -> str:
         """The SI unit the field holds."""
         unit = DIMENSIONS.get(self.dimension, self.dimension)

@@ -7,6 +7,7 @@ below half the sampling rate and whether the record is long enough follows from 
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -32,8 +33,12 @@ SLIPPED = 0.5
 
 def edge(case: Case) -> float:
     """Return what must be simulated beyond both ends of the record, s: half the length of the anti-alias filter."""
-    rate = case.output_rate
-    ratio = round(rate / case.signal_rate)
+    return _edge(case.output_rate, case.signal_rate)
+
+
+@cache
+def _edge(rate: float, signal_rate: float) -> float:
+    ratio = round(rate / signal_rate)
     if ratio == 1:
         return EDGE
     taps = decimation_taps(ratio, rate).size

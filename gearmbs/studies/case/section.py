@@ -7,6 +7,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -164,7 +165,16 @@ class Section(BaseModel, metaclass=_OneError):
         """The quantities that the user wrote with units, as written."""
         return self.__dict__.get("given", {})
 
+    def settings(self) -> dict[str, Any]:
+        """Return all settings, quantities as the user wrote them, else in SI."""
+        return {**self.model_dump(), **self.written}
 
+    def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """Return all settings with some changed."""
+        return {**self.settings(), **changes}
+
+
+@cache
 def measures_of(kind: type[BaseModel]) -> dict[str, Measure]:
     """Return what the fields of a section measure, by name."""
     return {
