@@ -67,9 +67,9 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.h_max = np.inf if options.max_step is None else options.max_step
     st.rtol = options.rtol
     st.rate_allowed = RATE_ALLOWED_IF_DEAR if problem.jacobian_residuals >= DEAR else RATE_ALLOWED
-    st.max_order = options.highest_order if options.max_order is None else options.max_order
-    st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else options.max_iterations
-    st.max_steps = options.max_steps or 0
+    st.max_order = options.highest_order if options.max_order is None else int(options.max_order)
+    st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else int(options.max_iterations)
+    st.max_steps = int(options.max_steps or 0)
     st.n_events = n_events
     st.most_crossings = SAMPLES * n_events
     st.fixed_leading = options.method == "GSTIFF"
