@@ -79,7 +79,14 @@ class JointMethods:
                     if marker is not i and marker is not j:
                         marker.body.markers.remove(marker)
                 raise
-        return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj)))
+        try:
+            rows = jt.JOINTS[kind].rows(mi, mj)
+        except ModelError:
+            raise
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise ModelError(f"{label}: the rows of JOINTS[{kind!r}] fail with {reason}") from error
+        return self._add_joint(jt.Joint(name, kind, mi, mj, rows))
 
     def fixed(self, name, i, j, **where) -> jt.Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
