@@ -44,7 +44,7 @@ from gearmbs.dae.integrators.messages import list_names
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import combine, lagrange_weights
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, no_events, no_hook
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 
 SETTLED = 1e-6
@@ -627,7 +627,7 @@ class AlgebraicOutputs:
     ) -> None:
         """Settle one output in place; see `settle_output`."""
         problem = self.problem
-        settle_output(
+        direct(settle_output)(
             self.functions, self.part, t, y, yp, h, t_old, y_old, idata, problem.rdata.copy(),
             np.zeros(problem.work_size),
         )  # fmt: skip
@@ -635,7 +635,7 @@ class AlgebraicOutputs:
     def settle_on_steps(self, times, ends, orders, nodes, rows, y, yp, idata: np.ndarray) -> None:
         """Write y and y' at times between steps, settled; see the function of this name."""
         problem = self.problem
-        settle_on_steps(
+        direct(settle_on_steps)(
             self.functions, self.part, times, ends, orders, nodes, rows, y, yp, idata, problem.rdata.copy(),
             np.zeros(problem.work_size),
         )  # fmt: skip
