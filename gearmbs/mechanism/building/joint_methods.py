@@ -75,7 +75,14 @@ class JointMethods:
         with _markers_kept_if_added((mi, mj), (i, j)):
             if crossed:
                 jt.check_crossed(label, mi, mj)
-            return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj)))
+            try:
+                rows = jt.JOINTS[kind].rows(mi, mj)
+            except ModelError:
+                raise
+            except Exception as error:
+                reason = f"{type(error).__name__}: {error}"
+                raise ModelError(f"{label}: the rows of JOINTS[{kind!r}] fail with {reason}") from error
+            return self._add_joint(jt.Joint(name, kind, mi, mj, rows))
 
     def fixed(self, name, i, j, **where) -> jt.Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
