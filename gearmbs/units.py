@@ -269,6 +269,9 @@ def _parse(text: str, target: str, field: str) -> float:
             f"{field}: cannot read {text!r} as a number with a unit ({error}); {_remedy(clean, target)}"
         ) from None
     example = USUAL.get(target, target)
+    if not re.match(r"[+-]?\s*\(*[+-]?\s*(\.?\d|inf|nan)", clean, re.IGNORECASE):
+        # a library takes a unit alone for one of it
+        raise ValueError(f"{field}: {text!r} has no number; write for example '1 {example}'")
     if not isinstance(quantity, registry.Quantity):
         quantity = registry.Quantity(quantity, "dimensionless")
     if not isinstance(quantity.magnitude, Real):
@@ -312,7 +315,7 @@ def _fault(text: str) -> str:
         return "has two signs"
     if SIDE_BY_SIDE.search(text) or (number is not None and re.match(r"[.\d]", text[number.end() :])):
         return "has two numbers side by side"
-    return "" if re.match(r"[+-]?\s*\(*[+-]?\s*(\.?\d|inf|nan)", text, re.IGNORECASE) else "has no number"
+    return ""
 
 
 def _remedy(text: str, target: str) -> str:

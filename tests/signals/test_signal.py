@@ -36,6 +36,8 @@ def test_make_signal_carries_its_metadata():
         (lambda: make_signal([], 1.0), "non-empty"),
         (lambda: make_signal([1.0, np.nan, 2.0], 1.0), says("1", "0", "first at row")),
         (lambda: make_signal([1.0], -5.0), says("positive", "rate")),
+        (lambda: make_signal([1.0, 2.0j], 5.0), says("data", "complex", "give")),
+        (lambda: make_signal({"a": np.array([1.0 + 0.0j])}, 5.0), says("data", "complex", "give")),
         (lambda: make_signal([1.0], 5.0, teeth=0), says("teeth", "0", "positive")),
         (lambda: make_signal([1.0], 5.0, teeth=28.5), says("teeth", "28.5", "whole")),
         (lambda: make_signal([1.0], 5.0, speed=float("nan")), says("speed", "nan", "positive")),
