@@ -48,6 +48,7 @@ In TOML files or nested tables each kind of part is a table of named tables::
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -64,9 +65,9 @@ from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
 from gearmbs.schema.described import Described, make
 from gearmbs.schema.files import read_toml
-from gearmbs.schema.messages import check_keys, chosen
+from gearmbs.schema.messages import check_keys, chosen, line
 from gearmbs.schema.quantities import Measure, OneOf
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
@@ -373,6 +374,7 @@ PAIR_KEYS = tuple(
     f.name for f in fields(GearPair) if f.init and f.name not in ("driver", "driven", "rotation", "torque")
 )
 HARMONICS = Measure(low=1, whole=True, remedy="give a whole number of mesh harmonics from 1 up")
+NUMERIC = re.compile(r"\b(int|float|Quantity)\b")
 GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name")
 
 
@@ -464,12 +466,21 @@ def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
         require(isinstance(tables, Mapping), f"{group}: write a table for each, such as [{group}.a]")
         parts[group] = [_part(group, str(name), table, fault) for name, table in tables.items()]
     others: dict[str, Any] = {key: data[key] for key in ("name", "running") if key in data}
+    running = data.get("running", False)
+    require(isinstance(running, bool), f"running is {running!r}; give true or false")
     if "gravity" in data:
-        others["gravity"] = tuple(to_si(g, "acceleration", "gravity") for g in data["gravity"])
+        others["gravity"] = _measured(data, "gravity", Measure("acceleration", several=3))
     if "run_up" in data:
-        others["run_up"] = to_si(data["run_up"], "time", "run_up")
+        others["run_up"] = _measured(data, "run_up", Measure("time", above=0))
     run = make(RunSettings, data.get("run", {}), "[run]", DrivetrainError)
     return Description(Drivetrain(**parts, **others), run)
+
+
+def _measured(data: Mapping[str, Any], key: str, measure: Measure) -> Any:
+    try:
+        return measure.as_given(data[key])
+    except ValueError as error:
+        raise DrivetrainError(line(key, data[key], error)) from None
 
 
 def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
@@ -488,6 +499,14 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
     return _of_kind(where, chosen(kinds, str(given.pop("kind", usual)), f"{where}: ", DrivetrainError), name, given)
 
 
+def _refuse_truth(where: str, kind: type, given: Mapping[str, Any]) -> None:
+    """Refuse true and false, which Python takes for 1 and 0, where a number is meant."""
+    for known in fields(kind):
+        value = given.get(known.name)
+        if isinstance(value, bool) and NUMERIC.search(str(known.type)):
+            raise DrivetrainError(f"{where}: {known.name} is {value}; give a number, not true or false")
+
+
 def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
     with told_of(where):
         return make(kind, given, where, DrivetrainError, name=name)
@@ -498,6 +517,7 @@ def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
     material = {key: given.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in given}
     known = ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"]
     check_keys(given, known, where, DrivetrainError, shown=repr)
+    _refuse_truth(where, GearSpec, given)
     for key in ("teeth", "module"):
         require(key in given, f"{where}: {key} is missing")
     with told_of(where):
@@ -516,6 +536,7 @@ def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | Non
     own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
     known = ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"]
     check_keys(given, known, where, DrivetrainError, shown=repr)
+    _refuse_truth(where, GearPair, given)
     if "faults" in given:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None

@@ -318,7 +318,8 @@ class GearPair(PairGeometry, Shown):
         else:
             if damping is not None:
                 raise ValueError(f"damping is {damping!r} and damping_ratio {damping_ratio!r}; give one of them")
-            if not (isinstance(damping_ratio, (int, float)) and 0.0 <= damping_ratio < math.inf):
+            real = isinstance(damping_ratio, (int, float)) and not isinstance(damping_ratio, bool)
+            if not (real and 0.0 <= damping_ratio < math.inf):
                 raise ValueError(f"damping_ratio is {damping_ratio!r}; give a number that is not negative")
             share = self._pairs_in_mesh * self._face_share
             damping = 2.0 * damping_ratio * math.sqrt(law.stiffness * self.reduced_mass / share)

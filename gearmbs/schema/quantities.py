@@ -11,9 +11,9 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from gearmbs.units import DIMENSIONS, to_si
+from gearmbs.units import DIMENSIONS, si_unit, to_si
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
@@ -254,8 +254,35 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:g}"
 
 
+def counts(hint: Any) -> bool:
+    """Whether an annotation allows numbers and no truth values, which Python takes for 1 and 0."""
+    if hint in (int, float):
+        return True
+    inner = get_args(hint)
+    return bool not in inner and any(map(counts, inner))
+
+
+def no_truth(value: Any) -> Any:
+    """Return a value unless it is true or false, or a list that holds one."""
+    if isinstance(value, bool):
+        raise ValueError("give a number, not true or false")
+    if isinstance(value, (list, tuple)):
+        for item in value:
+            no_truth(item)
+    return value
+
+
+@dataclass(frozen=True)
 class OverTime:
-    """A value over time: a number, a text with a unit or an expression, or an object that gives one."""
+    """A value over time: a number, a text with a unit or an expression, or an object that gives one.
+
+    Attributes
+    ----------
+    dimension : str
+        As of `Measure`; default: any.
+    """
+
+    dimension: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         from pydantic_core import core_schema
@@ -271,6 +298,8 @@ class OverTime:
             try:
                 float(value)
             except ValueError:
+                if self.dimension and si_unit(value) is not None:
+                    in_si(value, self.dimension)
                 return value
             raise OutOfRange(asked, f"{value!r}; {asked}")
         return value

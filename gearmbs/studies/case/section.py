@@ -11,10 +11,10 @@ from functools import cache
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
 
 from gearmbs.schema.messages import OWN, faults, path_of, remedy
-from gearmbs.schema.quantities import Measure
+from gearmbs.schema.quantities import Measure, counts, no_truth
 from gearmbs.units import NUMBER
 from gearmbs.wording import did_you_mean
 
@@ -139,6 +139,15 @@ class Section(BaseModel, metaclass=_OneError):
         if not name.startswith("_"):
             raise CaseError(f"{self.section or 'case'}.{name}: {_unknown((name,), type(self))}")
         super().__setattr__(name, value)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _number(cls, value: Any, info: Any) -> Any:
+        """Refuse true and false where a number is meant."""
+        field = cls.model_fields[info.field_name]
+        if counts(field.annotation) and not any(isinstance(item, Measure) for item in field.metadata):
+            return no_truth(value)
+        return value
 
     @model_validator(mode="wrap")
     @classmethod
