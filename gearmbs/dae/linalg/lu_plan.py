@@ -376,8 +376,8 @@ def analyse(
     size = 3 * len(indices) + 4 * n
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted
     while True:
-        lines = new_lines(n, size, True), new_lines(n, size, False)
-        rank, *chosen = choose(indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, *lines)
+        columns, rows = new_lines(n, size)
+        rank, *chosen = choose(indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, columns, rows)
         if rank >= 0:
             break
         size *= 2
