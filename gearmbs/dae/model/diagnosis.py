@@ -249,4 +249,4 @@ def _counted_rows(system: BaseSystem) -> np.ndarray:
     """Mark the rows with an angle whose full turns are counted."""
     model = system.model
     kinds = model.terms[:, T.TERM_TYPE]
-    return np.array([np.any(kinds[model.span(r)] == ANGLE) for r in range(len(model.rows))], dtype=bool)
+    return np.array([np.any(kinds[span] == ANGLE) for span in model.spans], dtype=bool)

@@ -241,11 +241,11 @@ def assemble_position(
     kept = independent_rows(jacobian, weights, order=system.row_order)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
     before = place
-    place, jacobian, phi, kept = _assembled(system, before, t, kept, report)
+    place, jacobian, phi, kept = _assembled(system, before, t, kept, weights, report)
     off = {turn.row for turn in _half_turned(system, place, jacobian, phi, drawn)}
     if off:
-        place = _turned(system, before, t, kept, [turn for turn in drawn if turn.row in off])
-        place, jacobian, phi, kept = _assembled(system, place, t, kept, report)
+        place = _turned(system, before, t, kept, weights, [turn for turn in drawn if turn.row in off])
+        place, jacobian, phi, kept = _assembled(system, place, t, kept, weights, report)
         still = _half_turned(system, place, jacobian, phi, drawn)
         if still:
             raise AssemblyError(
@@ -260,15 +260,14 @@ def assemble_position(
 
 
 def _assembled(
-    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, report: InitialReport
+    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, weights: np.ndarray, report: InitialReport
 ) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, np.ndarray]:
     """Solve all rows for the nearest position; return it with the Jacobian, Phi and the independent rows."""
-    weights = system.coordinate_weights()
     length = np.sqrt(weights[3]) if weights.size else 1.0
     dropped = np.zeros(0, dtype=np.int64)
     phi = np.zeros(0)
     for _ in range(SELECTIONS):
-        place, jacobian, phi, iterations = _closed(system, place, t, kept, length)
+        place, jacobian, phi, iterations = _closed(system, place, t, kept, weights)
         report.position_iterations += iterations
         dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
         if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
@@ -297,16 +296,19 @@ def _half_turned(
 
 
 def _turned(
-    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, turns: list[turning.Turn]
+    system: BaseSystem,
+    place: Configuration,
+    t: float,
+    kept: np.ndarray,
+    weights: np.ndarray,
+    turns: list[turning.Turn],
 ) -> Configuration:
     """Bring prescribed rotations to their angles in steps."""
-    weights = system.coordinate_weights()
-    length = np.sqrt(weights[3])
     own = system.assembler
     try:
         for held in turning.stages(system, turns):
             system.assembler = held
-            place = _closed(system, place, t, kept, length)[0]
+            place = _closed(system, place, t, kept, weights)[0]
     finally:
         system.assembler = own
     return place
@@ -327,10 +329,10 @@ def _note_correction(system: BaseSystem, report: InitialReport, before: np.ndarr
 
 
 def _closed(
-    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, length: float
+    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, weights: np.ndarray
 ) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, int]:
     """Solve the kept rows for the nearest position; return it with the Jacobian, Phi and the iterations taken."""
-    weights = system.coordinate_weights()
+    length = np.sqrt(weights[3]) if weights.size else 1.0
     jacobian, phi, _ = system.constraint_jacobian(place, t)
     size = 0.0
     for iteration in range(MAX_POSITION_ITERATIONS):

@@ -51,8 +51,7 @@ def prescribed_turns(
     """Return the prescribed rotations at a configuration whose constraint Jacobian and Phi are given."""
     model = system.model
     found = []
-    for row in range(len(model.rows)):
-        span = model.span(row)
+    for row, span in enumerate(model.spans):
         first = span.start
         # rows given by an expression have no terms
         if span.stop == first or model.terms[first, T.TERM_TYPE] != ROTATION:
@@ -88,7 +87,7 @@ def _held(model: Model, angles: dict[int, float]) -> Model:
     terms = model.terms.copy()
     functions = [np.array(model.functions)]
     for k, row in enumerate(angles):
-        terms[model.span(row).start, T.TERM_FUNCTION] = len(model.functions) + k
+        terms[model.spans[row].start, T.TERM_FUNCTION] = len(model.functions) + k
         functions.append(np.array([[CONSTANT, len(model.function_r) + k]], dtype=np.int64))
     return replace(
         model,
