@@ -221,32 +221,32 @@ def least_correction(jacobian: scipy.sparse.csc_array, weights: np.ndarray, viol
 
 
 def assemble_position(
-    system: BaseSystem, place: Configuration, t: float
+    system: BaseSystem, configuration: Configuration, t: float
 ) -> tuple[Configuration, np.ndarray, InitialReport]:
     """Move the bodies as little as possible onto the constraints.
 
     Returns
     -------
-    place : Configuration
+    configuration : Configuration
         With the velocities it had.
     kept : ndarray of int
         Independent constraint rows; the others follow from them.
     report : InitialReport
     """
     weights = system.coordinate_weights()
-    jacobian, phi, _ = system.constraint_jacobian(place, t)
+    jacobian, phi, _ = system.constraint_jacobian(configuration, t)
     if not np.all(np.isfinite(phi)):
         raise _not_finite(system, phi, t)
-    drawn = turning.prescribed_turns(system, place, jacobian, phi)
+    drawn = turning.prescribed_turns(system, configuration, jacobian, phi)
     kept = independent_rows(jacobian, weights, order=system.row_order)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
-    before = place
-    place, jacobian, phi, kept = _assembled(system, before, t, kept, weights, report)
-    off = {turn.row for turn in _half_turned(system, place, jacobian, phi, drawn)}
+    before = configuration
+    configuration, jacobian, phi, kept = _assembled(system, before, t, kept, weights, report)
+    off = {turn.row for turn in _half_turned(system, configuration, jacobian, phi, drawn)}
     if off:
-        place = _turned(system, before, t, kept, weights, [turn for turn in drawn if turn.row in off])
-        place, jacobian, phi, kept = _assembled(system, place, t, kept, weights, report)
-        still = _half_turned(system, place, jacobian, phi, drawn)
+        configuration = _turned(system, before, t, kept, weights, [turn for turn in drawn if turn.row in off])
+        configuration, jacobian, phi, kept = _assembled(system, configuration, t, kept, weights, report)
+        still = _half_turned(system, configuration, jacobian, phi, drawn)
         if still:
             raise AssemblyError(
                 f"{system.row_names[still[0].row]}: the mechanism can be assembled with this angle half a turn off; "
@@ -255,23 +255,28 @@ def assemble_position(
     dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
     report.redundant = [system.row_names[i] for i in dropped]
     report.violation = float(np.abs(phi).max(initial=0.0))
-    _note_correction(system, report, before.pose, place.pose)
-    return place, kept, report
+    _note_correction(system, report, before.pose, configuration.pose)
+    return configuration, kept, report
 
 
 def _assembled(
-    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, weights: np.ndarray, report: InitialReport
+    system: BaseSystem,
+    configuration: Configuration,
+    t: float,
+    kept: np.ndarray,
+    weights: np.ndarray,
+    report: InitialReport,
 ) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, np.ndarray]:
     """Solve all rows for the nearest position; return it with the Jacobian, Phi and the independent rows."""
     length = np.sqrt(weights[3]) if weights.size else 1.0
     dropped = np.zeros(0, dtype=np.int64)
     phi = np.zeros(0)
     for _ in range(SELECTIONS):
-        place, jacobian, phi, iterations = _closed(system, place, t, kept, weights)
+        configuration, jacobian, phi, iterations = _closed(system, configuration, t, kept, weights)
         report.position_iterations += iterations
         dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
         if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
-            return place, jacobian, phi, kept
+            return configuration, jacobian, phi, kept
         # rows that are redundant where the assembly began need not be so where it ends
         others = independent_rows(jacobian, weights, NEARLY, system.row_order)
         if np.array_equal(others, kept):
@@ -283,7 +288,7 @@ def _assembled(
 
 def _half_turned(
     system: BaseSystem,
-    place: Configuration,
+    configuration: Configuration,
     jacobian: scipy.sparse.csc_array,
     phi: np.ndarray,
     drawn: list[turning.Turn],
@@ -291,13 +296,13 @@ def _half_turned(
     """Return the prescribed rotations that are half a turn off, but those whose axes are drawn so."""
     if not drawn:
         return []
-    now = turning.prescribed_turns(system, place, jacobian, phi)
+    now = turning.prescribed_turns(system, configuration, jacobian, phi)
     return [b for a, b in zip(drawn, now) if abs(b.missing) > 0.5 * np.pi and not a.opposite]
 
 
 def _turned(
     system: BaseSystem,
-    place: Configuration,
+    configuration: Configuration,
     t: float,
     kept: np.ndarray,
     weights: np.ndarray,
@@ -308,10 +313,10 @@ def _turned(
     try:
         for held in turning.stages(system, turns):
             system.assembler = held
-            place = _closed(system, place, t, kept, weights)[0]
+            configuration = _closed(system, configuration, t, kept, weights)[0]
     finally:
         system.assembler = own
-    return place
+    return configuration
 
 
 def _note_correction(system: BaseSystem, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
@@ -329,22 +334,22 @@ def _note_correction(system: BaseSystem, report: InitialReport, before: np.ndarr
 
 
 def _closed(
-    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, weights: np.ndarray
+    system: BaseSystem, configuration: Configuration, t: float, kept: np.ndarray, weights: np.ndarray
 ) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, int]:
     """Solve the kept rows for the nearest position; return it with the Jacobian, Phi and the iterations taken."""
     length = np.sqrt(weights[3]) if weights.size else 1.0
-    jacobian, phi, _ = system.constraint_jacobian(place, t)
+    jacobian, phi, _ = system.constraint_jacobian(configuration, t)
     size = 0.0
     for iteration in range(MAX_POSITION_ITERATIONS):
         size = float(np.abs(phi[kept]).max(initial=0.0))
         if not np.isfinite(size):
             raise _not_finite(system, phi, t)
         if size <= POSITION_TOLERANCE * max(1.0, length):
-            return place, jacobian, phi, iteration
+            return configuration, jacobian, phi, iteration
         step = least_correction(scipy.sparse.csc_array(jacobian[kept]), weights, phi[kept])
-        turn = np.abs(place.parts(step)[0][:, 3:]).max(initial=0.0)
-        place = place.displaced(step * min(1.0, 0.5 / max(turn, 1e-300)))
-        jacobian, phi, _ = system.constraint_jacobian(place, t)
+        turn = np.abs(configuration.parts(step)[0][:, 3:]).max(initial=0.0)
+        configuration = configuration.displaced(step * min(1.0, 0.5 / max(turn, 1e-300)))
+        jacobian, phi, _ = system.constraint_jacobian(configuration, t)
     if size > 1e-9 * max(1.0, length):
         worst = kept[np.argmax(np.abs(phi[kept]))]
         raise AssemblyError(
@@ -352,7 +357,7 @@ def _closed(
             f"{system.row_names[worst]} is still violated by {abs(phi[worst]):.3g}; "
             "check the lengths and the markers of that joint"
         )
-    return place, jacobian, phi, MAX_POSITION_ITERATIONS
+    return configuration, jacobian, phi, MAX_POSITION_ITERATIONS
 
 
 def _not_finite(system: BaseSystem, phi: np.ndarray, t: float) -> AssemblyError:
@@ -372,13 +377,13 @@ def _conflict(system: BaseSystem, dropped: np.ndarray, phi: np.ndarray) -> Assem
     )
 
 
-def consistent_velocity(system: BaseSystem, place: Configuration, t: float) -> Configuration:
+def consistent_velocity(system: BaseSystem, configuration: Configuration, t: float) -> Configuration:
     """Correct the velocities as little as possible so that Phi_q v + Phi_t = 0."""
     weights = system.coordinate_weights()
-    jacobian, _, rate = system.constraint_jacobian(place, t)
+    jacobian, _, rate = system.constraint_jacobian(configuration, t)
     if jacobian.shape[0] == 0:
-        return place
-    return place.pushed(least_correction(jacobian, weights, rate))
+        return configuration
+    return configuration.pushed(least_correction(jacobian, weights, rate))
 
 
 def check_inertia(system: BaseSystem) -> None:
