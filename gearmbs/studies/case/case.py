@@ -425,18 +425,17 @@ class Case(Section, Shown):
         g, f, c, r = self.gears, self.fault, self.contact, self.friction
         wheels = []
         for k, name in enumerate(WHEELS):
-            material = Material(*(g.of_wheel(key, k) for key in ("youngs_modulus", "poisson_ratio", "density")))
-            own = ("face_width", "fillet_radius", "bore_radius", "tip_rounding")
+            material = [g.of_wheel(key, k) for key in ("youngs_modulus", "poisson_ratio", "density")]
+            own = {key: g.of_wheel(key, k) for key in ("face_width", "fillet_radius", "bore_radius", "tip_rounding")}
+            own |= {"addendum": g.height(k, above=True), "dedendum": g.height(k, above=False)}
             wheel = GearSpec(
                 g.teeth[k],
                 g.module,
                 g.pressure_angle,
-                addendum=g.height(k, above=True),
-                dedendum=g.height(k, above=False),
                 profile_shift=g.profile_shift[k],
-                material=material,
+                material=Material(*material),
                 name=name,
-                **{key: g.of_wheel(key, k) for key in own},
+                **own,
             )
             wheels.append(wheel)
         law = ContactLaw.impact(stiffness=c.stiffness, exponent=c.exponent, damping=c.damping, depth=c.depth)
