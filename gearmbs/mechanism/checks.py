@@ -265,10 +265,12 @@ def singular_passage(solution: Solution) -> tuple[float, str] | None:
         return None
     first = sign = 0.0
     before: tuple[float, float, np.ndarray, np.ndarray] | None = None
-    for k in np.unique(np.linspace(0, solution.t.size - 1, SAMPLES).astype(int)):
-        jacobian = system.constraint_jacobian(poses[k], float(solution.t[k]))[0].toarray() * scale
+    looked_at = np.unique(np.linspace(0, solution.t.size - 1, SAMPLES).astype(int))
+    times = solution.t[looked_at]
+    for t, matrix in zip(times.tolist(), system.constraint_jacobians(poses[looked_at], times)):
+        jacobian = matrix.toarray() * scale
         left, values, right = np.linalg.svd(jacobian, full_matrices=False)
-        here = (float(solution.t[k]), float(values[-1]), left[:, -1], right[-1])
+        here = (t, float(values[-1]), left[:, -1], right[-1])
         now = float(np.linalg.slogdet(jacobian)[0]) if jacobian.shape[0] == jacobian.shape[1] else 0.0
         if before is None:
             first, sign = here[1], now

@@ -349,3 +349,18 @@ def test_what_a_case_shows_is_what_differs_and_makes_it_again(case):
     for name in ("exponent", "density", "settling", "lump", "youngs_modulus"):
         assert name not in text
     assert all(f"{field}=" in text for field in wanted)
+
+
+def test_a_changed_case_keeps_what_does_not_change():
+    """Sections that stay are the same objects, a plain number is remarked once, and the case file stays short."""
+    with pytest.warns(CaseWarning, match="shafts.length"):
+        case = Case(name="a", shafts={"length": 0.5}, operation={"torque": "60 N m"})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        other = case.changed(name="b", operation={"torque": "70 N m"})
+    assert other.shafts is case.shafts
+    assert (other.operation.torque, case.operation.torque) == (70.0, 60.0)
+    assert other.settings() == {**case.settings(), "name": "b", "operation": other.operation.settings()}
+    assert "[gears]" not in case_module.case_toml(other)
+    with pytest.raises(CaseError, match=r"operation.torque = '70 m'"):
+        case.changed(operation={"torque": "70 m"})

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any, ClassVar
 
 from gearmbs.adams.parse.source import CONTINUED, RawStatement
@@ -90,9 +92,12 @@ def arg(
     return field(default=default, kw_only=True, metadata={"spec": spec})
 
 
-def specs_of(cls: type) -> dict[str, Spec]:
-    """Return field name -> Spec of a statement class."""
+def _specs(cls: Any) -> dict[str, Spec]:
     return {f.name: f.metadata["spec"] for f in fields(cls) if "spec" in f.metadata}
+
+
+specs_of: Callable[[type], dict[str, Spec]] = cache(_specs)
+"""Return field name -> Spec of a statement class."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from gearmbs.dae.model import initial
 from gearmbs.dae.problem import AssemblyError, ModelError
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration, PosedModel
+    from gearmbs.dae.model.base_system import BaseSystem
+    from gearmbs.dae.model.configuration import Configuration
     from gearmbs.dae.model.model import Model
 
 LARGEST_LOCK = 600
@@ -25,7 +26,7 @@ DENSE_COORDINATES = 600
 INVERSE_ITERATIONS = 3
 
 
-def locking(system: PosedModel, at: Configuration, t: float) -> str | None:
+def locking(system: BaseSystem, at: Configuration, t: float) -> str | None:
     """Return which constraint rows are about to depend on each other at a position, None when they are not.
 
     At a position where a mechanism locks the constraint Jacobian loses rank; near it, its smallest singular value
@@ -51,7 +52,7 @@ def locking(system: PosedModel, at: Configuration, t: float) -> str | None:
     )
 
 
-def check_finite(system: PosedModel, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
+def check_finite(system: BaseSystem, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
     """Raise a ModelError that names the load, constraint or body whose terms of the equations are not finite."""
     names = system.model.names
     bad = ~np.all(np.isfinite(loads[:, :6]), axis=1)
@@ -74,7 +75,7 @@ def check_finite(system: PosedModel, rhs: np.ndarray, loads: np.ndarray, t: floa
         raise ModelError(f"body '{body}': its forces at t = {t:.6g} s are not finite")
 
 
-def check_states(system: PosedModel, rest: np.ndarray, t: float) -> None:
+def check_states(system: BaseSystem, rest: np.ndarray, t: float) -> None:
     """Raise a ModelError that names the state whose equation, with ``rest`` its residual, is not finite."""
     for name, value in zip(system.state_names, rest):
         if not np.isfinite(value):
@@ -191,7 +192,7 @@ FARTHEST_COUNTED = 1e-3
 """Violation from which a counted angle is taken to be off by turns nobody counted; its row is then left alone."""
 
 
-def conflict(system: PosedModel, place: Configuration, t: float) -> str | None:
+def conflict(system: BaseSystem, place: Configuration, t: float) -> str | None:
     """Return which row dropped as redundant contradicts the motion at a configuration, or None.
 
     The rates are compared, which do not depend on counted turns.
@@ -211,7 +212,7 @@ def conflict(system: PosedModel, place: Configuration, t: float) -> str | None:
     )
 
 
-def _violated(system: PosedModel, place: Configuration, t: float) -> tuple[str, float] | None:
+def _violated(system: BaseSystem, place: Configuration, t: float) -> tuple[str, float] | None:
     """Return the name and rate of the redundant row most violated, None when none is."""
     jacobian, rate, names = system.dropped_rates(place, t)
     velocities = place.velocities
@@ -225,7 +226,7 @@ def _violated(system: PosedModel, place: Configuration, t: float) -> tuple[str, 
     return None if share[worst] <= CONFLICT_SHARE else (names[worst], float(abs(rate[worst])))
 
 
-def projected(system: PosedModel, place: Configuration, t: float) -> Configuration | None:
+def projected(system: BaseSystem, place: Configuration, t: float) -> Configuration | None:
     """Return the configuration put onto the constraints with velocities that keep it there, None where impossible."""
     weights = system.coordinate_weights()
     counted = _counted_rows(system)
@@ -244,8 +245,8 @@ def projected(system: PosedModel, place: Configuration, t: float) -> Configurati
     return None
 
 
-def _counted_rows(system: PosedModel) -> np.ndarray:
+def _counted_rows(system: BaseSystem) -> np.ndarray:
     """Mark the rows with an angle whose full turns are counted."""
     model = system.model
     kinds = model.terms[:, T.TERM_TYPE]
-    return np.array([np.any(kinds[model.span(r)] == ANGLE) for r in range(len(model.rows))], dtype=bool)
+    return np.array([np.any(kinds[span] == ANGLE) for span in model.spans], dtype=bool)

@@ -17,7 +17,8 @@ from gearmbs.dae.model import turning
 from gearmbs.dae.problem import AssemblyError, SingularModelError
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration, PosedModel
+    from gearmbs.dae.model.base_system import BaseSystem
+    from gearmbs.dae.model.configuration import Configuration
 
 POSITION_TOLERANCE = 1e-12
 """Part of the mechanism's length, or of 1 m, within which constraints hold: some thousand times the rounding of their
@@ -220,7 +221,7 @@ def least_correction(jacobian: scipy.sparse.csc_array, weights: np.ndarray, viol
 
 
 def assemble_position(
-    system: PosedModel, place: Configuration, t: float
+    system: BaseSystem, place: Configuration, t: float
 ) -> tuple[Configuration, np.ndarray, InitialReport]:
     """Move the bodies as little as possible onto the constraints.
 
@@ -240,11 +241,11 @@ def assemble_position(
     kept = independent_rows(jacobian, weights, order=system.row_order)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
     before = place
-    place, jacobian, phi, kept = _assembled(system, before, t, kept, report)
+    place, jacobian, phi, kept = _assembled(system, before, t, kept, weights, report)
     off = {turn.row for turn in _half_turned(system, place, jacobian, phi, drawn)}
     if off:
-        place = _turned(system, before, t, kept, [turn for turn in drawn if turn.row in off])
-        place, jacobian, phi, kept = _assembled(system, place, t, kept, report)
+        place = _turned(system, before, t, kept, weights, [turn for turn in drawn if turn.row in off])
+        place, jacobian, phi, kept = _assembled(system, place, t, kept, weights, report)
         still = _half_turned(system, place, jacobian, phi, drawn)
         if still:
             raise AssemblyError(
@@ -259,15 +260,14 @@ def assemble_position(
 
 
 def _assembled(
-    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, report: InitialReport
+    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, weights: np.ndarray, report: InitialReport
 ) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, np.ndarray]:
     """Solve all rows for the nearest position; return it with the Jacobian, Phi and the independent rows."""
-    weights = system.coordinate_weights()
     length = np.sqrt(weights[3]) if weights.size else 1.0
     dropped = np.zeros(0, dtype=np.int64)
     phi = np.zeros(0)
     for _ in range(SELECTIONS):
-        place, jacobian, phi, iterations = _closed(system, place, t, kept, length)
+        place, jacobian, phi, iterations = _closed(system, place, t, kept, weights)
         report.position_iterations += iterations
         dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
         if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
@@ -282,7 +282,7 @@ def _assembled(
 
 
 def _half_turned(
-    system: PosedModel,
+    system: BaseSystem,
     place: Configuration,
     jacobian: scipy.sparse.csc_array,
     phi: np.ndarray,
@@ -296,22 +296,25 @@ def _half_turned(
 
 
 def _turned(
-    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, turns: list[turning.Turn]
+    system: BaseSystem,
+    place: Configuration,
+    t: float,
+    kept: np.ndarray,
+    weights: np.ndarray,
+    turns: list[turning.Turn],
 ) -> Configuration:
     """Bring prescribed rotations to their angles in steps."""
-    weights = system.coordinate_weights()
-    length = np.sqrt(weights[3])
     own = system.assembler
     try:
         for held in turning.stages(system, turns):
             system.assembler = held
-            place = _closed(system, place, t, kept, length)[0]
+            place = _closed(system, place, t, kept, weights)[0]
     finally:
         system.assembler = own
     return place
 
 
-def _note_correction(system: PosedModel, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
+def _note_correction(system: BaseSystem, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
     report.length = system.length
     if not len(pose):
         return
@@ -326,10 +329,10 @@ def _note_correction(system: PosedModel, report: InitialReport, before: np.ndarr
 
 
 def _closed(
-    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, length: float
+    system: BaseSystem, place: Configuration, t: float, kept: np.ndarray, weights: np.ndarray
 ) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, int]:
     """Solve the kept rows for the nearest position; return it with the Jacobian, Phi and the iterations taken."""
-    weights = system.coordinate_weights()
+    length = np.sqrt(weights[3]) if weights.size else 1.0
     jacobian, phi, _ = system.constraint_jacobian(place, t)
     size = 0.0
     for iteration in range(MAX_POSITION_ITERATIONS):
@@ -352,7 +355,7 @@ def _closed(
     return place, jacobian, phi, MAX_POSITION_ITERATIONS
 
 
-def _not_finite(system: PosedModel, phi: np.ndarray, t: float) -> AssemblyError:
+def _not_finite(system: BaseSystem, phi: np.ndarray, t: float) -> AssemblyError:
     """Say which row has no value."""
     name = system.row_names[int(np.argmin(np.isfinite(phi)))]
     return AssemblyError(
@@ -360,7 +363,7 @@ def _not_finite(system: PosedModel, phi: np.ndarray, t: float) -> AssemblyError:
     )
 
 
-def _conflict(system: PosedModel, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
+def _conflict(system: BaseSystem, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
     """Say which redundant row contradicts the others most."""
     worst = dropped[np.argmax(np.abs(phi[dropped]))]
     return AssemblyError(
@@ -369,7 +372,7 @@ def _conflict(system: PosedModel, dropped: np.ndarray, phi: np.ndarray) -> Assem
     )
 
 
-def consistent_velocity(system: PosedModel, place: Configuration, t: float) -> Configuration:
+def consistent_velocity(system: BaseSystem, place: Configuration, t: float) -> Configuration:
     """Correct the velocities as little as possible so that Phi_q v + Phi_t = 0."""
     weights = system.coordinate_weights()
     jacobian, _, rate = system.constraint_jacobian(place, t)
@@ -378,7 +381,7 @@ def consistent_velocity(system: PosedModel, place: Configuration, t: float) -> C
     return place.pushed(least_correction(jacobian, weights, rate))
 
 
-def check_inertia(system: PosedModel) -> None:
+def check_inertia(system: BaseSystem) -> None:
     """Raise if the mass or inertia of a body is not finite."""
     for name, row in zip(system.body_names, system.model.bodies[1:]):
         if not np.all(np.isfinite(row)):

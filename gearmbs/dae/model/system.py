@@ -6,16 +6,17 @@ import numpy as np
 
 from gearmbs.dae.equations.unknowns import FORMULATIONS, Unknown
 from gearmbs.dae.model import diagnosis, initial, start
-from gearmbs.dae.model.configuration import Configuration, PosedModel
+from gearmbs.dae.model.base_system import BaseSystem
+from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.model.diagnosis import conflict
 from gearmbs.dae.problem import AssemblyError, DAEProblem, ModelError
 
 
-class System(PosedModel):
+class System(BaseSystem):
     """A mechanism as a DAE.
 
     Built by :meth:`gearmbs.mechanism.Mechanism.compile`; users rarely make one themselves. For its parameters see
-    `gearmbs.dae.model.configuration.PosedModel`; the configuration is a guess that :meth:`initialise` makes consistent.
+    `gearmbs.dae.model.base_system.BaseSystem`; the configuration is a guess that :meth:`initialise` makes consistent.
 
     Attributes
     ----------

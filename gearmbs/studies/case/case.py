@@ -197,6 +197,21 @@ class Operation(Section):
             self.__dict__["duration"] = max(ends)
         return self
 
+    def settings(self) -> dict[str, Any]:
+        """Return all settings; a duration that follows from a curve goes with it."""
+        data = super().settings()
+        if "duration" not in self.model_fields_set:
+            del data["duration"]
+        return data
+
+    def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """Return all settings with some changed; the length of the old record says nothing of a new curve's."""
+        data = super().with_settings(changes)
+        curves = [changes[key] for key in ("speed", "torque") if key in changes]
+        if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
+            data = {key: value for key, value in data.items() if key != "duration" or key in changes}
+        return data
+
     @cached_property
     def speed_curve(self) -> q.Points | None:
         """Points (s, rad/s) of a speed that changes, s from the beginning of the record."""
@@ -506,16 +521,11 @@ class Case(Section, Shown):
         >>> Case().changed(fault={"misalignment": "1 deg"}).fault.plane
         'skew'
         """
-        # sections do not change: the others are shared, with what was made of them
+        # sections that stay are taken over as they are: they do not change and have been checked
         data = {name: getattr(self, name) for name in type(self).model_fields}
         for key, value in sections.items():
-            old = data.get(key)
-            data[key] = {**old.as_written(), **value} if isinstance(value, dict) and isinstance(old, Section) else value
-        new = sections.get("operation")
-        curves = [v for k, v in new.items() if k in ("speed", "torque")] if isinstance(new, dict) else []
-        if "duration" not in (new or ()) and any(isinstance(v, Sequence) and not isinstance(v, str) for v in curves):
-            # the length of the old record says nothing of a new curve's
-            data["operation"].pop("duration", None)
+            own = data.get(key)
+            data[key] = own.with_settings(value) if isinstance(own, Section) and isinstance(value, dict) else value
         return make_case(data)
 
     def __str__(self) -> str:
@@ -526,8 +536,8 @@ class Case(Section, Shown):
 
     def settings(self) -> dict[str, Any]:
         """Return all settings as nested dictionaries, quantities as the user wrote them, else in SI."""
-        values = {name: getattr(self, name) for name in type(self).model_fields}
-        return {k: value.as_written() if isinstance(value, Section) else value for k, value in values.items()}
+        parts = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: part.settings() if isinstance(part, Section) else part for name, part in parts.items()}
 
 
 def units_of_fields(section: BaseModel) -> dict[str, str]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from numbers import Real
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -175,13 +175,16 @@ class Section(BaseModel, metaclass=_OneError):
         """The quantities that the user wrote with units, as written."""
         return self.__dict__.get("given", {})
 
-    def as_written(self) -> dict[str, Any]:
-        """Return all settings, quantities as the user wrote them, else in SI; no duration that follows from a curve."""
-        kept = {k: v for k, v in self.model_dump().items() if k != "duration" or k in self.model_fields_set}
-        return {**kept, **self.written}
+    def settings(self) -> dict[str, Any]:
+        """Return all settings, quantities as the user wrote them, else in SI."""
+        return {**self.model_dump(), **self.written}
+
+    def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """Return all settings with some changed."""
+        return {**self.settings(), **changes}
 
 
-@functools.lru_cache(maxsize=64)
+@cache
 def measures_of(kind: type[BaseModel]) -> Mapping[str, Measure]:
     """Return what the fields of a section measure, by name."""
     items = ((name, item) for name, field in kind.model_fields.items() for item in field.metadata)
