@@ -57,7 +57,6 @@ ARRAYS = {"Vector": ("f8", 1), "Matrix": ("f8", 2), "IntVector": ("i8", 1), "Ind
 _C_TYPES = {"f8": ctypes.c_double, "i8": ctypes.c_int64, "?": ctypes.c_bool}
 _byte_of: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 _address_of = ctypes.addressof
-_NO_BLOCK: tuple[None, int, dict] = None, 0, {}
 LINE = 64
 """Bytes of a line of the processor's cache."""
 KEPT_LAYOUTS = 64
@@ -125,7 +124,7 @@ class Struct(ctypes.Structure, metaclass=_Members):
         For signatures of compiled functions.
     """
 
-    __slots__ = ("__weakref__", "_block")
+    __slots__ = ("__weakref__",)
 
     scalar_members: ClassVar[Mapping[str, str]]
     array_members: ClassVar[Mapping[str, tuple[str, int]]]
@@ -133,7 +132,6 @@ class Struct(ctypes.Structure, metaclass=_Members):
     _numba_type_: ClassVar[StructType]
     _arrays: ClassVar[Mapping[str, tuple[np.dtype, int, int]]]
     _slots: ClassVar[Mapping[str, Any]]
-    _block: tuple[np.ndarray | None, int, Mapping[str, tuple[np.dtype, tuple[int, ...], int]]]
 
     _address = property(ctypes.addressof)
     __hash__ = object.__hash__
@@ -142,7 +140,6 @@ class Struct(ctypes.Structure, metaclass=_Members):
         missing = self.array_members.keys() - members.keys()
         if missing:
             raise TypeError(f"{type(self).__name__} is missing {', '.join(sorted(missing))}")
-        self._block = _NO_BLOCK
         words: list[int] = []
         for name, (kind, dimensions, _) in self._arrays.items():
             value = members.pop(name)
@@ -155,23 +152,15 @@ class Struct(ctypes.Structure, metaclass=_Members):
     def with_members(self, **members: Any) -> Self:
         """Return a struct with other values of some members, that shares all other arrays with this one."""
         other = type(self).from_buffer_copy(self)
-        other._block = self._block
         for name, slot in self._slots.items():
             if name not in members:
-                slot.__set__(other, getattr(self, name))
+                slot.__set__(other, slot.__get__(self))
         for name, value in members.items():
             setattr(other, name, value)
         return other
 
     def __getattr__(self, name: str) -> Any:
-        room, first, places = self._block
-        if name not in places:
-            raise AttributeError(f"{type(self).__name__} has no member {name!r}")
-        kind, shape, offset = places[name]
-        # made when Python first looks at it: compiled code goes by its address
-        array: np.ndarray = np.ndarray(shape, kind, room, first + offset)
-        self._slots[name].__set__(self, array)
-        return array
+        raise AttributeError(f"{type(self).__name__} has no member {name!r}")
 
     def __reduce__(self) -> tuple:
         # addresses do not travel
@@ -206,7 +195,7 @@ class BlockLayout(Generic[S]):
     ) -> None:
         self.kind = kind
         self.given = kind.array_members.keys() - shapes.keys()
-        self.places: dict[str, tuple[np.dtype, tuple[int, ...], int]] = {}
+        self.places: list[tuple[Any, np.dtype, tuple[int, ...], int]] = []
         self.size = 0
         words = getattr(kind, "words:").offset // 8
         self.image = np.zeros(-(-ctypes.sizeof(kind) // 8), dtype=np.int64)
@@ -216,7 +205,7 @@ class BlockLayout(Generic[S]):
             shape = (size,) if isinstance(size, int) else size
             before = on_line.get(name, 0) * item.itemsize
             offset = -(-(self.size + before) // LINE) * LINE - before
-            self.places[name] = item, shape, offset
+            self.places.append((kind._slots[name], item, shape, offset))
             self.size = offset + item.itemsize * math.prod(shape)
             first = words + place
             self.image[first : first + 1 + dimensions] = offset, *shape
@@ -232,7 +221,8 @@ class BlockLayout(Generic[S]):
         first = -address % LINE
         image: Any = self.image + (address + first) * self.is_address
         struct = self.kind.from_buffer(image)
-        struct._block = room, first, self.places
+        for slot, kind, shape, offset in self.places:
+            slot.__set__(struct, np.ndarray(shape, kind, room, first + offset))
         for name, value in members.items():
             setattr(struct, name, value)
         return struct

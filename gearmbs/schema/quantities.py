@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from numbers import Real
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -183,7 +183,11 @@ class Measure:
         return tuple(points)
 
     def _one(self, value: Any) -> Any:
-        number: Any = in_si(value, self.dimension)
+        return _read(self, value) if type(value) is str else self._checked(value)
+
+    def _checked(self, value: Any) -> Any:
+        """Return one value in SI if it is within the limits."""
+        number: Any = value if type(value) is float and not math.isnan(value) else in_si(value, self.dimension)
         if self.unit == "1" and isinstance(value, Real):
             # a whole number stays one
             number = value
@@ -227,6 +231,12 @@ class Measure:
         unit = self.shown or self.unit
         kind = "a whole number, " if self.whole else "" if span else "a number"
         return f"give {kind}{span}{'' if unit == '1' else f' {unit}'}"
+
+
+@lru_cache(maxsize=1024)
+def _read(measure: Measure, text: str) -> Any:
+    """Return what a text is in SI: the same texts are read again for each change of a description."""
+    return measure._checked(text)
 
 
 def two(value: Sequence) -> tuple:

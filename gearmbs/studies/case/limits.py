@@ -7,7 +7,7 @@ below half the sampling rate and whether the record is long enough follows from 
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def edge(case: Case) -> float:
     return _edge(case.output_rate, case.signal_rate)
 
 
-@cache
+@lru_cache(maxsize=64)
 def _edge(rate: float, signal_rate: float) -> float:
     ratio = round(rate / signal_rate)
     if ratio == 1:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from numbers import Real
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
@@ -169,6 +170,15 @@ class Section(BaseModel, metaclass=_OneError):
             if name in self.model_fields_set and value != field.get_default(call_default_factory=True):
                 yield name, self.written.get(name, value)
 
+    def model_copy(self, **options: Any) -> Any:
+        """Return a copy as pydantic does, without what follows from values that the copy may have others of."""
+        copy = super().model_copy(**options)
+        for name in copy.__dict__.keys() - type(self).model_fields.keys():
+            del copy.__dict__[name]
+        changed = options.get("update") or ()
+        copy.__dict__["given"] = {name: text for name, text in self.written.items() if name not in changed}
+        return copy
+
     @property
     def written(self) -> dict[str, Any]:
         """The quantities that the user wrote with units, as written."""
@@ -184,11 +194,10 @@ class Section(BaseModel, metaclass=_OneError):
 
 
 @cache
-def measures_of(kind: type[BaseModel]) -> dict[str, Measure]:
+def measures_of(kind: type[BaseModel]) -> Mapping[str, Measure]:
     """Return what the fields of a section measure, by name."""
-    return {
-        name: item for name, field in kind.model_fields.items() for item in field.metadata if isinstance(item, Measure)
-    }
+    items = ((name, item) for name, field in kind.model_fields.items() for item in field.metadata)
+    return MappingProxyType({name: item for name, item in items if isinstance(item, Measure)})
 
 
 def _has_text(value: Any) -> bool:
