@@ -38,7 +38,7 @@ EXPORTED = ["__all__"]
 
 CONSTANTS = {
     "gearmbs.signals": {
-        "COMPONENTS": "gearmbs.signals.shaft_force",
+        "COMPONENTS": "gearmbs.signals.conversion",
         "EXPECTED": "gearmbs.signals.analysis.comparison_report",
         "FORMATS": "gearmbs.signals.files.formats",
         "INDICATORS": "gearmbs.signals.analysis.indicators",

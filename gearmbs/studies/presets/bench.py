@@ -20,9 +20,9 @@ from gearmbs._shown import Written
 from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, SpeedDrive
 from gearmbs.gears import ContactLaw
 from gearmbs.signals import convert
+from gearmbs.signals.analysis.bands import harmonic_amplitudes
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
-from gearmbs.signals.rotation.orders import harmonic_amplitudes
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.paper.paper import PaperStudy, run_paper
 from gearmbs.studies.paper.preset import Claim, judge

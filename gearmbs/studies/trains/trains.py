@@ -22,10 +22,9 @@ from gearmbs.files import plain
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
+from gearmbs.signals.analysis.bands import MIN_PERIODS, harmonic_amplitudes
 from gearmbs.signals.files.simulated import holds_speed, placed_lines
-from gearmbs.signals.monotone_cubic import monotone_cubic
-from gearmbs.signals.resampling import MARGIN
-from gearmbs.signals.rotation.orders import MIN_PERIODS, harmonic_amplitudes
+from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
 from gearmbs.studies.run.parallel import run_named
