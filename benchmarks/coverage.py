@@ -71,7 +71,7 @@ def main(folder: str, tables: int = 200, workers: int = 2, first: int = 0) -> No
     from scipy.stats import norm
 
     from gearmbs.campaigns import Campaign, FunctionSubject, make_plan
-    from gearmbs.campaigns.sensitivity.bounds import probability
+    from gearmbs.campaigns.sobol_bounds import probability
 
     subject = FunctionSubject("benchmarks.coverage:recovered", {"seed": 0})
     rows = [{"seed": k} for k in range(first, first + tables)]

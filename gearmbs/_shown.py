@@ -38,7 +38,7 @@ TABLES = {
     "Case": "gearmbs.studies.show:case_html",
     **dict.fromkeys(
         ("AnalysisReport", "VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport"),
-        "gearmbs.view.scenes.pages:report_body",
+        "gearmbs.view.pages:report_body",
     ),
 }
 """What makes a table of an object for notebooks, where its class does not do so itself."""

@@ -26,7 +26,7 @@ WRITERS: dict[str, dict[str, str]] = {
     "DataFrame": {".csv": "gearmbs.saving:_table"},
     "AnalysisReport": {
         ".md": "gearmbs.saving:_report",
-        ".html": "gearmbs.view.scenes.pages:write_report_page",
+        ".html": "gearmbs.view.pages:write_report_page",
         ".csv": "gearmbs.saving:_report_tables",
         ".json": "gearmbs.saving:_report_data",
     },

@@ -92,8 +92,8 @@ CIRCLES = {
     ("mechanism.building.compile", "mechanism.building.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",
-    ("campaigns.campaign", "campaigns.report", "campaigns.results", "campaigns.sensitivity.indices",
-     "campaigns.sensitivity.surrogates"):
+    ("campaigns.campaign", "campaigns.report", "campaigns.results", "campaigns.sensitivity",
+     "campaigns.surrogates"):
         "methods of Campaign, and the functions that carry them out",
 }  # fmt: skip
 """Groups of modules that may know each other, and why."""

@@ -38,7 +38,7 @@ EXPORTED = ["__all__"]
 
 CONSTANTS = {
     "gearmbs.signals": {
-        "COMPONENTS": "gearmbs.signals.shaft_force",
+        "COMPONENTS": "gearmbs.signals.conversion",
         "EXPECTED": "gearmbs.signals.analysis.comparison_report",
         "FORMATS": "gearmbs.signals.files.formats",
         "INDICATORS": "gearmbs.signals.analysis.indicators",
@@ -136,10 +136,10 @@ MORE = {
         "gearmbs.campaigns.factors": EVERYTHING,
         "gearmbs.campaigns.cluster": ["DaskRunner", "batch_cluster", "job_script"],
         "gearmbs.campaigns.results": ["export"],
-        "gearmbs.campaigns.sensitivity.bounds": EVERYTHING,
+        "gearmbs.campaigns.sobol_bounds": EVERYTHING,
         "gearmbs.campaigns.subjects.claims": EVERYTHING,
-        "gearmbs.campaigns.sensitivity.surrogates": ["response_surface"],
-        "gearmbs.campaigns.sensitivity.indices": ["sensitivity", "campaign_chaos", "one_factor_studies"],
+        "gearmbs.campaigns.surrogates": ["response_surface"],
+        "gearmbs.campaigns.sensitivity": ["sensitivity", "campaign_chaos", "one_factor_studies"],
         "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],
     },
     "gearmbs.identify": {

@@ -17,11 +17,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from gearmbs.campaigns import Campaign, PolynomialChaos, fit_chaos, load_plan, total_bounds
-from gearmbs.campaigns.sensitivity.bounds import first_indices, probability
+from gearmbs.campaigns.sobol_bounds import first_indices, probability
 from gearmbs.campaigns.status import read_ledger
 from gearmbs.files import whole_file, write_whole
 from gearmbs.signals import COMPONENTS
-from gearmbs.studies.paper.preset import MUCH
+from gearmbs.studies.presets.paper_cases import MUCH
 from gearmbs.view.figures.style import new_figure
 
 DATA = Path(__file__).parent.parent / "data"
@@ -161,7 +161,7 @@ def totals(data: pd.DataFrame, component: str = "line_of_action") -> pd.DataFram
     """Return first and total indices of the ratios' logarithms, in percent, and what the surrogates explain.
 
     ``within`` is where the total index of the ratio itself must lie, whatever the part is like that the surrogate does
-    not explain; see `gearmbs.campaigns.sensitivity.bounds`.
+    not explain; see `gearmbs.campaigns.sobol_bounds`.
     """
     found = {}
     for ratio in ("misaligned", "distance", "load"):

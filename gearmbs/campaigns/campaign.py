@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from gearmbs.campaigns.sensitivity.surrogates import ResponseSurface
+    from gearmbs.campaigns.surrogates import ResponseSurface
 
 MOST_TRIES = 8
 """Attempts of a unit that end with a worker's death, after which the run gives up."""
@@ -187,14 +187,14 @@ class Campaign:
         return open_dataset(self.folder)
 
     def sensitivity(self, result: str) -> Any:
-        """Return what decides a result, by the design; see `gearmbs.campaigns.sensitivity.indices.sensitivity`."""
-        from gearmbs.campaigns.sensitivity.indices import sensitivity
+        """Return what decides a result, by the design; see `gearmbs.campaigns.sensitivity.sensitivity`."""
+        from gearmbs.campaigns.sensitivity import sensitivity
 
         return sensitivity(self, result)
 
     def response_surface(self, result: str, degree: int = 2) -> ResponseSurface:
         """Return a polynomial of a result over the factors, with its error at points left out."""
-        from gearmbs.campaigns.sensitivity.surrogates import response_surface
+        from gearmbs.campaigns.surrogates import response_surface
 
         return response_surface(self, result, degree)
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from gearmbs.campaigns.factors import Factor
 from gearmbs.campaigns.results import factor_names, result_names
-from gearmbs.campaigns.sensitivity.bounds import first_indices, probability
-from gearmbs.campaigns.sensitivity.indices import SobolIndices, sensitivity
-from gearmbs.campaigns.sensitivity.surrogates import PolynomialChaos
+from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.sobol_bounds import first_indices, probability
+from gearmbs.campaigns.surrogates import PolynomialChaos
 from gearmbs.files import write_whole
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def _at_hand(campaign: Campaign, result: str) -> str:
 
 
 def _surface(campaign: Campaign, result: str) -> str:
-    from gearmbs.campaigns.sensitivity.surrogates import response_surface
+    from gearmbs.campaigns.surrogates import response_surface
 
     for degree in (2, 1):
         try:

@@ -3,6 +3,7 @@ from .analysis.analysis import analyse as analyse
 from .analysis.analysis import analyse_file as analyse_file
 from .analysis.bands import band_rms as band_rms
 from .analysis.bands import gmf_rms as gmf_rms
+from .analysis.bands import harmonic_amplitudes as harmonic_amplitudes
 from .analysis.bands import order_rms as order_rms
 from .analysis.bands import rms as rms
 from .analysis.campbell import campbell as campbell
@@ -45,7 +46,10 @@ from .bearings.report import BearingLines as BearingLines
 from .bearings.report import BearingReport as BearingReport
 from .bearings.report import PartFinding as PartFinding
 from .bearings.report import bearing_lines as bearing_lines
+from .conversion import COMPONENTS as COMPONENTS
 from .conversion import convert as convert
+from .conversion import force_components as force_components
+from .conversion import force_to_acceleration as force_to_acceleration
 from .errors import MissingMetadataError as MissingMetadataError
 from .errors import SignalError as SignalError
 from .errors import SignalFileError as SignalFileError
@@ -76,7 +80,6 @@ from .rotation.angular import residual_signal as residual_signal
 from .rotation.angular import time_synchronous_average as time_synchronous_average
 from .rotation.order_tracking import order_map as order_map
 from .rotation.order_tracking import order_track as order_track
-from .rotation.orders import harmonic_amplitudes as harmonic_amplitudes
 from .rotation.phase import instantaneous_speed as instantaneous_speed
 from .rotation.phase import phase_from_line as phase_from_line
 from .rotation.phase import phase_from_speed as phase_from_speed
@@ -99,9 +102,6 @@ from .sensors import laser_vibrometer as laser_vibrometer
 from .sensors import measure as measure
 from .sensors import quantise as quantise
 from .sensors import sample as sample
-from .shaft_force import COMPONENTS as COMPONENTS
-from .shaft_force import force_components as force_components
-from .shaft_force import force_to_acceleration as force_to_acceleration
 from .signal.given import SpeedCurve as SpeedCurve
 from .signal.given import speed_curve as speed_curve
 from .signal.given import with_speed as with_speed

@@ -5,10 +5,6 @@ from .case.case import CaseError as CaseError
 from .case.case import CaseWarning as CaseWarning
 from .case.case import load_case as load_case
 from .case.case import make_case as make_case
-from .paper.paper import PaperStudy as PaperStudy
-from .paper.paper import run_paper as run_paper
-from .paper.preset import Claim as Claim
-from .paper.preset import paper_cases as paper_cases
 from .presets.bench import BenchSettings as BenchSettings
 from .presets.bench import BenchStudy as BenchStudy
 from .presets.bench import bench_choices as bench_choices
@@ -20,6 +16,10 @@ from .presets.gearbox import GearboxStudy as GearboxStudy
 from .presets.gearbox import gearbox_choices as gearbox_choices
 from .presets.gearbox import industrial_gearbox as industrial_gearbox
 from .presets.gearbox import run_gearbox as run_gearbox
+from .presets.paper import PaperStudy as PaperStudy
+from .presets.paper import run_paper as run_paper
+from .presets.paper_cases import Claim as Claim
+from .presets.paper_cases import paper_cases as paper_cases
 from .presets.rattle import RattleSettings as RattleSettings
 from .presets.rattle import rattle as rattle
 from .presets.rattle import rattle_map as rattle_map
@@ -44,8 +44,8 @@ from .run.simulation import run_case as run_case
 from .run.simulation import simulate_case as simulate_case
 from .run.sweep import Sweep as Sweep
 from .run.sweep import sweep as sweep
-from .trains.modes import train_campbell as train_campbell
-from .trains.modes import train_modes as train_modes
+from .trains.report import train_campbell as train_campbell
+from .trains.report import train_modes as train_modes
 from .trains.report import train_report as train_report
 from .trains.report import train_scene as train_scene
 from .trains.report import train_spectrum as train_spectrum

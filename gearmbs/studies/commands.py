@@ -15,8 +15,8 @@ from gearmbs.signals.commands import check_targets, hand_over, save_figures
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
-    from gearmbs.studies.paper.preset import Claim
     from gearmbs.studies.presets.gearbox import GearboxStudy
+    from gearmbs.studies.presets.paper_cases import Claim
     from gearmbs.studies.run.simulation import SimulationFailed
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
@@ -58,8 +58,8 @@ def bench(
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
-        from gearmbs.studies.paper.preset import paper_cases
         from gearmbs.studies.presets.bench import PRESSURES, SENSORS, STATES, BenchSettings, bench_train, run_bench
+        from gearmbs.studies.presets.paper_cases import paper_cases
         from gearmbs.studies.trains.trains import RunSettings, check_record
 
         settings = BenchSettings(
@@ -199,8 +199,8 @@ def paper(
         check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
 
         from gearmbs.files import check_place, keep
-        from gearmbs.studies.paper.paper import run_paper
-        from gearmbs.studies.paper.preset import paper_cases
+        from gearmbs.studies.presets.paper import run_paper
+        from gearmbs.studies.presets.paper_cases import paper_cases
         from gearmbs.studies.run.simulation import SimulationFailed
         from gearmbs.studies.run.store import file_stem, record_size, stored_record
 
@@ -413,7 +413,7 @@ def campbell(
 
         from gearmbs.drivetrain.drivetrain import read_description
         from gearmbs.signals import critical_speeds
-        from gearmbs.studies.trains.modes import train_campbell
+        from gearmbs.studies.trains.report import train_campbell
         from gearmbs.units import to_si
         from gearmbs.view import campbell_plot
 

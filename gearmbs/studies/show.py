@@ -16,7 +16,7 @@ from gearmbs.view.figures.style import BLUE, ORANGE, VERMILLION, look, new_figur
 
 if TYPE_CHECKING:
     from gearmbs.studies.case.case import Case
-    from gearmbs.studies.paper.paper import PaperStudy
+    from gearmbs.studies.presets.paper import PaperStudy
     from gearmbs.studies.run.sweep import Sweep
 
 

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from gearmbs.campaigns import Campaign, load_plan, make_plan
-from gearmbs.campaigns.sensitivity.bounds import first_indices, probability
+from gearmbs.campaigns.sobol_bounds import first_indices, probability
 from gearmbs.campaigns.subjects.claims import ClaimsSubject, ratios
 from tests.docs.support import DOCS
 

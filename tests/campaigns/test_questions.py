@@ -281,9 +281,7 @@ def test_bounds_of_random_points_are_in_order_and_hold(function, truth, monkeypa
     from sklearn.gaussian_process.kernels import Matern, WhiteKernel
 
     # the bounds hold for any surrogate; the kernel's likeliest lengths are what takes the time
-    monkeypatch.setattr(
-        "gearmbs.campaigns.sensitivity.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01)
-    )
+    monkeypatch.setattr("gearmbs.campaigns.sobol_bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01))
     held = []
     for seed in range(4):
         u = np.random.default_rng(seed).random((80, 3))
@@ -301,9 +299,7 @@ def test_bounds_of_noise_are_all_there_is(monkeypatch):
     pytest.importorskip("sklearn")
     from sklearn.gaussian_process.kernels import Matern, WhiteKernel
 
-    monkeypatch.setattr(
-        "gearmbs.campaigns.sensitivity.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01)
-    )
+    monkeypatch.setattr("gearmbs.campaigns.sobol_bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01))
     u = np.random.default_rng(2).random((60, 3))
     with pytest.warns(UserWarning, match=says("60", "0", "1", "explains nothing")):
         found = total_bounds(u, np.random.default_rng(5).standard_normal(60), NAMES)

@@ -14,9 +14,18 @@ from typer.testing import CliRunner
 
 import gearmbs as gm
 from gearmbs.signals import SignalError, SignalFileError, read_signal, sections, write_signal
-from gearmbs.signals.files.format import Content, Format, begins_with
 from gearmbs.signals.files.formats import written_endings
-from gearmbs.signals.files.table import TABLE, Row, format_of, formats_table, known_endings, titles
+from gearmbs.signals.files.table import (
+    TABLE,
+    Content,
+    Format,
+    Row,
+    begins_with,
+    format_of,
+    formats_table,
+    known_endings,
+    titles,
+)
 from gearmbs.signals.signal.record import Record
 from tests.docs.support import DOCS
 from tests.says import says

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearmbs.signals import SignalError, analyse, make_signal, phase_from_tacho
-from gearmbs.signals.rotation.pulses import pulse_faults
+from gearmbs.signals.rotation.phase import pulse_faults
 from tests.says import says
 
 RATE = 5000.0

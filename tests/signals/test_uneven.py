@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from gearmbs.signals import SignalError, even_signal
-from gearmbs.signals.monotone_cubic import monotone_cubic
+from gearmbs.signals.resampling import monotone_cubic
 from tests.says import says
 
 RATE = 51200.0

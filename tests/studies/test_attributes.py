@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.studies import Case, paper_cases, run_paper
-from gearmbs.studies.paper.report import paper_report
+from gearmbs.studies.presets.paper import paper_report
 from gearmbs.studies.run.record import attributes_of
 
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from gearmbs import cli
 from gearmbs.studies import commands
-from gearmbs.studies.paper.preset import Claim
+from gearmbs.studies.presets.paper_cases import Claim
 
 CASE = "[operation]\nrun_up = '30 ms'\nsettling = '10 ms'\nduration = '200 ms'\n"
 

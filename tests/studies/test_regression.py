@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearmbs.studies.paper.paper import gmf_levels
+from gearmbs.studies.presets.paper import gmf_levels
 
 STORED = json.loads((Path(__file__).parent / "gmf_levels.json").read_text())
 

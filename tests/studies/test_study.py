@@ -13,8 +13,8 @@ from gearmbs.files import whole_file
 from gearmbs.signals.files.simulated import model_signals, parse_states
 from gearmbs.studies import Case, SimulationFailed, run_case, run_paper, simulate_case
 from gearmbs.studies.case.case import CaseError, make_case
-from gearmbs.studies.paper.preset import judge, paper_cases
-from gearmbs.studies.paper.report import choices
+from gearmbs.studies.presets.paper import choices
+from gearmbs.studies.presets.paper_cases import judge, paper_cases
 from gearmbs.studies.run import rig as parts
 from gearmbs.studies.run.simulation import case_mechanism
 from gearmbs.studies.run.store import write_dataset

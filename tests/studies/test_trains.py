@@ -26,11 +26,10 @@ from gearmbs.drivetrain import (
     TorqueSensor,
 )
 from gearmbs.signals import analyse
+from gearmbs.signals.analysis.bands import harmonic_amplitudes
 from gearmbs.signals.files.simulated import read_any
-from gearmbs.signals.rotation.orders import harmonic_amplitudes
 from gearmbs.studies import run_train, run_trains, train_report, train_scene, train_signal, train_spectrum
-from gearmbs.studies.trains.recorder import counted_turns
-from gearmbs.studies.trains.speed import HeldSpeed, by_angle
+from gearmbs.studies.trains.recorder import HeldSpeed, by_angle, counted_turns
 from gearmbs.studies.trains.trains import check_record, load_train
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_description import TEXT

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from gearmbs.view import profile_area, write_step
-from gearmbs.view.geometry.profile import bore_edges, profile_edges
+from gearmbs.view.profile import bore_edges, profile_edges
 
 
 def step_entities(path):

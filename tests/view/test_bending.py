@@ -7,7 +7,7 @@ from gearmbs.flexible import Disc, Shaft, ShaftSection, block_mesh, reduce_model
 from gearmbs.flexible.interfaces import outward
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.view import Deflection, Mesh, mechanism_scene, solution_scene, stress_plot
-from gearmbs.view.geometry.mesh import box
+from gearmbs.view.mesh import box
 from tests.says import says
 
 SHAFT = Shaft(

@@ -5,7 +5,7 @@ from gearmbs.contact import gear_contact, layout
 from gearmbs.gears import GearPair
 from gearmbs.gears.faults import BrokenTooth
 from gearmbs.view import ContactProbe, mesh_view, static_motion
-from gearmbs.view.scenes.motion import chosen_times
+from gearmbs.view.motion import chosen_times
 from tests.view.looking import assert_readable
 
 CASES = {

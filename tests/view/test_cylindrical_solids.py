@@ -9,8 +9,8 @@ from scipy.interpolate import BSpline
 from gearmbs.gears import GearPair, GearSpec, faults
 from gearmbs.view import gear_outline, gear_solid, mesh_animation, pair_solids, profile_area, write_dxf, write_stl
 from gearmbs.view.figures.drawings import action_ends, pitch_point
-from gearmbs.view.geometry.profile import DEGREE, Spline, profile_edges
-from gearmbs.view.geometry.step import Sweep
+from gearmbs.view.profile import DEGREE, Spline, profile_edges
+from gearmbs.view.step import Sweep
 from tests.view.looking_at_step import check_shell, check_volume
 
 WHEELS = {

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.faults import BrokenTooth, ChippedCorner, Eccentricity, Pit, PitchError
 from gearmbs.view import gear_outline, gear_solid, pair_solids, profile_area, read_stl, write_dxf, write_step, write_stl
-from gearmbs.view.geometry.mesh import ball, box, cylinder, rod
-from gearmbs.view.geometry.profile import Arc, Spline, bore_edges, half_tooth, profile_edges
+from gearmbs.view.mesh import ball, box, cylinder, rod
+from gearmbs.view.profile import Arc, Spline, bore_edges, half_tooth, profile_edges
 from tests.view.looking_at_step import check_shell, check_volume, step_entities
 
 PAPER = GearPair.paper().driver

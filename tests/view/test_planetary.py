@@ -6,7 +6,7 @@ import pytest
 from gearmbs.gears import planetary, planetary_mechanism
 from gearmbs.signals import PlanetaryModel, diagnose_planetary
 from gearmbs.view import planetary_plot, planetary_scene
-from gearmbs.view.scenes.scenes import carrier_mesh
+from gearmbs.view.scenes import carrier_mesh
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import make_case, simulate_case
 from gearmbs.view import Scene, gear_scene, mechanism_scene, mesh_animation, solution_motion, solution_scene
-from gearmbs.view.geometry.mesh import body_mesh, box, corner_normals, cylinder, feature_edges
-from gearmbs.view.scenes.render import Camera, render
-from gearmbs.view.scenes.scene import Part
+from gearmbs.view.mesh import body_mesh, box, corner_normals, cylinder, feature_edges
+from gearmbs.view.render import Camera, render
+from gearmbs.view.scene import Part
 from tests.browser import browsed, needs_browser
 from tests.view.looking import assert_readable
 

@@ -50,7 +50,7 @@ class ClaimsSubject(Subject):
     states and
     harmonics of high over low load, in one scale for all; ``load_each.C``, the same with each load in the scale of
     its own healthy
-    state; and ``all.C``, 1 where all three claims hold as `gearmbs.studies.paper.preset.judge` judges them.
+    state; and ``all.C``, 1 where all three claims hold as `gearmbs.studies.presets.paper_cases.judge` judges them.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class ClaimsSubject(Subject):
     def check(self, data: dict[str, Any], name: str) -> list[Case]:
         """Return the six cases of a point."""
         from gearmbs.studies.case.limits import check_record
-        from gearmbs.studies.paper.preset import paper_cases
+        from gearmbs.studies.presets.paper_cases import paper_cases
 
         s = data
         friction = (
@@ -130,7 +130,7 @@ class ClaimsSubject(Subject):
         """Return the harmonics of the six cases: dims (load, state, harmonic), by component."""
         import xarray as xr
 
-        from gearmbs.studies.paper.preset import LOAD_NAMES, STATES
+        from gearmbs.studies.presets.paper_cases import LOAD_NAMES, STATES
 
         levels = []
         for k, case in enumerate(thing):
@@ -163,7 +163,7 @@ class ClaimsSubject(Subject):
 
 def ratios(levels: Any) -> dict[str, float]:
     """Return the ratios that decide the claims from harmonics of dims (load, state, component, harmonic)."""
-    from gearmbs.studies.paper.preset import judge
+    from gearmbs.studies.presets.paper_cases import judge
 
     found: dict[str, float] = {}
     for component in levels.component.values:

@@ -22,9 +22,8 @@ from gearmbs.signals.analysis.indicators import INDICATORS
 from gearmbs.signals.analysis.report import AnalysisReport
 from gearmbs.signals.analysis.vibration import VibrationReport
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.format import Asked
 from gearmbs.signals.files.formats import checked_format, read_signal
-from gearmbs.signals.files.table import format_of
+from gearmbs.signals.files.table import Asked, format_of
 from gearmbs.signals.signal.given import given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.inputs import to_signal
 from gearmbs.signals.signal.record import Record, checked_gaps, signal_from

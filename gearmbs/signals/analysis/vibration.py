@@ -11,6 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from gearmbs._shown import Shown
+from gearmbs.signals.analysis.bands import harmonic_amplitudes
 from gearmbs.signals.analysis.report import (
     BAND_FEATURES,
     FULL_LEVELS,
@@ -32,7 +33,6 @@ from gearmbs.signals.analysis.report import (
 from gearmbs.signals.conversion import convert
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.order_tracking import order_track
-from gearmbs.signals.rotation.orders import harmonic_amplitudes
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, refined_speed, remark_plausibility
 from gearmbs.signals.signal.signal import rate_of, unit_dimension, units_of
 from gearmbs.signals.spectra import envelope, spectrum

@@ -1,19 +1,38 @@
-"""Arrays of numpy: .npy with one, .npz with several and their names."""
+"""Files of named arrays: .npy and .npz of numpy, NetCDF and HDF5.
+
+NetCDF and HDF5 files written here are NetCDF-4, which is HDF5, with one variable per channel over a time axis: the same
+bytes serve `.nc` and `.h5`. Other layouts are read array by array.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
+from gearmbs.files import plain
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.files.format import Content, Format, begins_with
-from gearmbs.signals.signal.record import Record, assemble, metadata_json, record_from_json
+from gearmbs.signals.files.table import Asked, Content, Format, begins_with
+from gearmbs.signals.signal.record import (
+    Record,
+    assemble,
+    metadata_json,
+    rate_candidates,
+    rate_from_times,
+    record_from_json,
+)
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 
 OWN = "gearmbs_signal"
+LAYOUT = "gearmbs signal"
+BLOCK = 1 << 17
+MAGIC = b"\x89HDF\r\n\x1a\n"
+USER_BLOCK = 512
+"""Bytes that MATLAB 7.3 puts before the HDF5 data."""
 
 
 def read_npy(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
@@ -69,6 +88,202 @@ def _scalar(value: np.ndarray) -> Any:
     return item
 
 
+def write_netcdf(record: Record, path: Path) -> None:
+    """Write a NetCDF-4 file with one variable per channel (its name, if not allowed, kept as `channel`)."""
+    variables = {}
+    for i, (name, unit) in enumerate(zip(record.names, record.units)):
+        safe = "".join(c if c.isalnum() or c in "_-. " else "_" for c in name).strip() or "channel"
+        key = safe if safe not in variables and safe != "time" else f"{safe}_{i + 1}"
+        variables[key] = ("time", record.values[:, i], {"units": unit, "channel": name, "channel_index": i})
+    attrs: dict[str, Any] = {
+        "layout": LAYOUT,
+        "sampling_rate": record.rate,
+        "t0": record.t0,
+        "attrs": json.dumps(plain(record.attrs)),
+    }
+    if record.speed is not None:
+        attrs["speed"] = record.speed
+    if record.teeth is not None:
+        attrs["teeth"] = np.asarray(record.teeth)
+    times = record.t0 + np.arange(record.values.shape[0]) / float(record.rate or 1.0)
+    dataset = xr.Dataset(variables, coords={"time": ("time", times, {"units": "s", "axis": "T"})}, attrs=attrs)
+    # "units: s" is a plain number of seconds here, not a date.
+    # in memory first: the format's library ends the program where the disk is full
+    Path(path).write_bytes(dataset.to_netcdf(engine="h5netcdf"))
+
+
+def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
+    """Read NetCDF-4 or any HDF5 file with numeric arrays.
+
+    Raises
+    ------
+    SignalFileError
+        If the file is damaged, or holds no record, or several of different lengths.
+    """
+    import h5py
+
+    arrays: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    labels: dict[str, str] = {}
+    order: dict[str, int] = {}
+    scalars: dict[str, Any] = {}
+    try:
+        with h5py.File(path, "r") as file:
+            scalars.update({k: _value(v) for k, v in file.attrs.items()})
+
+            def visit(name: str, item: Any) -> None:
+                if not isinstance(item, h5py.Dataset):
+                    for attr, value in item.attrs.items():
+                        scalars[f"{name.replace('/', '.')}.{attr}"] = _value(value)
+                    return
+                short = name.rsplit("/", 1)[-1]
+                key = short if short not in arrays else name.replace("/", ".")
+                for attr, value in item.attrs.items():
+                    if rate_candidates({attr: _value(value)}):
+                        scalars[f"{key}.{attr}"] = _value(value)
+                if item.dtype.kind not in "fiu" or (item.attrs.get("CLASS") == b"DIMENSION_SCALE" and short != "time"):
+                    return
+                if item.size == 1:
+                    scalars.setdefault(key, item[()].item() if item.shape == () else item[...].ravel()[0].item())
+                    return
+                arrays[key] = item[...]
+                for attr in ("units", "unit"):
+                    if attr in item.attrs:
+                        units[key] = str(_value(item.attrs[attr]))
+                labels[key] = str(_value(item.attrs.get("channel", key)))
+                order[key] = int(_value(item.attrs.get("channel_index", len(order))))
+
+            file.visititems(visit)
+    except Exception as exc:
+        raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
+    if scalars.get("layout") == LAYOUT:
+        arrays = {key: arrays[key] for key in sorted(arrays, key=lambda key: order[key])}
+        return _own(path, arrays, units, labels, scalars)
+    return assemble(path, arrays, scalars, units, channels, rate)
+
+
+def hdf_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
+    """Read a file of this package's layout block by block, or return None for any other.
+
+    Raises
+    ------
+    SignalFileError
+        If the file is damaged, or its channels differ in length.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            if _value(file.attrs.get("layout")) != LAYOUT or "sampling_rate" not in file.attrs:
+                return None
+    except Exception as exc:
+        raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
+    return _slices(path)
+
+
+def _slices(path: Path) -> Iterator[tuple[Record, float]]:
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            columns = [v for k, v in file.items() if k != "time" and "channel_index" in v.attrs]
+            columns.sort(key=lambda column: int(_value(column.attrs["channel_index"])))
+            counts = {column.shape for column in columns}
+            if len(counts) != 1 or len(next(iter(counts))) != 1:
+                raise SignalFileError(path, f"its channels have the shapes {sorted(counts)}; they must be equal")
+            scalars = {k: _value(v) for k, v in file.attrs.items()}
+            teeth = scalars.get("teeth")
+            count = columns[0].shape[0]
+            for start in range(0, count, BLOCK):
+                stop = min(start + BLOCK, count)
+                yield (
+                    Record(
+                        np.stack([np.asarray(column[start:stop], dtype=float) for column in columns], axis=1),
+                        [str(_value(column.attrs["channel"])) for column in columns],
+                        [str(_value(column.attrs.get("units", UNKNOWN_UNITS))) for column in columns],
+                        float(scalars["sampling_rate"]),
+                        float(scalars.get("t0", 0.0)),
+                        scalars.get("speed"),
+                        None if teeth is None else check_teeth(teeth),
+                        json.loads(scalars.get("attrs", "{}")),
+                    ),
+                    stop / count,
+                )
+    except SignalFileError:
+        raise
+    except Exception as exc:
+        raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
+
+
+def read_netcdf3(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
+    """Read a classic NetCDF file, array by array."""
+    try:
+        with xr.open_dataset(path, engine="scipy", decode_times=False) as file:
+            arrays = {str(k): np.asarray(v.values) for k, v in file.variables.items() if v.dtype.kind in "fiu"}
+            units = {str(k): str(v.attrs["units"]) for k, v in file.variables.items() if "units" in v.attrs}
+            scalars = {str(k): _value(v) for k, v in file.attrs.items()}
+    except Exception as exc:
+        raise SignalFileError(path, f"cannot be read as NetCDF: it is damaged or cut short ({exc})") from exc
+    return assemble(path, arrays, scalars, units, channels, rate)
+
+
+def _own(path: Path, arrays: dict, units: dict, labels: dict, scalars: dict) -> Record:
+    times = arrays.pop("time", None)
+    if not arrays:
+        # A record of one sample is a scalar to HDF5 readers.
+        arrays = {k: np.atleast_1d(v) for k, v in scalars.items() if k not in ("sampling_rate", "t0", "speed", "teeth")}
+        arrays = {k: v for k, v in arrays.items() if v.dtype.kind == "f"}
+    rate = scalars.get("sampling_rate")
+    if not arrays or rate is None:
+        raise SignalFileError(path, "holds no samples or no sampling rate although it is laid out as a signal")
+    if times is not None and times.size > 1:
+        measured = rate_from_times(times, path)
+        if abs(measured - rate) > 1e-3 * rate:
+            raise SignalFileError(path, f"its time axis runs at {measured:g} Hz, its sampling_rate says {rate:g} Hz")
+    teeth = scalars.get("teeth")
+    return Record(
+        np.stack([np.asarray(a, dtype=float) for a in arrays.values()], axis=1),
+        [labels.get(k, k) for k in arrays],
+        [units.get(k, UNKNOWN_UNITS) for k in arrays],
+        float(rate),
+        float(scalars.get("t0", 0.0)),
+        scalars.get("speed"),
+        None if teeth is None else check_teeth(teeth),
+        json.loads(scalars.get("attrs", "{}")),
+    )
+
+
+def _value(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", errors="replace")
+    if isinstance(value, np.ndarray):
+        return value.item() if value.size == 1 else value
+    if isinstance(value, np.generic):
+        return value.item()
+    return value
+
+
+def _begins_as_hdf5(head: bytes) -> bool:
+    # a header of MATLAB 7.3 in front of nothing is a file cut off, still one of this kind
+    return head.startswith((MAGIC, b"MATLAB 7.3")) or head[USER_BLOCK : USER_BLOCK + len(MAGIC)] == MAGIC
+
+
+def _read(path: Path, asked: Asked) -> Record:
+    read = read_netcdf3 if asked.content == "netcdf3" else read_hdf
+    return read(path, asked.channels, asked.rate)
+
+
+def _format(contents: dict[str, Content], also: tuple[str, ...] = ()) -> Format:
+    return Format(
+        read=_read,
+        write=lambda record, path, progress: write_netcdf(record, path),
+        pieces=lambda path, asked: hdf_pieces(path) if asked.content == "hdf5" else None,
+        contents=contents,
+        also=also,
+        through="xarray, h5py",
+    )
+
+
 FORMATS = {
     "npy": Format(
         read=lambda path, asked: read_npy(path, asked.channels, asked.rate),
@@ -79,5 +294,10 @@ FORMATS = {
         },
         not_written={".npy": "an .npy file holds one array without rate and units; write .npz, which holds all"},
         through="numpy",
-    )
+    ),
+    # NetCDF-4 is HDF5
+    "netcdf": _format(
+        {"netcdf3": Content("classic NetCDF", begins_with(b"CDF\x01", b"CDF\x02", b"CDF\x05"))}, ("hdf5",)
+    ),
+    "hdf5": _format({"hdf5": Content("HDF5", _begins_as_hdf5)}),
 }

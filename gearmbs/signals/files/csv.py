@@ -24,8 +24,8 @@ import pandas as pd
 
 from gearmbs.files import plain
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.format import Asked, Content, Format, begins_with
-from gearmbs.signals.files.lvm import read_lvm
+from gearmbs.signals.files.labview import read_lvm
+from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.files.text_tables import (
     COMMENT,
     GAP_CELLS,

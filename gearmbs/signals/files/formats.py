@@ -15,8 +15,7 @@ import xarray as xr
 from gearmbs.progress import staged
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.csv import CUT
-from gearmbs.signals.files.format import Asked, Content
-from gearmbs.signals.files.table import TABLE, format_of, known_endings
+from gearmbs.signals.files.table import TABLE, Asked, Content, format_of, known_endings
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.record import Progress, checked_gaps, record_of, signal_from
 from gearmbs.signals.signal.signal import as_signal, check_units

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.format import Content, Format, begins_with
+from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.signal.record import (
     STEP_NAMES,
     Record,

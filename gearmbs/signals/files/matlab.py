@@ -20,7 +20,7 @@ import numpy as np
 
 from gearmbs.files import plain
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.files.format import Content, Format, begins_with
+from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.signal.record import Record, assemble
 from gearmbs.signals.signal.signal import check_teeth
 

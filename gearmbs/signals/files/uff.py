@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.files.format import Content, Format
+from gearmbs.signals.files.table import Content, Format
 from gearmbs.signals.signal.record import Record
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth, nice_rate
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.files.format import Content, Format
+from gearmbs.signals.files.table import Content, Format
 from gearmbs.signals.signal.record import Record, metadata_json, record_from_json
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 

@@ -12,9 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from gearmbs.gears.spec import COUNTED_TWICE
-from gearmbs.signals.analysis.bands import ATTENUATION_DB, HALF_WIDTH, TRANSITION
+from gearmbs.signals.analysis.bands import ATTENUATION_DB, HALF_WIDTH, MIN_PERIODS, TRANSITION
 from gearmbs.signals.filters import bandpass_taps, decimation_taps
-from gearmbs.signals.rotation.orders import MIN_PERIODS
 from gearmbs.studies.case.case import Case, CaseError
 
 HARMONICS = 3

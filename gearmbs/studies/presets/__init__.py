@@ -1,1 +1,1 @@
-"""Rigs that are ready to run."""
+"""Rigs and studies that are ready to run."""

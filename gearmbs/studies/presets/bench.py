@@ -20,14 +20,13 @@ from gearmbs._shown import Written
 from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, SpeedDrive
 from gearmbs.gears import ContactLaw
 from gearmbs.signals import convert
+from gearmbs.signals.analysis.bands import harmonic_amplitudes
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
-from gearmbs.signals.rotation.orders import harmonic_amplitudes
 from gearmbs.studies.case.case import Case
-from gearmbs.studies.paper.paper import PaperStudy, run_paper
-from gearmbs.studies.paper.preset import Claim, judge
-from gearmbs.studies.paper.report import verdict_table
 from gearmbs.studies.presets.files import BenchChoice, choices, on_mounts, preset_train, with_values
+from gearmbs.studies.presets.paper import PaperStudy, run_paper, verdict_table
+from gearmbs.studies.presets.paper_cases import Claim, judge
 from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.run.store import save_study
 from gearmbs.studies.trains.trains import run_trains, train_signal

@@ -14,8 +14,7 @@ import numpy as np
 import gearmbs
 from gearmbs.dae.results.solution import Solution
 from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, gmf_rms, make_signal, trim
-from gearmbs.signals.monotone_cubic import monotone_cubic
-from gearmbs.signals.resampling import MARGIN
+from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.case import Case, CaseError, units_of_fields
 from gearmbs.studies.case.drive import drive_angle
 from gearmbs.studies.case.limits import HARMONICS, edge, remarks

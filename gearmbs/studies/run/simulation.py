@@ -48,7 +48,6 @@ ADVICE = {
 
 KERNELS = (
     "gearmbs.mechanism.parts.elements",
-    "gearmbs.signals.piecewise_cubic",
     "gearmbs.signals.resampling",
 )
 """Modules of kernels that are called late in a run, besides those of the contact."""

@@ -22,16 +22,24 @@ from gearmbs.files import plain
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
+from gearmbs.signals.analysis.bands import MIN_PERIODS, harmonic_amplitudes
 from gearmbs.signals.files.simulated import holds_speed, placed_lines
-from gearmbs.signals.monotone_cubic import monotone_cubic
-from gearmbs.signals.resampling import MARGIN
-from gearmbs.signals.rotation.orders import MIN_PERIODS, harmonic_amplitudes
+from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
-from gearmbs.studies.trains.recorder import CONTACT, TrainColumns, TrainRecorder
-from gearmbs.studies.trains.speed import TURN, HeldSpeed, by_angle, held_speeds, speed_attributes, warn_of_speeds
+from gearmbs.studies.trains.recorder import (
+    CONTACT,
+    TURN,
+    HeldSpeed,
+    TrainColumns,
+    TrainRecorder,
+    by_angle,
+    held_speeds,
+    speed_attributes,
+    warn_of_speeds,
+)
 
 COUNTED = ("pairs_drive", "pairs_back")
 TRACK_MOMENTS = 60
@@ -87,7 +95,7 @@ def run_train(
         tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft;
         by ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal``
         (the normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the record's mean
-        speed, and NaN where the speed is not steady, see `gearmbs.studies.trains.speed`; of a run-up or coast-down
+        speed, and NaN where the speed is not steady, see `gearmbs.studies.trains.recorder`; of a run-up or coast-down
         (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the same at 60 moments. The attribute
         ``remarks`` names speeds that are not the nominal ones.
 

@@ -30,9 +30,9 @@ from gearmbs.view.figures.style import (
     look,
     new_figure,
 )
-from gearmbs.view.geometry.profile import circle, gear_outline
-from gearmbs.view.geometry.solid import pair_deviations, section_outline
-from gearmbs.view.scenes.motion import ContactPoints, ContactProbe, mean_frame, static_motion
+from gearmbs.view.motion import ContactPoints, ContactProbe, mean_frame, static_motion
+from gearmbs.view.profile import circle, gear_outline
+from gearmbs.view.solid import pair_deviations, section_outline
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism

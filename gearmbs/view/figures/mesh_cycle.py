@@ -38,8 +38,7 @@ from gearmbs.view.figures.style import (
     png_bytes,
     write_film,
 )
-from gearmbs.view.geometry.solid import pair_deviations, section_outline
-from gearmbs.view.scenes.motion import (
+from gearmbs.view.motion import (
     ContactPoints,
     ContactProbe,
     PairMotion,
@@ -50,7 +49,8 @@ from gearmbs.view.scenes.motion import (
     solution_motion,
     static_motion,
 )
-from gearmbs.view.scenes.pages import Page, packed, rounded
+from gearmbs.view.pages import Page, packed, rounded
+from gearmbs.view.solid import pair_deviations, section_outline
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from gearmbs.campaigns.campaign import Campaign
     from gearmbs.campaigns.plan import Plan
-    from gearmbs.campaigns.sensitivity.surrogates import PolynomialChaos
+    from gearmbs.campaigns.surrogates import PolynomialChaos
 
 RESAMPLES = 200
 CONFIDENCE = 0.95
@@ -93,7 +93,7 @@ def sobol_indices(
     With A, B and AB_i, A with coordinate i of B, standardised together: first index the mean of f_B (f_AB - f_A)
     (Saltelli 2010), total index half the mean of (f_A - f_AB)^2 (Jansen 1999), over the variance of f_A and f_B. With
     the points, polynomials serve as control variates, which narrows the intervals and leaves the expectation; see
-    `gearmbs.campaigns.sensitivity.surrogates`.
+    `gearmbs.campaigns.surrogates`.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def sobol_indices(
     blocks = (blocks - blocks.mean()) / blocks.std()
     controlled = None
     if points is not None:
-        from gearmbs.campaigns.sensitivity.surrogates import control_variates
+        from gearmbs.campaigns.surrogates import control_variates
 
         controlled = control_variates(blocks, np.reshape(points, (-1, d + 2, d))[good], levels or [0] * d, seed=seed)
     estimate = (lambda rows: _indices(blocks[rows])) if controlled is None else controlled.indices
@@ -315,7 +315,7 @@ def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
 
 def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -> PolynomialChaos:
     """Return the polynomial chaos of a campaign's result over the coordinates of its plan."""
-    from gearmbs.campaigns.sensitivity.surrogates import fit_chaos
+    from gearmbs.campaigns.surrogates import fit_chaos
 
     plan = campaign.plan
     if plan.variants > 1 or plan.constraints:

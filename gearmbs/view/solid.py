@@ -13,13 +13,8 @@ import numpy as np
 from gearmbs.files import whole_file
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.progress import waiting
-from gearmbs.view.geometry.mesh import Mesh, joined
-from gearmbs.view.geometry.profile import (
-    TOLERANCE,
-    arc_chords,
-    half_tooth,
-    land_angles,
-)
+from gearmbs.view.mesh import Mesh, joined
+from gearmbs.view.profile import TOLERANCE, arc_chords, half_tooth, land_angles
 
 LENGTH_UNITS = {"mm": 1e3, "m": 1.0, "cm": 1e2, "in": 1.0 / 0.0254}
 

@@ -1,4 +1,4 @@
-"""The paper's six cases: healthy, misaligned and +3 mm, at 100 and 200 N m."""
+"""The paper's six cases: healthy, misaligned and +3 mm, at 100 and 200 N m, and its three claims."""
 
 from __future__ import annotations
 

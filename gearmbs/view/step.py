@@ -1,7 +1,7 @@
 """A wheel as a STEP solid (AP214), external or internal, spur or helical, written directly.
 
 The boundary representation needs nothing but the profile's exact edges, so no CAD kernel is called for: every edge of
-profile and bore or rim sweeps one face of the solid; see `gearmbs.view.geometry.step`.
+profile and bore or rim sweeps one face of the solid; see `gearmbs.view.step`.
 """
 
 from __future__ import annotations
@@ -16,18 +16,8 @@ from scipy.interpolate import make_interp_spline
 from gearmbs.files import write_whole
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.progress import waiting
-from gearmbs.view.geometry.profile import (
-    DEGREE,
-    SPLINE_POINTS,
-    Arc,
-    Edge,
-    Line,
-    Spline,
-    backwards,
-    bore_edges,
-    profile_edges,
-)
-from gearmbs.view.geometry.solid import title_of
+from gearmbs.view.profile import DEGREE, SPLINE_POINTS, Arc, Edge, Line, Spline, backwards, bore_edges, profile_edges
+from gearmbs.view.solid import title_of
 
 # Faces of a wheel's solid as STEP entities: what an edge of the transverse profile sweeps along the axis or a helix.
 #

@@ -13,17 +13,10 @@ from gearmbs.gears import GearPair, PlanetarySet
 from gearmbs.mechanism import Mechanism, ModalBody
 from gearmbs.progress import waiting
 from gearmbs.view.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE
-from gearmbs.view.geometry.mesh import Mesh, ball, body_mesh, box, cylinder, joined
-from gearmbs.view.geometry.solid import pair_solids
-from gearmbs.view.scenes.motion import (
-    ContactProbe,
-    PairMotion,
-    chosen_times,
-    marker_motion,
-    mechanism_of,
-    static_motion,
-)
-from gearmbs.view.scenes.scene import UP, Deflection, Part, Scene
+from gearmbs.view.mesh import Mesh, ball, body_mesh, box, cylinder, joined
+from gearmbs.view.motion import ContactProbe, PairMotion, chosen_times, marker_motion, mechanism_of, static_motion
+from gearmbs.view.scene import UP, Deflection, Part, Scene
+from gearmbs.view.solid import pair_solids
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution

@@ -14,13 +14,9 @@ from matplotlib.figure import Figure
 from gearmbs.files import whole_file
 from gearmbs.progress import waiting
 from gearmbs.view.figures.style import DPI, ENDINGS, VERMILLION, look, new_figure, png_bytes, unit_text, write_film
-from gearmbs.view.geometry.mesh import Mesh, corner_normals, feature_edges, feature_ends
-from gearmbs.view.scenes.pages import (
-    Page,
-    packed,
-    rounded,
-)
-from gearmbs.view.scenes.render import Camera, render
+from gearmbs.view.mesh import Mesh, corner_normals, feature_edges, feature_ends
+from gearmbs.view.pages import Page, packed, rounded
+from gearmbs.view.render import Camera, render
 
 AZIMUTH, ELEVATION = 38.0, 22.0
 UP = (0.0, 1.0, 0.0)

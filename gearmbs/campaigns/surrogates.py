@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.campaigns.results import factor_names
-from gearmbs.campaigns.sensitivity.indices import coordinates, results_in_order
+from gearmbs.campaigns.sensitivity import coordinates, results_in_order
 from gearmbs.campaigns.settings import CampaignError, whole
 
 if TYPE_CHECKING:

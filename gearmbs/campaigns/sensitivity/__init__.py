@@ -1,1 +1,0 @@
-"""Which factors move a result: Sobol' indices, their bounds, and surrogates."""

@@ -1,1 +1,0 @@
-"""The paper's study: six cases, their levels, their claims."""

@@ -1,1 +1,0 @@
-"""Wheels and bodies as profiles, meshes and solids, and their files."""

@@ -1,1 +1,0 @@
-"""Scenes in space, their pages and pictures."""
