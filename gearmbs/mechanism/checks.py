@@ -42,7 +42,7 @@ def locked_bodies(mechanism: Mechanism, system: System) -> list[str]:
     if not rows or len(rows) > MOST_ROWS:
         return []
     kept = [k for k, name in enumerate(rows) if name in mechanism.joints and mechanism.joints[name].kind not in MOTIONS]
-    jacobian = system.constraint_jacobian(system.start, system.t0)[0].toarray()[kept]
+    jacobian = system.constraint_jacobian(system.configuration, system.t0)[0].toarray()[kept]
     scale = 1.0 / np.sqrt(system.coordinate_weights())
     _, values, right = np.linalg.svd(jacobian * scale)
     rank = int(np.sum(values > 1e-10 * values.max(initial=0.0))) if values.size else 0
@@ -351,7 +351,7 @@ def refuse_overlaps(elements: Mapping[str, Any], compiled: Callable[[Collection[
 def _accelerations(system: System) -> dict[str, tuple[np.ndarray, ...]]:
     """Return place and acceleration of the centre of mass, and angular acceleration, of each body."""
     system.initialise()
-    rows = system.accelerations(system.start, system.t0)[0]
+    rows = system.accelerations(system.configuration, system.t0)[0]
     return {n: (pose[:3], row[:3], row[3:]) for n, pose, row in zip(system.body_names, system.pose, rows)}
 
 

@@ -39,7 +39,7 @@ class BaseSystem:
 
     Attributes
     ----------
-    start : Configuration
+    configuration : Configuration
     state_start : ndarray
     whole : Model
         The model with the rows that have been dropped as redundant.
@@ -56,7 +56,7 @@ class BaseSystem:
     ) -> None:
         self.model = model
         self.whole = model
-        self.start = configuration
+        self.configuration = configuration
         self.state_start = np.array(states, dtype=float)
         self.t0 = t0
         self.mechanism = mechanism
@@ -98,14 +98,14 @@ class BaseSystem:
     @property
     def pose(self) -> np.ndarray:
         """R, A (row-major), v and omega of each moving body at the start, shape (bodies, 18)."""
-        return self.start.pose
+        return self.configuration.pose
 
     @property
     def length(self) -> float:
         """A typical length in m: the largest marker arm or distance between bodies, at least 1 mm."""
         if self.typical_length is not None:
             return self.typical_length
-        spread = np.ptp(self.start.pose[:, POSE_R:POSE_A], axis=0).max(initial=0.0)
+        spread = np.ptp(self.configuration.pose[:, POSE_R:POSE_A], axis=0).max(initial=0.0)
         return float(max(self.model.longest_arm, spread, SHORTEST))
 
     def coordinate_weights(self) -> np.ndarray:
@@ -114,22 +114,26 @@ class BaseSystem:
         one = np.concatenate([np.ones(3), np.full(3, length**2)])
         sizes = self.model.modal_sizes[:, 0]
         # assembly moves bodies rather than bending them
-        return np.concatenate([np.tile(one, len(self.start.pose)), STIFFENED * (length / sizes) ** 2])
+        return np.concatenate([np.tile(one, len(self.configuration.pose)), STIFFENED * (length / sizes) ** 2])
 
-    def constraint_jacobian(self, place: Configuration | np.ndarray, t: float):
+    def constraint_jacobian(self, configuration: Configuration | np.ndarray, t: float):
         """Return Phi_q in spatial displacements, Phi, and Phi_q v + Phi_t at a configuration."""
-        return self.assembler.constraints(self._configuration(place), t, self.state_start)
+        return self.assembler.constraints(self._configuration(configuration), t, self.state_start)
 
     def constraint_jacobians(self, poses: np.ndarray, times: np.ndarray) -> list[scipy.sparse.csc_array]:
         """Return Phi_q in spatial displacements at each of some poses, (times, bodies, 18), of rigid bodies."""
         places = [Configuration(pose) for pose in poses]
         return self.assembler.constraint_jacobians(places, times, self.state_start)
 
-    def _configuration(self, place: Configuration | np.ndarray) -> Configuration:
+    def _configuration(self, configuration: Configuration | np.ndarray) -> Configuration:
         """Return a configuration; of a pose alone, with the modal coordinates of the start."""
-        if isinstance(place, Configuration):
-            return place
-        return Configuration(np.asarray(place, dtype=float).reshape(-1, POSE_COLUMNS), self.start.q_f, self.start.v_f)
+        if isinstance(configuration, Configuration):
+            return configuration
+        return Configuration(
+            np.asarray(configuration, dtype=float).reshape(-1, POSE_COLUMNS),
+            self.configuration.q_f,
+            self.configuration.v_f,
+        )
 
     # --- redundant rows -----------------------------------------------------------------------------
 
@@ -142,9 +146,11 @@ class BaseSystem:
         self.model = self.model.with_rows(kept)
         self.assembler = Assembler(self.model)
 
-    def dropped_rates(self, place: Configuration, t: float) -> tuple[scipy.sparse.csc_array, np.ndarray, list[str]]:
+    def dropped_rates(
+        self, configuration: Configuration, t: float
+    ) -> tuple[scipy.sparse.csc_array, np.ndarray, list[str]]:
         """Return Phi_q, Phi_q v + Phi_t and the names of the rows dropped as redundant, at a configuration."""
-        phi_q, _, rate = self._of_whole.constraints(place, t, self.state_start)
+        phi_q, _, rate = self._of_whole.constraints(configuration, t, self.state_start)
         return (
             scipy.sparse.csc_array(phi_q[self._dropped]),
             rate[self._dropped],

@@ -382,7 +382,7 @@ class Assembler:
         """Tables of integers and numbers, and the size of the work array."""
         return self.model.pack(I3)
 
-    def at(self, place: Configuration, t: float, inner: np.ndarray | None, states: np.ndarray) -> Assembled:
+    def at(self, configuration: Configuration, t: float, inner: np.ndarray | None, states: np.ndarray) -> Assembled:
         """Assemble at a configuration; ``inner`` holds loads and states, F to z of y; default: no loads, ``states``."""
         idata, rdata, size = self._tables
         idata, rdata, work = idata.copy(), rdata.copy(), np.zeros(size)
@@ -390,7 +390,9 @@ class Assembler:
         y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + states.size] = states
         if inner is not None:
             y[int(idata[T.H_F]) :] = inner
-        unknowns_from_pose(np.ascontiguousarray(place.pose), place.q_f, place.v_f, idata, rdata, work, y)
+        unknowns_from_pose(
+            np.ascontiguousarray(configuration.pose), configuration.q_f, configuration.v_f, idata, rdata, work, y
+        )
         if self._pattern is None:
             self._pattern = pattern(idata, rdata, size, t, y)
         indptr, indices, slots = self._pattern
@@ -401,18 +403,21 @@ class Assembler:
         return Assembled(matrix, records.solution[0], records.phi[0], records.loads[0], y, idata, rdata, work)
 
     def constraints(
-        self, place: Configuration, t: float, states: np.ndarray
+        self, configuration: Configuration, t: float, states: np.ndarray
     ) -> tuple[scipy.sparse.csc_array, np.ndarray, np.ndarray]:
         """Return Phi_q in spatial displacements and modal coordinates, Phi, and Phi_q v + Phi_t."""
-        found = self.at(place, t, None, states)
+        found = self.at(configuration, t, None, states)
         base = int(found.idata[T.H_COORDINATES])
         return scipy.sparse.csc_array(found.matrix[base:, :base]), found.phi[0::3].copy(), found.phi[1::3].copy()
 
     def constraint_jacobians(
-        self, places: Sequence[Configuration], times: np.ndarray, states: np.ndarray
+        self, configurations: Sequence[Configuration], times: np.ndarray, states: np.ndarray
     ) -> list[scipy.sparse.csc_array]:
         """Return Phi_q at each of some configurations."""
-        return [self.constraints(place, float(t), states)[0] for place, t in zip(places, times, strict=True)]
+        return [
+            self.constraints(configuration, float(t), states)[0]
+            for configuration, t in zip(configurations, times, strict=True)
+        ]
 
 
 class Evaluator:

@@ -34,7 +34,9 @@ extrapolated."""
 MAX_STATE_ITERATIONS = 100
 
 
-def accelerations(system: BaseSystem, place: Configuration, t: float) -> tuple[np.ndarray, np.ndarray, Assembled]:
+def accelerations(
+    system: BaseSystem, configuration: Configuration, t: float
+) -> tuple[np.ndarray, np.ndarray, Assembled]:
     """Return the accelerations of the coordinates, lambda, and the system they solve with its loads in y.
 
     Loads that depend on other loads or on reactions are iterated until they agree.
@@ -46,11 +48,11 @@ def accelerations(system: BaseSystem, place: Configuration, t: float) -> tuple[n
     ModelError
         If a load or a function of time has no finite value.
     """
-    base = place.coordinates
-    inner = _algebraic_start(system, place, t)
+    base = configuration.coordinates
+    inner = _algebraic_start(system, configuration, t)
     passes: list[tuple[np.ndarray, np.ndarray]] = []
     for attempt in range(MAX_LOAD_ITERATIONS if _coupled(system.model) else 1):
-        found = system.assembler.at(place, t, inner, system.state_start)
+        found = system.assembler.at(configuration, t, inner, system.state_start)
         diagnosis.check_finite(system, found.rhs, found.loads, t)
         try:
             solution = scipy.sparse.linalg.splu(found.matrix).solve(found.rhs)
@@ -86,7 +88,7 @@ def _extrapolated(passes: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     return passes[-1][1] - weights @ steps
 
 
-def _algebraic_start(system: BaseSystem, place: Configuration, t: float) -> np.ndarray | None:
+def _algebraic_start(system: BaseSystem, configuration: Configuration, t: float) -> np.ndarray | None:
     """Return F, N and z at a configuration whose algebraic states satisfy their equations, None without such states.
 
     Newton's method from the given start; the loads follow the states, reactions are left out.
@@ -94,7 +96,7 @@ def _algebraic_start(system: BaseSystem, place: Configuration, t: float) -> np.n
     model, algebraic = system.model, np.flatnonzero(~system.model.differential_states)
     if algebraic.size == 0:
         return None
-    found = system.assembler.at(place, t, None, system.state_start)
+    found = system.assembler.at(configuration, t, None, system.state_start)
     y, first, z = found.y, int(found.idata[T.H_F]), int(found.idata[T.H_Z])
     y[first:] = _inner(y, found.loads, found.idata)
     indptr, indices, slots = jacobian.pattern(found.idata, found.rdata, found.work.size, t, y)
@@ -158,7 +160,7 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
     See :meth:`gearmbs.dae.model.system.System.problem`.
     """
     model, form = system.model, FORMULATIONS[formulation]
-    acc, lam, found = accelerations(system, system.start, system.t0)
+    acc, lam, found = accelerations(system, system.configuration, system.t0)
     codes = found.codes
     idata, rdata, size = model.pack(form, codes=codes)
     at = model.layout(form)

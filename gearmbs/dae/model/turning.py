@@ -46,7 +46,7 @@ class Turn:
 
 
 def prescribed_turns(
-    system: BaseSystem, place: Configuration, jacobian: scipy.sparse.csc_array, phi: np.ndarray
+    system: BaseSystem, configuration: Configuration, jacobian: scipy.sparse.csc_array, phi: np.ndarray
 ) -> list[Turn]:
     """Return the prescribed rotations at a configuration whose constraint Jacobian and Phi are given."""
     model = system.model
@@ -56,7 +56,9 @@ def prescribed_turns(
         # rows given by an expression have no terms
         if span.stop == first or model.terms[first, T.TERM_TYPE] != ROTATION:
             continue
-        (i, body_i), (j, body_j) = (_axes(model, place, int(model.terms[first, m])) for m in (T.TERM_I, T.TERM_J))
+        (i, body_i), (j, body_j) = (
+            _axes(model, configuration, int(model.terms[first, m])) for m in (T.TERM_I, T.TERM_J)
+        )
         # one of the bodies moves: its rotation about the axis changes the sine by the cosine
         body, sense = (body_i, 1.0) if body_i > 0 else (body_j, -1.0)
         columns = POSE_PLACES * (body - 1) + 3 + np.arange(3)
@@ -66,13 +68,13 @@ def prescribed_turns(
     return found
 
 
-def _axes(model: Model, place: Configuration, marker: int) -> tuple[np.ndarray, int]:
+def _axes(model: Model, configuration: Configuration, marker: int) -> tuple[np.ndarray, int]:
     """Return the axes of a marker in global components, as columns, and its body; of a modal body the undeformed."""
     body = int(model.marker_body[marker])
     if body >= len(model.bodies):
         body = model.frame_body[body - len(model.bodies)]
     axes = model.marker_frame[marker, 3:].reshape(3, 3)
-    return (axes if body == 0 else place.pose[body - 1, POSE_A:POSE_V].reshape(3, 3) @ axes), body
+    return (axes if body == 0 else configuration.pose[body - 1, POSE_A:POSE_V].reshape(3, 3) @ axes), body
 
 
 def stages(system: BaseSystem, turns: list[Turn]) -> Iterator[Assembler]:

@@ -70,7 +70,7 @@ def test_constraints_are_the_same_in_any_company():
     system = slider_crank().compile()
     axes = np.array([[1.0, 2.0, -0.5], [0.3, -1.0, 2.0], [2.0, 0.1, 1.0]])
     steps = [np.concatenate([[0.0, 0.0, 0.0, *(s * axis)] for axis in axes]) for s in np.linspace(0.0, 1.5, 7)]
-    places = [system.start.displaced(step) for step in steps]
+    places = [system.configuration.displaced(step) for step in steps]
     times = np.linspace(0.0, 0.3, 7)
     found = system.constraint_jacobians(np.array([place.pose for place in places]), times)
     references = set()
