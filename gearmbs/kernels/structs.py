@@ -77,28 +77,29 @@ class _Members(RecordType):
         if not all(isinstance(kind, str) for kind in kinds.values()):
             raise TypeError(f"{name}: annotations are read as text; import annotations from __future__")
         scalars = {member: SCALARS[kind] for member, kind in kinds.items() if kind in SCALARS}
-        kinds_of_arrays = {member: ARRAYS[kind] for member, kind in kinds.items() if kind not in SCALARS}
-        arrays, words = {}, 0
-        for member, (kind, dimensions) in kinds_of_arrays.items():
-            arrays[member] = np.dtype(kind), dimensions, words
-            words += 1 + dimensions
+        arrays = {member: ARRAYS[kind] for member, kind in kinds.items() if kind not in SCALARS}
         fields = [(member, _C_TYPES[kind]) for member, kind in scalars.items()]
-        made: Any = super().__new__(
-            cls,
-            name,
-            bases,
-            space | {"_fields_": [*fields, ("words:", ctypes.c_int64 * words)], "__slots__": [*arrays]},
-        )
-        made.scalar_members, made.array_members, made._arrays = scalars, kinds_of_arrays, arrays
-        made._slots = {member: vars(made)[member] for member in arrays}
-        for member, slot in made._slots.items():
-            setattr(made, member, property(slot.__get__, _setter(member, slot, *arrays[member])))
+        words = ctypes.c_int64 * sum(1 + dimensions for _, dimensions in arrays.values())
+        own = {"scalar_members": scalars, "array_members": arrays, "_fields_": [*fields, ("words:", words)]}
+        return super().__new__(cls, name, bases, {**space, **own, "__slots__": [*arrays]})
+
+    def __init__(cls: Any, name: str, bases: tuple[type, ...], space: dict[str, Any]) -> None:
+        # newer Pythons lay the record out here
+        RecordType.__init__(cls, name, bases, space)
+        if bases == (ctypes.Structure,):
+            return
+        places, words = {}, 0
+        for member, (kind, dimensions) in cls.array_members.items():
+            places[member] = np.dtype(kind), dimensions, words
+            words += 1 + dimensions
+        cls._arrays = places
+        cls._slots = {member: vars(cls)[member] for member in places}
+        for member, slot in cls._slots.items():
+            setattr(cls, member, property(slot.__get__, _setter(member, slot, *places[member])))
+        arrays = tuple((member, *kind) for member, kind in cls.array_members.items())
         # numba asks for it by the second name before it looks any further
-        made.numba_type = made._numba_type_ = StructType(
-            name, tuple(scalars.items()), tuple((member, *kind) for member, kind in kinds_of_arrays.items())
-        )
-        assert ctypes.sizeof(made) == made.numba_type.layout.itemsize
-        return made
+        cls.numba_type = cls._numba_type_ = StructType(name, tuple(cls.scalar_members.items()), arrays)
+        assert ctypes.sizeof(cls) == cls.numba_type.layout.itemsize
 
 
 def _setter(name: str, slot: Any, kind: np.dtype, dimensions: int, place: int) -> Callable[[Any, Any], None]:

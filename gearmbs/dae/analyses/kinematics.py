@@ -43,7 +43,7 @@ class Instant:
         self.idata = self.problem.idata.copy()
         self.rdata = self.problem.rdata.copy()
         self.work = np.zeros(self.problem.work_size)
-        self.at = system.model.layout(int(self.idata[T.H_FORMULATION]))
+        self.at = system.model.layouts[int(self.idata[T.H_FORMULATION])]
         self.y = self.problem.y0.copy()
         self.differential = system.model.differential_states
 

@@ -121,7 +121,7 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
     n = 2 * len(free) + states
     idata, rdata, size = _with_axes(model, packed, axes, free, turns)
     whole = system.problem("SI2", rate_scale) if states else None
-    at = int(model.layout(SI2)["z"])
+    at = int(model.layouts[SI2]["z"])
     z = slice(2 * len(free), n)
     y, yp, out, work = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(size)
     omega, phi = np.split(np.arange(z.start), 2)

@@ -138,12 +138,9 @@ class Model:
             states=len(self.states),
         )
 
-    def layout(self, formulation: int) -> dict[str, int]:
-        """Return the offsets of the blocks of y, eq. (9)."""
-        return self._layouts[formulation]
-
     @cached_property
-    def _layouts(self) -> dict[int, dict[str, int]]:
+    def layouts(self) -> dict[int, dict[str, int]]:
+        """Offsets of the blocks of y, eq. (9), by the formulation."""
         return {formulation: offsets(self.counts, formulation) for formulation in FORMULATIONS.values()}
 
     def unknowns(self, formulation: str = "SI2") -> list[Unknown]:
@@ -205,7 +202,7 @@ class Model:
         terms = places_of_terms.astype(np.int64)
         rows = self.rows[kept].copy()
         rows[:, T.ROW_FIRST] = np.concatenate([[0], np.cumsum(sizes)[:-1]]) if len(sizes) else 0
-        old = self.layout(I3)
+        old = self.layouts[I3]
         less = len(self.rows) - len(kept)
         new = {old["lambda"] + int(i): old["lambda"] + k for k, i in enumerate(kept)}
         new |= {k: k - less for k in range(old["F"], old["n"])}
@@ -318,7 +315,7 @@ class Model:
 
     def _head(self, formulation: int) -> np.ndarray:
         """Return the header: counts, offsets of y and of the work array; the tables are placed later."""
-        at, counts = self.layout(formulation), self.counts
+        at, counts = self.layouts[formulation], self.counts
         head = np.zeros(T.H_SIZE, dtype=np.int64)
         head[T.H_BODIES], head[T.H_MARKERS] = len(self.bodies), len(self.marker_body)
         head[T.H_ROWS], head[T.H_TERMS] = len(self.rows), len(self.terms)
@@ -381,7 +378,7 @@ class Model:
 
         Places of an element's own states and addresses of functions are put among the extra integers.
         """
-        at = self.layout(formulation)
+        at = self.layouts[formulation]
         forces, extra_i = self.forces.copy(), self.extra_i.copy()
         free = {T.FORCE_F: at["F"], T.FORCE_N: at["N"]}
         work = T.SCRATCH_FIXED + self.largest_jac

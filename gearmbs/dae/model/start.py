@@ -126,7 +126,7 @@ def _algebraic_start(system: BaseSystem, configuration: Configuration, t: float)
 
 def _coupled(model: Model) -> bool:
     """Whether some load depends on unknowns other than positions, velocities and states."""
-    at = model.layout(I3)
+    at = model.layouts[I3]
     for row in model.forces:
         first = row[T.FORCE_DEPENDS]
         first += 1 + model.extra_i[first]
@@ -163,7 +163,7 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
     acc, lam, found = accelerations(system, system.configuration, system.t0)
     codes = found.codes
     idata, rdata, size = model.pack(form, codes=codes)
-    at = model.layout(form)
+    at = model.layouts[form]
     y, yp = np.zeros(at["n"]), np.zeros(at["n"])
     first = int(found.idata[T.H_F])
     y[: at["lambda"]] = found.y[: at["lambda"]]

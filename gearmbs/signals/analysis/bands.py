@@ -61,14 +61,14 @@ def band_rms(
     -------
     xarray.DataArray of dimension (channel,)
     """
-    return _per_channel(signal, _band_levels(signal, frequency, half_width, transition, period))
+    return _per_channel(signal, _band_levels(signal, rate_of(signal), frequency, half_width, transition, period))
 
 
 def _band_levels(
-    signal: xr.DataArray, frequency: float, half_width: float, transition: float, period: float | None
+    signal: xr.DataArray, rate: float, frequency: float, half_width: float, transition: float, period: float | None
 ) -> np.ndarray:
-    """RMS of each channel in a band; see `band_rms`."""
-    rate, n = rate_of(signal), signal.sizes["time"]
+    """RMS of each channel, sampled at ``rate`` (Hz), in a band; see `band_rms`."""
+    n = signal.sizes["time"]
     taps = bandpass_taps(rate, frequency - half_width, frequency + half_width, transition, ATTENUATION_DB)
     if n < taps.size:
         raise SignalError(
@@ -170,7 +170,8 @@ def gmf_rms(
     multiples = np.arange(1, harmonics + 1)
     per_turn = _whole_turns(signal, gmf, teeth)
     widths = half_width * gmf, TRANSITION * gmf
-    by_band = np.stack([_band_levels(signal, k * gmf, *widths, per_turn / gmf) for k in multiples])
+    rate = rate_of(signal)
+    by_band = np.stack([_band_levels(signal, rate, k * gmf, *widths, per_turn / gmf) for k in multiples])
     by_orders = order_rms(signal, gmf / per_turn, list(multiples * per_turn)).values
     units = common_unit(signal)
     dims = ("harmonic", "channel")

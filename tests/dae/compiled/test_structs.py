@@ -112,7 +112,7 @@ def test_an_array_of_another_kind_is_refused(wrong):
 def test_unknown_and_missing_members_are_named():
     with pytest.raises(TypeError, match="missing marks, rows"):
         Sample(y=np.ones(1))
-    with pytest.raises(AttributeError, match="'Sample' object has no attribute 'size'"):
+    with pytest.raises(AttributeError, match=says("Sample", "no attribute", "size")):
         sample().size = 1.0
     with pytest.raises(AttributeError, match="no member 'size'"):
         _ = sample().size
