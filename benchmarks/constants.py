@@ -35,8 +35,8 @@ MODULES = ("bdf", "controller", "corrector", "driver", "initial_state", "newton_
 LEFT_OUT = {
     "corrector": {"HELD", "ROUNDED_TERMS", "SETTLED_RATE", "GOLDEN_FRACTION"},
     "controller": {"START_TARGET", "START_GROWTH"},
-    "driver": {"FIRST_MOVE", "FIRST_TRIED", "CHECK_RATIO", "LEAST_DIGITS", "HOPELESS_DIGITS", "UNSATISFIED"},
-    "initial_state": {"LARGE_GAMMA"},
+    "driver": {"LEAST_DIGITS", "HOPELESS_DIGITS", "UNSATISFIED"},
+    "initial_state": {"FIRST_MOVE", "FIRST_TRIED", "CHECK_RATIO", "LARGE_GAMMA"},
     "newton_matrix": {"PLANNED_RANGE", "LEAP"},
     "restart": {"FIRST_TARGET", "SETTLED", "BLOCK_ERROR", "SHORT_OF_STOP"},
     "step": {"FORESEEN", "LANDED"},

@@ -77,6 +77,13 @@ COMMON = {
 }
 """Common units: factor to SI, and powers of m, kg, s and rad."""
 
+ANGULAR = re.compile("radian|degree(?!_)|turn|revolution|rpm|rps|arcminute|arcsecond|grade")
+WITHOUT_ANGLE = ("m", "m^2", "m^3", "s", "kg", "kg/m^3", "N", "Pa", "N/m", "N*s/m", "N*m", "dimensionless")
+"""Units of quantities that are none for an angle, of which a library takes the radian for 1; a torque is also J/rad."""
+FOREIGN = re.compile(r"[^\w\s.+*/^()%°‰×⁻-]")
+SIDE_BY_SIDE = re.compile(r"[\w.)%‰]\s+(?!1\s*/\s*[^\W\d])[.\d]")
+"""A number behind something else without an operator between them, but for 5 1/s."""
+
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 FACTOR = re.compile(r"\s*([*/]?)\s*([A-Za-z]+)(?:(?:\^|\*\*)(-?\d+(?:\.\d+)?))?\s*")
 
@@ -242,11 +249,15 @@ def _parse(text: str, target: str, field: str) -> float:
             f"{field}: {text!r} has a comma in its number; write a point before decimals, and nothing between thousands"
         )
     clean = re.sub(r"(?<=\d)\s*°", " deg", text.strip()).replace("·", "*").replace("µ", "u").replace("μ", "u")
+    clean = clean.replace("\N{MINUS SIGN}", "-")
     for pattern, written in SPELLINGS:
         clean = re.sub(pattern, written, clean)
     quick = _quick(clean, target)
     if quick is not None:
         return quick
+    fault = _fault(clean)
+    if fault:
+        raise ValueError(f"{field}: {text!r} {fault}; write for example '1 {USUAL.get(target, target)}'")
 
     import pint
 
@@ -258,6 +269,9 @@ def _parse(text: str, target: str, field: str) -> float:
             f"{field}: cannot read {text!r} as a number with a unit ({error}); {_remedy(clean, target)}"
         ) from None
     example = USUAL.get(target, target)
+    if not re.match(r"[+-]?\s*\(*[+-]?\s*(\.?\d|inf|nan)", clean, re.IGNORECASE):
+        # a library takes a unit alone for one of it
+        raise ValueError(f"{field}: {text!r} has no number; write for example '1 {example}'")
     if not isinstance(quantity, registry.Quantity):
         quantity = registry.Quantity(quantity, "dimensionless")
     if not isinstance(quantity.magnitude, Real):
@@ -267,6 +281,14 @@ def _parse(text: str, target: str, field: str) -> float:
         raise ValueError(f"{field}: {text!r} has no unit; write for example '{text.strip()} {example}'")
     if wanted.units == registry.radian and quantity.dimensionless and quantity.unitless:
         raise ValueError(f"{field}: {text!r} has no unit; write 'deg' or 'rad'")
+    names = str(quantity.units)
+    per_energy = target == "N*m" and "radian" in names and ("joule" in names or "watt" in names)
+    if target in WITHOUT_ANGLE and ANGULAR.search(names) and not per_energy:
+        hint = "; of a whole turn it is 2 pi times what it is per radian" if "/ radian" in names else ""
+        raise ValueError(
+            f"{field}: {text!r} has an angle in its unit where a quantity in {target} is expected{hint}; write for "
+            f"example '1 {example}'"
+        )
     turns = _turns(quantity, registry, text, target, field)
     if turns is not None:
         return turns
@@ -277,6 +299,23 @@ def _parse(text: str, target: str, field: str) -> float:
             f"{field}: {text!r} is in {quantity.units:~} where a quantity in {target} is expected; write for example "
             f"'1 {example}'"
         ) from None
+
+
+def _fault(text: str) -> str:
+    """Return what is wrong with a text that a library would make something of; empty if nothing is.
+
+    It leaves out signs that it does not know, so that 1'000 is 0, and multiplies what stands side by side, so that
+    1 000 is 0 as well.
+    """
+    unknown = FOREIGN.search(text)
+    number = NUMBER.match(text)
+    if unknown:
+        return f"has {unknown[0]!r} in it, which is no part of a number or a unit"
+    if re.match(r"[+-]\s*[+-]", text):
+        return "has two signs"
+    if SIDE_BY_SIDE.search(text) or (number is not None and re.match(r"[.\d]", text[number.end() :])):
+        return "has two numbers side by side"
+    return ""
 
 
 def _remedy(text: str, target: str) -> str:
@@ -304,7 +343,7 @@ def _turns(quantity: Any, registry: Any, text: str, target: str, field: str) -> 
     if target not in ("rad/s", "Hz") or not quantity.check("1/[time]"):
         return None
     names = str(quantity.units)
-    angular = any(word in names for word in ("radian", "degree", "turn", "revolution", "rpm", "rps"))
+    angular = ANGULAR.search(names) is not None
     if target == "Hz":
         return float(quantity.to("rad/s").magnitude) / math.tau if angular else None
     if angular:

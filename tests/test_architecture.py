@@ -89,8 +89,6 @@ CIRCLES = {
     ("drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.placement",
      "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
-    ("bearings.bearing", "bearings.catalogue"):
-        "a bearing is found by its designation",
     ("mechanism.building.compile", "mechanism.building.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import pytest
+from gearmbs.drivetrain.description import make_description
+from pydantic import ValidationError
 
 import gearmbs
 from gearmbs.gears import GearSpec
-from gearmbs.schema.described import Described, make, measures_of
+from gearmbs.schema.described import Described, _hints, _readers, make, measures_of
 from gearmbs.schema.files import read_toml, toml_table
 from gearmbs.schema.messages import check_keys, chosen
-from gearmbs.schema.quantities import Measure, OneOf, OverTime
+from gearmbs.schema.quantities import Measure, OneOf, OverTime, counts
 from gearmbs.studies import Case, CaseError
+from gearmbs.studies.case.case import Contact, FrictionSettings, Gears, Operation, Shafts, Solver
 from gearmbs.units import Given, Quantity
 from tests.generators import cases, seed
 from tests.says import says
@@ -178,3 +182,91 @@ def test_limits_of_a_case_are_within():
     assert Case(fault={"misalignment": "-10 deg"}).fault.misalignment == pytest.approx(-math.pi / 18.0)
     with pytest.raises(CaseError, match="give -10 to 10 deg"):
         Case(fault={"misalignment": "-10.1 deg"})
+
+
+def _described(kind: type = Described) -> list[type]:
+    """All classes of descriptions of the package whose fields are read."""
+    found = [one for one in kind.__subclasses__() if one.__module__.startswith("gearmbs.")]
+    return [*found, *(inner for one in found for inner in _described(one))]
+
+
+def _fault_of(read: Callable, *values: float, **named: float) -> str:
+    try:
+        read(*values, **named)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def test_true_is_no_number_in_any_description():
+    """Of every field that measures or counts; 1.0 is not refused for its kind."""
+    import gearmbs.drivetrain
+    import gearmbs.studies.presets.resonance
+    import gearmbs.studies.trains.planetary  # noqa: F401
+
+    tried = 0
+    for kind in _described():
+        for name, reader in _readers(kind).items():
+            if name not in measures_of(kind) and not counts(_hints(kind)[name]):
+                continue
+            tried += 1
+            for wrong in (True, False, [True, 1.0]):
+                with pytest.raises(ValidationError):
+                    reader.validate_python(wrong)
+            assert "true or false" not in _fault_of(reader.validate_python, 1.0), (kind, name)
+    assert tried > 100
+    for kind in (Gears, Shafts, Operation, Contact, FrictionSettings, Solver):
+        for name, field in kind.model_fields.items():
+            if counts(field.annotation):
+                for wrong in (True, False):
+                    with pytest.raises(CaseError, match=says(f"{kind.section}.{name}", str(wrong), "give")):
+                        kind(**{name: wrong})
+                assert "true or false" not in _fault_of(kind, **{name: 1.0}), (kind, name)
+
+
+def test_truth_in_trains_is_told_by_name():
+    def refused(where: str, key: str, value: object, *words: str) -> None:
+        table = tomllib.loads(TRAIN)
+        place = table
+        for part in filter(None, where.split(".")):
+            place = place[part]
+        place[key] = value
+        with pytest.raises(gearmbs.drivetrain.DrivetrainError, match=says(key, str(value), *words)):
+            make_description(table)
+
+    make_description(tomllib.loads(TRAIN))
+    refused("", "gravity", True, "give", "3 values")
+    refused("", "run_up", True, "give")
+    refused("", "running", 1, "give true or false")
+    for key in ("damping_ratio", "stiffness", "backlash", "slices"):
+        refused("meshes.m", key, True, "give")
+    for key in ("teeth", "module", "profile_shift", "addendum", "poisson_ratio"):
+        refused("wheels.p", key, True, "give")
+    # values of another kind are refused on reading, not when the train is built
+    refused("loads.l", "torque", "10 mm", "N*m")
+    refused("loads.pump", "pressure", "20 N", "Pa")
+    refused("loads.pump", "displacement", "300 cm^3/rad", "2 pi", "m^3")
+
+
+TRAIN = """
+gravity = [0, 0, "-9.81 m/s^2"]
+run_up = 0.1
+running = false
+shafts = {a = {}, b = {}}
+[wheels]
+p = {shaft = "a", teeth = 20, module = "3 mm", internal = false}
+g = {shaft = "b", teeth = 60, module = "3 mm"}
+[meshes.m]
+driver = "p"
+driven = "g"
+damping_ratio = 1
+[bearings]
+x = {kind = "ideal", shaft = "a"}
+y = {kind = "ideal", shaft = "b"}
+[drives]
+d = {kind = "speed", shaft = "a", speed = "100 rpm"}
+[loads]
+l = {kind = "torque", shaft = "b", torque = "10 N m"}
+t = {kind = "torque", shaft = "b", torque = "2*pi + 100*SIN(2*pi*TIME)"}
+pump = {kind = "pump", shaft = "b", displacement = "300 cm^3", pressure = "20 bar"}
+"""

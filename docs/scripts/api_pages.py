@@ -71,14 +71,20 @@ MORE = {
     "gearmbs.gears": {
         "gearmbs.gears.modifications": EVERYTHING,
         "gearmbs.gears.faults": EVERYTHING,
-        "gearmbs.gears.mesh": EVERYTHING,
+        "gearmbs.gears.mesh": ["Mesh"],
         "gearmbs.gears.pattern": EVERYTHING,
         "gearmbs.gears.stiffness": EVERYTHING,
         "gearmbs.gears.iso6336": EVERYTHING,
     },
     "gearmbs.bearings": {
         "gearmbs.bearings.catalogue": EVERYTHING,
-        "gearmbs.bearings.bearing": EVERYTHING,
+        "gearmbs.bearings.bearing": [
+            "dynamic_rating",
+            "static_rating",
+            "load_factors",
+            "life_exponent",
+            "roller_length_for",
+        ],
         "gearmbs.bearings.laws_kernel": EVERYTHING,
     },
     "gearmbs.contact": {

@@ -30,6 +30,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gearmbs.bearings.catalogue import look_up
 from gearmbs.bearings.kinds import KINDS, BearingError, require
 from gearmbs.bearings.laws_kernel import (
     BALL_EXPONENT,
@@ -172,9 +173,11 @@ class Bearing(Described):
         UserWarning
             Of suffixes that are not known.
         """
-        from gearmbs.bearings.catalogue import look_up
-
-        return look_up(designation, changes)
+        found = look_up(designation, changes, [item.name for item in fields(cls)])
+        rollers = found.get("kind") in KINDS and KINDS[found["kind"]].rollers
+        if rollers and found.get("roller_length") is None and {"designation", "dynamic_rating"} <= found.keys():
+            return roller_length_for(cls(**{**found, "roller_length": found["element_diameter"]}))
+        return cls(**found)
 
     def changed(self, **changes: Any) -> Bearing:
         """Return the bearing with other values of some fields."""

@@ -10,13 +10,9 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of
-
-if TYPE_CHECKING:
-    from gearmbs.bearings.bearing import Bearing
 
 
 def dimension_series(designation: str) -> tuple[str, str, str] | None:
@@ -120,22 +116,23 @@ def known() -> list[str]:
     return [*ELEMENTS, *RECORDINGS]
 
 
-def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
-    """Return the bearing of a designation; see `gearmbs.bearings.Bearing.from_designation`."""
-    from gearmbs.bearings.bearing import Bearing
+def look_up(designation: str, changes: dict[str, Any], names: list[str]) -> dict[str, Any]:
+    """Return the fields of a designation's bearing; ``names`` are those there are, see `Bearing.from_designation`.
 
+    Of rollers without a length ``dynamic_rating`` is among them, from which it follows.
+    """
     if not isinstance(designation, str) or not designation.strip():
         raise BearingError(f"designation is {designation!r}; give a text such as '6205'")
-    designation, given = _with_fields(designation)
+    designation, given = _with_fields(designation, names)
     changes = {**given, **changes}
     if not designation:
         missing = {"elements", "element_diameter", "pitch_diameter"} - changes.keys()
         if missing:
             raise BearingError(f"a bearing without a designation needs {', '.join(f'{m}=' for m in sorted(missing))}")
-        return Bearing(**changes)
+        return changes
     plain = re.sub(r"[^A-Z0-9]", "", designation.upper())
     if plain in ALIASES:
-        return Bearing(**{**RECORDINGS[ALIASES[plain]], **changes})
+        return {**RECORDINGS[ALIASES[plain]], **changes}
     bare = MAKERS.sub("", designation.upper().strip())
     group = dimension_series(bare)
     if group is not None:
@@ -153,14 +150,14 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
         z, d, pitch = ELEMENTS[series]
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
         found |= _clearance(named, _boundary(series))
-        return Bearing(**{**found, **_boundary(series), "designation": designation.strip(), **changes})
+        return {**found, **_boundary(series), "designation": designation.strip(), **changes}
     boundary = _boundary(series)
     if boundary:
         if {"elements", "element_diameter"} <= changes.keys():
             middle = 0.5 * (boundary["bore"] + boundary["outside_diameter"])
             own = {"pitch_diameter": middle, **boundary, "designation": designation.strip()}
             own |= _clearance(named, boundary)
-            return Bearing(**{**own, **changes})
+            return {**own, **changes}
         sizes = ", ".join(f"{key.replace('_', ' ')} {1e3 * value:g} mm" for key, value in boundary.items())
         raise BearingError(
             f"designation {designation!r}: {sizes}, but how many balls it has, and of which diameter, differs between "
@@ -172,21 +169,18 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
                 f"designation {designation!r}: its bore is not in the catalogue, so that {named} says no clearance; "
                 "give clearance= (diametral)"
             )
-        return Bearing(**{"designation": designation.strip(), **changes})
+        return {"designation": designation.strip(), **changes}
     raise BearingError(
         f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter="
         " and pitch_diameter=, and contact_angle= if it is not 0"
     )
 
 
-def _with_fields(text: str) -> tuple[str, dict[str, Any]]:
+def _with_fields(text: str, names: list[str]) -> tuple[str, dict[str, Any]]:
     """Return a designation and the fields written behind it, "6305, elements=7, element_diameter=13.49 mm"."""
-    from gearmbs.bearings.bearing import Bearing
-
     head, *parts = [part.strip() for part in text.split(",")]
     if "=" in head:
         head, parts = "", [head, *parts]
-    names = [field.name for field in fields(Bearing)]
     found: dict[str, Any] = {}
     for part in parts:
         name, _, value = (piece.strip() for piece in part.partition("="))
@@ -256,16 +250,12 @@ def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> N
         )
 
 
-def _asked(designation: str, fixed: Known, changes: dict[str, Any], named: str | None) -> Bearing:
-    """Return a bearing whose designation fixes some fields, the length of rollers by the rating if that is given."""
-    from gearmbs.bearings.bearing import Bearing, roller_length_for
-
+def _asked(designation: str, fixed: Known, changes: dict[str, Any], named: str | None) -> dict[str, Any]:
+    """Return the fields of a bearing whose designation fixes some; rollers may be without a length if rated."""
     own = {**fixed.fields, **_class_of(designation, fixed, named), "designation": designation.strip(), **changes}
     missing = [name for name in fixed.asked if own.get(name) is None]
-    if missing == ["roller_length"] and own.get("dynamic_rating") is not None:
-        return roller_length_for(Bearing(**{**own, "roller_length": own["element_diameter"]}))
-    if not missing:
-        return Bearing(**own)
+    if not missing or (missing == ["roller_length"] and own.get("dynamic_rating") is not None):
+        return own
     sizes = ", ".join(
         f"{key.replace('_', ' ')} {1e3 * value:.4g} mm"
         if key != "contact_angle"

@@ -160,7 +160,7 @@ def section_of_pair(options, wheels, scratch, zeta):
     kind = int(scratch.loads.kind[0])
     if kind != L.FLANKS:
         pair_corners(wheels, scratch, strip, strip, 1, kind, True, 0)
-        corner = scratch.corner_1 if kind == L.CORNER_1 else scratch.corner_2
+        corner = scratch.corner_2 if kind == L.CORNER_2 else scratch.corner_1
         roll_under_corner(side, corner, strip, 0, scratch.lookup_1, kind % 2, 0)
         # a foot beyond the mate's tip is none
         if scratch.lookup_1.roll - corner.mate_tip[0] > wheels.edge:

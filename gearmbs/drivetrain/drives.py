@@ -139,7 +139,7 @@ class TorqueDrive(Drive):
     """
 
     kind: ClassVar[str] = "torque"
-    torque: Annotated[Any, OverTime()] = 0.0
+    torque: Annotated[Any, OverTime("torque")] = 0.0
 
     def largest_torque(self) -> float | None:
         return fixed_value(self.torque, "torque")

@@ -48,6 +48,7 @@ In TOML files or nested tables each kind of part is a table of named tables::
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -64,9 +65,9 @@ from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
 from gearmbs.schema.described import Described, make
 from gearmbs.schema.files import read_toml
-from gearmbs.schema.messages import check_keys, chosen
+from gearmbs.schema.messages import check_keys, chosen, line
 from gearmbs.schema.quantities import Measure, OneOf
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
@@ -78,7 +79,11 @@ if TYPE_CHECKING:
 
 P = TypeVar("P", bound=Part)
 
-GROUPS = ("shafts", "wheels", "meshes", "bearings", "couplings", "housings", "drives", "loads", "sensors")
+KINDS: dict[str, type[Part]] = {
+    "shafts": Shaft, "wheels": Wheel, "meshes": GearMesh, "bearings": Bearing, "couplings": Coupling,
+    "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor,
+}  # fmt: skip
+"""What each group holds."""
 
 
 @dataclass(frozen=True)
@@ -146,13 +151,10 @@ class Drivetrain:
 
     def __post_init__(self) -> None:
         known: dict[str, Part] = {}
-        for group in GROUPS:
+        for group, kind in KINDS.items():
             object.__setattr__(self, group, tuple(getattr(self, group)))
             for part in getattr(self, group):
-                require(
-                    isinstance(part, KINDS[group]),
-                    f"{self.name}: {group} holds {part!r}; give objects of {KINDS[group].__name__}",
-                )
+                require(isinstance(part, kind), f"{self.name}: {group} holds {part!r}; give objects of {kind.__name__}")
                 require(
                     part.name not in known and part.name != "ground",
                     f"{part.label}: the name is in use; choose another",
@@ -166,9 +168,9 @@ class Drivetrain:
 
     def with_parts(self, *parts: Part) -> Drivetrain:
         """Return a drivetrain with these parts; parts whose names are there take the place of those."""
-        groups: dict[str, Any] = {group: list(getattr(self, group)) for group in GROUPS}
+        groups: dict[str, Any] = {group: list(getattr(self, group)) for group in KINDS}
         for part in parts:
-            group = next((g for g in GROUPS if isinstance(part, KINDS[g])), None)
+            group = next((g for g, kind in KINDS.items() if isinstance(part, kind)), None)
             require(group is not None, f"{part!r} is no part of a drivetrain")
             assert group is not None
             names = [p.name for p in groups[group]]
@@ -343,24 +345,17 @@ class Drivetrain:
         return max([1.0, *(fastest or map(abs, self.speeds.values()))])
 
     def _repr_html_(self) -> str:
-        parts = (part for group in GROUPS for part in getattr(self, group))
+        parts = (part for group in KINDS for part in getattr(self, group))
         return parts_html(self.name, parts, self._laws()) + self.kinematics.to_html()
 
     def __repr__(self) -> str:
-        counts = [(len(getattr(self, g)), g) for g in GROUPS if getattr(self, g)]
+        counts = [(len(getattr(self, g)), g) for g in KINDS if getattr(self, g)]
         said = [f"{n} {KINDS[g].title if n == 1 else g}" for n, g in counts]
         by_law: dict[str, list[str]] = {}
         for name, law in self._laws().items():
             by_law.setdefault(law, []).append(name)
         said += [f"{', '.join(names)}: {law}" for law, names in by_law.items()]
         return f"Drivetrain({self.name!r}: {'; '.join([', '.join(said[: len(counts)]), *said[len(counts) :]])})"
-
-
-KINDS: dict[str, type[Part]] = {
-    "shafts": Shaft, "wheels": Wheel, "meshes": GearMesh, "bearings": Bearing, "couplings": Coupling,
-    "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor,
-}  # fmt: skip
-"""What each group holds."""
 
 
 FaultReader = Callable[[Any], Any]
@@ -379,6 +374,7 @@ PAIR_KEYS = tuple(
     f.name for f in fields(GearPair) if f.init and f.name not in ("driver", "driven", "rotation", "torque")
 )
 HARMONICS = Measure(low=1, whole=True, remedy="give a whole number of mesh harmonics from 1 up")
+NUMERIC = re.compile(r"\b(int|float|Quantity)\b")
 GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name")
 
 
@@ -462,20 +458,29 @@ def make_description(
 
 
 def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
-    known = ("name", "gravity", "run_up", "running", "run", *GROUPS)
+    known = ("name", "gravity", "run_up", "running", "run", *KINDS)
     check_keys(data, known, "the file", DrivetrainError, shown=repr)
     parts: dict[str, Any] = {}
-    for group in GROUPS:
+    for group in KINDS:
         tables = data.get(group, {})
         require(isinstance(tables, Mapping), f"{group}: write a table for each, such as [{group}.a]")
         parts[group] = [_part(group, str(name), table, fault) for name, table in tables.items()]
     others: dict[str, Any] = {key: data[key] for key in ("name", "running") if key in data}
+    running = data.get("running", False)
+    require(isinstance(running, bool), f"running is {running!r}; give true or false")
     if "gravity" in data:
-        others["gravity"] = tuple(to_si(g, "acceleration", "gravity") for g in data["gravity"])
+        others["gravity"] = _measured(data, "gravity", Measure("acceleration", several=3))
     if "run_up" in data:
-        others["run_up"] = to_si(data["run_up"], "time", "run_up")
+        others["run_up"] = _measured(data, "run_up", Measure("time", above=0))
     run = make(RunSettings, data.get("run", {}), "[run]", DrivetrainError)
     return Description(Drivetrain(**parts, **others), run)
+
+
+def _measured(data: Mapping[str, Any], key: str, measure: Measure) -> Any:
+    try:
+        return measure.as_given(data[key])
+    except ValueError as error:
+        raise DrivetrainError(line(key, data[key], error)) from None
 
 
 def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
@@ -494,6 +499,14 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
     return _of_kind(where, chosen(kinds, str(given.pop("kind", usual)), f"{where}: ", DrivetrainError), name, given)
 
 
+def _refuse_truth(where: str, kind: type, given: Mapping[str, Any]) -> None:
+    """Refuse true and false, which Python takes for 1 and 0, where a number is meant."""
+    for known in fields(kind):
+        value = given.get(known.name)
+        if isinstance(value, bool) and NUMERIC.search(str(known.type)):
+            raise DrivetrainError(f"{where}: {known.name} is {value}; give a number, not true or false")
+
+
 def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
     with told_of(where):
         return make(kind, given, where, DrivetrainError, name=name)
@@ -504,6 +517,7 @@ def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
     material = {key: given.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in given}
     known = ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"]
     check_keys(given, known, where, DrivetrainError, shown=repr)
+    _refuse_truth(where, GearSpec, given)
     for key in ("teeth", "module"):
         require(key in given, f"{where}: {key} is missing")
     with told_of(where):
@@ -522,6 +536,7 @@ def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | Non
     own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
     known = ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"]
     check_keys(given, known, where, DrivetrainError, shown=repr)
+    _refuse_truth(where, GearPair, given)
     if "faults" in given:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None

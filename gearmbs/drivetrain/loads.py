@@ -64,7 +64,7 @@ class TorqueLoad(Load):
     """
 
     kind: ClassVar[str] = "torque"
-    torque: Annotated[Any, OverTime()]
+    torque: Annotated[Any, OverTime("torque")]
 
     def nominal(self, speed: float) -> float:
         return fixed_value(self.torque, "torque") or 0.0
@@ -138,7 +138,7 @@ class Pump(Load):
     kind: ClassVar[str] = "pump"
 
     displacement: Annotated[Quantity, Measure("m^3", above=0)]
-    pressure: Annotated[Any, OverTime()]
+    pressure: Annotated[Any, OverTime("pressure")]
     efficiency: Annotated[Quantity, Measure(above=0, high=1)] = 1.0
     idle: Resistance = 0.0
     viscous: Viscous = 0.0
@@ -203,7 +203,7 @@ class Brake(Load):
     kind: ClassVar[str] = "brake"
 
     torque: Resistance
-    share: Annotated[Any, OverTime()] = 1.0
+    share: Annotated[Any, OverTime("dimensionless")] = 1.0
     smoothing: Smoothing = 0.1
 
     def nominal(self, speed: float) -> float:

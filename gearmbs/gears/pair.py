@@ -34,6 +34,12 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.parts.bodies import Marker
 
 
+_OF_GEOMETRY = {item.name for item in fields(PairGeometry)} | {
+    name for name, item in vars(PairGeometry).items() if isinstance(item, cached_property) and name != "_name"
+}
+"""Fields of a pair and what follows from them that its geometry has, too."""
+
+
 @dataclass(frozen=True)
 class GearPair(PairGeometry, Shown):
     """A driver and a driven wheel, placed in space, with their contact, operating point and faults.
@@ -186,10 +192,9 @@ class GearPair(PairGeometry, Shown):
     @cached_property
     def geometry(self) -> PairGeometry:
         """The wheels and their places alone."""
-        # as checked already, and remarked on
+        # as checked already, and remarked on, with what was found then
         geometry = object.__new__(PairGeometry)
-        for item in fields(PairGeometry):
-            object.__setattr__(geometry, item.name, getattr(self, item.name))
+        geometry.__dict__.update((name, value) for name, value in vars(self).items() if name in _OF_GEOMETRY)
         return geometry
 
     @cached_property
@@ -318,7 +323,8 @@ class GearPair(PairGeometry, Shown):
         else:
             if damping is not None:
                 raise ValueError(f"damping is {damping!r} and damping_ratio {damping_ratio!r}; give one of them")
-            if not (isinstance(damping_ratio, (int, float)) and 0.0 <= damping_ratio < math.inf):
+            real = isinstance(damping_ratio, (int, float)) and not isinstance(damping_ratio, bool)
+            if not (real and 0.0 <= damping_ratio < math.inf):
                 raise ValueError(f"damping_ratio is {damping_ratio!r}; give a number that is not negative")
             share = self._pairs_in_mesh * self._face_share
             damping = 2.0 * damping_ratio * math.sqrt(law.stiffness * self.reduced_mass / share)

@@ -8,7 +8,7 @@ are negative.
 from __future__ import annotations
 
 import math
-import weakref
+import operator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from gearmbs.contact import layout as L
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import ContactModel, Mesh
-from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, ToothDeviations
+from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, Fault, ToothDeviations
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 
@@ -63,25 +63,23 @@ def _pack_wheel(gear: GearSpec, table: np.void) -> None:
 
 
 class _Latest:
-    """The tables of the pair that was packed last: setting a simulation up asks for the same ones several times."""
+    """The tables packed last: setting a simulation up asks for them several times, a series changes the load alone."""
 
     def __init__(self) -> None:
-        self._kept: tuple[weakref.ref, int | None, tuple[np.ndarray, np.ndarray, int]] | None = None
+        self._kept: tuple[tuple, tuple[Fault, ...], tuple[np.ndarray, np.ndarray, int]] | None = None
 
-    def find(self, pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int] | None:
-        """Return copies of the pair's tables, or None."""
+    def find(self, key: tuple, faults: tuple[Fault, ...]) -> tuple[np.ndarray, np.ndarray, int] | None:
+        """Return copies of the tables of what the key holds and of these very faults, or None."""
         kept = self._kept
-        if kept is None or kept[0]() is not pair or kept[1] != slices:
+        if kept is None or len(faults) != len(kept[1]) or not all(map(operator.is_, faults, kept[1])) or kept[0] != key:
             return None
         gi, gr, size = kept[2]
         return gi.copy(), gr.copy(), size
 
-    def keep(self, pair: Mesh, slices: int | None, tables: tuple[np.ndarray, np.ndarray, int]) -> None:
-        """Keep copies of tables of a pair that cannot change."""
-        parameters = getattr(type(pair), "__dataclass_params__", None)
-        if parameters is not None and parameters.frozen:
-            gi, gr, size = tables
-            self._kept = (weakref.ref(pair), slices, (gi.copy(), gr.copy(), size))
+    def keep(self, key: tuple, faults: tuple[Fault, ...], tables: tuple[np.ndarray, np.ndarray, int]) -> None:
+        """Keep copies of tables."""
+        gi, gr, size = tables
+        self._kept = key, faults, (gi.copy(), gr.copy(), size)
 
 
 _latest = _Latest()
@@ -96,10 +94,15 @@ def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray,
     slices : int, optional
         Slices along the face, default the pair's own.
     """
-    tables = _latest.find(pair, slices)
+    parameters = getattr(type(pair), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen:
+        # it may change
+        return _pack(pair, slices)
+    key, faults = (pair.geometry, pair.contact_model, pair.operating_point.rotation, slices), pair.faults
+    tables = _latest.find(key, faults)
     if tables is None:
         tables = _pack(pair, slices)
-        _latest.keep(pair, slices, tables)
+        _latest.keep(key, faults, tables)
     return tables
 
 

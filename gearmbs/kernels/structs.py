@@ -10,17 +10,20 @@ to outlive the call.
 from __future__ import annotations
 
 import ctypes
-import inspect
 import math
-import operator
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeAlias, TypeVar
 
 import numpy as np
 from numba.extending import typeof_impl
 
 from gearmbs.kernels.views import StructType, matrix_at, uncounted, uncounted_rows, vector_at
+
+if TYPE_CHECKING:
+    from _ctypes import _PyCStructType as RecordType
+else:
+    RecordType = type(ctypes.Structure)
 
 __all__ = [
     "ARRAYS",
@@ -52,17 +55,63 @@ IndexVector: TypeAlias = np.ndarray
 SCALARS = {"float": "f8", "int": "i8", "bool": "?"}
 ARRAYS = {"Vector": ("f8", 1), "Matrix": ("f8", 2), "IntVector": ("i8", 1), "IndexVector": ("u4", 1)}
 _C_TYPES = {"f8": ctypes.c_double, "i8": ctypes.c_int64, "?": ctypes.c_bool}
-_CASTS = {"f8": float, "i8": int, "?": bool}
 _byte_of: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 _address_of = ctypes.addressof
-_NO_BLOCK: tuple[None, int, dict] = None, 0, {}
 LINE = 64
 """Bytes of a line of the processor's cache."""
 KEPT_LAYOUTS = 64
 """Sets of sizes for which a kind of struct keeps its layout."""
 
 
-class Struct:
+class _Members(RecordType):
+    """Class of structs: a record of C whose fields are the annotated scalars, then address and shape of each array.
+
+    So scalars are set and read without a call of Python, in a fifth of the time that a record of numpy needs. Arrays
+    are kept in slots: an attribute that is no member cannot be set.
+    """
+
+    def __new__(cls, name: str, bases: tuple[type, ...], space: dict[str, Any]) -> Any:
+        if bases == (ctypes.Structure,):
+            return super().__new__(cls, name, bases, space)
+        kinds = space.get("__annotations__", {})
+        if not all(isinstance(kind, str) for kind in kinds.values()):
+            raise TypeError(f"{name}: annotations are read as text; import annotations from __future__")
+        scalars = {member: SCALARS[kind] for member, kind in kinds.items() if kind in SCALARS}
+        kinds_of_arrays = {member: ARRAYS[kind] for member, kind in kinds.items() if kind not in SCALARS}
+        arrays, words = {}, 0
+        for member, (kind, dimensions) in kinds_of_arrays.items():
+            arrays[member] = np.dtype(kind), dimensions, words
+            words += 1 + dimensions
+        fields = [(member, _C_TYPES[kind]) for member, kind in scalars.items()]
+        made: Any = super().__new__(
+            cls,
+            name,
+            bases,
+            space | {"_fields_": [*fields, ("words:", ctypes.c_int64 * words)], "__slots__": [*arrays]},
+        )
+        made.scalar_members, made.array_members, made._arrays = scalars, kinds_of_arrays, arrays
+        made._slots = {member: vars(made)[member] for member in arrays}
+        for member, slot in made._slots.items():
+            setattr(made, member, property(slot.__get__, _setter(member, slot, *arrays[member])))
+        # numba asks for it by the second name before it looks any further
+        made.numba_type = made._numba_type_ = StructType(
+            name, tuple(scalars.items()), tuple((member, *kind) for member, kind in kinds_of_arrays.items())
+        )
+        assert ctypes.sizeof(made) == made.numba_type.layout.itemsize
+        return made
+
+
+def _setter(name: str, slot: Any, kind: np.dtype, dimensions: int, place: int) -> Callable[[Any, Any], None]:
+    """Return what replaces an array."""
+
+    def put(struct: Any, value: np.ndarray) -> None:
+        getattr(struct, "words:")[place : place + 1 + dimensions] = _words_of(name, value, kind, dimensions)
+        slot.__set__(struct, value)
+
+    return put
+
+
+class Struct(ctypes.Structure, metaclass=_Members):
     """Base of structs; a subclass annotates its members with float, int, bool, or an array of this module.
 
     Scalars start at zero unless they are given; arrays have to be given.
@@ -75,88 +124,43 @@ class Struct:
         For signatures of compiled functions.
     """
 
+    __slots__ = ("__weakref__",)
+
     scalar_members: ClassVar[Mapping[str, str]]
     array_members: ClassVar[Mapping[str, tuple[str, int]]]
     numba_type: ClassVar[StructType]
     _numba_type_: ClassVar[StructType]
-    _record_type: ClassVar[type[ctypes.Structure]]
-    _casts: ClassVar[Mapping[str, Callable[[Any], Any]]]
     _arrays: ClassVar[Mapping[str, tuple[np.dtype, int, int]]]
+    _slots: ClassVar[Mapping[str, Any]]
 
-    def __init_subclass__(cls) -> None:
-        kinds = inspect.get_annotations(cls)
-        if not all(isinstance(kind, str) for kind in kinds.values()):
-            raise TypeError(f"{cls.__name__}: annotations are read as text; import annotations from __future__")
-        cls.scalar_members = {name: SCALARS[kind] for name, kind in kinds.items() if kind in SCALARS}
-        cls.array_members = {name: ARRAYS[kind] for name, kind in kinds.items() if kind not in SCALARS}
-        cls.numba_type = StructType(
-            cls.__name__,
-            tuple(cls.scalar_members.items()),
-            tuple((name, *kind) for name, kind in cls.array_members.items()),
-        )
-        # numba asks for it by this name before it looks any further
-        cls._numba_type_ = cls.numba_type
-        arrays, words = {}, 0
-        for name, (kind, dimensions) in cls.array_members.items():
-            arrays[name] = np.dtype(kind), dimensions, words
-            words += 1 + dimensions
-        cls._arrays = arrays
-        # a record of ctypes gives and takes a scalar in a fifth of the time that one of numpy needs
-        fields = [(name, _C_TYPES[kind]) for name, kind in cls.scalar_members.items()]
-        record = type("Record", (ctypes.Structure,), {"_fields_": [*fields, ("words:", ctypes.c_int64 * words)]})
-        assert ctypes.sizeof(record) == cls.numba_type.layout.itemsize
-        cls._record_type = record
-        cls._casts = {name: _CASTS[kind] for name, kind in cls.scalar_members.items()}
-        for name in cls.scalar_members:
-            setattr(cls, name, property(operator.attrgetter(f"_record.{name}")))
+    _address = property(ctypes.addressof)
+    __hash__ = object.__hash__
 
     def __init__(self, **members: Any) -> None:
         missing = self.array_members.keys() - members.keys()
         if missing:
             raise TypeError(f"{type(self).__name__} is missing {', '.join(sorted(missing))}")
-        self._stand_in(self._record_type())
-        own = self.__dict__
         words: list[int] = []
         for name, (kind, dimensions, _) in self._arrays.items():
-            own[name] = value = members.pop(name)
+            value = members.pop(name)
             words += _words_of(name, value, kind, dimensions)
-        getattr(own["_record"], "words:")[:] = words
+            self._slots[name].__set__(self, value)
+        getattr(self, "words:")[:] = words
         for name, value in members.items():
             setattr(self, name, value)
 
-    def _stand_in(self, record: ctypes.Structure) -> None:
-        """Keep scalars, addresses and shapes in a record."""
-        self.__dict__["_record"] = record
-        self.__dict__["_address"] = _address_of(record)
-
     def with_members(self, **members: Any) -> Self:
         """Return a struct with other values of some members, that shares all other arrays with this one."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
-        other._stand_in(self._record_type.from_buffer_copy(self._record))
+        other = type(self).from_buffer_copy(self)
+        for name, slot in self._slots.items():
+            if name not in members:
+                slot.__set__(other, slot.__get__(self))
         for name, value in members.items():
             setattr(other, name, value)
         return other
 
     def __getattr__(self, name: str) -> Any:
-        room, first, places = self.__dict__.get("_block", _NO_BLOCK)
-        if name not in places:
-            raise AttributeError(f"{type(self).__name__} has no member {name!r}")
-        kind, shape, offset = places[name]
-        # made when Python first looks at it: compiled code goes by its address
-        array = self.__dict__[name] = np.ndarray(shape, kind, room, first + offset)
-        return array
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        cast = self._casts.get(name)
-        if cast is not None:
-            setattr(self._record, name, cast(value))
-            return
-        if name not in self._arrays:
-            raise AttributeError(f"{type(self).__name__} has no member {name!r}")
-        kind, dimensions, place = self._arrays[name]
-        getattr(self._record, "words:")[place : place + 1 + dimensions] = _words_of(name, value, kind, dimensions)
-        self.__dict__[name] = value
+        raise AttributeError(f"{type(self).__name__} has no member {name!r}")
 
     def __reduce__(self) -> tuple:
         # addresses do not travel
@@ -191,18 +195,17 @@ class BlockLayout(Generic[S]):
     ) -> None:
         self.kind = kind
         self.given = kind.array_members.keys() - shapes.keys()
-        self.places: dict[str, tuple[np.dtype, tuple[int, ...], int]] = {}
+        self.places: list[tuple[Any, np.dtype, tuple[int, ...], int]] = []
         self.size = 0
-        record = kind._record_type
-        words = getattr(record, "words:").offset // 8
-        self.image = np.zeros(-(-ctypes.sizeof(record) // 8), dtype=np.int64)
+        words = getattr(kind, "words:").offset // 8
+        self.image = np.zeros(-(-ctypes.sizeof(kind) // 8), dtype=np.int64)
         self.is_address = np.zeros_like(self.image)
         for name, size in shapes.items():
             item, dimensions, place = kind._arrays[name]
             shape = (size,) if isinstance(size, int) else size
             before = on_line.get(name, 0) * item.itemsize
             offset = -(-(self.size + before) // LINE) * LINE - before
-            self.places[name] = item, shape, offset
+            self.places.append((kind._slots[name], item, shape, offset))
             self.size = offset + item.itemsize * math.prod(shape)
             first = words + place
             self.image[first : first + 1 + dimensions] = offset, *shape
@@ -216,10 +219,10 @@ class BlockLayout(Generic[S]):
         room = np.zeros(self.size + LINE, dtype=np.uint8)
         address = _address_of(_byte_of(room))
         first = -address % LINE
-        struct = object.__new__(self.kind)
         image: Any = self.image + (address + first) * self.is_address
-        struct._stand_in(self.kind._record_type.from_buffer(image))
-        struct.__dict__["_block"] = room, first, self.places
+        struct = self.kind.from_buffer(image)
+        for slot, kind, shape, offset in self.places:
+            slot.__set__(struct, np.ndarray(shape, kind, room, first + offset))
         for name, value in members.items():
             setattr(struct, name, value)
         return struct

@@ -42,16 +42,20 @@ def locked_bodies(mechanism: Mechanism, system: System) -> list[str]:
     if not rows or len(rows) > MOST_ROWS:
         return []
     kept = [k for k, name in enumerate(rows) if name in mechanism.joints and mechanism.joints[name].kind not in MOTIONS]
-    jacobian = system.constraint_jacobian(system.start, system.t0)[0].toarray()[kept]
+    jacobian = system.constraint_jacobian(system.configuration, system.t0)[0].toarray()[kept]
     scale = 1.0 / np.sqrt(system.coordinate_weights())
     _, values, right = np.linalg.svd(jacobian * scale)
     rank = int(np.sum(values > 1e-10 * values.max(initial=0.0))) if values.size else 0
     free = right[rank:].T
     if not np.all(np.isfinite(free)):
         return []
-    places = [slice(6 * k, 6 * k + 3 + kind.angles) for k, kind in enumerate(system.model.kinds[1:])]
-    still = [name for name, place in zip(names, places) if not np.any(np.abs(free[place]) > STILL)]
+    still = [name for name, own in zip(names, _directions_of(system)) if not np.any(np.abs(free[own]) > STILL)]
     return [name for name in still if name not in _fixed_to_ground(mechanism)]
+
+
+def _directions_of(system: System) -> list[np.ndarray]:
+    """Return for each body which of all spatial displacements it has."""
+    return [6 * k + np.array(kind.directions) for k, kind in enumerate(system.model.kinds[1:])]
 
 
 def locking_remark(mechanism: Mechanism, system: System) -> str:
@@ -264,12 +268,15 @@ def singular_passage(solution: Solution) -> tuple[float, str] | None:
     if poses.shape[1] * 6 != scale.size:
         # bodies with modes have coordinates of their own
         return None
+    own = np.concatenate(_directions_of(system))
     first = sign = 0.0
     before: tuple[float, float, np.ndarray, np.ndarray] | None = None
-    for k in np.unique(np.linspace(0, solution.t.size - 1, SAMPLES).astype(int)):
-        jacobian = system.constraint_jacobian(poses[k], float(solution.t[k]))[0].toarray() * scale
+    looked_at = np.unique(np.linspace(0, solution.t.size - 1, SAMPLES).astype(int))
+    times = solution.t[looked_at]
+    for t, matrix in zip(times.tolist(), system.constraint_jacobians(poses[looked_at], times)):
+        jacobian = (matrix.toarray() * scale)[:, own]
         left, values, right = np.linalg.svd(jacobian, full_matrices=False)
-        here = (float(solution.t[k]), float(values[-1]), left[:, -1], right[-1])
+        here = (t, float(values[-1]), left[:, -1], right[-1])
         now = float(np.linalg.slogdet(jacobian)[0]) if jacobian.shape[0] == jacobian.shape[1] else 0.0
         if before is None:
             first, sign = here[1], now
@@ -350,7 +357,7 @@ def refuse_overlaps(elements: Mapping[str, Any], compiled: Callable[[Collection[
 def _accelerations(system: System) -> dict[str, tuple[np.ndarray, ...]]:
     """Return place and acceleration of the centre of mass, and angular acceleration, of each body."""
     system.initialise()
-    rows = system.accelerations(system.start, system.t0)[0]
+    rows = system.accelerations(system.configuration, system.t0)[0]
     return {n: (pose[:3], row[:3], row[3:]) for n, pose, row in zip(system.body_names, system.pose, rows)}
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from types import UnionType
-from typing import Any, ClassVar, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from gearmbs._shown import Written
 from gearmbs.schema.messages import UNKNOWN, check_keys, faults, line, path_of, remedy
-from gearmbs.schema.quantities import Measure
+from gearmbs.schema.quantities import Measure, counts, no_truth
 
 T = TypeVar("T")
 
@@ -68,10 +68,11 @@ def _hints(kind: Any) -> dict[str, Any]:
 @cache
 def _readers(kind: Any) -> dict[str, Any]:
     """Return what reads the fields of a class, by name."""
-    from pydantic import ConfigDict, InstanceOf, TypeAdapter
+    from pydantic import BeforeValidator, ConfigDict, InstanceOf, TypeAdapter
 
     config = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
     optional = {f.name for f in fields(kind) if f.default is None}
+    measures = measures_of(kind)
 
     def taken(hint: Any) -> Any:
         """Let objects be taken as they are."""
@@ -81,6 +82,8 @@ def _readers(kind: Any) -> dict[str, Any]:
 
     def reader(name: str, hint: Any) -> Any:
         allowed = taken(hint | None if name in optional else hint)
+        if name not in measures and counts(hint):
+            allowed = Annotated[allowed, BeforeValidator(no_truth)]
         # pydantic wants no settings for a class alone
         return TypeAdapter(allowed, config=None if is_dataclass(hint) and name not in optional else config)
 

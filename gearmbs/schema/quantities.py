@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from gearmbs.units import DIMENSIONS, to_si
+from gearmbs.units import DIMENSIONS, si_unit, to_si
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ class Measure:
     each: bool = False
     curve: bool = False
 
-    @property
+    @cached_property
     def unit(self) -> str:
         """The SI unit the field holds."""
         unit = DIMENSIONS.get(self.dimension, self.dimension)
@@ -182,7 +183,11 @@ class Measure:
         return tuple(points)
 
     def _one(self, value: Any) -> Any:
-        number: Any = in_si(value, self.dimension)
+        return _read(self, value) if type(value) is str else self._checked(value)
+
+    def _checked(self, value: Any) -> Any:
+        """Return one value in SI if it is within the limits."""
+        number: Any = value if type(value) is float and not math.isnan(value) else in_si(value, self.dimension)
         if self.unit == "1" and isinstance(value, Real):
             # a whole number stays one
             number = value
@@ -228,6 +233,12 @@ class Measure:
         return f"give {kind}{span}{'' if unit == '1' else f' {unit}'}"
 
 
+@lru_cache(maxsize=1024)
+def _read(measure: Measure, text: str) -> Any:
+    """Return what a text is in SI: the same texts are read again for each change of a description."""
+    return measure._checked(text)
+
+
 def two(value: Sequence) -> tuple:
     """Return the values of driver and driven."""
     if len(value) != 2:
@@ -253,8 +264,35 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:g}"
 
 
+def counts(hint: Any) -> bool:
+    """Whether an annotation allows numbers and no truth values, which Python takes for 1 and 0."""
+    if hint in (int, float):
+        return True
+    inner = get_args(hint)
+    return bool not in inner and any(map(counts, inner))
+
+
+def no_truth(value: Any) -> Any:
+    """Return a value unless it is true or false, or a list that holds one."""
+    if isinstance(value, bool):
+        raise ValueError("give a number, not true or false")
+    if isinstance(value, (list, tuple)):
+        for item in value:
+            no_truth(item)
+    return value
+
+
+@dataclass(frozen=True)
 class OverTime:
-    """A value over time: a number, a text with a unit or an expression, or an object that gives one."""
+    """A value over time: a number, a text with a unit or an expression, or an object that gives one.
+
+    Attributes
+    ----------
+    dimension : str
+        As of `Measure`; default: any.
+    """
+
+    dimension: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         from pydantic_core import core_schema
@@ -270,6 +308,8 @@ class OverTime:
             try:
                 float(value)
             except ValueError:
+                if self.dimension and si_unit(value) is not None:
+                    in_si(value, self.dimension)
                 return value
             raise OutOfRange(asked, f"{value!r}; {asked}")
         return value

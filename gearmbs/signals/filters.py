@@ -284,6 +284,7 @@ def bandpass(
     return like(signal, values, t0=float(signal["time"].values[first]))
 
 
+@functools.lru_cache(maxsize=64)
 def bandpass_taps(rate: float, low: float, high: float, transition: float, attenuation: float) -> np.ndarray:
     """The filter of `bandpass`; SignalError if the band does not fit below half the sampling rate."""
     if not (0.0 < transition and 0.0 < low - transition / 2 and low < high and high + transition / 2 < rate / 2):
@@ -305,6 +306,7 @@ def filtered_mean_square(column: np.ndarray, taps: np.ndarray, count: int) -> fl
     return total / count
 
 
+@functools.lru_cache(maxsize=64)
 def decimation_taps(ratio: int, rate: float, attenuation: float = ATTENUATION_DB) -> np.ndarray:
     """The anti-alias filter of `decimate`: flat to 0.4 of the new rate, down by `attenuation` from 0.5 of it."""
     new_rate = rate / ratio

@@ -107,3 +107,19 @@ def test_after_an_analysis_they_go_on_from_where_they_are():
 def test_what_is_wrong_with_a_point_mass(given, message):
     with pytest.raises(DeckError, match=message):
         parse_deck(HEAD + given + "END\n")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("JOINT/1, REVOLUTE, I=20, J=1\n", says("JOINT/1", "'POINT_MASS_1'", "spherical", "7")),
+        ("VTORQUE/1, I=20, JFLOAT=9, RM=1, TX=4\\TY=0\\TZ=0\nMARKER/9, PART=1, FLOATING\n",
+         says("VTORQUE/1", "'POINT_MASS_1'", "torque")),
+    ],
+)  # fmt: skip
+def test_what_turns_a_point_mass_is_refused_at_its_line(given, message):
+    point = "POINT_MASS/1, MASS=2, CM=20\nMARKER/20, POINT_MASS=1\n"
+    with pytest.raises(DeckError, match=message):
+        parse_deck(HEAD + point + given + "END\n").to_mechanism()
+    # the same with nothing that turns it
+    run(point + given.replace("REVOLUTE", "SPHERICAL").replace("TX=4", "TX=0"))

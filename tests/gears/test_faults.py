@@ -94,27 +94,27 @@ def test_every_fault_has_a_name_a_size_and_an_effect(kind, wheel):
 
 
 @pytest.mark.parametrize(
-    ("kind", "name", "bad"),
+    ("kind", "name", "bad", "words"),
     [
-        (ChippedCorner, "height", -1e-3),
-        (ChippedCorner, "length", "50 mm"),
-        (BrokenTooth, "lost", 1.2),
-        (RootCrack, "depth", 0.0),
-        (Pit, "depth", -1e-6),
-        (Pit, "radius", "80 mm"),
-        (Wear, "depth", -1e-6),
-        (Eccentricity, "amount", -1e-6),
-        (TipRelief, "length", 0.0),
-        (TipRelief, "power", 0.5),
-        (GradedFlanks, "grade", 12),
-        (Wear, "flank", "top"),
-        (Wear, "teeth", "some"),
+        (ChippedCorner, "height", -1e-3, ("-0.001 m", "0.006895 m")),
+        (ChippedCorner, "length", "50 mm", ("0.05 m", "0.02 m")),
+        (BrokenTooth, "lost", 1.2, ("1.2", "give", "1")),
+        (RootCrack, "depth", 0.0, ("0.0 m", "positive")),
+        (Pit, "depth", -1e-6, ("-1e-06 m", "positive")),
+        (Pit, "radius", "80 mm", ("0.08 m", "enlarge")),
+        (Wear, "depth", -1e-6, ("-1e-06 m", "negative")),
+        (Eccentricity, "amount", -1e-6, ("-1e-06 m", "negative")),
+        (TipRelief, "length", 0.0, ("0.0 m", "positive")),
+        (TipRelief, "power", 0.5, ("0.5", "give 1")),
+        (GradedFlanks, "grade", 12, ("12.0", "1 to 11")),
+        (Wear, "flank", "top", ("'top'", "choose 'drive'")),
+        (Wear, "teeth", "some", ("'some'", "give 'all'")),
     ],
 )
-def test_nonsense_is_named(kind, name, bad):
-    with pytest.raises(ValueError, match=name):
+def test_nonsense_is_named(kind, name, bad, words):
+    with pytest.raises(ValueError, match=says(f"{kind.__name__}.{name}", *words)):
         GearPair.paper().with_faults(kind(**{name: bad})).contact_tables()
-    with pytest.raises(ValueError, match="wheel"):
+    with pytest.raises(ValueError, match=says(f"{kind.__name__}.wheel", "'third'", "choose 'driver'")):
         kind(wheel="third")
 
 

@@ -105,19 +105,19 @@ def test_placement():
 
 
 BAD_WHEELS = {
-    "teeth": {"teeth": 4},
-    "module": {"module": -1e-3},
-    "face_width": {"face_width": 0.0},
-    "pressure_angle": {"pressure_angle": 20.0},
+    says("gear.teeth", "4", "give", "5"): {"teeth": 4},
+    says("gear.module", "-0.001 m", "positive"): {"module": -1e-3},
+    says("gear.face_width", "0 mm", "positive"): {"face_width": 0.0},
+    says("gear.pressure_angle", "1145.916 deg", "give 5"): {"pressure_angle": 20.0},
     "undercut": {"teeth": 10},
     "pointed": {"profile_shift": 1.0, "teeth": 12},
-    "negative backlash": {"thinning": -1e-5},
-    "bore_radius": {"bore_radius": "60 mm"},
-    "fillet_radius": {"fillet_radius": "2.5 mm"},
-    "tip_rounding": {"tip_rounding": "2 mm"},
-    "addendum": {"addendum": "-1 mm"},
-    "NaN": {"module": float("nan")},
-    "kg": {"module": "3 kg"},
+    says("gear.thinning", "-0.01 mm", "profile_shift"): {"thinning": -1e-5},
+    says("gear.bore_radius", "60.0000 mm", "39.7500 mm"): {"bore_radius": "60 mm"},
+    says("gear.fillet_radius", "2.5000 mm", "reduce"): {"fillet_radius": "2.5 mm"},
+    says("gear.tip_rounding", "2.0000 mm", "2.2029 mm"): {"tip_rounding": "2 mm"},
+    says("gear.addendum", "-1 mm", "positive"): {"addendum": "-1 mm"},
+    says("gear.module", "NaN", "give"): {"module": float("nan")},
+    says("gear.module", "'3 kg'", "'1 mm'"): {"module": "3 kg"},
 }
 
 
@@ -167,15 +167,15 @@ def test_default_wheels_of_any_size_mesh(pressure, helix):
 BAD_PAIRS = {
     "overlapping wheels": {"centre_distance_error": "-0.8 mm"},
     "do not reach": {"centre_distance_error": "7 mm"},
-    "negative backlash": {"backlash": "-0.1 mm"},
-    "misalignment": {"misalignment": 1.0},
-    "plane": {"plane": "sideways"},
-    "rotation": {"rotation": 2},
-    "slices": {"slices": 0},
-    "load": {"load": "magic"},
+    says("GearPair.backlash", "-0.1 mm", "give 0"): {"backlash": "-0.1 mm"},
+    says("GearPair.misalignment", "57.296 deg", "'1 deg'"): {"misalignment": 1.0},
+    says("GearPair.plane", "'sideways'", "choose 'skew'"): {"plane": "sideways"},
+    says("GearPair.rotation", "2", "give 1"): {"rotation": 2},
+    says("GearPair.slices", "0", "give"): {"slices": 0},
+    says("GearPair.load", "'magic'", "choose 'slices'"): {"load": "magic"},
     "axial_shift": {"axial_shift": "25 mm"},
     says("axial_shift", "-20.0000 mm"): {"axial_shift": "-20 mm"},
-    "torque": {"torque": "100 N"},
+    says("GearPair.torque", "'100 N'", "'1 N*m'"): {"torque": "100 N"},
     "module and pressure_angle": {"driven": GearSpec(29, "3 mm")},
     "interference": {"driver": GearSpec(15, 95e-3 / 31), "driven": GearSpec(120, 95e-3 / 31)},
 }

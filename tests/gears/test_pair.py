@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from gearmbs.gears import ContactLaw, ContactModel, FlankFriction, GearPair, GearSpec, OperatingPoint, PairGeometry
 from gearmbs.gears.faults import Pit, Wear
+from gearmbs.gears.tables import pack
 
 WHEELS = (GearSpec(17, "2 mm", name="driver"), GearSpec(38, "2 mm", name="driven"))
 
@@ -95,3 +97,32 @@ def test_a_pair_keeps_the_input_torque_that_it_was_given():
     assert pair.with_changes(driven=other, torque=70.0).torque == 70.0
     assert pair.with_changes(torque=70.0).with_changes(driven=other).torque == 70.0
     assert GearPair(driver, driven, torque=70.0).with_changes(driven=other).torque == 70.0
+
+
+def test_tables_are_those_of_a_pair_whatever_was_packed_before_it():
+    changes = [
+        {"torque": "10 N m"},
+        {"rotation": -1},
+        {"slices": 3},
+        {"contact": ContactLaw.linear("1e8 N/m")},
+        {"friction": FlankFriction.none()},
+        {"faults": (Wear(depth="20 um"),)},
+        {"faults": (Wear(depth="30 um"),)},
+        {"centre_distance_error": "0.1 mm"},
+    ]
+    pairs = [GearPair(*WHEELS, backlash="0.1 mm", **change) for change in changes]
+    alone = []
+    for pair in pairs:
+        pack(GearPair.paper())
+        alone.append(pack(pair))
+    for pair, (gi, gr, size) in zip(pairs, alone, strict=True):
+        found = pack(pair)
+        assert np.array_equal(found[0], gi)
+        assert np.array_equal(found[1], gr)
+        assert found[2] == size
+        # whoever has tables may change them
+        found[1][:] = 0.0
+        assert np.array_equal(pack(pair)[1], gr)
+    # the load is in none of them
+    loads = [pack(GearPair(*WHEELS, backlash="0.1 mm", torque=torque))[1] for torque in ("5 N m", "50 N m")]
+    assert np.array_equal(*loads)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
+from weakref import WeakSet
 
 import numpy as np
 import pytest
@@ -12,8 +14,19 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
 from gearmbs.adams import write_deck
-from gearmbs.mechanism import Diagnostic, Mechanism, ModelError, linear_modes, quasi_static, static_equilibrium
-from gearmbs.mechanism.forces import functions
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG
+from gearmbs.mechanism import (
+    Compiled,
+    Diagnostic,
+    ForceElement,
+    Mechanism,
+    ModelError,
+    linear_modes,
+    quasi_static,
+    static_equilibrium,
+)
+from gearmbs.mechanism.forces import derivatives, functions
+from gearmbs.mechanism.parts.joints import JOINTS, JointKind
 from tests.says import says
 
 UNIT = (0.1, 0.1, 0.1)
@@ -414,3 +427,90 @@ def test_a_state_whose_equation_has_no_solution_ends_the_run(strength, integrato
     place = strength * (4.0 / 15.0 * left**2.5 - 4.0 / 15.0 + 2.0 / 3.0 * 0.98)
     x = before.problem.names.index(next(name for name in before.problem.names if name.startswith("R_x")))
     assert before.result.y[-1, x] == pytest.approx(place, abs=1e-5)
+
+
+@njit(FORCE_SIG, nogil=True, error_model="numpy")
+def bumper(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
+    """Along global x: a one-sided spring, dry and quadratic friction; ``ints`` says which derivative is wrong."""
+    k, c, dry, wrong = reals[0], reals[1], reals[2], ints[0]
+    x, v = frames[0, 0] - frames[1, 0], frames[0, 12] - frames[1, 12]
+    wrench[0, 0] = -k * max(x, 0.0) - c * abs(v) * v - dry * np.sign(v)
+    if want & DERIVATIVES:
+        jac[0, 0] = -k if x > 0.0 else 0.0
+        jac[0, 6] = -2.0 * c * abs(v)
+        if wrong == 1:
+            jac[0, 6] *= -1.0
+        elif wrong == 2:
+            jac[0, 6] = 0.0
+        elif wrong == 3:
+            jac[0, 0] *= 1.01
+        elif wrong == 4:
+            jac[0, 4] = 0.01 * k
+        jac[0, 12], jac[0, 18] = -jac[0, 0], -jac[0, 6] if wrong != 5 else 0.0
+
+
+@dataclass(eq=False, repr=False)
+class Bumper(ForceElement):
+    """See `bumper`."""
+
+    wrong: int = 0
+    numbers: tuple[float, float, float] = (1e4, 3.0, 2.0)
+
+    kind = "bumper"
+    has_torque = False
+
+    def compiled(self):
+        if self.wrong < 0:
+            raise KeyError("stiffness")
+        return Compiled(bumper, integers=(self.wrong,), reals=self.numbers)
+
+
+def bumped(wrong: int, place: float = 0.0, numbers: tuple[float, float, float] = (1e4, 3.0, 2.0)) -> Mechanism:
+    m = Mechanism("bumped", gravity=(0, 0, 0))
+    block = m.body("block", 1.0, UNIT, position=(place, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
+    m.add(Bumper("stop", block.marker(name="nose"), m.ground.marker(name="wall"), wrong, numbers))
+    return m
+
+
+@pytest.mark.parametrize(("wrong", "entry", "names"), [
+    (1, "jac[0, 6]", "Fx by the velocity x of marker 'nose'"), (2, "jac[0, 6]", "is 0;"), (3, "jac[0, 0]", "place x"),
+    (4, "jac[0, 4]", "rotation y"), (5, "jac[0, 18]", "marker 'wall'"),
+])  # fmt: skip
+def test_a_wrong_derivative_of_a_family_is_named(wrong, entry, names, monkeypatch):
+    monkeypatch.setattr(derivatives, "_TRIED", WeakSet())
+    with pytest.raises(ModelError, match=says("bumper 'stop'", entry, names, "differences")):
+        bumped(wrong).compile()
+
+
+@pytest.mark.parametrize("place", [-1.0, -1e-9, 0.0, 1e-9, 0.2])
+def test_right_derivatives_beside_kinks_and_jumps_are_not_refused(place, monkeypatch):
+    rng = np.random.default_rng([7, int(1e9 * abs(place))])
+    for _ in range(20):
+        monkeypatch.setattr(derivatives, "_TRIED", WeakSet())
+        bumped(0, place, tuple(10.0 ** rng.uniform(-4, 9, 3))).compile()
+
+
+def test_derivatives_given_beside_a_function_are_compared_too():
+    @njit
+    def opposite(t, frames, states, parameters, jac):
+        exact_magnet(t, frames, states, -parameters, jac)
+
+    for given, fits in ((exact_magnet, True), (opposite, False)):
+        m = Mechanism("m", gravity=(0, 0, 0))
+        body = m.body("b", 1.0, UNIT, position=(1.0, 0.2, 0.3))
+        m.force("magnet", magnet, body.marker(), m.ground.marker(), parameters=[2.0], derivatives=given,
+                diagnostics=[("energy", "J", "stored"), ("size", "N")])  # fmt: skip
+        if fits:
+            m.compile()
+        else:
+            with pytest.raises(ModelError, match=says("force 'magnet'", "jac[", "differences")):
+                m.compile()
+
+
+def test_failures_of_parts_that_a_user_wrote_name_the_part(monkeypatch):
+    with pytest.raises(ModelError, match=says("bumper 'stop'", "compiled()", "stiffness")):
+        bumped(-1).compile()
+    monkeypatch.setitem(JOINTS, "broken", JointKind(lambda i, j: [i.no_such_thing]))
+    m = bumped(0)
+    with pytest.raises(ModelError, match=says("broken joint 'pin'", "JOINTS['broken']", "no_such_thing")):
+        m.joint("broken", "pin", m.bodies["block"].marker(), m.ground.marker())

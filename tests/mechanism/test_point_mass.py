@@ -15,6 +15,7 @@ from gearmbs.dae.equations.residual import residual
 from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.model.system import FORMULATIONS
 from gearmbs.mechanism import Mechanism, ModelError, PointMass, kinematic, quasi_static, static_equilibrium
+from gearmbs.mechanism.checks import singular_passage
 from gearmbs.view import mechanism_scene, solution_scene
 from tests.says import says
 
@@ -122,6 +123,9 @@ def test_a_point_mass_has_three_coordinates():
     assert names[:9] == [f"u_{c}({b})" for b in ("one", "block", "two") for c in "xyz"]
     assert [n for n in names if n.startswith("theta_")] == [f"theta_{c}(block)" for c in ("psi", "theta", "phi")]
     assert len(names) == len(system.problem("I3").y0)
+    counts = system.model.counts
+    assert counts.coordinates == 12
+    assert counts.owners.tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2, 1, 1, 1]
     assert system.report.degrees_of_freedom == 12
     assert "12 coordinates" in repr(m)
     assert repr(m.bodies["one"]) == "PointMass('one', mass=1.5 kg, 1 markers)"
@@ -254,6 +258,24 @@ def test_a_piston_follows_its_crank(way):
     np.testing.assert_allclose(s.com_acceleration("piston")[:, 0], (near[0] - 2 * near[1] + near[2]) / h**2, atol=1e-5)
 
 
+@pytest.mark.parametrize("rate", [37, 10])
+def test_a_position_of_change_passed_between_outputs_is_found(rate):
+    """Of a rod as long as the crank: at a quarter turn the piston could stay in the middle."""
+    found = []
+    for point in (True, False):
+        m = Mechanism("equal")
+        crank = m.body("crank", 1.0, (0.01, 0.01, 0.01), orientation=[[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+        piston = m.point_mass("piston", 2.0, at=(0.32, 0, 0)) if point else m.body("piston", 2.0, (1, 1, 1),
+                                                                                   position=(0.32, 0, 0))  # fmt: skip
+        m.rotation("motor", m.revolute("pin", crank, m.ground, axis=(0, 1, 0)), "1.5*TIME")
+        m.distance("rod", crank.marker((0.2, 0, 0)), piston.marker())
+        m.joint("inline" if point else "translational", "rail", piston, m.ground, axis=(1, 0, 0))
+        found.append(singular_passage(m.simulate(1.0, rate=rate)))
+    assert found[0] is not None
+    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-6)
+    assert "rod: distance 0.2 m" in found[0][1]
+
+
 def test_a_force_acts_along_the_axes_a_marker_was_given():
     """x of a marker turned with the body's frame: both stay, so the acceleration is constant."""
     m = Mechanism("thrust")
@@ -359,9 +381,10 @@ def test_bodies_fixed_to_each_other_are_one_beside_a_point_mass():
     np.testing.assert_allclose(runs[0].reaction_force("weld"), runs[1].reaction_force("weld"), atol=1e-5)
 
 
-def test_it_is_drawn():
+def test_it_is_drawn_and_kept():
     m = two_masses()
     s = m.simulate(0.1)
+    assert s.to_dataset()["position"].sel(body="right").shape == (s.t.size, 3)
     assert {part.name for part in mechanism_scene(m).parts} >= {"left", "right"}
     assert {part.name for part in solution_scene(s).parts} >= {"left", "right"}
 
@@ -374,6 +397,8 @@ def test_a_deck_and_back():
     ball = m.point_mass("ball", 2.0, at=(1, 0, 0), velocity=(0, 0.5, 0), com=(0.1, 0, 0.2), orientation=TURNED)
     hook = ball.marker((0.2, 0.1, 0), (0.1, 0.2, 0.3), name="hook")
     m.load("pull", ball.marker(name="J"), m.ground.marker(name="G"), rm=hook, fx=1.0, fz='-8*DZ("hook")', kind="vforce")
+    # the reaction acts on the ball where the force does, beside it: the moment does nothing
+    m.load("push", m.ground.marker((0, 0, 1), name="P"), ball.marker(name="Q"), fy="2*TIME", kind="vforce")
     text = write_deck(m)
     assert "POINT_MASS/" in text
     assert "IP =" not in text
@@ -397,8 +422,14 @@ def test_joints_that_hold_an_orientation_are_refused(kind):
     for pair in ((ball, block), (m.ground, ball)):
         with pytest.raises(ModelError, match=says("pin", "'ball'", "spherical", "m.body")):
             m.joint(kind, "pin", *pair)
+    with pytest.raises(ModelError, match=says("pin", "'ball'", "spherical", "m.body")):
+        m.screw("pin", ball, block, pitch=0.1)
     # the name is free again, and so are those of its markers
     m.spherical("pin", ball, block)
+    with pytest.raises(ModelError, match=says("friction", "'ball'", "torque", "m.body")):
+        m.friction("friction", m.joints["pin"], 0.3, 0.2, ball_radius=0.01)
+    with pytest.raises(ModelError, match=says("turn", "'ball'", "m.body")):
+        m.rotation("turn", m.joint("self_aligning", "eye", ball, m.ground), 1.0)
 
 
 def test_torques_are_refused_and_forces_of_the_same_kind_are_not():
@@ -425,6 +456,13 @@ def test_torques_are_refused_and_forces_of_the_same_kind_are_not():
 def test_a_mass_that_is_none_is_refused(mass):
     with pytest.raises(ModelError, match=says("ball", "mass", "kg")):
         Mechanism("none").point_mass("ball", mass)
+
+
+def test_an_angular_velocity_is_refused():
+    m = two_masses()
+    m.bodies["left"].angular_velocity = np.array([0.0, 0.0, 1.0])
+    with pytest.raises(ModelError, match=says("left", "angular_velocity", "inertia")):
+        m.simulate(0.1)
 
 
 def test_a_name_in_use_is_refused():

@@ -111,6 +111,8 @@ def test_gmf_asks_for_missing_metadata_by_name():
         ({"gmf": -1.0}, "gmf: must be a positive"),
         ({"gmf": 480.0, "half_width": 0.8}, "half_width"),
         ({"gmf": 480.0, "harmonics": 0}, "harmonics"),
+        ({"gmf": 480.0, "harmonics": 2.5}, r"harmonics: .*whole number, got 2\.5"),
+        ({"gmf": 480.0, "harmonics": True}, "harmonics: .*whole number, got True"),
     ],
 )
 def test_gmf_refuses_what_it_cannot_do(kwargs, match):

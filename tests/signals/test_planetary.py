@@ -17,6 +17,7 @@ from gearmbs.signals import (
     phase_from_speed,
     planetary_average,
 )
+from tests.says import says
 
 LINES = {
     (100, 4): {96: 0.104, 100: 0.828, 104: 0.104},
@@ -123,9 +124,9 @@ def test_order_tracking_by_the_carrier():
 @pytest.mark.parametrize(
     ("build", "words"),
     [
-        (lambda: PlanetaryModel((1, 2, 3), 0), "planets"),
-        (lambda: PlanetaryModel((20, 30, 80), 3, fault="shaft"), "fault"),
-        (lambda: PlanetaryModel((20, 30, 80), 3, planet=3), "planet"),
+        (lambda: PlanetaryModel((1, 2, 3), 0), says("planets", "0", "1 or more")),
+        (lambda: PlanetaryModel((20, 30, 80), 3, fault="shaft"), says("fault", "'shaft'", "'sun'")),
+        (lambda: PlanetaryModel((20, 30, 80), 3, planet=3), says("planet", "3", "0 to 2")),
         (lambda: fixed_sensor(np.zeros((5, 2)), np.zeros(5), 3), "does not fit"),
     ],
 )

@@ -20,6 +20,7 @@ from gearmbs.signals import (
 )
 from gearmbs.signals.conversion import band_window
 from gearmbs.signals.signal.signal import unit_dimension
+from tests.says import says
 
 RATE = 12800.0
 POWER = {"displacement": 0, "velocity": 1, "acceleration": 2}
@@ -103,8 +104,8 @@ def test_units_that_measure_no_vibration(unit):
     ("kwargs", "match"),
     [
         ({"to": "jerk", "band": (10.0, 100.0)}, "to: .*one of"),
-        ({"to": "velocity", "band": (100.0, 10.0)}, "band"),
-        ({"to": "velocity", "band": (0.0, 10.0)}, "band"),
+        ({"to": "velocity", "band": (100.0, 10.0)}, says("band", "(100.0, 10.0)", "6400 Hz")),
+        ({"to": "velocity", "band": (0.0, 10.0)}, says("band", "(0.0, 10.0)", "6400 Hz")),
         ({"to": "velocity", "band": (1.0, 10.0)}, "too short"),
     ],
 )

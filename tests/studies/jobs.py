@@ -25,6 +25,17 @@ def raise_what_cannot_travel(job, report):
     raise Local("only here")
 
 
+def return_what_cannot_travel(job, report):
+    return lambda: job
+
+
+class Unreadable:
+    """What can be sent but not read."""
+
+    def __reduce__(self):
+        return int, ("no number",)
+
+
 def square_or_die(job, report):
     if job == "die":
         os._exit(3)

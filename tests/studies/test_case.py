@@ -97,6 +97,29 @@ def test_changed_keeps_the_rest():
     assert case.fault.plane == "skew"
 
 
+def test_changed_shares_the_other_sections_and_what_was_made_of_them():
+    case = Case(gears={"module": "3 mm"}, operation={"torque": "200 N m"})
+    other = case.changed(operation={"torque": "150 N m"})
+    assert other.gears is case.gears
+    assert other.pair().driver is case.pair().driver
+    assert (other.pair().torque, case.pair().torque) == (150.0, 200.0)
+    assert other == Case(gears={"module": "3 mm"}, operation={"torque": "150 N m"})
+    assert other.settings()["gears"]["module"] == "3 mm"
+
+
+def test_a_copy_with_other_values_has_what_follows_from_these():
+    case = Case(gears={"module": "3 mm"}, operation={"speed": "1000 rpm"})
+    assert case.mesh_frequency == pytest.approx(29 * 1000 / 60)
+    wheel = case.pair().driver
+    gears = case.gears.model_copy(update={"module": 0.004})
+    assert gears.wheels[0].module == 0.004
+    assert gears.written == {}
+    fast = case.model_copy(update={"gears": gears, "operation": Case(operation={"speed": "2000 rpm"}).operation})
+    assert fast.pair().driver.module == 0.004
+    assert fast.mesh_frequency == pytest.approx(29 * 2000 / 60)
+    assert case.pair().driver is wheel
+
+
 def test_the_pair_is_built_once_and_anew_for_a_changed_case():
     case = Case()
     pair = case.pair()
@@ -326,3 +349,18 @@ def test_what_a_case_shows_is_what_differs_and_makes_it_again(case):
     for name in ("exponent", "density", "settling", "lump", "youngs_modulus"):
         assert name not in text
     assert all(f"{field}=" in text for field in wanted)
+
+
+def test_a_changed_case_keeps_what_does_not_change():
+    """Sections that stay are the same objects, a plain number is remarked once, and the case file stays short."""
+    with pytest.warns(CaseWarning, match="shafts.length"):
+        case = Case(name="a", shafts={"length": 0.5}, operation={"torque": "60 N m"})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        other = case.changed(name="b", operation={"torque": "70 N m"})
+    assert other.shafts is case.shafts
+    assert (other.operation.torque, case.operation.torque) == (70.0, 60.0)
+    assert other.settings() == {**case.settings(), "name": "b", "operation": other.operation.settings()}
+    assert "[gears]" not in case_module.case_toml(other)
+    with pytest.raises(CaseError, match=r"operation.torque = '70 m'"):
+        case.changed(operation={"torque": "70 m"})

@@ -9,12 +9,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
 from gearmbs.studies.run.engine import WorkerDied, claimed, run_jobs, take
 from gearmbs.studies.run.simulation import simulate_case
+from gearmbs.studies.run.store import RecordFolder
 from gearmbs.studies.run.workers import DEATH, RESULT, here, processes, threads
-from tests.studies.jobs import fail_or_wait, raise_what_cannot_travel, square, square_or_die
+from tests.says import says
+from tests.studies.jobs import (
+    Unreadable,
+    fail_or_wait,
+    raise_what_cannot_travel,
+    return_what_cannot_travel,
+    square,
+    square_or_die,
+)
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
 
@@ -129,6 +139,37 @@ def test_what_others_are_at_work_on_is_theirs(tmp_path, monkeypatch):
 def test_an_error_that_cannot_be_sent_arrives_as_text():
     with pytest.raises(RuntimeError, match="Local: only here"):
         run_jobs(raise_what_cannot_travel, [0], 1)
+
+
+def test_a_result_that_cannot_be_sent_is_no_death():
+    with pytest.raises(RuntimeError, match=says("'case 7'", "function", "pickled", "threads")):
+        run_jobs(return_what_cannot_travel, ["case 7"], 1)
+    with pytest.raises(RuntimeError, match=says("ValueError", "'no number'", "modules", "imported")):
+        run_jobs(square, [Unreadable()], 1)
+
+
+def test_jobs_without_a_result_are_known():
+    results = run_jobs(square, [3, 1, 2], 1, where=here)
+    assert (results, results.left) == ([9, 1, 4], [])
+    assert run_jobs(square, [3, 1], where=here, seconds=0.0).left == [3, 1]
+
+
+def test_a_case_at_work_gives_signs_of_life(tmp_path, monkeypatch):
+    """So that its claim is not taken over elsewhere after a lease, which here would have ended long ago."""
+    monkeypatch.setattr("gearmbs.studies.run.engine.BEAT", 0.0)
+    case = Case(name="long", operation=SHORT)
+    seen = []
+
+    def run(case, report):
+        claim = RecordFolder(tmp_path).claim(case)
+        os.utime(claim, (0.0, 0.0))
+        report(0.01)
+        seen.append(claim.stat().st_mtime)
+        return xr.Dataset(attrs={"case": case.name})
+
+    monkeypatch.setattr("gearmbs.studies.run.parallel.run_case", run)
+    run_cases([case], workers=1, folder=tmp_path)
+    assert seen[0] > 1e9
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals to process groups are POSIX")

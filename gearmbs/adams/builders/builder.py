@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace as replaced
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -138,7 +138,11 @@ class Builder:
     # --- helpers ------------------------------------------------------------------------------------
 
     def active(self, kind: type[Any]) -> list[Any]:
-        return [s for s in self.deck.of(kind).values() if acts(s, self.inactive)]
+        return self._acting.get(kind, [])
+
+    @cached_property
+    def _acting(self) -> dict[type[st.Statement], list[Any]]:
+        return {kind: [s for s in group.values() if acts(s, self.inactive)] for kind, group in self.deck.items.items()}
 
     def absent_marker(self, statement: st.Statement) -> int | None:
         """Return a marker of a statement that is left out with what it is on; None without one."""
@@ -187,6 +191,8 @@ class Builder:
     def name_elements(self) -> None:
         """Name everything that transmits a force before any expression refers to it."""
         for cls, kind in st.KINDS.items():
+            if cls not in self.deck.items:
+                continue
             for statement in self.active(cls):
                 self.claim(statement, kind)
             for statement in self.deck.of(cls).values():

@@ -122,8 +122,7 @@ class Deck:
         return next(iter(self.of(kind).values()), None)
 
     def __iter__(self) -> Iterator[st.Statement]:
-        for group in self.items.values():
-            yield from group.values()
+        return iter([statement for group in self.items.values() for statement in group.values()])
 
     @cached_property
     def units(self) -> Units:

@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any, ClassVar
 
 from gearmbs.mechanism.language.syntax import ExpressionError, parse
@@ -126,9 +128,12 @@ def arg(
     return field(default=default, kw_only=True, metadata={"spec": spec})
 
 
-def specs_of(cls: type) -> dict[str, Spec]:
-    """Return field name -> Spec of a statement class."""
+def _specs(cls: Any) -> dict[str, Spec]:
     return {f.name: f.metadata["spec"] for f in fields(cls) if "spec" in f.metadata}
+
+
+specs_of: Callable[[type], dict[str, Spec]] = cache(_specs)
+"""Return field name -> Spec of a statement class."""
 
 
 @dataclass(frozen=True)

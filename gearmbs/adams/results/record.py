@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -300,7 +301,7 @@ class RunRecord:
     @property
     def track_units(self) -> tuple[str, ...]:
         """The units of the columns of tracks."""
-        return tuple(self.unit(d) for d in TRACK_DIMENSIONS)
+        return self.units_of(TRACK_DIMENSIONS)
 
     @property
     def elements(self) -> list[tuple[str, int]]:
@@ -318,6 +319,10 @@ class RunRecord:
 
     def unit(self, dimension: str) -> str:
         """Return how result files spell the unit of a dimension."""
+        return self._units.get(dimension, "no_units")
+
+    @cached_property
+    def _units(self) -> dict[str, str]:
         names = unit_names(self.deck.only(st.Units))
         spelled = {q: RESULT_NAMES.get(n, n.lower()) or "no_units" for q, n in names.items()}
         length, time, force = spelled["length"], spelled["time"], spelled["force"]
@@ -332,7 +337,11 @@ class RunRecord:
             "force": force,
             "torque": f"{force}-{length}",
             "mass": spelled["mass"],
-        }.get(dimension, "no_units")
+        }
+
+    def units_of(self, dimensions: Iterable[str]) -> tuple[str, ...]:
+        """Return how result files spell the units of some dimensions."""
+        return tuple(self._units.get(dimension, "no_units") for dimension in dimensions)
 
     def to_dataset(self) -> xr.Dataset:
         """Return requests, parts and forces as an :class:`xarray.Dataset` in the deck's units.
@@ -357,14 +366,14 @@ class RunRecord:
             data[f"request_{number}"] = (along, self.request(number), {"long_name": title})
         for number, part in self.deck.of(st.Part).items() if self.segments else ():
             if not part.ground:
-                along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
+                along = columns("part", PART_COLUMNS, self.units_of(PART_DIMENSIONS))
                 data[f"part_{number}"] = (along, self.part(number), {"long_name": part.name or part.label()})
         for number, point in self.deck.of(st.PointMass).items() if self.segments else ():
-            units = tuple(self.unit(PART_DIMENSIONS[PART_COLUMNS.index(name)]) for name in POINT_COLUMNS)
+            units = self.units_of(PART_DIMENSIONS[PART_COLUMNS.index(name)] for name in POINT_COLUMNS)
             along = columns("point_mass", POINT_COLUMNS, units)
             data[f"point_mass_{number}"] = (along, self.point_mass(number), {"long_name": point.name or point.label()})
         for number, body in self.deck.of(st.FlexBody).items() if self.segments else ():
-            along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
+            along = columns("part", PART_COLUMNS, self.units_of(PART_DIMENSIONS))
             data[f"flex_body_{number}"] = (along, self.flexible(number), {"long_name": body.name or body.label()})
             q_f, v_f = self.modal(number)
             modes = ("time", f"flex_body_{number}_mode")
@@ -372,7 +381,7 @@ class RunRecord:
             data[f"flex_body_{number}_modal_rate"] = (modes, v_f, {"units": f"1/{self.unit('time')}"})
         for number in self.beams:
             beam, found = self.deck.of(st.FePart)[number], self.nodes(number)
-            time, component = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
+            time, component = columns("part", PART_COLUMNS, self.units_of(PART_DIMENSIONS))
             nodes = f"fe_part_{number}_node"
             coords[nodes] = (nodes, np.array(list(found)))
             motion = np.stack(list(found.values()), axis=1)

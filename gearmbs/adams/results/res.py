@@ -39,13 +39,13 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
             continue
         name = part.name or f"PART_{number}"
         attributes = f'name={quoteattr(name + "_XFORM")} entity={quoteattr(name)} entType="Part" objectId="{number}"'
-        units = tuple(result.unit(d) for d in PART_DIMENSIONS)
+        units = result.units_of(PART_DIMENSIONS)
         yield _Entity(attributes, PART_COLUMNS, units, result.part(number))
     for number, point in deck.of(st.PointMass).items():
         name = point.name or f"POINT_MASS_{number}"
         kind = f'entity={quoteattr(name)} entType="Point_Mass" objectId="{number}"'
         columns = [k for k, column in enumerate(PART_COLUMNS) if column in POINT_COLUMNS]
-        units = tuple(result.unit(PART_DIMENSIONS[k]) for k in columns)
+        units = result.units_of(PART_DIMENSIONS[k] for k in columns)
         yield _Entity(f"name={quoteattr(name + '_XFORM')} {kind}", POINT_COLUMNS, units, result.point_mass(number))
     yield from _flexible_entities(result)
     yield from _beam_entities(result)
@@ -85,7 +85,7 @@ def _flexible_entities(result: RunRecord) -> Iterator[_Entity]:
     for number, body in result.deck.of(st.FlexBody).items():
         name = body.name or f"FLEX_BODY_{number}"
         kind = f'entity={quoteattr(name)} entType="Flexible_Body" objectId="{number}"'
-        units = tuple(result.unit(d) for d in PART_DIMENSIONS)
+        units = result.units_of(PART_DIMENSIONS)
         yield _Entity(f"name={quoteattr(name + '_XFORM')} {kind}", PART_COLUMNS, units, result.flexible(number))
         q_f, v_f = result.modal(number)
         names = tuple(f"{letter}{k + 1}" for letter in ("Q", "QDOT") for k in range(q_f.shape[1]))
@@ -96,7 +96,7 @@ def _flexible_entities(result: RunRecord) -> Iterator[_Entity]:
 
 def _beam_entities(result: RunRecord) -> Iterator[_Entity]:
     """Nodes of FE_PARTs with the columns of parts, one set a node."""
-    units = tuple(result.unit(d) for d in PART_DIMENSIONS)
+    units = result.units_of(PART_DIMENSIONS)
     for number in result.beams:
         name = result.deck.of(st.FePart)[number].name or f"FE_PART_{number}"
         kind = f'entity={quoteattr(name)} entType="FE_Part" objectId="{number}"'

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import cholesky, eig, qr, solve_triangular
 
 from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
-from gearmbs.dae.analyses.turning import DIFFERENCED, turning
+from gearmbs.dae.analyses.turning import OTHER_TURN, turning
 from gearmbs.dae.problem import ModelError, SingularModelError
 
 if TYPE_CHECKING:
@@ -123,11 +123,11 @@ def reduce(instant: Instant) -> Reduced:
         # see `turning`: T delta phi for delta theta, and what the coefficients' own change adds
         to, rate = turn.transform, turn.transform_rate
         mass = to.T @ turn.momentum_rate
-        terms = np.abs(turn.momentum_place) + np.abs(turn.momentum_rate_change)
-        damping_terms = np.abs(to.T) @ (damping_terms @ np.abs(to) + terms)
-        stiffness_terms = np.abs(to.T) @ (
-            stiffness_terms @ np.abs(to) + DIFFERENCED * np.abs(turn.momentum_place_change)
-        )
+        again = turning(instant, OTHER_TURN)
+        assert again is not None
+        rate_terms, of_damping, of_stiffness = turn.terms(again)
+        stiffness_terms = np.abs(to.T) @ (stiffness_terms @ np.abs(to) + damping_terms @ rate_terms + of_stiffness)
+        damping_terms = np.abs(to.T) @ (damping_terms @ np.abs(to) + np.abs(turn.momentum_place) + of_damping)
         stiffness = to.T @ (turn.momentum_place_change + damping @ rate + stiffness @ to)
         damping = to.T @ (turn.momentum_rate_change + turn.momentum_place + damping @ to)
         state_force = to.T @ state_force
@@ -361,10 +361,15 @@ def _drifting(balanced: Balanced, null: np.ndarray, left: np.ndarray) -> int:
     terms = np.abs(balanced.first)
     n = balanced.mass.shape[0]
     terms[:n, :n] = balanced.damping_terms
-    rounding = 10.0 * balanced.tolerance * float((np.abs(left).T @ terms @ np.abs(null)).max(initial=0.0))
-    inertia = np.linalg.eigvalsh(null[:n].T @ balanced.mass @ null[:n])
-    slow = SLOWEST * float(inertia[inertia > 1e-12 * inertia[-1]].min(initial=inertia[-1]))
-    return int(np.sum(np.linalg.svd(resisted, compute_uv=False) <= max(rounding, slow)))
+    # of the terms, and of the directions: neither null space is known better
+    terms = np.abs(left).T @ terms @ (np.abs(null) + 1.0)
+    rounding = 10.0 * balanced.tolerance * float(terms.max(initial=0.0))
+    _, sizes, right = np.linalg.svd(resisted)
+    motions = null[:n] @ right.T
+    # gyroscopic couples of a spin of rounding size dissipate nothing
+    dissipated = np.abs(np.einsum("nk,nm,mk->k", motions, balanced.damping, motions))
+    inertia = np.einsum("nk,nm,mk->k", motions, balanced.mass, motions)
+    return int(np.sum((sizes <= rounding) | ((sizes <= SLOWEST * inertia) & (dissipated <= rounding))))
 
 
 def _rigid(balanced: Balanced, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -418,7 +423,9 @@ def _least_rate(balanced: Balanced, slowest: np.ndarray) -> float:
         return float(np.sqrt(stiff / (motion @ balanced.mass @ motion)))
     inertia = np.diag(balanced.mass) if n else np.ones(1)
     damped = np.abs(np.diag(balanced.damping)) / inertia if n else np.ones(1)
-    return float(damped[damped > 0.0].min(initial=np.inf)) if np.any(damped > 0.0) else 1.0
+    # beside the others the damping of what is free may be rounding, 1e-126
+    damped = damped[damped > ROUNDING * damped.max()]
+    return float(damped.min()) if damped.size else 1.0
 
 
 def _inverted(balanced: Balanced, root: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:

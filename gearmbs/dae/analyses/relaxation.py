@@ -209,9 +209,7 @@ class Relaxation:
 
 def unbalanced_body(model: Model, row: int) -> str:
     """Return the name of the body that row ``row`` of the balance of forces belongs to."""
-    counts = model.counts
-    owners = [np.repeat(np.arange(counts.bodies), n) for n in (3, counts.angles, counts.modes)]
-    return model.names.bodies[int(np.concatenate(owners)[row])]
+    return model.names.bodies[model.counts.owners[row]]
 
 
 def describe(shape: np.ndarray, names: list[str], length: float) -> tuple[str, str]:

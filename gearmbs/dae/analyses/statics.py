@@ -379,11 +379,11 @@ def static_equilibrium(system: System, *, tol: float = 1e-10, max_iterations: in
         raise ModelError(f"tol = {tol}, max_iterations = {max_iterations}; both must be positive")
     if system.report is None:
         system.initialise()
-    system.start = system.start.at_rest()
+    system.configuration = system.configuration.at_rest()
     instant = Instant(system, "I3")
     instant.y = instant.settle(instant.stop(instant.y))
     iterations, size = equilibrium(Relaxation(instant, tol), max_iterations)
-    system.start = instant.configuration()
+    system.configuration = instant.configuration()
     system.state_start = instant.y[instant.block("z", "mu")].copy()
     return _result(instant, iterations, size)
 

@@ -161,8 +161,10 @@ ROUNDING_OF_RATES = float(np.abs(WEIGHTS).sum()) ** 2 * EPS
 """The same from rounding, by the inverse square of that angle."""
 TURN = (0.5 * ROUNDING_OF_RATES / TRUNCATION) ** (1.0 / 6.0)
 """Angle, rad, between the places at which rates are differenced: where the sum of both errors is least."""
-DIFFERENCED = (ROUNDING_OF_RATES / TURN**2 + TRUNCATION * TURN**4) / ROUNDING
-"""This error against that of other terms: the weight of such terms where rounding is judged."""
+OTHER_TURN = 1.4 * TURN
+"""A second such angle: what rates differ by is their error, as rounding falls by half and truncation grows fourfold."""
+MISSED = 10.0
+"""Ratio of an error to this difference, at most: of entries that happen to differ by less than others."""
 
 
 @dataclass
@@ -177,6 +179,8 @@ class Turning:
         A1 and A0.
     momentum_rate_change, momentum_place_change : ndarray, shape (n, n)
         A1' and A0'.
+    steps : ndarray, shape (n,)
+        Times between the places they are differenced over, of the body of each coordinate, s.
     """
 
     transform: np.ndarray
@@ -185,35 +189,56 @@ class Turning:
     momentum_place: np.ndarray
     momentum_rate_change: np.ndarray
     momentum_place_change: np.ndarray
+    steps: np.ndarray
+
+    def terms(self, other: Turning) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the sizes of the terms of the rates T', A1' and A0', from those with `OTHER_TURN`.
+
+        Of them errors are the part that is rounding in coefficients that are not differenced.
+        """
+        of_both = [
+            (turn.transform_rate, turn.momentum_rate_change, turn.momentum_place_change) for turn in (self, other)
+        ]
+        t, a1, a0 = (np.abs(one) + MISSED / ROUNDING * np.abs(one - two) for one, two in zip(*of_both, strict=True))
+        # both may be off alike by what the last digits are worth
+        digits = np.abs(WEIGHTS).sum() * EPS / ROUNDING / self.steps[:, None]
+        return t + digits * np.abs(self.transform), a1 + digits * np.abs(self.momentum_rate), a0
 
 
-def turning(instant: Instant) -> Turning | None:
-    """Return the transformation at an instant, None where no body turns."""
+def turning(instant: Instant, angle: float = TURN) -> Turning | None:
+    """Return the transformation at an instant, its rates from places ``angle`` apart; None where no body turns."""
     y = instant.y.copy()
     velocities = angular_velocities(instant)
     fastest = float(np.abs(velocities).max(initial=0.0))
     if not fastest > 0.0:
         return None
-    step = TURN / fastest
+    accelerations = _angular_accelerations(instant, velocities)
+    own = np.maximum(np.abs(velocities).max(axis=1), np.sqrt(np.abs(accelerations).max(axis=1)))
+    own = np.where(own > 0.0, own, fastest)
+    step = angle / own
+    # a row for each coordinate, as that of its body
+    modes = instant.system.model.modes[1:]
+    turn = instant.system.model.counts.turning
+    rows = np.concatenate([np.repeat(step, 3), np.repeat(step[turn], 3), np.repeat(step, modes)])
     spins = spinning_modes(instant, velocities)
-    places = [_moved(instant, y, velocities, k * step) for k in range(-REACH, REACH + 1)]
+    places = [_moved(instant, y, velocities, accelerations, k * step) for k in range(-REACH, REACH + 1)]
     transforms = np.array(
         [_transform(instant, place, spins, k * step) for k, place in zip(range(-REACH, REACH + 1), places, strict=True)]
     )
     middle = range(REACH - 2, REACH + 3)
-    rates = np.array([_rate(transforms[k - 2 : k + 3], step) for k in middle])
+    rates = np.array([_rate(transforms[k - 2 : k + 3], rows) for k in middle])
     momenta = [_momenta(instant, places[k]) for k in middle]
     first = np.array([mass @ transforms[k] for k, (mass, _) in zip(middle, momenta, strict=True)])
     zeroth = np.array(
         [mass @ rate + moved @ transforms[k] for k, rate, (mass, moved) in zip(middle, rates, momenta, strict=True)]
     )
     instant.y = y
-    return Turning(transforms[REACH], rates[2], first[2], zeroth[2], _rate(first, step), _rate(zeroth, step))
+    return Turning(transforms[REACH], rates[2], first[2], zeroth[2], _rate(first, rows), _rate(zeroth, rows), rows)
 
 
-def _rate(values: np.ndarray, step: float) -> np.ndarray:
-    """Return the rate in the middle of five values."""
-    return np.tensordot(WEIGHTS, values, 1) / step
+def _rate(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return the rate in the middle of five values, in each row a step of its own apart."""
+    return np.tensordot(WEIGHTS, values, 1) / steps[:, None]
 
 
 def _axes(instant: Instant, y: np.ndarray) -> np.ndarray:
@@ -231,25 +256,46 @@ def angular_velocities(instant: Instant) -> np.ndarray:
     return velocities
 
 
-def _moved(instant: Instant, y: np.ndarray, velocities: np.ndarray, time: float) -> np.ndarray:
-    """Return y after every body has turned for a time about its angular velocity, by a Runge-Kutta step."""
+def _angular_accelerations(instant: Instant, velocities: np.ndarray) -> np.ndarray:
+    """Return the global angular accelerations, rad/s^2, shape (bodies, 3): B zeta' and what B changes along omega."""
+    y, eps, turn = instant.y.copy(), instant.block("eps", "v_f"), instant.system.model.counts.turning
+    axes = _axes(instant, y)
+    rates = instant.problem.yp0[eps].reshape(-1, 3)
+    size = np.abs(velocities).max(axis=1)
+    steps = TURN / np.where(size > 0.0, size, size.max())
+    still = np.zeros_like(velocities)
+    places = [_moved(instant, y, velocities, still, k * steps) for k in range(-2, 3)]
+    changed = _rate(np.array([place[eps].reshape(-1, 3) for place in places]), steps[turn])
+    instant.y = y
+    accelerations = np.zeros_like(velocities)
+    accelerations[turn] = np.einsum("bck,bk->bc", axes, rates - changed)
+    return accelerations
+
+
+def _moved(
+    instant: Instant, y: np.ndarray, velocities: np.ndarray, accelerations: np.ndarray, times: np.ndarray
+) -> np.ndarray:
+    """Return y after every body has turned for a time of its own with its angular velocity, by a Runge-Kutta step."""
+    turn = instant.system.model.counts.turning
+    velocities, accelerations, times = velocities[turn], accelerations[turn], times[turn]
+    time = np.repeat(times, 3)
     angles = slice(instant.at["theta"], instant.at["q_f"])
     rates = slice(instant.at["eps"], instant.at["v_f"])
-    velocities = velocities[instant.system.model.counts.turning]
     start = y[angles].copy()
 
-    def rate(theta: np.ndarray) -> np.ndarray:
+    def rate(theta: np.ndarray, part: float) -> np.ndarray:
         place = y.copy()
         place[angles] = theta
-        return np.linalg.solve(_axes(instant, place), velocities[:, :, None])[:, :, 0].ravel()
+        omega = velocities + part * times[:, None] * accelerations
+        return np.linalg.solve(_axes(instant, place), omega[:, :, None])[:, :, 0].ravel()
 
-    k1 = rate(start)
-    k2 = rate(start + 0.5 * time * k1)
-    k3 = rate(start + 0.5 * time * k2)
-    k4 = rate(start + time * k3)
+    k1 = rate(start, 0.0)
+    k2 = rate(start + 0.5 * time * k1, 0.5)
+    k3 = rate(start + 0.5 * time * k2, 0.5)
+    k4 = rate(start + time * k3, 1.0)
     out = y.copy()
     out[angles] = start + time / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    out[rates] = rate(out[angles])
+    out[rates] = rate(out[angles], 1.0)
     return out
 
 
@@ -266,9 +312,9 @@ def spinning_modes(instant: Instant, velocities: np.ndarray) -> list[tuple[int, 
 
 
 def _transform(
-    instant: Instant, y: np.ndarray, spins: list[tuple[int, float, Generator | None]], time: float
+    instant: Instant, y: np.ndarray, spins: list[tuple[int, float, Generator | None]], times: np.ndarray
 ) -> np.ndarray:
-    """Return T for all coordinates."""
+    """Return T for all coordinates after a time of each body."""
     first = instant.at["R"]
     n = instant.at["lambda"] - first
     out = np.eye(n)
@@ -280,7 +326,7 @@ def _transform(
     for k, speed, found in spins:
         if found is not None:
             own = slice(int(starts[k]), int(starts[k + 1]))
-            out[own, own] = expm(-speed * time * found.matrix)
+            out[own, own] = expm(-speed * times[k] * found.matrix)
     return out
 
 

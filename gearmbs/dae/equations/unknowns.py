@@ -114,6 +114,12 @@ class Counts:
         return 6 * self.bodies + sum(self.modes)
 
     @property
+    def owners(self) -> np.ndarray:
+        """Number of the moving body that each coordinate is of, in the order of R, theta and q_f."""
+        every = np.arange(self.bodies)
+        return np.concatenate([np.repeat(every, n) for n in (3, self.angles, self.modes)])
+
+    @property
     def turning(self) -> np.ndarray:
         """Numbers of the moving bodies that have Euler angles."""
         return np.flatnonzero(self.angles)

@@ -44,7 +44,7 @@ from gearmbs.dae.integrators.messages import list_names
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import combine, lagrange_weights
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, no_events, no_hook
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 
 SETTLED = 1e-6
@@ -97,8 +97,9 @@ class AlgebraicPart(Struct):
         Absolute tolerances.
     lu, scale, pivots : ndarray, shapes (m, m), (m,) and (m,)
         Factors of the matrix, scales of its rows, interchanges.
-    f, guess, last, known : ndarray, shape (m,)
-        What the equations are off by, or corrections; values to return to: of a guess, of slopes, along a branch.
+    f, guess, last, known, here : ndarray, shape (m,)
+        What the equations are off by, or corrections; values to return to: of a guess, of slopes, along a branch; what
+        they are off by at a breakpoint.
     """
 
     count: int
@@ -106,6 +107,8 @@ class AlgebraicPart(Struct):
     any_rates: bool
     factored: bool
     rtol: float
+    t_first: float  # breakpoints on either side: beyond them constraints may have other derivatives
+    t_last: float
     failures: int  # instants at which the iteration did not converge
     first_failure: float
     rows: IntVector
@@ -126,6 +129,7 @@ class AlgebraicPart(Struct):
     guess: Vector
     last: Vector
     known: Vector
+    here: Vector
     res: Vector
     y_moved: Vector
     yp_kept: Vector
@@ -219,17 +223,40 @@ def _evaluate_matrix(functions, part, t, y, yp, h, idata, rdata, work):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _is_beyond(functions, part, t, y, yp, idata, rdata, work):
+    """Return whether the equations at a breakpoint are those behind it, where other rows than constraints jump."""
+    res, f = part.res, part.here
+    before, behind = 0.0, 0.0
+    functions.residual(t, y, yp, res, idata, rdata, work)
+    for k in range(part.count):
+        f[k] = res[part.rows[k]]
+    for j in range(2):
+        functions.residual(np.nextafter(t, (-np.inf, np.inf)[j]), y, yp, res, idata, rdata, work)
+        for k in range(part.count):
+            off = abs(res[part.rows[k]] - f[k]) if part.lifted[k] == 0 else 0.0
+            before, behind = (max(before, off), behind) if j == 0 else (before, max(behind, off))
+    return before > behind
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _slopes(functions, part, t, y, yp, s, f, idata, rdata, work):
     """Write the derivatives by time of all rows along y', where y' itself is kept: (8 (1) - (2))/(12 s) [3]_.
 
-    (1) and (2) are the differences between the rows s and 2 s later and earlier. The slopes are written to ``f``;
-    the other parameters are those of `settle`.
+    (1) and (2) are the differences between the rows s and 2 s later and earlier; next to a breakpoint all rows are of
+    this side of it. The slopes are written to ``f``; the other parameters are those of `settle`.
     """
     moved, res = part.y_moved, part.res
     f[: part.count] = 0.0
-    for j in range(4):
-        d = (1.0, -1.0, 2.0, -2.0)[j] * s
-        weight = (8.0, -8.0, -1.0, 1.0)[j] / (12.0 * s)
+    side = 0.0
+    if part.t_first <= t <= part.t_last:
+        s = min(s, (part.t_last - part.t_first) / 8.0)
+        side = 1.0 if t - 2.0 * s < part.t_first else -1.0 if t + 2.0 * s > part.t_last else 0.0
+        if t == part.t_last and _is_beyond(functions, part, t, y, yp, idata, rdata, work):
+            side = 1.0
+    for j in range(4 if side == 0.0 else 5):
+        d = (1.0, -1.0, 2.0, -2.0)[j] * s if side == 0.0 else side * j * s
+        weight = (8.0, -8.0, -1.0, 1.0)[j] if side == 0.0 else side * (-25.0, 48.0, -36.0, 16.0, -3.0)[j]
+        weight /= 12.0 * s
         for i in range(y.shape[0]):
             moved[i] = y[i] + d * yp[i]
         functions.residual(t + d, moved, yp, res, idata, rdata, work)
@@ -511,9 +538,11 @@ def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
     """Return room for m equations among those of n unknowns, with ``nnz`` entries, ``entries`` of them in these."""
     return AlgebraicPart(
         count=m,
+        t_first=-np.inf,
+        t_last=np.inf,
         **{name: np.zeros(m, dtype=np.int64) for name in ("rows", "lifted", "cols", "rates", "pivots")},
         **{name: np.zeros(entries, dtype=np.int64) for name in ("entry_row", "entry_col", "entry_at", "entry_kind")},
-        **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known")},
+        **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known", "here")},
         **{name: np.zeros(n) for name in ("atol", "res", "y_moved", "yp_kept")},
         **{name: np.zeros(nnz) for name in ("vals", "vals_of_rates")},
         **{name: np.zeros(MAX_POINTS) for name in ("value", "slope")},
@@ -598,7 +627,7 @@ class AlgebraicOutputs:
     ) -> None:
         """Settle one output in place; see `settle_output`."""
         problem = self.problem
-        settle_output(
+        direct(settle_output)(
             self.functions, self.part, t, y, yp, h, t_old, y_old, idata, problem.rdata.copy(),
             np.zeros(problem.work_size),
         )  # fmt: skip
@@ -606,7 +635,7 @@ class AlgebraicOutputs:
     def settle_on_steps(self, times, ends, orders, nodes, rows, y, yp, idata: np.ndarray) -> None:
         """Write y and y' at times between steps, settled; see the function of this name."""
         problem = self.problem
-        settle_on_steps(
+        direct(settle_on_steps)(
             self.functions, self.part, times, ends, orders, nodes, rows, y, yp, idata, problem.rdata.copy(),
             np.zeros(problem.work_size),
         )  # fmt: skip

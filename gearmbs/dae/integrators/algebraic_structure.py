@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, int64, types
 
-from gearmbs.dae.problem import RESIDUAL_SIG, DAEProblem
+from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
 
 KNOWN = 64
 """Structures kept."""
@@ -35,16 +36,15 @@ _BOOLS = types.boolean[:, ::1]
 
 
 @njit(
-    types.boolean(types.FunctionType(RESIDUAL_SIG), float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
+    types.boolean(FUNCTIONS_TYPE, float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
     cache=True,
 )
-def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
+def _probe(functions, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
     """Mark which rows each unknown and each rate changes at one point.
 
     Parameters
     ----------
-    residual : function
-        G(t, y, y').
+    functions : Functions
     t : float
     y, yp : ndarray, shape (n,)
         The point.
@@ -62,18 +62,18 @@ def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
     """
     n = y.shape[0]
     base, moved = np.empty(n), np.empty(n)
-    residual(t, y, yp, base, idata, rdata, work)
+    functions.residual(t, y, yp, base, idata, rdata, work)
     if not np.isfinite(base).all():
         return False
     y_moved, yp_moved = y.copy(), yp.copy()
     for j in range(n):
         y_moved[j] = y[j] + PROBE * max(abs(y[j]), sizes[j])
-        residual(t, y_moved, yp, moved, idata, rdata, work)
+        functions.residual(t, y_moved, yp, moved, idata, rdata, work)
         y_moved[j] = y[j]
         for i in range(n):
             by_y[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
         yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
-        residual(t, y, yp_moved, moved, idata, rdata, work)
+        functions.residual(t, y, yp_moved, moved, idata, rdata, work)
         yp_moved[j] = yp[j]
         for i in range(n):
             by_rate[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
@@ -92,9 +92,10 @@ def dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
     generic = 1.0 + np.arange(n) / (2.0 * n)
     y, yp = problem.y0.astype(float), problem.yp0.astype(float)
     away = np.where(yp == 0.0, PROBE_OF_RATE * generic, yp)
+    functions = bind(problem.residual, problem.jacobian, no_hook, no_events)
     places = [(y, yp)] + [(np.where(y == 0.0, part * np.abs(problem.scale) * generic, y), away) for part in GENERIC]
     for k, place in enumerate(places):
-        found = _probe(problem.residual, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
+        found = direct(_probe)(functions, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
         if k > 0 and found:
             break
     return by_y, by_rate

@@ -411,6 +411,9 @@ class _Run:
         """Return IDA, set up at the time reached, with a first step of ``h`` where none is asked for."""
         o = self.options
         first, last = beside(self.t, self.end - self.t), beside(self.stop, self.stop - self.t)
+        settled = self.algebraic.part
+        settled.t_first = self.t if self.t in self.stops else -np.inf
+        settled.t_last = self.stop if self.stop < self.end else np.inf
         self.calls.first = self.t + first if self.t in self.stops else -np.inf
         self.calls.last = self.stop - last if self.stop < self.end else np.inf
         settings = {

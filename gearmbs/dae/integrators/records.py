@@ -98,7 +98,7 @@ class Records:
         consumed = self.options.consumer is not None
         sol = None
         if rows is not None and not consumed:
-            between = Between(self.algebraic, self.tables, self.options) if self.algebraic.is_needed else None
+            between = Between(self.algebraic, self.tables, st.stops, self.options) if self.algebraic.is_needed else None
             sol = DenseOutput(t, rows, order, between)
         outputs: tuple[np.ndarray, np.ndarray, np.ndarray]
         if consumed and rows is not None:
@@ -162,12 +162,21 @@ class Between:
     algebraic : AlgebraicOutputs
     tables : list of (float, ndarray)
         Times, and the integer tables that are valid from there on.
+    stops : ndarray
+        Breakpoints.
     options : Options
         With tolerances, and what tells that a function of the user has failed.
     """
 
-    def __init__(self, algebraic: AlgebraicOutputs, tables: list[tuple[float, np.ndarray]], options: Options) -> None:
+    def __init__(
+        self,
+        algebraic: AlgebraicOutputs,
+        tables: list[tuple[float, np.ndarray]],
+        stops: np.ndarray,
+        options: Options,
+    ) -> None:
         self.algebraic = algebraic
+        self.stops = stops.copy()
         self.tables = list(tables)
         self.error_probe = options.error_probe
         part = algebraic.part
@@ -183,8 +192,13 @@ class Between:
             What a function of the user has raised.
         """
         valid = np.searchsorted([t for t, _ in self.tables], times, side="left") - 1
-        for k, (_, idata) in enumerate(self.tables):
-            mine = np.flatnonzero(np.maximum(valid, 0) == k)
+        pieces = np.searchsorted(self.stops, times, side="left")
+        for k, piece in sorted({*zip(np.maximum(valid, 0).tolist(), pieces.tolist())}):
+            mine = np.flatnonzero((np.maximum(valid, 0) == k) & (pieces == piece))
+            idata = self.tables[k][1]
+            among = self.algebraic.part
+            among.t_first = self.stops[piece - 1] if piece > 0 else -np.inf
+            among.t_last = self.stops[piece] if piece < len(self.stops) else np.inf
             if mine.size:
                 part, slopes = y[mine], yp[mine]
                 self.algebraic.settle_on_steps(times[mine], ends[mine], orders, nodes, rows, part, slopes, idata)

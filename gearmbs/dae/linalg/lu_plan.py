@@ -211,13 +211,10 @@ def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     else:
         f |= operations_on_blocks(tail, step, f["u_ptr"], f["u_pos"], u_at, blocks)
     none, u_tail = np.empty(0), np.count_nonzero(f["u_col"] >= tail)
+    places = [np.searchsorted(taken, f[entries]) for entries in ("a_src", "tail_src")]
+    of_a, of_tail = ((indices[k], np.searchsorted(indptr, k, side="right") - 1) for k in places)
     plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, u_tail=u_tail, **f, **order)
-
-    def where(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        places = np.searchsorted(taken, entries)
-        return indices[places], np.searchsorted(indptr, places, side="right") - 1
-
-    return _Unscaled(plan, where(plan.a_src), where(plan.tail_src), (rows, cols))
+    return _Unscaled(plan, of_a, of_tail, (rows, cols))
 
 
 def plan_from_pivots(
@@ -376,8 +373,8 @@ def analyse(
     size = 3 * len(indices) + 4 * n
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted
     while True:
-        lines = new_lines(n, size, True), new_lines(n, size, False)
-        rank, *chosen = choose(indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, *lines)
+        columns, rows = new_lines(n, size)
+        rank, *chosen = choose(indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, columns, rows)
         if rank >= 0:
             break
         size *= 2

@@ -117,9 +117,9 @@ def _layout(n: int, size: int, with_values: bool) -> BlockLayout[Lines]:
     return BlockLayout(Lines, {**whole, **counts, "pool": size, "vals": size if with_values else 1})
 
 
-def new_lines(n: int, size: int, with_values: bool) -> Lines:
-    """Return ``n`` empty lines with a pool of ``size`` places."""
-    return _layout(n, size, with_values).new()
+def new_lines(n: int, size: int) -> tuple[Lines, Lines]:
+    """Return ``n`` empty columns with values and ``n`` empty rows without, each with a pool of ``size`` places."""
+    return _layout(n, size, True).new(), _layout(n, size, False).new()
 
 
 LINES_TYPE = Lines.numba_type

@@ -13,7 +13,8 @@ from gearmbs.dae.model import initial
 from gearmbs.dae.problem import AssemblyError, ModelError
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration, PosedModel
+    from gearmbs.dae.model.base_system import BaseSystem
+    from gearmbs.dae.model.configuration import Configuration
     from gearmbs.dae.model.model import Model
 
 LARGEST_LOCK = 600
@@ -25,7 +26,7 @@ DENSE_COORDINATES = 600
 INVERSE_ITERATIONS = 3
 
 
-def locking(system: PosedModel, at: Configuration, t: float) -> str | None:
+def locking(system: BaseSystem, configuration: Configuration, t: float) -> str | None:
     """Return which constraint rows are about to depend on each other at a position, None when they are not.
 
     At a position where a mechanism locks the constraint Jacobian loses rank; near it, its smallest singular value
@@ -36,12 +37,12 @@ def locking(system: PosedModel, at: Configuration, t: float) -> str | None:
         return None
     scale = 1.0 / np.sqrt(system.coordinate_weights())
 
-    def smallest(place: Configuration, time: float) -> tuple[float, np.ndarray]:
-        left, values, _ = np.linalg.svd(system.constraint_jacobian(place, time)[0].toarray() * scale)
+    def smallest(configuration: Configuration, time: float) -> tuple[float, np.ndarray]:
+        left, values, _ = np.linalg.svd(system.constraint_jacobian(configuration, time)[0].toarray() * scale)
         return float(values[-1]), left[:, -1]
 
-    value, direction = smallest(at, t)
-    if not np.isfinite(value) or value > LOCKED * smallest(system.start, system.t0)[0]:
+    value, direction = smallest(configuration, t)
+    if not np.isfinite(value) or value > LOCKED * smallest(system.configuration, system.t0)[0]:
         return None
     rows = np.argsort(-np.abs(direction))[:3]
     named = ", ".join(names[r] for r in rows if abs(direction[r]) > 0.1 * np.abs(direction).max())
@@ -51,7 +52,7 @@ def locking(system: PosedModel, at: Configuration, t: float) -> str | None:
     )
 
 
-def check_finite(system: PosedModel, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
+def check_finite(system: BaseSystem, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
     """Raise a ModelError that names the load, constraint or body whose terms of the equations are not finite."""
     names = system.model.names
     bad = ~np.all(np.isfinite(loads[:, :6]), axis=1)
@@ -74,7 +75,7 @@ def check_finite(system: PosedModel, rhs: np.ndarray, loads: np.ndarray, t: floa
         raise ModelError(f"body '{body}': its forces at t = {t:.6g} s are not finite")
 
 
-def check_states(system: PosedModel, rest: np.ndarray, t: float) -> None:
+def check_states(system: BaseSystem, rest: np.ndarray, t: float) -> None:
     """Raise a ModelError that names the state whose equation, with ``rest`` its residual, is not finite."""
     for name, value in zip(system.state_names, rest):
         if not np.isfinite(value):
@@ -191,14 +192,14 @@ FARTHEST_COUNTED = 1e-3
 """Violation from which a counted angle is taken to be off by turns nobody counted; its row is then left alone."""
 
 
-def conflict(system: PosedModel, place: Configuration, t: float) -> str | None:
+def conflict(system: BaseSystem, configuration: Configuration, t: float) -> str | None:
     """Return which row dropped as redundant contradicts the motion at a configuration, or None.
 
     The rates are compared, which do not depend on counted turns.
     """
-    if _violated(system, place, t) is None:
+    if _violated(system, configuration, t) is None:
         return None
-    on_constraints = projected(system, place, t)
+    on_constraints = projected(system, configuration, t)
     if on_constraints is None:
         return None
     found = _violated(system, on_constraints, t)
@@ -211,10 +212,10 @@ def conflict(system: PosedModel, place: Configuration, t: float) -> str | None:
     )
 
 
-def _violated(system: PosedModel, place: Configuration, t: float) -> tuple[str, float] | None:
+def _violated(system: BaseSystem, configuration: Configuration, t: float) -> tuple[str, float] | None:
     """Return the name and rate of the redundant row most violated, None when none is."""
-    jacobian, rate, names = system.dropped_rates(place, t)
-    velocities = place.velocities
+    jacobian, rate, names = system.dropped_rates(configuration, t)
+    velocities = configuration.velocities
     speeds = np.abs(velocities)
     moving = jacobian @ velocities
     size = abs(jacobian) @ speeds + np.abs(rate - moving)
@@ -225,27 +226,27 @@ def _violated(system: PosedModel, place: Configuration, t: float) -> tuple[str, 
     return None if share[worst] <= CONFLICT_SHARE else (names[worst], float(abs(rate[worst])))
 
 
-def projected(system: PosedModel, place: Configuration, t: float) -> Configuration | None:
+def projected(system: BaseSystem, configuration: Configuration, t: float) -> Configuration | None:
     """Return the configuration put onto the constraints with velocities that keep it there, None where impossible."""
     weights = system.coordinate_weights()
     counted = _counted_rows(system)
     try:
         for _ in range(MAX_PASSES):
-            jacobian, phi, _ = system.constraint_jacobian(place, t)
+            jacobian, phi, _ = system.constraint_jacobian(configuration, t)
             phi[counted & (np.abs(phi) > FARTHEST_COUNTED)] = 0.0
             if np.abs(phi).max(initial=0.0) <= ON_CONSTRAINTS * max(1.0, system.length):
-                return initial.consistent_velocity(system, place, t)
+                return initial.consistent_velocity(system, configuration, t)
             step = initial.least_correction(jacobian, weights, phi)
             if not np.abs(step).max() <= FARTHEST:
                 return None
-            place = place.displaced(step)
+            configuration = configuration.displaced(step)
     except AssemblyError:
         pass
     return None
 
 
-def _counted_rows(system: PosedModel) -> np.ndarray:
+def _counted_rows(system: BaseSystem) -> np.ndarray:
     """Mark the rows with an angle whose full turns are counted."""
     model = system.model
     kinds = model.terms[:, T.TERM_TYPE]
-    return np.array([np.any(kinds[model.span(r)] == ANGLE) for r in range(len(model.rows))], dtype=bool)
+    return np.array([np.any(kinds[span] == ANGLE) for span in model.spans], dtype=bool)

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy
 from numba import float64, int64
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies.body import body_from_pose
 from gearmbs.dae.equations.constraints.projection import are_satisfied, displace, largest_violation, violations
+from gearmbs.dae.equations.kinematics.rotation import (
+    POSE_A,
+    POSE_COLUMNS,
+    best_reference,
+)
 from gearmbs.dae.equations.kinematics.update import track, turns_are_counted, update_tables
 from gearmbs.dae.equations.loads.reactions import renew_reactions
 from gearmbs.dae.equations.outputs import accelerations as index1
@@ -24,16 +31,18 @@ from gearmbs.dae.equations.outputs.accelerations import (
     poses,
 )
 from gearmbs.dae.equations.residual import update
-from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed
+from gearmbs.dae.equations.unknowns import COUNT, I3, NUMBERS, PLACES, compressed
 from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
-from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding, new_records
+from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:
+    from gearmbs.dae.model.configuration import Configuration
+    from gearmbs.dae.model.model import Model
     from gearmbs.dae.problem import DAEProblem
 
 _VEC = float64[::1]
@@ -260,6 +269,19 @@ def pattern(idata, rdata, work_size: int, t: float, y: np.ndarray) -> tuple[np.n
     return compressed(places.reshape(-1, 2).astype(np.int64), n)
 
 
+def new_records(m: int, bodies: int, rows: int, elements: int, diagnostics: int, modes: int = 0) -> Records:
+    """Return empty records for m output times; ``diagnostics`` is the most that an element has."""
+    return Records(
+        np.zeros((m, POSE_COLUMNS * bodies + 2 * modes)),
+        np.zeros((m, 6 * bodies + modes + rows)),
+        np.zeros((m, max(elements, 1), index1.FORCE_RECORD + diagnostics)),
+        np.zeros((m, 3 * rows)),
+        np.zeros((m, rows, 3)),
+        np.zeros((m, rows, 3)),
+        np.zeros(m),
+    )
+
+
 def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
     """Assemble the index-1 system at ``t[0], y[0]`` into ``vals`` and the right-hand side in ``solution``."""
     bodies, rows, elements = int(idata[T.H_BODIES]) - 1, int(idata[T.H_ROWS]), int(idata[T.H_FORCES])
@@ -268,6 +290,103 @@ def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
     work = np.zeros(work_size)
     evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, *_no_factors(), records, GROWTH_LIMIT)
     return records
+
+
+# The acceleration system of a model at a configuration: masses, constraints, loads, and the unknowns y behind them.
+
+
+POSE_PLACES = 6
+"""Spatial displacements of a body, after which the modal coordinates come."""
+
+
+class Assembled(NamedTuple):
+    """The acceleration system of a model at a configuration, with the unknowns and tables it was made from."""
+
+    matrix: scipy.sparse.csc_array
+    rhs: np.ndarray
+    phi: np.ndarray
+    loads: np.ndarray
+    y: np.ndarray
+    idata: np.ndarray
+    rdata: np.ndarray
+    work: np.ndarray
+
+    @property
+    def codes(self) -> np.ndarray:
+        """Euler reference of each body, the ground first."""
+        first = int(self.idata[T.H_I_CODE])
+        return self.idata[first : first + int(self.idata[T.H_BODIES])]
+
+
+@njit(
+    "void(float64[:, ::1], float64[::1], float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])",
+    cache=True,
+    error_model="numpy",
+)
+def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
+    """Fill positions, velocities and momenta of y from a configuration.
+
+    The Euler reference of each body becomes the one that is farther from its singularity.
+    """
+    tab = T.unpack(idata, rdata, work)
+    for b in range(1, idata[T.H_BODIES]):
+        row, at = pose[b - 1], tab.at[b]
+        first = at[T.AT_V_MODES] - POSE_PLACES * pose.shape[0]
+        for m in range(at[T.AT_MODES]):
+            y[at[T.AT_QF] + m] = q_f[first + m]
+            y[at[T.AT_VF] + m] = v_f[first + m]
+        tab.code[b] = best_reference(row, POSE_A)
+        body_from_pose(b, row, y, at, tab.code[b], tab.body[b], tab.modal, tab.partial, tab.kin, tab.scratch)
+
+
+class Assembler:
+    """Assembles the acceleration system of one model; its tables and its pattern are made once."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._pattern: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    @cached_property
+    def _tables(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """Tables of integers and numbers, and the size of the work array."""
+        return self.model.pack(I3)
+
+    def at(self, configuration: Configuration, t: float, inner: np.ndarray | None, states: np.ndarray) -> Assembled:
+        """Assemble at a configuration; ``inner`` holds loads and states, F to z of y; default: no loads, ``states``."""
+        idata, rdata, size = self._tables
+        idata, rdata, work = idata.copy(), rdata.copy(), np.zeros(size)
+        y = np.zeros(int(idata[T.H_UNKNOWNS]))
+        y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + states.size] = states
+        if inner is not None:
+            y[int(idata[T.H_F]) :] = inner
+        unknowns_from_pose(
+            np.ascontiguousarray(configuration.pose), configuration.q_f, configuration.v_f, idata, rdata, work, y
+        )
+        if self._pattern is None:
+            self._pattern = pattern(idata, rdata, size, t, y)
+        indptr, indices, slots = self._pattern
+        n = indptr.size - 1
+        vals = np.zeros(indices.size)
+        records = assemble(np.array([t]), y[None, :], slots, idata, rdata, size, vals)
+        matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(n, n))
+        return Assembled(matrix, records.solution[0], records.phi[0], records.loads[0], y, idata, rdata, work)
+
+    def constraints(
+        self, configuration: Configuration, t: float, states: np.ndarray
+    ) -> tuple[scipy.sparse.csc_array, np.ndarray, np.ndarray]:
+        """Return Phi_q in spatial displacements and modal coordinates, Phi, and Phi_q v + Phi_t."""
+        found = self.at(configuration, t, None, states)
+        base = int(found.idata[T.H_COORDINATES])
+        return scipy.sparse.csc_array(found.matrix[base:, :base]), found.phi[0::3].copy(), found.phi[1::3].copy()
+
+    def constraint_jacobians(
+        self, configurations: Sequence[Configuration], times: np.ndarray, states: np.ndarray
+    ) -> list[scipy.sparse.csc_array]:
+        """Return Phi_q at each of some configurations."""
+        return [
+            self.constraints(configuration, float(t), states)[0]
+            for configuration, t in zip(configurations, times, strict=True)
+        ]
 
 
 class Evaluator:

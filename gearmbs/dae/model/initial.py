@@ -7,7 +7,7 @@ length L of the mechanism, by Newton's method on the constraints with the exact 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy
@@ -17,7 +17,8 @@ from gearmbs.dae.model import turning
 from gearmbs.dae.problem import AssemblyError, SingularModelError
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration, PosedModel
+    from gearmbs.dae.model.base_system import BaseSystem
+    from gearmbs.dae.model.configuration import Configuration
 
 POSITION_TOLERANCE = 1e-12
 """Part of the mechanism's length, or of 1 m, within which constraints hold: some thousand times the rounding of their
@@ -219,99 +220,109 @@ def least_correction(jacobian: scipy.sparse.csc_array, weights: np.ndarray, viol
         ) from error
 
 
+class _Constrained(NamedTuple):
+    """A configuration with the constraints there: Phi_q in spatial displacements, and Phi."""
+
+    configuration: Configuration
+    jacobian: scipy.sparse.csc_array
+    phi: np.ndarray
+
+
+def _constrained(system: BaseSystem, configuration: Configuration, t: float) -> _Constrained:
+    """Evaluate the constraints at a configuration."""
+    jacobian, phi, _ = system.constraint_jacobian(configuration, t)
+    return _Constrained(configuration, jacobian, phi)
+
+
 def assemble_position(
-    system: PosedModel, place: Configuration, t: float
+    system: BaseSystem, configuration: Configuration, t: float
 ) -> tuple[Configuration, np.ndarray, InitialReport]:
     """Move the bodies as little as possible onto the constraints.
 
     Returns
     -------
-    place : Configuration
+    configuration : Configuration
         With the velocities it had.
     kept : ndarray of int
         Independent constraint rows; the others follow from them.
     report : InitialReport
     """
     weights = system.coordinate_weights()
-    jacobian, phi, _ = system.constraint_jacobian(place, t)
-    if not np.all(np.isfinite(phi)):
-        raise _not_finite(system, phi, t)
-    drawn = turning.prescribed_turns(system, place, jacobian, phi)
-    kept = independent_rows(jacobian, weights, order=system.row_order)
+    given = _constrained(system, configuration, t)
+    if not np.all(np.isfinite(given.phi)):
+        raise _not_finite(system, given.phi, t)
+    drawn = turning.prescribed_turns(system, *given)
+    kept = independent_rows(given.jacobian, weights, order=system.row_order)
     report = InitialReport(degrees_of_freedom=system.model.counts.coordinates - kept.size)
-    before = place
-    place, jacobian, phi, kept = _assembled(system, before, t, kept, report)
-    off = {turn.row for turn in _half_turned(system, place, jacobian, phi, drawn)}
+    found, kept = _assembled(system, given, t, kept, weights, report)
+    off = {turn.row for turn in _half_turned(system, found, drawn)}
     if off:
-        place = _turned(system, before, t, kept, [turn for turn in drawn if turn.row in off])
-        place, jacobian, phi, kept = _assembled(system, place, t, kept, report)
-        still = _half_turned(system, place, jacobian, phi, drawn)
+        turned = _turned(system, configuration, t, kept, weights, [turn for turn in drawn if turn.row in off])
+        found, kept = _assembled(system, _constrained(system, turned, t), t, kept, weights, report)
+        still = _half_turned(system, found, drawn)
         if still:
             raise AssemblyError(
                 f"{system.row_names[still[0].row]}: the mechanism can be assembled with this angle half a turn off; "
                 "draw its bodies nearer to the angle prescribed"
             )
-    dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
+    dropped = np.setdiff1d(np.arange(found.jacobian.shape[0]), kept)
     report.redundant = [system.row_names[i] for i in dropped]
-    report.violation = float(np.abs(phi).max(initial=0.0))
-    _note_correction(system, report, before.pose, place.pose)
-    return place, kept, report
+    report.violation = float(np.abs(found.phi).max(initial=0.0))
+    _note_correction(system, report, configuration.pose, found.configuration.pose)
+    return found.configuration, kept, report
 
 
 def _assembled(
-    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, report: InitialReport
-) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, np.ndarray]:
-    """Solve all rows for the nearest position; return it with the Jacobian, Phi and the independent rows."""
-    weights = system.coordinate_weights()
+    system: BaseSystem, here: _Constrained, t: float, kept: np.ndarray, weights: np.ndarray, report: InitialReport
+) -> tuple[_Constrained, np.ndarray]:
+    """Solve all rows for the nearest position; return it with the independent rows."""
     length = np.sqrt(weights[3]) if weights.size else 1.0
     dropped = np.zeros(0, dtype=np.int64)
-    phi = np.zeros(0)
     for _ in range(SELECTIONS):
-        place, jacobian, phi, iterations = _closed(system, place, t, kept, length)
+        here, iterations = _closed(system, here, t, kept, weights)
         report.position_iterations += iterations
-        dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
-        if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
-            return place, jacobian, phi, kept
+        rows = here.jacobian.shape[0]
+        dropped = np.setdiff1d(np.arange(rows), kept)
+        if not dropped.size or np.abs(here.phi[dropped]).max() <= CONFLICT * max(1.0, length):
+            return here, kept
         # rows that are redundant where the assembly began need not be so where it ends
-        others = independent_rows(jacobian, weights, NEARLY, system.row_order)
+        others = independent_rows(here.jacobian, weights, NEARLY, system.row_order)
         if np.array_equal(others, kept):
-            raise _conflict(system, dropped, phi)
+            raise _conflict(system, dropped, here.phi)
         kept = others
         report.degrees_of_freedom = system.model.counts.coordinates - kept.size
-    raise _conflict(system, dropped, phi)
+    raise _conflict(system, dropped, here.phi)
 
 
-def _half_turned(
-    system: PosedModel,
-    place: Configuration,
-    jacobian: scipy.sparse.csc_array,
-    phi: np.ndarray,
-    drawn: list[turning.Turn],
-) -> list[turning.Turn]:
+def _half_turned(system: BaseSystem, here: _Constrained, drawn: list[turning.Turn]) -> list[turning.Turn]:
     """Return the prescribed rotations that are half a turn off, but those whose axes are drawn so."""
     if not drawn:
         return []
-    now = turning.prescribed_turns(system, place, jacobian, phi)
+    now = turning.prescribed_turns(system, *here)
     return [b for a, b in zip(drawn, now) if abs(b.missing) > 0.5 * np.pi and not a.opposite]
 
 
 def _turned(
-    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, turns: list[turning.Turn]
+    system: BaseSystem,
+    configuration: Configuration,
+    t: float,
+    kept: np.ndarray,
+    weights: np.ndarray,
+    turns: list[turning.Turn],
 ) -> Configuration:
     """Bring prescribed rotations to their angles in steps."""
-    weights = system.coordinate_weights()
-    length = np.sqrt(weights[3])
     own = system.assembler
     try:
         for held in turning.stages(system, turns):
             system.assembler = held
-            place = _closed(system, place, t, kept, length)[0]
+            here, _ = _closed(system, _constrained(system, configuration, t), t, kept, weights)
+            configuration = here.configuration
     finally:
         system.assembler = own
-    return place
+    return configuration
 
 
-def _note_correction(system: PosedModel, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
+def _note_correction(system: BaseSystem, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
     report.length = system.length
     if not len(pose):
         return
@@ -326,33 +337,32 @@ def _note_correction(system: PosedModel, report: InitialReport, before: np.ndarr
 
 
 def _closed(
-    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, length: float
-) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, int]:
-    """Solve the kept rows for the nearest position; return it with the Jacobian, Phi and the iterations taken."""
-    weights = system.coordinate_weights()
-    jacobian, phi, _ = system.constraint_jacobian(place, t)
+    system: BaseSystem, here: _Constrained, t: float, kept: np.ndarray, weights: np.ndarray
+) -> tuple[_Constrained, int]:
+    """Solve the kept rows for the nearest position; return it with the iterations taken."""
+    length = np.sqrt(weights[3]) if weights.size else 1.0
     size = 0.0
     for iteration in range(MAX_POSITION_ITERATIONS):
+        configuration, jacobian, phi = here
         size = float(np.abs(phi[kept]).max(initial=0.0))
         if not np.isfinite(size):
             raise _not_finite(system, phi, t)
         if size <= POSITION_TOLERANCE * max(1.0, length):
-            return place, jacobian, phi, iteration
+            return here, iteration
         step = least_correction(scipy.sparse.csc_array(jacobian[kept]), weights, phi[kept])
-        turn = np.abs(place.parts(step)[0][:, 3:]).max(initial=0.0)
-        place = place.displaced(step * min(1.0, 0.5 / max(turn, 1e-300)))
-        jacobian, phi, _ = system.constraint_jacobian(place, t)
+        turn = np.abs(configuration.parts(step)[0][:, 3:]).max(initial=0.0)
+        here = _constrained(system, configuration.displaced(step * min(1.0, 0.5 / max(turn, 1e-300))), t)
     if size > 1e-9 * max(1.0, length):
-        worst = kept[np.argmax(np.abs(phi[kept]))]
+        worst = kept[np.argmax(np.abs(here.phi[kept]))]
         raise AssemblyError(
             f"the mechanism cannot be assembled: after {MAX_POSITION_ITERATIONS} iterations "
-            f"{system.row_names[worst]} is still violated by {abs(phi[worst]):.3g}; "
+            f"{system.row_names[worst]} is still violated by {abs(here.phi[worst]):.3g}; "
             "check the lengths and the markers of that joint"
         )
-    return place, jacobian, phi, MAX_POSITION_ITERATIONS
+    return here, MAX_POSITION_ITERATIONS
 
 
-def _not_finite(system: PosedModel, phi: np.ndarray, t: float) -> AssemblyError:
+def _not_finite(system: BaseSystem, phi: np.ndarray, t: float) -> AssemblyError:
     """Say which row has no value."""
     name = system.row_names[int(np.argmin(np.isfinite(phi)))]
     return AssemblyError(
@@ -360,7 +370,7 @@ def _not_finite(system: PosedModel, phi: np.ndarray, t: float) -> AssemblyError:
     )
 
 
-def _conflict(system: PosedModel, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
+def _conflict(system: BaseSystem, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
     """Say which redundant row contradicts the others most."""
     worst = dropped[np.argmax(np.abs(phi[dropped]))]
     return AssemblyError(
@@ -369,16 +379,16 @@ def _conflict(system: PosedModel, dropped: np.ndarray, phi: np.ndarray) -> Assem
     )
 
 
-def consistent_velocity(system: PosedModel, place: Configuration, t: float) -> Configuration:
+def consistent_velocity(system: BaseSystem, configuration: Configuration, t: float) -> Configuration:
     """Correct the velocities as little as possible so that Phi_q v + Phi_t = 0."""
     weights = system.coordinate_weights()
-    jacobian, _, rate = system.constraint_jacobian(place, t)
+    jacobian, _, rate = system.constraint_jacobian(configuration, t)
     if jacobian.shape[0] == 0:
-        return place
-    return place.pushed(least_correction(jacobian, weights, rate))
+        return configuration
+    return configuration.pushed(least_correction(jacobian, weights, rate))
 
 
-def check_inertia(system: PosedModel) -> None:
+def check_inertia(system: BaseSystem) -> None:
     """Raise if the mass or inertia of a body is not finite."""
     for name, row in zip(system.body_names, system.model.bodies[1:]):
         if not np.all(np.isfinite(row)):

@@ -28,7 +28,7 @@ from gearmbs.dae.equations.kinematics.rotation import (
 from gearmbs.dae.equations.kinematics.update import update_functions, update_markers
 from gearmbs.dae.equations.outputs.accelerations import ROW_RECORD
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
-from gearmbs.dae.model.evaluator import Evaluator
+from gearmbs.dae.model.evaluator import Evaluator, new_records
 from gearmbs.dae.model.member_tables import (
     EDGE_AXES,
     EDGE_CHILD,
@@ -44,7 +44,7 @@ from gearmbs.dae.model.member_tables import (
     PLACE_R,
     Members,
 )
-from gearmbs.dae.model.records import RECORDS_TYPE, Records, new_records
+from gearmbs.dae.model.records import RECORDS_TYPE, Records
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 

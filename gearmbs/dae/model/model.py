@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -187,17 +188,18 @@ class Model:
         places[elastic] = self.modal[shapes[:, None] + np.arange(3)]
         return float(np.abs(places).max(initial=0.0))
 
-    def span(self, row: int) -> slice:
-        """Return where the terms of a constraint row are."""
-        end = self.rows[row + 1, T.ROW_FIRST] if row + 1 < len(self.rows) else len(self.terms)
-        return slice(int(self.rows[row, T.ROW_FIRST]), int(end))
+    @cached_property
+    def spans(self) -> list[slice]:
+        """Where the terms of each constraint row are."""
+        ends = [*self.rows[:, T.ROW_FIRST].tolist(), len(self.terms)]
+        return [slice(first, end) for first, end in pairwise(ends)]
 
     def with_rows(self, kept: np.ndarray) -> Model:
         """Return the model with the constraint rows ``kept`` alone.
 
         What depends on an unknown is pointed to its new place in y; reactions lose the multipliers that are dropped.
         """
-        spans = [self.span(int(i)) for i in kept]
+        spans = [self.spans[i] for i in kept]
         sizes = [span.stop - span.start for span in spans]
         places_of_terms = np.concatenate([np.arange(span.start, span.stop) for span in spans] or [np.zeros(0, int)])
         terms = places_of_terms.astype(np.int64)

@@ -8,7 +8,6 @@ import numpy as np
 from numba import float64, types
 
 from gearmbs.dae.equations.kinematics.rotation import POSE_COLUMNS
-from gearmbs.dae.equations.outputs import accelerations as index1
 from gearmbs.kernels.jit import njit
 
 _VEC = float64[::1]
@@ -95,19 +94,6 @@ class Records(NamedTuple):
 
 
 RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), Records)
-
-
-def new_records(m: int, bodies: int, rows: int, elements: int, diagnostics: int, modes: int = 0) -> Records:
-    """Return empty records for m output times; ``diagnostics`` is the most that an element has."""
-    return Records(
-        np.zeros((m, POSE_COLUMNS * bodies + 2 * modes)),
-        np.zeros((m, 6 * bodies + modes + rows)),
-        np.zeros((m, max(elements, 1), index1.FORCE_RECORD + diagnostics)),
-        np.zeros((m, 3 * rows)),
-        np.zeros((m, rows, 3)),
-        np.zeros((m, rows, 3)),
-        np.zeros(m),
-    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

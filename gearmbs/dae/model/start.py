@@ -15,11 +15,12 @@ from gearmbs.dae.equations.kinematics.update import hook
 from gearmbs.dae.equations.loads.reactions import reactions_from
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, multipliers_are_rates
 from gearmbs.dae.model import diagnosis
-from gearmbs.dae.model.configuration import Assembled, euler_references
 from gearmbs.dae.problem import DAEProblem, ModelError, SingularModelError
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration, PosedModel
+    from gearmbs.dae.model.base_system import BaseSystem
+    from gearmbs.dae.model.configuration import Configuration
+    from gearmbs.dae.model.evaluator import Assembled
     from gearmbs.dae.model.model import Model
 
 MAX_LOAD_ITERATIONS = 200
@@ -33,7 +34,9 @@ extrapolated."""
 MAX_STATE_ITERATIONS = 100
 
 
-def accelerations(system: PosedModel, place: Configuration, t: float) -> tuple[np.ndarray, np.ndarray, Assembled]:
+def accelerations(
+    system: BaseSystem, configuration: Configuration, t: float
+) -> tuple[np.ndarray, np.ndarray, Assembled]:
     """Return the accelerations of the coordinates, lambda, and the system they solve with its loads in y.
 
     Loads that depend on other loads or on reactions are iterated until they agree.
@@ -45,11 +48,11 @@ def accelerations(system: PosedModel, place: Configuration, t: float) -> tuple[n
     ModelError
         If a load or a function of time has no finite value.
     """
-    base = place.coordinates
-    inner = _algebraic_start(system, place, t)
+    base = configuration.coordinates
+    inner = _algebraic_start(system, configuration, t)
     passes: list[tuple[np.ndarray, np.ndarray]] = []
     for attempt in range(MAX_LOAD_ITERATIONS if _coupled(system.model) else 1):
-        found = system.assembler.at(place, t, inner, system.state_start)
+        found = system.assembler.at(configuration, t, inner, system.state_start)
         diagnosis.check_finite(system, found.rhs, found.loads, t)
         try:
             solution = scipy.sparse.linalg.splu(found.matrix).solve(found.rhs)
@@ -85,7 +88,7 @@ def _extrapolated(passes: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     return passes[-1][1] - weights @ steps
 
 
-def _algebraic_start(system: PosedModel, place: Configuration, t: float) -> np.ndarray | None:
+def _algebraic_start(system: BaseSystem, configuration: Configuration, t: float) -> np.ndarray | None:
     """Return F, N and z at a configuration whose algebraic states satisfy their equations, None without such states.
 
     Newton's method from the given start; the loads follow the states, reactions are left out.
@@ -93,12 +96,11 @@ def _algebraic_start(system: PosedModel, place: Configuration, t: float) -> np.n
     model, algebraic = system.model, np.flatnonzero(~system.model.differential_states)
     if algebraic.size == 0:
         return None
-    found = system.assembler.at(place, t, None, system.state_start)
+    found = system.assembler.at(configuration, t, None, system.state_start)
     y, first, z = found.y, int(found.idata[T.H_F]), int(found.idata[T.H_Z])
     y[first:] = _inner(y, found.loads, found.idata)
-    codes = euler_references(place.pose)
     indptr, indices, slots = jacobian.pattern(found.idata, found.rdata, found.work.size, t, y)
-    idata, rdata, size = model.pack(I3, slots, codes)
+    idata, rdata, size = model.pack(I3, slots, found.codes)
     out, rest, vals, work = np.zeros(y.size), np.zeros(y.size), np.zeros(indices.size), np.zeros(size)
     places = np.concatenate([np.arange(first, z), z + algebraic])
     for _ in range(MAX_STATE_ITERATIONS):
@@ -152,14 +154,14 @@ RESIDUALS_AN_ENTRY = 0.6
 # --- the problem --------------------------------------------------------------------------------------
 
 
-def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAEProblem:
+def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAEProblem:
     """Return the DAE of a system in one of the formulations with consistent initial values.
 
     See :meth:`gearmbs.dae.model.system.System.problem`.
     """
     model, form = system.model, FORMULATIONS[formulation]
-    acc, lam, found = accelerations(system, system.start, system.t0)
-    codes = euler_references(system.pose)
+    acc, lam, found = accelerations(system, system.configuration, system.t0)
+    codes = found.codes
     idata, rdata, size = model.pack(form, codes=codes)
     at = model.layout(form)
     y, yp = np.zeros(at["n"]), np.zeros(at["n"])
@@ -235,7 +237,7 @@ def turns_of_one(rates: np.ndarray, accelerations: np.ndarray) -> float:
 
 
 def _state_rates(
-    system: PosedModel, y, yp, z: slice, idata, rdata, work, pattern: tuple[np.ndarray, np.ndarray]
+    system: BaseSystem, y, yp, z: slice, idata, rdata, work, pattern: tuple[np.ndarray, np.ndarray]
 ) -> None:
     """Settle algebraic states to their definitions, which reactions may enter; set the rates of the others.
 

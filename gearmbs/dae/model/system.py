@@ -6,16 +6,17 @@ import numpy as np
 
 from gearmbs.dae.equations.unknowns import FORMULATIONS, Unknown
 from gearmbs.dae.model import diagnosis, initial, start
-from gearmbs.dae.model.configuration import Configuration, PosedModel
+from gearmbs.dae.model.base_system import BaseSystem
+from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.model.diagnosis import conflict
 from gearmbs.dae.problem import AssemblyError, DAEProblem, ModelError
 
 
-class System(PosedModel):
+class System(BaseSystem):
     """A mechanism as a DAE.
 
     Built by :meth:`gearmbs.mechanism.Mechanism.compile`; users rarely make one themselves. For its parameters see
-    `gearmbs.dae.model.configuration.PosedModel`; the configuration is a guess that :meth:`initialise` makes consistent.
+    `gearmbs.dae.model.base_system.BaseSystem`; the configuration is a guess that :meth:`initialise` makes consistent.
 
     Attributes
     ----------
@@ -40,11 +41,11 @@ class System(PosedModel):
 
     # --- the start ----------------------------------------------------------------------------------
 
-    def accelerations(self, place: Configuration | np.ndarray, t: float):
+    def accelerations(self, configuration: Configuration | np.ndarray, t: float):
         """Return (a, alpha) a row per body, lambda, and the load records at a configuration; see `model.start`."""
-        place = self._configuration(place)
-        acc, multipliers, found = start.accelerations(self, place, t)
-        return place.parts(acc)[0], multipliers, found.loads
+        configuration = self._configuration(configuration)
+        acc, multipliers, found = start.accelerations(self, configuration, t)
+        return configuration.parts(acc)[0], multipliers, found.loads
 
     def initialise(self) -> initial.InitialReport:
         """Make positions and velocities consistent; drop redundant constraint rows.
@@ -60,23 +61,23 @@ class System(PosedModel):
             bad = self.body_names[int(np.argwhere(~np.isfinite(self.pose))[0, 0])]
             raise ModelError(f"body '{bad}': initial position, orientation or velocity is not finite")
         initial.check_inertia(self)
-        place, kept, self.report = initial.assemble_position(self, self.start, self.t0)
+        configuration, kept, self.report = initial.assemble_position(self, self.configuration, self.t0)
         self.keep_rows(kept)
-        self.start = initial.consistent_velocity(self, place, self.t0)
-        found = self.conflict(self.start, self.t0)
+        self.configuration = initial.consistent_velocity(self, configuration, self.t0)
+        found = self.conflict(self.configuration, self.t0)
         if found is not None:
             raise AssemblyError(found)
         return self.report
 
     # --- redundant rows, locking --------------------------------------------------------------------
 
-    def conflict(self, place: Configuration | np.ndarray, t: float) -> str | None:
+    def conflict(self, configuration: Configuration | np.ndarray, t: float) -> str | None:
         """Return which row dropped as redundant contradicts the motion at a configuration, or None."""
-        return conflict(self, self._configuration(place), t) if self.has_dropped_rows else None
+        return conflict(self, self._configuration(configuration), t) if self.has_dropped_rows else None
 
-    def locking(self, place: Configuration | np.ndarray, t: float) -> str | None:
+    def locking(self, configuration: Configuration | np.ndarray, t: float) -> str | None:
         """Return which constraint rows are about to depend on each other, None when they are not."""
-        return diagnosis.locking(self, self._configuration(place), t)
+        return diagnosis.locking(self, self._configuration(configuration), t)
 
     # --- the problem --------------------------------------------------------------------------------
 

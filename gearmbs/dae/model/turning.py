@@ -17,11 +17,12 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints.terms import ROTATION
 from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_V
 from gearmbs.dae.equations.loads.time_functions import CONSTANT
-from gearmbs.dae.model.configuration import POSE_PLACES, AccelerationSystem
+from gearmbs.dae.model.evaluator import POSE_PLACES, Assembler
 from gearmbs.dae.model.model import Model, frozen
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration, PosedModel
+    from gearmbs.dae.model.base_system import BaseSystem
+    from gearmbs.dae.model.configuration import Configuration
 
 LONGEST_STEP = 0.5
 """rad, far from the quarter turn at which the nearest solution is another one."""
@@ -45,18 +46,19 @@ class Turn:
 
 
 def prescribed_turns(
-    system: PosedModel, place: Configuration, jacobian: scipy.sparse.csc_array, phi: np.ndarray
+    system: BaseSystem, configuration: Configuration, jacobian: scipy.sparse.csc_array, phi: np.ndarray
 ) -> list[Turn]:
     """Return the prescribed rotations at a configuration whose constraint Jacobian and Phi are given."""
     model = system.model
     found = []
-    for row in range(len(model.rows)):
-        span = model.span(row)
+    for row, span in enumerate(model.spans):
         first = span.start
         # rows given by an expression have no terms
         if span.stop == first or model.terms[first, T.TERM_TYPE] != ROTATION:
             continue
-        (i, body_i), (j, body_j) = (_axes(model, place, int(model.terms[first, m])) for m in (T.TERM_I, T.TERM_J))
+        (i, body_i), (j, body_j) = (
+            _axes(model, configuration, int(model.terms[first, m])) for m in (T.TERM_I, T.TERM_J)
+        )
         # one of the bodies moves: its rotation about the axis changes the sine by the cosine
         body, sense = (body_i, 1.0) if body_i > 0 else (body_j, -1.0)
         columns = POSE_PLACES * (body - 1) + 3 + np.arange(3)
@@ -66,20 +68,20 @@ def prescribed_turns(
     return found
 
 
-def _axes(model: Model, place: Configuration, marker: int) -> tuple[np.ndarray, int]:
+def _axes(model: Model, configuration: Configuration, marker: int) -> tuple[np.ndarray, int]:
     """Return the axes of a marker in global components, as columns, and its body; of a modal body the undeformed."""
     body = int(model.marker_body[marker])
     if body >= len(model.bodies):
         body = model.frame_body[body - len(model.bodies)]
     axes = model.marker_frame[marker, 3:].reshape(3, 3)
-    return (axes if body == 0 else place.pose[body - 1, POSE_A:POSE_V].reshape(3, 3) @ axes), body
+    return (axes if body == 0 else configuration.pose[body - 1, POSE_A:POSE_V].reshape(3, 3) @ axes), body
 
 
-def stages(system: PosedModel, turns: list[Turn]) -> Iterator[AccelerationSystem]:
+def stages(system: BaseSystem, turns: list[Turn]) -> Iterator[Assembler]:
     """Yield the equations with these rotations held at angles from the drawn ones to those prescribed, in steps."""
     count = int(np.ceil(max(abs(turn.missing) for turn in turns) / LONGEST_STEP))
     for share in np.linspace(0.0, 1.0, count + 1):
-        yield AccelerationSystem(_held(system.model, {turn.row: turn.angle + share * turn.missing for turn in turns}))
+        yield Assembler(_held(system.model, {turn.row: turn.angle + share * turn.missing for turn in turns}))
 
 
 def _held(model: Model, angles: dict[int, float]) -> Model:
@@ -87,7 +89,7 @@ def _held(model: Model, angles: dict[int, float]) -> Model:
     terms = model.terms.copy()
     functions = [np.array(model.functions)]
     for k, row in enumerate(angles):
-        terms[model.span(row).start, T.TERM_FUNCTION] = len(model.functions) + k
+        terms[model.spans[row].start, T.TERM_FUNCTION] = len(model.functions) + k
         functions.append(np.array([[CONSTANT, len(model.function_r) + k]], dtype=np.int64))
     return replace(
         model,

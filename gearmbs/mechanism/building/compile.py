@@ -294,7 +294,18 @@ class _Compiler:
             return
         if not isinstance(element, ForceElement):
             raise ModelError(f"force element {element!r}: its type is unknown to the mechanism")
-        wrenches, acting, states, made = element.wrenches, element.markers, element.states, element.compiled()
+        try:
+            wrenches, acting, states, made = element.wrenches, element.markers, element.states, element.compiled()
+        except ModelError:
+            raise
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise ModelError(f"{element.kind} '{element.name}': its compiled() fails with {reason}") from error
+        if type(element).__module__.partition(".")[0] != "gearmbs" or getattr(element, "derivatives", None) is not None:
+            # what the package's own elements have is tested with the package
+            from gearmbs.mechanism.forces.derivatives import check_derivatives
+
+            check_derivatives(element, made)
         self.force_names += [f"{element.name}[{k}]" for k in range(1, wrenches)]
         label = f"{element.kind} '{element.name}'"
         turns = self.mechanism.turns

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,17 +72,17 @@ class JointMethods:
             kinds = " and ".join(k for k, v in jt.JOINTS.items() if v.crossed)
             raise ModelError(f"{label}: axis_j is for {kinds} joints; others have one axis")
         mi, mj = self._markers(label, name, i, j, at, axis, axis_j)
-        made = jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj))
-        try:
+        with _markers_kept_if_added((mi, mj), (i, j)):
             if crossed:
                 jt.check_crossed(label, mi, mj)
-            return self._add_joint(made)
-        except ModelError:
-            # markers made for it would be in the way of the next attempt
-            for marker in (mi, mj):
-                if marker is not i and marker is not j:
-                    marker.body.markers.remove(marker)
-            raise
+            try:
+                rows = jt.JOINTS[kind].rows(mi, mj)
+            except ModelError:
+                raise
+            except Exception as error:
+                reason = f"{type(error).__name__}: {error}"
+                raise ModelError(f"{label}: the rows of JOINTS[{kind!r}] fail with {reason}") from error
+            return self._add_joint(jt.Joint(name, kind, mi, mj, rows))
 
     def fixed(self, name, i, j, **where) -> jt.Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
@@ -115,7 +117,8 @@ class JointMethods:
         """Add a screw joint: I advances ``pitch`` metres along z_J a turn."""
         pitch = quantity(pitch, "length", f"joint '{name}': pitch")
         mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
-        return self._add_joint(jt.Joint(name, "screw", mi, mj, jt.screw_rows(mi, mj, pitch)))
+        with _markers_kept_if_added((mi, mj), (i, j)):
+            return self._add_joint(jt.Joint(name, "screw", mi, mj, jt.screw_rows(mi, mj, pitch)))
 
     @keeps_given
     def distance(self, name: str, i: Marker, j: Marker, length: float | None = None) -> jt.Joint:
@@ -270,6 +273,18 @@ class JointMethods:
             marker.body.check(joint)
         self.joints[joint.name] = joint
         return joint
+
+
+@contextmanager
+def _markers_kept_if_added(used: tuple[Marker, ...], given: tuple[Body | Marker, ...]) -> Iterator[None]:
+    """Remove the markers made for a joint if it is refused: they would be in the way of the next attempt."""
+    try:
+        yield
+    except ModelError:
+        for marker in used:
+            if not any(marker is part for part in given):
+                marker.body.markers.remove(marker)
+        raise
 
 
 def _displacement(

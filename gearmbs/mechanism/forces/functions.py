@@ -120,7 +120,7 @@ def function_force(
                 raise ModelError(
                     f"{label}: {title} '{key.removeprefix(f'{name}.')}' is given twice; choose another name"
                 )
-    frames = np.array([_frame(marker) for marker in markers])
+    frames = np.array([frame_of(marker) for marker in markers])
     _try(label, kernel, derivatives, frames, numbers, own, told)
     return FunctionForce(
         name,
@@ -188,7 +188,7 @@ def _diagnostic(label: str, given: Any) -> Diagnostic:
     return made
 
 
-def _frame(marker: Marker) -> np.ndarray:
+def frame_of(marker: Marker) -> np.ndarray:
     """Return a marker's frame at the start, columns ``FRAME_*``."""
     body, axes = marker.body, marker.global_orientation()
     origin = marker.global_position()

@@ -96,7 +96,7 @@ class Body:
     @property
     def coordinates(self) -> int:
         """Number of coordinates."""
-        return 3 + self.kind.angles
+        return len(self.kind.directions)
 
     @property
     def numbers(self) -> list[float]:

@@ -36,6 +36,11 @@ class PointMass(Body):
     @property
     def numbers(self) -> list[float]:
         """Its constant orientation, row-major."""
+        if np.any(self.angular_velocity != 0.0):
+            raise ModelError(
+                f"point mass '{self.name}': angular_velocity = {self.angular_velocity} rad/s; it does not turn: leave "
+                "it 0, or give it an inertia by m.body(...)"
+            )
         return self.orientation.ravel().tolist()
 
     def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:

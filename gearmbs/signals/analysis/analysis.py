@@ -14,7 +14,7 @@ import scipy.fft
 import xarray as xr
 
 from gearmbs.progress import staged
-from gearmbs.signals.analysis.bands import HALF_WIDTH, TRANSITION, band_rms
+from gearmbs.signals.analysis.bands import HALF_WIDTH, TRANSITION, band_rms, check_harmonics
 from gearmbs.signals.analysis.indicators import condition_indicators
 from gearmbs.signals.analysis.report import (
     AnalysisReport,
@@ -313,6 +313,7 @@ def _in_angle(signal: xr.DataArray, shaft: Shaft, teeth: int, harmonics: int, no
 
 def _fitting_harmonics(rate: float, gmf: float, options: AnalysisOptions, notes: list[str]) -> int:
     """Return how many of the harmonics wanted have their bands below half the sampling rate."""
+    check_harmonics(options.harmonics)
     fitting = math.floor((rate / 2 / gmf - options.half_width - TRANSITION) * (1 - 1e-9))
     if fitting < 1:
         raise SignalError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from numbers import Integral
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -101,6 +102,12 @@ def order_rms(signal: xr.DataArray, fundamental: float, orders: Sequence[float])
     )
 
 
+def check_harmonics(harmonics: object) -> None:
+    """Refuse a number of harmonics that is not whole and positive."""
+    if isinstance(harmonics, bool) or not isinstance(harmonics, Integral) or harmonics < 1:
+        raise SignalError(f"harmonics: must be at least 1, a whole number, got {harmonics!r}")
+
+
 def gmf_rms(
     signal: xr.DataArray,
     gmf: float | None = None,
@@ -157,8 +164,7 @@ def gmf_rms(
     gmf = mesh_frequency(signal, speed, teeth) if gmf is None else float(gmf)
     if not (math.isfinite(gmf) and gmf > 0.0):
         raise SignalError(f"gmf: must be a positive frequency in Hz, got {gmf!r}")
-    if harmonics < 1:
-        raise SignalError(f"harmonics: must be at least 1, got {harmonics!r}")
+    check_harmonics(harmonics)
     if not 0.0 < half_width < 1.0 - TRANSITION:
         raise SignalError(f"half_width: must lie between 0 and {1.0 - TRANSITION:g} of the GMF, got {half_width!r}")
     multiples = np.arange(1, harmonics + 1)

@@ -18,8 +18,8 @@ from gearmbs.signals.rotation.speed import (
     SIDEBANDS,
     Comb,
     SpeedEstimate,
-    estimate_speed,
     find_comb,
+    followed_comb,
     line_near,
     own_lines_missing,
     prominence,
@@ -254,7 +254,9 @@ def mesh_shaft(
         shaft = found
         notes += shaft.phase.attrs.get("notes", ())
     else:
-        estimate = estimate_speed(signal, teeth, speed_range=known.speed_range)
+        estimate = followed_comb(signal, teeth, known.speed_range)
+        if estimate.doubt:
+            notes.append(estimate.doubt)
         if estimate.phase is None:
             notes.append(_why_constant(signal, estimate.speed, "The mesh line is too weak to follow in phase"))
         phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
@@ -334,7 +336,7 @@ def _estimate(
     signal: xr.DataArray, counts: tuple[int, ...], around: tuple[float, float] | None
 ) -> SpeedEstimate | None:
     try:
-        return estimate_speed(signal, counts, speed_range=around)
+        return followed_comb(signal, counts, around)
     except SignalError:
         return None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
+from gearmbs.signals.rotation.mesh_lines import Explained, Lines, choose
 from gearmbs.signals.rotation.phase import phase_from_line
 from gearmbs.signals.signal.any_data import takes_data
 from gearmbs.signals.signal.signal import rate_of, require
@@ -67,6 +69,8 @@ class SpeedEstimate:
         Shaft angle (rad) from the line's phase, if it could be followed.
     score : float
         Height of the comb of harmonics, shaft orders and sidebands in dB, less what lies between (`estimate_speed`).
+    doubt : str
+        Why the mesh line may be another one, with the frequencies that explain the record as well; empty if none does.
     """
 
     speed: float
@@ -76,6 +80,7 @@ class SpeedEstimate:
     prominence: float
     phase: xr.DataArray | None
     score: float = math.nan
+    doubt: str = ""
 
 
 @takes_data(speed_range="angular speed")
@@ -91,9 +96,11 @@ def estimate_speed(
     2. Comb: for every candidate GMF f the mean height at f ... 4 f (weights 1 to 0.7), plus half of that at the first
        three shaft orders and sidebands, less half of that midway between the harmonics; less 5 % for each harmonic
        beyond half the rate. Of the candidates within 3 % of the best the one whose harmonics carry most power wins.
-       It is accepted if its harmonics stand 12 dB (RMS) over the floor, or if its score is ahead of every other comb's
-       by 5.5 robust standard deviations of all scores.
-    3. The fundamental's peak, then the mean of its phase's slope over the record, where it can be followed.
+       It is accepted if its score is ahead of every other comb's by 5.5 robust standard deviations of all scores, or if
+       its harmonics stand 12 dB (RMS) over the floor. Then, of all that the strongest lines suggest, the mesh line
+       that explains most of them with fewest harmonics missing is taken. Where another one explains as much, or all
+       rests on one line, a warning says so.
+    3. The peak of the first harmonic that is there, then the mean of its phase's slope, where it can be followed.
 
     Parameters
     ----------
@@ -117,13 +124,25 @@ def estimate_speed(
     SignalError
         If the range is empty, the record is too short, or no comb stands out.
     """
+    found = followed_comb(signal, teeth, speed_range)
+    if found.doubt:
+        warnings.warn(found.doubt, UserWarning, stacklevel=3)
+    return found
+
+
+def followed_comb(
+    signal: xr.DataArray, teeth: int | Sequence[int] | None, speed_range: tuple[float, float] | None
+) -> SpeedEstimate:
+    """`estimate_speed` without its warning."""
     comb = find_comb(signal, teeth, speed_range=speed_range)
     count, gmf = comb.teeth, comb.gmf
-    phase, spread = _follow(signal, gmf, count)
+    phase, spread = _follow(signal, gmf, count, comb.first)
     if phase is not None:
         gmf = float(phase.attrs["mean_speed"]) * count / (2.0 * math.pi)
     resolution = rate_of(signal) / signal.sizes["time"]
-    return SpeedEstimate(2.0 * math.pi * gmf / count, gmf, resolution, spread, comb.prominence, phase, comb.score)
+    return SpeedEstimate(
+        2.0 * math.pi * gmf / count, gmf, resolution, spread, comb.prominence, phase, comb.score, comb.doubt
+    )
 
 
 HOLLOW_POWER, HOLLOW_HEIGHT = 1.0 / 64.0, 0.5
@@ -137,6 +156,9 @@ class Comb(NamedTuple):
     gmf: float
     prominence: float
     score: float
+    first: int = 1
+    """The first harmonic that is there."""
+    doubt: str = ""
 
     @property
     def speed(self) -> float:
@@ -172,13 +194,50 @@ def find_comb(
     share = (power / np.maximum(power.sum(axis=0), 1e-300)).sum(axis=1)
     carried = sum((_at(share, h * candidates[near], bin_width) for h in range(1, HARMONICS + 1)), np.zeros(near.size))
     best = int(near[np.argmax(carried)])
-    if direct[best] < MIN_SCORE_DB and _lead(score, candidates, best) < MIN_LEAD:
+    ahead = _lead(score, candidates, best) >= MIN_LEAD
+    if direct[best] < MIN_SCORE_DB and not ahead:
         raise SignalError(
             f"signal: no gear mesh line stands out (best {direct[best]:.1f} dB at {candidates[best]:.1f} Hz); "
             "give the speed, a tacho, or a narrower speed_range"
         )
-    gmf = _peak(power, candidates[best], bin_width)
-    return Comb(count, float(gmf), float(direct[best]), float(score[best]))
+    lines = Lines(power, height, bin_width)
+    guess = float(candidates[best])
+    one, others = (lines.explained(guess, count), []) if ahead else choose(lines, guess, count, low_gmf, high_gmf)
+    about = one.gmf if one.harmonics else guess
+    first = one.harmonics[0] if one.harmonics else 1
+    gmf = _peak(power, first * about, bin_width) / first
+    if one.harmonics and first * abs(gmf - one.gmf) > AGREED_BINS * bin_width:
+        gmf = one.gmf
+    if abs(gmf / guess - 1.0) > SAME_COMB:
+        score, direct = _comb(height, np.array([gmf]), bin_width, count)
+        best = 0
+    doubt = "" if ahead else _doubt(one._replace(gmf=gmf), others, count)
+    return Comb(count, float(gmf), float(direct[best]), float(score[best]), first, doubt)
+
+
+def _doubt(one: Explained, others: list[Explained], teeth: int) -> str:
+    """Why a mesh line may be the wrong one, and what to do; empty if nothing speaks against it."""
+
+    def named(gmf: float) -> str:
+        return f"{gmf:.2f} Hz ({gmf / teeth * 60.0:.1f} rpm with {teeth} teeth)"
+
+    if others:
+        also = " or ".join(named(other.gmf) for other in others[:MOST_NAMED])
+        why = f"the mesh line was taken to be {named(one.gmf)}, but {also} explains the lines of the record as well"
+    elif one.certain:
+        return ""
+    else:
+        why = (
+            f"the mesh line was taken to be {named(one.gmf)} from one line alone, or without its first two harmonics; "
+            "it may be a harmonic or a part of the true one, or a line of something else"
+        )
+    return f"CHECK THE SPEED: {why}. Give the speed, a tacho, or a narrower speed_range."
+
+
+AGREED_BINS = 1.5
+"""By which the peak at a harmonic may be off the frequency on which all agree; what is further off is another line."""
+MOST_NAMED = 3
+"""Other mesh lines that are named in a doubt."""
 
 
 ELSEWHERE = np.r_[np.linspace(0.55, 0.94, 30), np.linspace(1.06, 1.9, 60)]
@@ -346,9 +405,10 @@ def _peak(power: np.ndarray, guess: float, bin_width: float) -> float:
     return (low - 1 + k + float(np.clip(shift, -0.5, 0.5))) * bin_width
 
 
-def _follow(signal: xr.DataArray, gmf: float, count: int) -> tuple[xr.DataArray | None, float]:
+def _follow(signal: xr.DataArray, gmf: float, count: int, harmonic: int) -> tuple[xr.DataArray | None, float]:
+    """Angle by the phase of a harmonic, and the standard deviation of the mesh frequency in Hz."""
     try:
-        phase = phase_from_line(signal, gmf, count)
+        phase = phase_from_line(signal, harmonic * gmf, harmonic * count)
     except SignalError:
         return None, math.nan
     if phase.attrs["quality"] < MIN_QUALITY:

@@ -114,13 +114,19 @@ def make_signal(
     )
 
 
+def _real(data: ArrayLike) -> np.ndarray:
+    if np.iscomplexobj(data):
+        raise SignalError("data: holds complex numbers; give their real parts or magnitudes")
+    return np.asarray(data, dtype=float)
+
+
 def _columns(
     data: ArrayLike | Mapping[str, ArrayLike], channels: Sequence[str] | None
 ) -> tuple[np.ndarray, Sequence[str] | None]:
     """Return the samples by columns, and the channels' names as far as they are known."""
     if isinstance(data, Mapping):
         channels = [str(key) for key in data] if channels is None else channels
-        columns = [np.asarray(column, dtype=float) for column in data.values()]
+        columns = [_real(column) for column in data.values()]
         if not columns:
             raise SignalError("data: has no channels")
         if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
@@ -128,7 +134,7 @@ def _columns(
             raise SignalError(f"data: every channel must be one column of the same length, got {shapes}")
         values = np.stack(columns, axis=1)
     else:
-        values = np.asarray(data, dtype=float)
+        values = _real(data)
         if values.ndim == 1:
             values = values[:, None]
     if values.ndim != 2 or 0 in values.shape:

@@ -35,7 +35,7 @@ from gearmbs.studies.case.section import CaseError, CaseWarning, Section, measur
 from gearmbs.units import to_si
 
 if TYPE_CHECKING:
-    from gearmbs.gears import GearPair
+    from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 
     IntegratorName = str
     FormulationName = str
@@ -126,6 +126,34 @@ class Gears(Section):
             return self.of_wheel("addendum" if above else "dedendum", wheel)
         return abs(radius - 0.5 * self.module * self.teeth[wheel])
 
+    @cached_property
+    def wheels(self) -> tuple[GearSpec, GearSpec]:
+        """The driver and the driven wheel.
+
+        Raises
+        ------
+        ValueError
+            If they are impossible.
+        """
+        return self._wheel(0), self._wheel(1)
+
+    def _wheel(self, wheel: int) -> GearSpec:
+        from gearmbs.gears import GearSpec, Material
+
+        material = Material(*(self.of_wheel(key, wheel) for key in ("youngs_modulus", "poisson_ratio", "density")))
+        own = ("face_width", "fillet_radius", "bore_radius", "tip_rounding")
+        return GearSpec(
+            self.teeth[wheel],
+            self.module,
+            self.pressure_angle,
+            addendum=self.height(wheel, above=True),
+            dedendum=self.height(wheel, above=False),
+            profile_shift=self.profile_shift[wheel],
+            material=material,
+            name=WHEELS[wheel],
+            **{key: self.of_wheel(key, wheel) for key in own},
+        )
+
 
 class Shafts(Section):
     """Both shafts: solid steel cylinders centred on their wheels."""
@@ -169,22 +197,37 @@ class Operation(Section):
             self.__dict__["duration"] = max(ends)
         return self
 
-    @property
+    def settings(self) -> dict[str, Any]:
+        """Return all settings; a duration that follows from a curve goes with it."""
+        data = super().settings()
+        if "duration" not in self.model_fields_set:
+            del data["duration"]
+        return data
+
+    def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """Return all settings with some changed; the length of the old record says nothing of a new curve's."""
+        data = super().with_settings(changes)
+        curves = [changes[key] for key in ("speed", "torque") if key in changes]
+        if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
+            data = {key: value for key, value in data.items() if key != "duration" or key in changes}
+        return data
+
+    @cached_property
     def speed_curve(self) -> q.Points | None:
         """Points (s, rad/s) of a speed that changes, s from the beginning of the record."""
         return self.speed if isinstance(self.speed, tuple) else None
 
-    @property
+    @cached_property
     def torque_curve(self) -> q.Points | None:
         """Points (s, N m) of a torque that changes."""
         return self.torque if isinstance(self.torque, tuple) else None
 
-    @property
+    @cached_property
     def top_speed(self) -> float:
         """Highest speed, rad/s."""
         return self.speed if isinstance(self.speed, float) else max(value for _, value in self.speed)
 
-    @property
+    @cached_property
     def top_torque(self) -> float:
         """Largest torque, N m."""
         return self.torque if isinstance(self.torque, float) else max(value for _, value in self.torque)
@@ -229,10 +272,19 @@ class Contact(Section):
     slices: int | None = Field(default=None, ge=1)
 
     @model_validator(mode="after")
-    def _law(self) -> Contact:
+    def _readable(self) -> Contact:
         to_si(self.stiffness, self.stiffness_unit, "stiffness")
         to_si(self.damping, "damping", "damping")
         return self
+
+    @cached_property
+    def law(self) -> ContactLaw:
+        """The law between two flanks."""
+        from gearmbs.gears import ContactLaw
+
+        return ContactLaw.impact(
+            stiffness=self.stiffness, exponent=self.exponent, damping=self.damping, depth=self.depth
+        )
 
     @property
     def stiffness_unit(self) -> str:
@@ -250,6 +302,15 @@ class FrictionSettings(Section):
     dynamic: float = Field(default=0.05, ge=0)
     static_speed: q.SlidingSpeed = 0.1
     dynamic_speed: q.SlidingSpeed = 1.0
+
+    @cached_property
+    def law(self) -> FlankFriction:
+        """The law along two flanks."""
+        from gearmbs.gears import FlankFriction
+
+        if not self.enabled:
+            return FlankFriction.none()
+        return FlankFriction(self.static, self.dynamic, self.static_speed, self.dynamic_speed)
 
 
 class Solver(Section):
@@ -276,7 +337,7 @@ class Solver(Section):
     signal_rate: q.SamplingRate = None
     lump: bool = False
 
-    @property
+    @cached_property
     def used_tolerance(self) -> float:
         """The tolerance, or the integrator's default."""
         return self.tolerance or INTEGRATORS[self.integrator].tolerance
@@ -369,33 +430,18 @@ class Case(Section, Shown):
                 f"flanks; give at least {1e3 * (f.backlash + overlap):.4g} mm of backlash"
             )
         if not f.teeth:
-            self._pairs[self._sections_key] = self._sections, sound
+            self.__dict__["_built"] = sound
         return self
-
-    @property
-    def _sections(self) -> tuple:
-        """The sections that a pair is built of."""
-        return self.gears, self.fault, self.contact, self.friction, self.operation
-
-    @property
-    def _sections_key(self) -> tuple[int, ...]:
-        return tuple(map(id, self._sections))
-
-    @cached_property
-    def _pairs(self) -> dict[tuple[int, ...], tuple[tuple, GearPair]]:
-        """The pair that was built, by the identity of the sections, which a copy of the case may share or not."""
-        return {}
 
     def pair(self) -> GearPair:
         """Return the gear pair of the case."""
+        return self._built
+
+    @cached_property
+    def _built(self) -> GearPair:
         from gearmbs.studies.case.tooth_faults import tooth_fault
 
-        key = self._sections_key
-        if key not in self._pairs:
-            faults = tuple(tooth_fault(table) for table in self.fault.teeth)
-            self._pairs.clear()
-            self._pairs[key] = self._sections, self._pair(faults)
-        return self._pairs[key][1]
+        return self._pair(tuple(tooth_fault(table) for table in self.fault.teeth))
 
     def _pair(self, faults: tuple) -> GearPair:
         """Return the gear pair of the case with these faults of teeth.
@@ -405,46 +451,25 @@ class Case(Section, Shown):
         ValueError
             If the wheels are impossible or do not mesh.
         """
-        from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material
+        from gearmbs.gears import GearPair
 
-        g, f, c, r = self.gears, self.fault, self.contact, self.friction
-        wheels = []
-        for k, name in enumerate(WHEELS):
-            material = Material(*(g.of_wheel(key, k) for key in ("youngs_modulus", "poisson_ratio", "density")))
-            own = ("face_width", "fillet_radius", "bore_radius", "tip_rounding")
-            wheel = GearSpec(
-                g.teeth[k],
-                g.module,
-                g.pressure_angle,
-                addendum=g.height(k, above=True),
-                dedendum=g.height(k, above=False),
-                profile_shift=g.profile_shift[k],
-                material=material,
-                name=name,
-                **{key: g.of_wheel(key, k) for key in own},
-            )
-            wheels.append(wheel)
-        law = ContactLaw.impact(stiffness=c.stiffness, exponent=c.exponent, damping=c.damping, depth=c.depth)
-        friction = (
-            FlankFriction(r.static, r.dynamic, r.static_speed, r.dynamic_speed) if r.enabled else FlankFriction.none()
-        )
+        f = self.fault
         return GearPair(
-            wheels[0],
-            wheels[1],
+            *self.gears.wheels,
             centre_distance_error=f.centre_distance_error,
             misalignment=f.misalignment,
             plane=f.plane,
             pivot=f.pivot,
             axial_shift=f.axial_shift,
             backlash=f.backlash,
-            contact=law,
-            friction=friction,
+            contact=self.contact.law,
+            friction=self.friction.law,
             torque=self.operation.top_torque,
-            slices=c.slices,
+            slices=self.contact.slices,
             faults=faults,
         )
 
-    @property
+    @cached_property
     def mesh_frequency(self) -> float:
         """Gear mesh frequency at the operating speed, the highest if it changes, Hz."""
         return self.gears.teeth[0] * self.operation.top_speed / 6.283185307179586
@@ -461,7 +486,7 @@ class Case(Section, Shown):
         angle = drive_angle(operation.speed, operation.run_up, start)
         return angle(start + operation.duration) - angle(start)
 
-    @property
+    @cached_property
     def signal_rate(self) -> float:
         """Sampling rate of the acceleration, Hz.
 
@@ -476,7 +501,7 @@ class Case(Section, Shown):
         given = self.solver.output_rate
         return rate if given is None else given / max(1, int(given // rate))
 
-    @property
+    @cached_property
     def output_rate(self) -> float:
         """Sampling rate of forces and contact, Hz: given, or the signal's rate doubled until it is 51.2 kHz or more."""
         if self.solver.output_rate is not None:
@@ -496,14 +521,11 @@ class Case(Section, Shown):
         >>> Case().changed(fault={"misalignment": "1 deg"}).fault.plane
         'skew'
         """
-        data = self.settings()
-        operation = sections.get("operation")
-        curves = [v for k, v in operation.items() if k in ("speed", "torque")] if isinstance(operation, dict) else []
-        if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
-            # the length of the old record says nothing of a new curve's
-            data["operation"].pop("duration", None)
+        # sections that stay are taken over as they are: they do not change and have been checked
+        data = {name: getattr(self, name) for name in type(self).model_fields}
         for key, value in sections.items():
-            data[key] = {**data[key], **value} if isinstance(value, dict) and key in data else value
+            own = data.get(key)
+            data[key] = own.with_settings(value) if isinstance(own, Section) and isinstance(value, dict) else value
         return make_case(data)
 
     def __str__(self) -> str:
@@ -514,14 +536,8 @@ class Case(Section, Shown):
 
     def settings(self) -> dict[str, Any]:
         """Return all settings as nested dictionaries, quantities as the user wrote them, else in SI."""
-        data = self.model_dump()
-        for name in type(self).model_fields:
-            section = getattr(self, name)
-            if isinstance(section, Section):
-                # a duration that follows from a curve goes with it
-                kept = {k: v for k, v in data[name].items() if k != "duration" or k in section.model_fields_set}
-                data[name] = {**kept, **section.written}
-        return data
+        parts = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: part.settings() if isinstance(part, Section) else part for name, part in parts.items()}
 
 
 def units_of_fields(section: BaseModel) -> dict[str, str]:

@@ -7,6 +7,7 @@ below half the sampling rate and whether the record is long enough follows from 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -31,8 +32,12 @@ SLIPPED = 0.5
 
 def edge(case: Case) -> float:
     """Return what must be simulated beyond both ends of the record, s: half the length of the anti-alias filter."""
-    rate = case.output_rate
-    ratio = round(rate / case.signal_rate)
+    return _edge(case.output_rate, case.signal_rate)
+
+
+@lru_cache(maxsize=64)
+def _edge(rate: float, signal_rate: float) -> float:
+    ratio = round(rate / signal_rate)
     if ratio == 1:
         return EDGE
     taps = decimation_taps(ratio, rate).size
@@ -84,11 +89,9 @@ def check_record(case: Case, source: str = "") -> None:
 def _check_length(case: Case, source: str) -> None:
     """Refuse a record at constant speed that is too short for its filters."""
     operation, gmf, rate = case.operation, case.mesh_frequency, case.signal_rate
-    taps = max(
-        bandpass_taps(rate, (k - HALF_WIDTH) * gmf, (k + HALF_WIDTH) * gmf, TRANSITION * gmf, ATTENUATION_DB).size
-        for k in range(1, HARMONICS + 1)
-    )
-    need = max((taps + 1) / rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / rate)
+    bands = [((k - HALF_WIDTH) * gmf, (k + HALF_WIDTH) * gmf) for k in range(1, HARMONICS + 1)]
+    taps = [bandpass_taps(rate, low, high, TRANSITION * gmf, ATTENUATION_DB).size for low, high in bands]
+    need = max((max(taps) + 1) / rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / rate)
     if operation.duration < need:
         least = math.ceil(1e4 * need) / 1e4
         raise CaseError(

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from numbers import Real
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
 
 from gearmbs.schema.messages import OWN, faults, path_of, remedy
-from gearmbs.schema.quantities import Measure
+from gearmbs.schema.quantities import Measure, counts, no_truth
 from gearmbs.units import NUMBER
 from gearmbs.wording import did_you_mean
 
@@ -139,6 +141,15 @@ class Section(BaseModel, metaclass=_OneError):
             raise CaseError(f"{self.section or 'case'}.{name}: {_unknown((name,), type(self))}")
         super().__setattr__(name, value)
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _number(cls, value: Any, info: Any) -> Any:
+        """Refuse true and false where a number is meant."""
+        field = cls.model_fields[info.field_name]
+        if counts(field.annotation) and not any(isinstance(item, Measure) for item in field.metadata):
+            return no_truth(value)
+        return value
+
     @model_validator(mode="wrap")
     @classmethod
     def _remember(cls, data: Any, handler: Any) -> Any:
@@ -159,17 +170,34 @@ class Section(BaseModel, metaclass=_OneError):
             if name in self.model_fields_set and value != field.get_default(call_default_factory=True):
                 yield name, self.written.get(name, value)
 
+    def model_copy(self, **options: Any) -> Any:
+        """Return a copy as pydantic does, without what follows from values that the copy may have others of."""
+        copy = super().model_copy(**options)
+        for name in copy.__dict__.keys() - type(self).model_fields.keys():
+            del copy.__dict__[name]
+        changed = options.get("update") or ()
+        copy.__dict__["given"] = {name: text for name, text in self.written.items() if name not in changed}
+        return copy
+
     @property
     def written(self) -> dict[str, Any]:
         """The quantities that the user wrote with units, as written."""
         return self.__dict__.get("given", {})
 
+    def settings(self) -> dict[str, Any]:
+        """Return all settings, quantities as the user wrote them, else in SI."""
+        return {**self.model_dump(), **self.written}
 
-def measures_of(kind: type[BaseModel]) -> dict[str, Measure]:
+    def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """Return all settings with some changed."""
+        return {**self.settings(), **changes}
+
+
+@cache
+def measures_of(kind: type[BaseModel]) -> Mapping[str, Measure]:
     """Return what the fields of a section measure, by name."""
-    return {
-        name: item for name, field in kind.model_fields.items() for item in field.metadata if isinstance(item, Measure)
-    }
+    items = ((name, item) for name, field in kind.model_fields.items() for item in field.metadata)
+    return MappingProxyType({name: item for name, item in items if isinstance(item, Measure)})
 
 
 def _has_text(value: Any) -> bool:

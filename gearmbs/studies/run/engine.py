@@ -29,6 +29,9 @@ POLL = 0.5
 LEASE = 1800.0
 """Seconds without a sign of life after which a claim of another machine is void."""
 
+BEAT = LEASE / 30.0
+"""Seconds between the signs of life of a job that reports progress, many to a lease: files show late elsewhere."""
+
 WRITING = 5.0
 """Seconds for which a claim that cannot be read is taken for one that is being written."""
 
@@ -45,6 +48,20 @@ class WorkerDied(RuntimeError):
     def __init__(self, message: str, job: Any = None) -> None:
         super().__init__(message)
         self.job = job
+
+
+class Results(list[Any]):
+    """Results of jobs, in order.
+
+    Attributes
+    ----------
+    left : list
+        The jobs that have none, since the time was up.
+    """
+
+    def __init__(self, results: Iterable[Any] = (), left: Iterable[Any] = ()) -> None:
+        super().__init__(results)
+        self.left = list(left)
 
 
 class Ledger(Protocol):
@@ -68,7 +85,7 @@ def run_jobs(
     ledger: Ledger | None = None,
     tries: int = 1,
     seconds: float | None = None,
-) -> list[Any]:
+) -> Results:
     """Return ``work(job, report)`` of all jobs in order.
 
     Parameters
@@ -88,7 +105,7 @@ def run_jobs(
     tries : int
         A job whose worker has died so often ends the run.
     seconds : float, optional
-        Start no job after so long; those that were not started are left out of the results.
+        Start no job after so long; those that were not started are left out of the results and are their ``left``.
 
     Raises
     ------
@@ -145,7 +162,7 @@ def run_jobs(
                     finish(k, known)
                 else:
                     (elsewhere if owner(ledger.claim(jobs[k])) else queue).append(k)
-    return [results[k] for k in sorted(results)]
+    return Results((results[k] for k in sorted(results)), [job for k, job in enumerate(jobs) if k not in results])
 
 
 @dataclass(frozen=True)
@@ -154,6 +171,19 @@ class Claim:
 
     path: Path
     attempts: int
+
+    def beating(self, report: Callable[[float], None]) -> Callable[[float], None]:
+        """Return a report of progress that gives a sign of life, now and then, as well."""
+        last = time.monotonic()
+
+        def both(number: float) -> None:
+            nonlocal last
+            if time.monotonic() - last >= BEAT:
+                last = time.monotonic()
+                self.beat()
+            report(number)
+
+        return both
 
     def beat(self) -> None:
         """Give a sign of life."""

@@ -16,7 +16,7 @@ from gearmbs.files import check_place
 from gearmbs.progress import bars
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
-from gearmbs.studies.run.engine import claimed, run_jobs
+from gearmbs.studies.run.engine import Claim, claimed, run_jobs
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
 from gearmbs.studies.run.store import RecordFolder, file_stem, record_size
 from gearmbs.studies.run.workers import processes, threads
@@ -165,11 +165,12 @@ def _carried_out(
 
     begun = False
 
-    def work(_claim: object = None) -> tuple[Any, str]:
+    def work(claim: Claim | None = None) -> tuple[Any, str]:
         nonlocal begun
         begun = True
+        told = report if claim is None else claim.beating(report)
         try:
-            record = run_case(case, lambda t: report(min(t / _span(case), 1.0)))
+            record = run_case(case, lambda t: told(min(t / _span(case), 1.0)))
         except SimulationFailed as failure:
             if not keep or isinstance(failure, SimulationInterrupted):
                 raise

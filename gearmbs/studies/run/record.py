@@ -114,7 +114,8 @@ class Recorder:
         if self._columns:
             self._columns.append(self.columns(part))
             return
-        self._model = part.over(np.empty(0), part.result.y[:0], part.result.epochs)
+        if self._model is None:
+            self._model = part.over(np.empty(0), part.result.y[:0], part.result.epochs)
         self._early.append((part.t.copy(), part.result.y.copy(), part.result.epochs[0][1]))
         if part.t[-1] < self._begin:
             return

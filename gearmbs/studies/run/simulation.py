@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Collection, Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -119,7 +120,7 @@ def simulate_case(
         Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
         without aliases; see its ``status``.
     """
-    _load_kernels(case)
+    _load_kernels(case.solver.integrator, case.solver.lump)
     mechanism = case_mechanism(case) if mechanism is None else mechanism
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.duration + edge(case)
@@ -237,7 +238,7 @@ def run_case(
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
-    _load_kernels(case)
+    _load_kernels(case.solver.integrator, case.solver.lump)
     recorder = Recorder(case)
     solution = simulate_case(case, progress, mechanism=mechanism, every_step=True, consumer=recorder.take)
     if not solution.success:
@@ -262,13 +263,14 @@ def _misplaced(name: str, value: Any) -> str:
     return f"{name}: run_case takes a case, progress, mechanism and variables; settings belong to the case"
 
 
-def _load_kernels(case: Case) -> None:
+@cache
+def _load_kernels(integrator: str, lump: bool) -> None:
     """Import the kernels of a run before the first is called, so that all that are missing are compiled at once."""
     with uncollected():
         contact_kernels()
-        for name in (*KERNELS, *(LUMPED_KERNELS if case.solver.lump else ())):
+        for name in (*KERNELS, *(LUMPED_KERNELS if lump else ())):
             importlib.import_module(name)
-        INTEGRATORS[case.solver.integrator.upper()].load()
+        INTEGRATORS[integrator].load()
 
 
 def _partial(case: Case, solution: Solution, recorder: Recorder, mechanism: Mechanism | None) -> xr.Dataset | None:

@@ -231,7 +231,8 @@ def _check_field(case: Case, field: str) -> None:
 
 def _measure(case: Case, field: str) -> Any:
     section, _, name = field.partition(".")
-    return measures_of(type(getattr(case, section))).get(name)
+    settings: Section = getattr(case, section)
+    return measures_of(type(settings)).get(name)
 
 
 def _value(case: Case, field: str) -> float:

@@ -181,11 +181,26 @@ def _serve(work: Work, connection: Connection) -> None:
             job = connection.recv()
         except (EOFError, ConnectionError):
             return
-        kind, value = outcome(work, job, lambda number: connection.send((PROGRESS, number)))
+        except Exception as error:
+            kind, value = (
+                FAILURE,
+                RuntimeError(
+                    f"a job cannot be read in its worker process ({type(error).__name__}: {error}); what it is made of "
+                    "must be in modules that can be imported there"
+                ),
+            )
+        else:
+            kind, value = outcome(work, job, lambda number: connection.send((PROGRESS, number)))
         try:
             connection.send((kind, _portable(value) if kind == FAILURE else value))
         except ConnectionError:
             return
+        except Exception as error:
+            cause = RuntimeError(
+                f"the result of {job!r}, of type {type(value).__name__}, cannot be sent from its worker process "
+                f"({type(error).__name__}: {error}); return what can be pickled, or run in threads"
+            )
+            connection.send((FAILURE, cause))
 
 
 def _portable(error: Exception) -> Exception:

@@ -407,3 +407,63 @@ def test_quasi_static_snap_through():
     assert z[0] > 0.29
     assert z[-1] < -0.3
     assert np.diff(z).min() < -0.4
+
+
+def train(rng: np.random.Generator, slow: bool, spin: float) -> tuple[Mechanism, np.ndarray, np.ndarray, np.ndarray]:
+    """Return wheels about one axis in space with dampers between them and to the ground, inertias, K and C.
+
+    Some of the dampers to the ground have a soft spring beside them, if ``slow``.
+    """
+    n, m = int(rng.integers(1, 5)), Mechanism("train")
+    axis = rng.normal(size=3) if rng.random() < 0.5 else np.eye(3)[rng.integers(3)]
+    axis = axis / np.linalg.norm(axis)
+    inertia, stiffness, damping = 10.0 ** rng.uniform(-2, 2, n), np.zeros((n, n)), np.zeros((n, n))
+    pins = []
+    for k in range(n):
+        wheel = m.body(f"wheel{k}", mass=1.0, inertia=(inertia[k],) * 3, angular_velocity=tuple(spin * axis))
+        pins.append(m.revolute(f"pin{k}", wheel, m.ground, at=(0, 0, 0), axis=tuple(axis)))
+    held = rng.random(n) < 0.5
+    held[rng.integers(n)] |= slow
+    ties = [(k, k - 1) for k in range(1, n) if rng.random() < 0.7] + [(int(k), -1) for k in np.flatnonzero(held)]
+    for k, other in ties:
+        c = 10.0 ** rng.uniform(-2, 2)
+        soft = c * 10.0 ** rng.uniform(-5, -3) + 1e-7 * spin**2 * inertia.sum() if slow and other < 0 else 0.0
+        m.torsion_spring(
+            f"{k} {other}", pins[k].i, pins[k].j if other < 0 else pins[other].i, stiffness=soft, damping=c
+        )
+        apart = np.eye(n)[k] - (np.eye(n)[other] if other >= 0 else 0.0)
+        stiffness += soft * np.outer(apart, apart)
+        damping += c * np.outer(apart, apart)
+    return m, inertia, stiffness, damping
+
+
+@pytest.mark.parametrize("number", range(60))
+def test_motions_that_nothing_but_dampers_resist_are_rigid_and_slow_decays_are_not(number):
+    """At any speed, also while dampers brake the wheels: as many as K has null directions, and no others."""
+    rng = np.random.default_rng([41, number])
+    slow, spin = number % 3 == 0, 10.0 ** rng.uniform(-1, 2.5) if number % 2 == 0 else 0.0
+    m, inertia, stiffness, damping = train(rng, slow, spin)
+    found = linear_modes(m)
+    sizes = np.linalg.eigvalsh(stiffness)
+    assert found.kinds.count("rigid") == int(np.sum(sizes <= 1e-12 * sizes[-1]))
+    assert found.stable
+    n = len(inertia)
+    first = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness / inertia[:, None], -damping / inertia[:, None]]])
+    rates = np.sort(np.linalg.eigvals(first).real)
+    got = np.sort(np.repeat(found.eigenvalues.real, 1 + (found.eigenvalues.imag > 0.0)))
+    for s in got[got < 0.0]:
+        assert np.abs(rates / s - 1.0).min() < 1e-2
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize(("inertia", "damping"), [(1e6, 1e-6), (1.0, 1e-9), (0.2, 1e-13)])
+def test_a_soft_damper_on_a_large_inertia_decays(inertia, damping, beside):
+    m = Mechanism("slow")
+    wheel = m.body("wheel", mass=1.0, inertia=(inertia,) * 3)
+    pin = m.revolute("pin", wheel, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.torsion_spring("damper", pin.i, pin.j, stiffness=0.0, damping=damping)
+    if beside:
+        m.revolute("free", m.body("base", mass=1.0, inertia=(1.0, 1.0, 1.0)), m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    found = linear_modes(m)
+    assert found.kinds == ["rigid"] * (1 + beside) + ["damped rigid"]
+    assert found.eigenvalues[-1].real == pytest.approx(-damping / inertia, rel=1e-6)

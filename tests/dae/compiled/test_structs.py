@@ -60,6 +60,38 @@ def test_an_array_replaced_in_python_is_the_one_compiled_code_sees():
     assert work(st, 0) == 60.0
 
 
+def test_scalars_take_numbers_of_numpy_and_nothing_of_another_kind():
+    st = sample()
+    st.h, st.order, st.open = np.int64(2), np.int32(5), np.bool_(True)
+    assert [(type(value), value) for value in (st.h, st.order, st.open)] == [(float, 2.0), (int, 5), (bool, True)]
+    assert work(st, 0) == 3.0 + 3.0
+    assert st.order == 11
+    for name, wrong in (("h", "2"), ("order", 2.5)):
+        with pytest.raises(TypeError):
+            setattr(st, name, wrong)
+
+
+class Twin(Struct):
+    h: float
+    order: int
+    open: bool
+    y: IntVector
+    rows: Matrix
+    marks: IntVector
+
+
+@njit
+def first(st):
+    """Return an entry of an array that is of another kind in each of two structs."""
+    return st.y[0]
+
+
+def test_structs_with_the_same_record_and_other_arrays_are_told_apart():
+    whole = np.full(3, 7)
+    twin = Twin(y=whole, rows=np.zeros((2, 3)), marks=whole)
+    assert [type(first(st)) for st in (sample(), twin, sample(), twin)] == [float, int, float, int]
+
+
 def test_a_copy_has_memory_of_its_own():
     st = sample()
     other = pickle.loads(pickle.dumps(st))
@@ -80,7 +112,7 @@ def test_an_array_of_another_kind_is_refused(wrong):
 def test_unknown_and_missing_members_are_named():
     with pytest.raises(TypeError, match="missing marks, rows"):
         Sample(y=np.ones(1))
-    with pytest.raises(AttributeError, match="no member 'size'"):
+    with pytest.raises(AttributeError, match="'Sample' object has no attribute 'size'"):
         sample().size = 1.0
     with pytest.raises(AttributeError, match="no member 'size'"):
         _ = sample().size

@@ -222,3 +222,30 @@ def test_a_multiplier_beside_what_is_zero_at_the_start(weight, method):
     assert "could not" not in found.message
     _, y, u, v, tension = found.y.T
     np.testing.assert_allclose(tension, u**2 + v**2 - weight * y, rtol=1e-5, atol=1e-5 * abs(weight))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("loads", ["none", "before", "behind"])
+def test_a_multiplier_at_a_breakpoint_is_that_of_one_side(loads, method):
+    """Of x = sin t + 2 max(0, t - b), and of loads on it that jump at b, which belongs to either side."""
+    b = 0.7
+
+    def kinked(t, y, yp, out):
+        pushed = 0.0 if loads == "none" or t < b or (t == b and loads == "before") else 5.0
+        out[0] = yp[0] - y[1] - y[2] - pushed
+        out[1] = yp[1] + y[0]
+        out[2] = y[0] - np.sin(t) - 2.0 * max(0.0, t - b)
+
+    times = np.array([0.0, 0.3, b - 1e-4, np.nextafter(b, 0.0), b, np.nextafter(b, 1.0), b + 1e-9, b + 1e-5, 1.4, 2.0])
+    behind = np.maximum(times - b, 0.0)
+    speed = np.cos(times) - 1.0 - behind**2
+    moved = (times > b) | ((times == b) & (loads == "behind"))
+    multiplier = np.cos(times) + 2.0 * moved - speed - 5.0 * moved * (loads != "none")
+    more = {"dense_output": True} if method in BDF else {}
+    found = solve_dae(
+        kinked, (0.0, 2.0), [0.0, 0.0, 1.0], method=method, breakpoints=[b], t_eval=times, rtol=1e-8, atol=1e-8, **more
+    )
+    assert found.success, found.message
+    np.testing.assert_allclose(found.y[:, 2], multiplier, atol=2e-6)
+    if more:
+        np.testing.assert_allclose(found.sol(times[1:])[:, 2], multiplier[1:], atol=2e-6)

@@ -154,6 +154,11 @@ def test_resume_after_the_step_limit_and_refusal_after_success():
         resume(whole)
 
 
+def test_whole_numbers_of_options_may_be_floats():
+    part = solve_wstiff(pendulum(), TIMES, tol=1e-6, max_steps=4e1, max_order=4.0, max_iterations=8.0)
+    assert part.stats.steps == 40
+
+
 def test_progress_rises_to_the_end():
     seen = []
     solve_wstiff(pendulum(), TIMES, tol=1e-8, progress=seen.append)

@@ -207,7 +207,7 @@ def test_growing_entries_ask_for_stricter_pivots():
                 dense[k, j] = rng.choice([-1, 1]) * (0.011 if rng.random() < 0.6 else 1.0)
     indptr, indices, vals = csc(dense)
     n, size = len(indptr) - 1, 8 * len(indices)
-    lines = new_lines(n, size, True), new_lines(n, size, False)
+    lines = new_lines(n, size)
     growth = [choose_pivots(indptr, indices, vals, 1e-14, threshold, *lines)[1] for threshold in THRESHOLDS[:2]]
     assert growth[0] > GROWTH_ALLOWED > 10.0 * growth[1]
     x = rng.normal(size=n)
@@ -224,7 +224,7 @@ def test_fill_that_does_not_fit_is_told_and_given_room():
     indptr, indices, vals = csc(dense)
 
     def pivots(size):
-        lines = new_lines(n, size, True), new_lines(n, size, False)
+        lines = new_lines(n, size)
         return choose_pivots(indptr, indices, vals, 1e-14, 0.1, *lines)
 
     assert pivots(len(indices) + 2)[0] == -1

@@ -65,6 +65,22 @@ def slider_crank() -> Mechanism:
     return m
 
 
+def test_constraints_are_the_same_in_any_company():
+    """The tables are shared by all configurations of a system; on the way bodies change their Euler references."""
+    system = slider_crank().compile()
+    axes = np.array([[1.0, 2.0, -0.5], [0.3, -1.0, 2.0], [2.0, 0.1, 1.0]])
+    steps = [np.concatenate([[0.0, 0.0, 0.0, *(s * axis)] for axis in axes]) for s in np.linspace(0.0, 1.5, 7)]
+    places = [system.configuration.displaced(step) for step in steps]
+    times = np.linspace(0.0, 0.3, 7)
+    found = system.constraint_jacobians(np.array([place.pose for place in places]), times)
+    references = set()
+    for place, t, jacobian in zip(places, times, found):
+        alone = slider_crank().compile()
+        references.add(tuple(alone.assembler.at(place, t, None, alone.state_start).codes))
+        np.testing.assert_array_equal(jacobian.toarray(), alone.constraint_jacobian(place, t)[0].toarray())
+    assert len(references) > 1
+
+
 def test_outputs_whose_pivots_do_not_fit_get_new_ones():
     """With a bound on the growth that eleven rows keep and later ones exceed, plans change on the way."""
     solution = slider_crank().simulate(2.0, rate=60.0)

@@ -135,20 +135,29 @@ def update_body(y, at, code, body_row, modal, partial, turn, first, row, moment)
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def body_residual(y, yp, at, body_row, gravity, modal, partial, kin, out):
-    """Write a body's rows of eq. (5) and (6) without loads and constraints; parameters as of `modal_residual`."""
+    """Write a body's rows of eq. (5) and (6) without loads and constraints.
+
+    Parameters
+    ----------
+    y, yp, out : ndarray
+        Unknowns and their rates; the residual.
+    at, body_row, kin : ndarray
+        The body's places, its mass and inertia, its row of the kinematics table.
+    gravity : ndarray, shape (3,)
+        m/s^2.
+    modal, partial : ndarray
+        Numbers and present state of modal bodies.
+    """
     u, r = at[T.AT_U], at[T.AT_R]
-    mass = body_row[T.BODY_MASS]
+    for c in range(3):
+        out[u + c] = body_row[T.BODY_MASS] * (yp[u + c] - gravity[c])
+        out[r + c] = y[u + c] - yp[r + c]
     if not has_angles(at):
-        for c in range(3):
-            out[u + c] = mass * (yp[u + c] - gravity[c])
-            out[r + c] = y[u + c] - yp[r + c]
         return
     p, e, th = at[T.AT_P], at[T.AT_EPS], at[T.AT_THETA]
     for c in range(3):
-        out[u + c] = mass * (yp[u + c] - gravity[c])
         out[p + c] = yp[p + c] - dot3(kin, KIN_ADOT + 3 * c, kin, KIN_H)
         out[e + c] = y[p + c] - dot3(kin, KIN_AXES + 3 * c, kin, KIN_H)
-        out[r + c] = y[u + c] - yp[r + c]
         out[th + c] = y[e + c] - yp[th + c]
     if at[T.AT_MODES] > 0:
         modal_residual(y, yp, at, modal, partial, kin, out)
@@ -158,15 +167,13 @@ def body_residual(y, yp, at, body_row, gravity, modal, partial, kin, out):
 def add_wrench(at, row, out):
     """Bring the forces added up in a body's row of the kinematics table to its rows of eq. (5), and mu to eq. (6)."""
     u, r = at[T.AT_U], at[T.AT_R]
-    if not has_angles(at):
-        for c in range(3):
-            out[u + c] += row[KIN_FORCE + c]
-            out[r + c] -= row[KIN_SHIFT + c]
-        return
-    p, th = at[T.AT_P], at[T.AT_THETA]
     for c in range(3):
         out[u + c] += row[KIN_FORCE + c]
         out[r + c] -= row[KIN_SHIFT + c]
+    if not has_angles(at):
+        return
+    p, th = at[T.AT_P], at[T.AT_THETA]
+    for c in range(3):
         out[p + c] += dot3(row, KIN_AXES + 3 * c, row, KIN_MOMENT)
         out[th + c] -= dot3(row, KIN_AXES + 3 * c, row, KIN_TURN)
 
@@ -176,7 +183,13 @@ def add_wrench(at, row, out):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def rigid_entries(mode, cj, y, at, body_row, kin, s, slot, vals, k):
-    """Hand over the inertia terms of eq. (5) and (6) of a body that turns; parameters as of `body_entries`."""
+    """Hand over the inertia terms of eq. (5) and (6) of a body that turns; return the number of the next entry.
+
+    Parameters
+    ----------
+    mode, cj, y, at, body_row, kin, s, slot, vals, k
+        As of `body_entries`.
+    """
     u, p, e, r, th = at[T.AT_U], at[T.AT_P], at[T.AT_EPS], at[T.AT_R], at[T.AT_THETA]
     mass = body_row[T.BODY_MASS]
     for m in range(3):

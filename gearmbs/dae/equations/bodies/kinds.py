@@ -18,17 +18,23 @@ class BodyKind:
     ----------
     name : str
         For messages.
-    angles : int
-        Euler angles among its coordinates, 3 or 0; without them it keeps the orientation it starts with.
+    directions : tuple of int
+        In which of the six spatial displacements, rotations last, it can move; without rotations it keeps the
+        orientation it starts with.
     lumps : bool
         Whether it may be integrated as one with what it is fixed to, or by an angle about a fixed axis alone.
     """
 
     name: str
-    angles: int = 3
+    directions: tuple[int, ...] = tuple(range(6))
     lumps: bool = False
+
+    @property
+    def angles(self) -> int:
+        """Number of Euler angles among its coordinates."""
+        return sum(direction >= 3 for direction in self.directions)
 
 
 RIGID = BodyKind("rigid body", lumps=True)
 MODAL = BodyKind("body with modes")
-POINT_MASS = BodyKind("point mass", angles=0)
+POINT_MASS = BodyKind("point mass", directions=(0, 1, 2))
