@@ -1,19 +1,23 @@
-"""One case of a unit, carried out here or in a process of its own."""
+"""One case of a unit, within limits of processor time and memory, carried out here or in a process of its own."""
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import errno
 import os
 import pickle
+import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gearmbs.campaigns.folder import Folder, check_signals
-from gearmbs.campaigns.limits import TimeLimitReached, limited
 from gearmbs.campaigns.settings import content_key
 from gearmbs.campaigns.subjects.base import DIED, FAILED, MEMORY, TIME, Kept, Outcome
 
@@ -22,6 +26,9 @@ DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO}
 
 DEATHS = 2
 """A case whose own process has died so often is recorded as the cause."""
+
+_ALONE = threading.Lock()
+"""Held while a bound of memory is in force, which is the whole process's."""
 
 
 @dataclass
@@ -171,6 +178,134 @@ def serve(path: str | Path) -> None:
             answer = ("error", error)
         pickle.dump(answer, sink)
         sink.flush()
+
+
+# Limits of processor time and memory.
+
+
+class TimeLimitReached(RuntimeError):
+    """A case has used up its processor time."""
+
+
+@contextlib.contextmanager
+def limited(seconds: float | None, memory: float | None) -> Iterator[Callable[[float], None]]:
+    """Bound what is done inside; yield a progress function that checks the time.
+
+    Parameters
+    ----------
+    seconds : float, optional
+        Of this thread's processor time. Python code that reports no progress is interrupted, too: by a timer in a main
+        thread, in others, as those of Dask's workers, by a thread that looks at the clock.
+    memory : float, optional
+        Bytes that may be allocated beyond what the process has: more raises MemoryError. Without effect where the
+        system cannot tell how much that is. Threads of one process wait for each other, since the bound of one would
+        be that of its neighbours.
+
+    Raises
+    ------
+    TimeLimitReached
+    """
+    end = None if seconds is None else time.thread_time() + seconds
+
+    def check(fraction: float) -> None:
+        if end is not None and time.thread_time() > end:
+            raise TimeLimitReached(f"more than {seconds:g} s of processor time, at {100 * fraction:.0f} % of the run")
+
+    with _timer(seconds), _memory(memory):
+        yield check
+
+
+@contextlib.contextmanager
+def _timer(seconds: float | None) -> Iterator[None]:
+    if seconds is None:
+        yield
+        return
+    message = f"more than {seconds:g} s of processor time"
+    # a little later than the check between steps, which can say how far the run has come
+    allowed = 1.1 * seconds + 0.1
+    if threading.current_thread() is threading.main_thread() and hasattr(signal, "SIGPROF"):
+        with _alarm(allowed, message):
+            yield
+    elif hasattr(time, "pthread_getcpuclockid"):
+        with _watched(allowed, message):
+            yield
+    else:
+        yield
+
+
+@contextlib.contextmanager
+def _alarm(allowed: float, message: str) -> Iterator[None]:
+    def late(*_args) -> None:
+        raise TimeLimitReached(message)
+
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, allowed)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+@contextlib.contextmanager
+def _watched(allowed: float, message: str) -> Iterator[None]:
+    """Interrupt this thread from another one, which looks at its processor time."""
+
+    class Late(TimeLimitReached):
+        def __init__(self) -> None:
+            # the interpreter makes it of the class alone
+            super().__init__(message)
+
+    interrupt = ctypes.pythonapi.PyThreadState_SetAsyncExc
+    me = ctypes.c_ulong(threading.get_ident())
+    clock = time.pthread_getcpuclockid(threading.get_ident())
+    end = time.clock_gettime(clock) + allowed
+    over, deciding = threading.Event(), threading.Lock()
+
+    def watch() -> None:
+        # processor time never runs faster than the clock on the wall
+        while not over.wait(max(0.01, end - time.clock_gettime(clock))):
+            with deciding:
+                if not over.is_set() and time.clock_gettime(clock) >= end:
+                    interrupt(me, ctypes.py_object(Late))
+                    return
+
+    threading.Thread(target=watch, daemon=True).start()
+    try:
+        yield
+    finally:
+        with deciding:
+            over.set()
+            # what was sent and has not arrived must not hit the next case
+            interrupt(me, None)
+
+
+@contextlib.contextmanager
+def _memory(limit: float | None) -> Iterator[None]:
+    if limit is None or _address_space() is None:
+        yield
+        return
+    import resource
+
+    with _ALONE:
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        bound = int((_address_space() or 0) + limit)
+        if hard != resource.RLIM_INFINITY:
+            bound = min(bound, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def _address_space() -> int | None:
+    try:
+        import resource
+
+        return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    except (OSError, ImportError):
+        return None
 
 
 if __name__ == "__main__":

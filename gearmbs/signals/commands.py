@@ -92,6 +92,49 @@ def sample_units(text: str | None) -> str | dict[str, str] | None:
     return found
 
 
+def parse_speed(text: str | None) -> Any:
+    """The speed (rad/s) that a text such as "1500 rpm" means, or the curve in the file that it names.
+
+    The file may be of any format that is read. Of several columns beside the times the one is taken that is called
+    speed or rpm, in the unit that its label names.
+
+    Raises
+    ------
+    SignalError
+        If the file has no such column, or its unit is not one of rotation.
+    ValueError
+        If the text is no speed.
+    """
+    if text is None:
+        return None
+    if not Path(text).is_file():
+        from gearmbs.units import to_si
+
+        return to_si(text, "angular speed", "--speed")
+    from gearmbs.signals import SignalError, read_signal
+    from gearmbs.signals.rotation.shaft import speed_of_channel
+    from gearmbs.signals.signal.record import SHAFT_FREQUENCIES, SPEED_NAMES, key_of, name_and_unit
+
+    signal = read_signal(text)
+    names = [str(c) for c in signal["channel"].values]
+    if len(names) > 1:
+        keys = [key_of(name_and_unit(name)[0])[0] for name in names]
+        found = [n for n, k in zip(names, keys) if k in SPEED_NAMES | SHAFT_FREQUENCIES or "speed" in k or "rpm" in k]
+        if len(found) != 1:
+            raise SignalError(f"speed: {text} holds {names}; leave the column of the speed and that of the times")
+        names = found
+    try:
+        curve = speed_of_channel(signal, names[0])
+    except SignalError:
+        unit = str(signal["units"].sel(channel=names[0]).values)
+        source = signal.attrs.get("source", "the file")
+        raise SignalError(
+            f"speed: {source} has {names[0]!r} in {unit!r}; write its unit, rpm, Hz or rad/s, into its label, "
+            f"'{names[0]} [rpm]'"
+        ) from None
+    return curve.assign_coords(time=signal["time"].values)
+
+
 def tooth_counts(text: str) -> tuple[int, ...]:
     """Return the counts of a text such as "32" or "32,80"."""
     try:
@@ -198,7 +241,6 @@ def analyse(
         check_kind(file, "record")
         check_targets(out, tables=tables, figures=figures)
         from gearmbs.signals.files.simulated import read_any
-        from gearmbs.signals.rotation.speed_file import parse_speed
 
         helpers = [name for name in (tacho, speed_channel) if name and name not in (channel or ())]
         signal = read_any(
@@ -315,7 +357,6 @@ def trend(
         from gearmbs.files import write_whole
         from gearmbs.signals import series, trend_table
         from gearmbs.signals import trend as follow
-        from gearmbs.signals.rotation.speed_file import parse_speed
 
         known: dict[str, Any] = {
             "teeth": None if teeth is None else tooth_counts(teeth),
@@ -382,7 +423,6 @@ def compare(
         check_targets(out, tables=tables, figures=figures)
         from gearmbs.signals import compare as compare_signals
         from gearmbs.signals.files.simulated import parse_models, parse_states, read_any
-        from gearmbs.signals.rotation.speed_file import parse_speed
 
         for item in (*experiment, *(model or ())):
             check_kind(Path(item.partition("=")[2] or item), "record")
@@ -448,7 +488,6 @@ def waterfall(
         check_targets(out=out)
         from gearmbs.signals import waterfall as spectra_over_speed
         from gearmbs.signals.files.simulated import read_any
-        from gearmbs.signals.rotation.speed_file import parse_speed
         from gearmbs.view import changing_speed_figures, waterfall_plot
 
         helpers = [name for name in (tacho, speed_channel) if name]

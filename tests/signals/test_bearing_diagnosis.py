@@ -21,8 +21,8 @@ from gearmbs.signals import (
     spectrum,
     with_metadata,
 )
-from gearmbs.signals.bearings.judgement import EnvelopeSpectrum, find_lines, judge, log_tail, power_of
-from gearmbs.signals.bearings.report import PartFinding
+from gearmbs.signals.diagnosis.bearing_judgement import EnvelopeSpectrum, find_lines, judge, log_tail, power_of
+from gearmbs.signals.diagnosis.bearing_report import PartFinding
 from tests.says import says
 from tests.view.looking import assert_readable
 

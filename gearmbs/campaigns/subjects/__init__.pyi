@@ -3,9 +3,9 @@ from .base import Outcome as Outcome
 from .base import Subject as Subject
 from .base import make_subject as make_subject
 from .base import subject_kinds as subject_kinds
-from .bearing import BearingSubject as BearingSubject
 from .deck import DeckSubject as DeckSubject
-from .drivetrain import DrivetrainSubject as DrivetrainSubject
-from .drivetrain import PlanetarySubject as PlanetarySubject
 from .function import FunctionSubject as FunctionSubject
 from .pair import PairSubject as PairSubject
+from .tables import BearingSubject as BearingSubject
+from .tables import DrivetrainSubject as DrivetrainSubject
+from .tables import PlanetarySubject as PlanetarySubject

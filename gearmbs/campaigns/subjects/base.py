@@ -23,9 +23,9 @@ KINDS = {
     "pair": "gearmbs.campaigns.subjects.pair:PairSubject",
     "function": "gearmbs.campaigns.subjects.function:FunctionSubject",
     "deck": "gearmbs.campaigns.subjects.deck:DeckSubject",
-    "drivetrain": "gearmbs.campaigns.subjects.drivetrain:DrivetrainSubject",
-    "planetary": "gearmbs.campaigns.subjects.drivetrain:PlanetarySubject",
-    "bearing": "gearmbs.campaigns.subjects.bearing:BearingSubject",
+    "drivetrain": "gearmbs.campaigns.subjects.tables:DrivetrainSubject",
+    "planetary": "gearmbs.campaigns.subjects.tables:PlanetarySubject",
+    "bearing": "gearmbs.campaigns.subjects.tables:BearingSubject",
     "paper claims": "gearmbs.campaigns.subjects.claims:ClaimsSubject",
 }
 """Subjects that come with the package; a plan may also name one as ``"module:Class"``."""

@@ -25,10 +25,10 @@ from gearmbs.signals.analysis.report import (
     strongest_lines,
 )
 from gearmbs.signals.analysis.vibration import VibrationReport, vibration_report
+from gearmbs.signals.diagnosis.planetary import PlanetaryReport, diagnose_planetary
+from gearmbs.signals.diagnosis.planetary_averages import planetary_lines
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.files.simulated import read_any
-from gearmbs.signals.planetary.averages import planetary_lines
-from gearmbs.signals.planetary.diagnosis import PlanetaryReport, diagnose_planetary
 from gearmbs.signals.rotation.angular import angular_resample, samples_per_revolution, time_synchronous_average
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, mesh_shaft
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed

@@ -296,7 +296,7 @@ def speed_attributes(held: dict[str, HeldSpeed]) -> dict[str, Any]:
     }
 
 
-def warn_of_speeds(train: Drivetrain, held: dict[str, HeldSpeed], stacklevel: int = 4) -> None:
+def warn_of_speeds(train: Drivetrain, held: dict[str, HeldSpeed]) -> None:
     """Warn of speeds that are not steady, or far from the nominal ones.
 
     Warns
@@ -309,5 +309,5 @@ def warn_of_speeds(train: Drivetrain, held: dict[str, HeldSpeed], stacklevel: in
         warnings.warn(
             f"drivetrain '{train.name}': {remark}; give a drive that carries the load at its speed, longer "
             "run.settling, or a SpeedDrive with curve for a run-up",
-            stacklevel=stacklevel,
+            stacklevel=4,
         )

@@ -34,9 +34,9 @@ from gearmbs.view.figures.style import (
     GREY,
     RATE,
     VERMILLION,
+    drawing,
     drawn_on,
     label,
-    legend_below,
     look,
     new_figure,
     png_bytes,
@@ -187,8 +187,7 @@ def modal_energy_plot(
     """Draw the strain energy of a body by mode over time: of the ``shown`` modes with most of it, and of the rest."""
     energy = model.strain_energies(solution.modal_coordinates(body))
     order = np.argsort(energy.mean(axis=0))[::-1]
-    with look():
-        figure, panel = drawn_on(ax)
+    with drawing(ax, legend=3) as (figure, panel):
         for rank, k in enumerate(order[:shown]):
             text = f"mode {k + 1}, {model.frequencies[k]:.4g} Hz"
             panel.plot(solution.t, energy[:, k], color=COLOURS[rank % len(COLOURS)], label=text)
@@ -196,7 +195,6 @@ def modal_energy_plot(
             panel.plot(solution.t, energy[:, order[shown:]].sum(axis=1), color="0.6", label="all others")
         panel.set_xlabel(label("time", "s"))
         panel.set_ylabel(label("strain energy", "J"))
-        legend_below(panel)
     return figure
 
 
@@ -219,8 +217,7 @@ def whirl_plot(
     # a pair that is equal at rest begins the curves into which it splits
     ways = np.where(diagram.directions == "planar", np.roll(diagram.directions, -1, axis=0), diagram.directions)
     ways[-1] = diagram.directions[-1]
-    with look():
-        figure, panel = drawn_on(ax)
+    with drawing(ax, legend=3) as (figure, panel):
         for kind, dash in DASHES.items():
             kept = np.where(ways == kind, frequency, np.nan)
             if np.all(np.isnan(kept)):
@@ -237,7 +234,6 @@ def whirl_plot(
         panel.set_ylim(0.0, top)
         panel.set_xlabel(label("speed", "rpm"))
         panel.set_ylabel(label("natural frequency", "Hz"))
-        legend_below(panel)
     return figure
 
 
@@ -371,8 +367,7 @@ def campbell_plot(
     operating = diagram.attrs.get("operating_speed") if operating is None else operating
     highest = in_si(maximum, "frequency", "maximum")
     top = 1.1 * float(np.nanmax(diagram["frequency"].values)) if highest is None else float(highest)
-    with look():
-        figure, panel = drawn_on(ax, 7.2, 4.6)
+    with drawing(ax, 7.2, 4.6, title=title, legend=3) as (figure, panel):
         if measured is not None:
             table = one_channel(upto(measured, "frequency", top), channel)
             draw_map(figure, panel, by_speed(table), "speed", "frequency", RANGE_DB)
@@ -402,9 +397,6 @@ def campbell_plot(
         panel.set_ylim(0.0, top)
         panel.set_xlabel("speed, rpm")
         panel.set_ylabel("frequency, Hz")
-        legend_below(panel, 3)
-        if title:
-            panel.set_title(title, wrap=True)
     return figure
 
 

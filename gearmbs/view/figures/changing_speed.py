@@ -16,7 +16,7 @@ from scipy.signal import find_peaks
 from gearmbs.progress import waiting
 from gearmbs.signals import order_map, order_track, spectrogram, waterfall
 from gearmbs.signals.signal.any_data import in_si
-from gearmbs.view.figures.style import BLACK, COLOURS, VERMILLION, drawn_on, label, legend_below, look, scaling_name
+from gearmbs.view.figures.style import BLACK, COLOURS, VERMILLION, drawing, label, scaling_name
 
 # What figures over time, speed, frequency and order share: maps in decibels, stacked lines, marks of orders.
 
@@ -256,8 +256,7 @@ def spectrogram_plot(
     if not (isinstance(data, xr.DataArray) and {"time", "frequency"} <= set(data.dims)):
         data = spectrogram(data, maximum=maximum, **settings)
     table = one_channel(upto(data, "frequency", maximum), channel)
-    with look():
-        figure, panel = drawn_on(ax, 7.2, 4.0)
+    with drawing(ax, 7.2, 4.0) as (figure, panel):
         draw_map(figure, panel, table, "time", "frequency", decibels)
         panel.set_xlabel("time, s")
         panel.set_ylabel("frequency, Hz")
@@ -305,8 +304,7 @@ def order_map_plot(
     table = one_channel(upto(data, "order", maximum), channel)
     if over == "speed":
         table = by_speed(table)
-    with look():
-        figure, panel = drawn_on(ax, 7.2, 4.0)
+    with drawing(ax, 7.2, 4.0) as (figure, panel):
         draw_map(figure, panel, table, "order", over, decibels)
         panel.set_xlabel("order of the shaft's speed")
         panel.set_ylabel("time, s" if over == "time" else "speed, rpm")
@@ -360,8 +358,7 @@ def waterfall_plot(
     if not (isinstance(data, xr.DataArray) and {"speed", "frequency"} <= set(data.dims)):
         data = waterfall(data, maximum=maximum, **settings)
     table = one_channel(upto(data, "frequency", maximum), channel)
-    with look():
-        figure, panel = drawn_on(ax, 7.2, 5.0)
+    with drawing(ax, 7.2, 5.0) as (figure, panel):
         if style == "map":
             draw_map(figure, panel, by_speed(table), "frequency", "speed", decibels or RANGE_DB)
         else:
@@ -409,8 +406,7 @@ def order_track_plot(
         data = order_track(data, **settings)
     table = one_channel(data, channel)
     x = table["time"].values if over == "time" else table["speed"].values * RPM
-    with look():
-        figure, panel = drawn_on(ax, 7.2, 3.6)
+    with drawing(ax, 7.2, 3.6, legend=5) as (figure, panel):
         for k, colour in zip(range(table.sizes["order"]), repeated(COLOURS)):
             order = float(table["order"].values[k])
             panel.plot(x, table.isel(order=k).values, color=colour, label=f"order {order:g}")
@@ -421,7 +417,6 @@ def order_track_plot(
         panel.margins(x=0)
         panel.set_xlabel("time, s" if over == "time" else "speed, rpm")
         panel.set_ylabel(label(scaling_name(table.attrs.get("scaling")), table.attrs["units"]))
-        legend_below(panel, 5)
         put_title(panel, title, data, table)
     return figure
 

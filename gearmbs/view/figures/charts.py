@@ -11,9 +11,9 @@ from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 
 from gearmbs.view.figures.style import (
+    drawing,
     drawn_on,
     label,
-    legend_below,
     look,
     new_figure,
     state_colour,
@@ -63,15 +63,11 @@ def gmf_bars(
         If dimensions are missing or a value is negative or not finite.
     """
     table = checked_table(table, "table", ("state", "harmonic"))
-    with look():
-        figure, ax = drawn_on(ax, 6.4, 4.2)
+    with drawing(ax, 6.4, 4.2, title=title, legend=3) as (figure, ax):
         states = [str(s) for s in table.state.values]
         bars(ax, table, "state", [state_colour(s, k) for k, s in enumerate(states)], state_labels(table), values, log)
         harmonic_axis(ax, table)
         ax.set_ylabel(label(rms_name(table), unit or table.attrs.get("units", "")))
-        if title:
-            ax.set_title(title, wrap=True)
-        legend_below(ax)
     return figure
 
 

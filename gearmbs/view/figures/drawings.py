@@ -25,8 +25,7 @@ from gearmbs.view.figures.style import (
     ORANGE,
     PURPLE,
     VERMILLION,
-    drawn_on,
-    legend_below,
+    drawing,
     look,
     new_figure,
 )
@@ -97,8 +96,7 @@ def mesh_view(
     span = 7.0 * pair.driver.module if width is None else float(width)
     if not span > 0.0:
         raise ValueError(f"width is {width} m; give a positive width of the detail")
-    with look():
-        figure, ax = drawn_on(ax, 7.0, 6.6)
+    with drawing(ax, 7.0, 6.6, title=title) as (figure, ax):
         mean = mean_frame(place)
         draw_wheels(ax, pair, place, mean, section, exaggeration)
         draw_lines(ax, pair)
@@ -109,8 +107,6 @@ def mesh_view(
         ax.set_aspect("equal")
         ax.set_xlabel("along the line of centres, mm")
         ax.set_ylabel("across, mm")
-        if title:
-            ax.set_title(title, wrap=True)
         _legend(ax, exaggeration)
     return figure
 
@@ -268,8 +264,7 @@ def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = No
     >>> figure.axes[0].get_title(loc="left")
     'gear: 20 teeth, module 2 mm, face 20 mm'
     """
-    with look():
-        figure, ax = drawn_on(ax, 5.2, 5.6)
+    with drawing(ax, 5.2, 5.6, legend=2) as (figure, ax):
         turn = np.linspace(0.0, 2.0 * np.pi, 361)
         outline = gear_outline(gear) * MM
         body, empty = "#DCE8F3", "white"
@@ -295,7 +290,6 @@ def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = No
         helix = f", helix {shown(gear.helix_angle, 'deg', '.4g')}" if gear.helix_angle else ""
         sizes = f"module {shown(gear.module, 'mm', '.4g')}, face {shown(gear.face_width, 'mm', '.4g')}{helix}"
         ax.set_title(title or f"{gear.name}: {abs(gear.teeth)} teeth, {sizes}")
-        legend_below(ax, 2)
     return figure
 
 

@@ -31,10 +31,8 @@ from gearmbs.view.figures.style import (
     COLOURS,
     ENDINGS,
     VERMILLION,
-    drawn_on,
+    drawing,
     label,
-    legend_below,
-    look,
     png_bytes,
     write_film,
 )
@@ -105,8 +103,7 @@ def load_sharing_plot(
     """
     named = patterns if isinstance(patterns, Mapping) else {"": patterns}
     _some(named, "patterns")
-    with look():
-        figure, ax = drawn_on(ax, 6.4, 3.8)
+    with drawing(ax, 6.4, 3.8, title=title, legend=3) as (figure, ax):
         for k, (name, pattern) in enumerate(named.items()):
             colour, dashes = COLOURS[k % len(COLOURS)], DASHES[k % len(DASHES)]
             ax.plot(np.rad2deg(pattern.roll_angle), pattern.share, color=colour, linestyle=dashes, label=name or None)
@@ -114,9 +111,6 @@ def load_sharing_plot(
         ax.set_xlabel("driver angle from the pitch point, °")
         ax.set_ylabel("share of the load")
         ax.margins(x=0)
-        if title:
-            ax.set_title(title, wrap=True)
-        legend_below(ax)
     return figure
 
 
@@ -137,8 +131,7 @@ def contact_pattern_plot(
     """
     section, roll = np.asarray(pattern.section) * 1e3, np.rad2deg(pattern.roll_angle)
     pressure = np.ma.masked_less_equal(np.asarray(pattern.pressure, dtype=float) * 1e-3, 0.0)
-    with look():
-        figure, ax = drawn_on(ax, 6.6, 4.4)
+    with drawing(ax, 6.6, 4.4, title=title) as (figure, ax):
         top = max(float(pressure.max()) if pressure.count() else 1.0, 1e-12)
         mesh = ax.pcolormesh(section, roll, pressure, cmap="cividis", vmin=0.0, vmax=top, shading="nearest")
         ax.set_facecolor("#ECEDEF")
@@ -151,8 +144,6 @@ def contact_pattern_plot(
         ax.set_ylabel("driver angle from the pitch point, °")
         bar = figure.colorbar(mesh, ax=ax, label="load per face width, N/mm", pad=0.02)
         bar.outline.set_visible(False)  # type: ignore[operator]
-        if title:
-            ax.set_title(title, wrap=True)
     return figure
 
 
@@ -210,8 +201,7 @@ def _over_cycle(errors, attribute: str, ylabel: str, factor: float, cycles: int,
     _some(named, "errors")
     if cycles < 1:
         raise ValueError(f"cycles is {cycles}; give 1 or more")
-    with look():
-        figure, ax = drawn_on(ax, 6.4, 3.8)
+    with drawing(ax, 6.4, 3.8, title=title, legend=3) as (figure, ax):
         for k, (name, error) in enumerate(named.items()):
             phase = np.concatenate([error.phase + c for c in range(cycles)])
             values = np.tile(getattr(error, attribute), cycles) * factor
@@ -221,9 +211,6 @@ def _over_cycle(errors, attribute: str, ylabel: str, factor: float, cycles: int,
         ax.set_xlim(0.0, cycles)
         ax.set_xlabel("driver angle over pitch angle")
         ax.set_ylabel(ylabel)
-        if title:
-            ax.set_title(title, wrap=True)
-        legend_below(ax)
     return figure
 
 

@@ -28,7 +28,7 @@ from gearmbs.view.figures.style import (
     COLOURS,
     GREY,
     VERMILLION,
-    drawn_on,
+    drawing,
     label,
     legend_below,
     look,
@@ -238,8 +238,7 @@ def bearing_plot(
     spectrum = report.spectra[channel]
     top = float(spectrum["frequency"].iloc[-1])
     named = {(f.bearing, f.part): f.found for f in report.accused if f.channel == channel}
-    with look():
-        figure, panel = drawn_on(ax, 7.2, 3.4)
+    with drawing(ax, 7.2, 3.4, legend=4) as (figure, panel):
         panel.plot(spectrum["frequency"], spectrum["power"], color=GREY, linewidth=0.8)
         for number, lines in enumerate(report.bearings):
             for k, (part, order) in enumerate(lines.orders.items()):
@@ -259,7 +258,6 @@ def bearing_plot(
         panel.set_xlabel("frequency, Hz")
         panel.set_ylabel("power by its neighbourhood")
         panel.set_title(title or f"{report.source}, {channel}: squared envelope", wrap=True)
-        legend_below(panel, 4)
     return figure
 
 

@@ -93,6 +93,20 @@ def drawn_on(ax: Axes | None, width: float = 6.4, height: float = 4.0) -> tuple[
     return owner, ax
 
 
+@contextmanager
+def drawing(
+    ax: Axes | None, width: float = 6.4, height: float = 4.0, *, title: str | None = None, legend: int = 0
+) -> Iterator[tuple[Figure, Axes]]:
+    """Draw on the caller's axes or on new ones, in the common look; a title and a legend of so many columns follow."""
+    with look():
+        figure, panel = drawn_on(ax, width, height)
+        yield figure, panel
+        if legend:
+            legend_below(panel, legend)
+        if title:
+            panel.set_title(title, wrap=True)
+
+
 def unit_text(unit: object) -> str:
     """Return a unit as it is written in a label."""
     text = str(unit or "").strip()

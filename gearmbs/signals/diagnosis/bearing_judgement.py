@@ -3,7 +3,7 @@
 That lines are no noise does not make them a bearing's: other shafts, gears and machines have families of lines, too,
 and some of them lie where a bearing's would. So a part is named only if
 
-* its lines are no noise (`gearmbs.signals.bearings.judgement`), the number of parts and channels looked at considered;
+* its lines are no noise, the number of parts and channels looked at considered;
 * they are left when those of known shafts are taken out: multiples of each shaft and sums of these, to which all lines
   of a pair of gears and its sidebands belong in an envelope;
 * hardly any other place of the record holds a family as strong: the orders from a third of a turn to beyond the highest
@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.fft
 
-from gearmbs.signals.bearings.report import CAGE, ELEMENT, OUTER, BearingLines
+from gearmbs.signals.diagnosis.bearing_report import CAGE, ELEMENT, OUTER, BearingLines
 
 # How clearly the lines of a bearing stand in a spectrum of a squared envelope.
 #

@@ -12,7 +12,7 @@ import scipy.fft
 import xarray as xr
 
 from gearmbs.progress import staged
-from gearmbs.signals.bearings.judgement import (
+from gearmbs.signals.diagnosis.bearing_judgement import (
     CLEAR,
     HARMONICS,
     SIGNS,
@@ -24,7 +24,7 @@ from gearmbs.signals.bearings.judgement import (
     power_of,
     squared_envelope,
 )
-from gearmbs.signals.bearings.report import BearingLines, BearingReport, PartFinding, bearing_lines
+from gearmbs.signals.diagnosis.bearing_report import BearingLines, BearingReport, PartFinding, bearing_lines
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
@@ -172,9 +172,9 @@ def diagnose_bearing(
 ) -> BearingReport:
     """Look for the lines of one or several bearings in a record and say what they mean.
 
-    Lines are looked for in three spectra of the squared envelope (`gearmbs.signals.bearings.diagnosis`). A part is
-    named if its lines are no noise (`gearmbs.signals.bearings.judgement`), not those of known shafts, and stronger than
-    families of lines at hardly any other place of the record (`gearmbs.signals.bearings.judgement`).
+    Lines are looked for in three spectra of the squared envelope (`gearmbs.signals.diagnosis.bearings`). A part is
+    named if its lines are no noise, not those of known shafts, and stronger than families of lines at hardly any other
+    place of the record (`gearmbs.signals.diagnosis.bearing_judgement`).
 
     Parameters
     ----------

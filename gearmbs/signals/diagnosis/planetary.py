@@ -31,8 +31,8 @@ import xarray as xr
 from gearmbs._shown import Shown
 from gearmbs.progress import waiting
 from gearmbs.signals.analysis.report import markdown_table
+from gearmbs.signals.diagnosis.planetary_averages import PLANET, RING, SUN, PlanetaryLines, path_weight, planetary_lines
 from gearmbs.signals.errors import MissingMetadataError, SignalError
-from gearmbs.signals.planetary.averages import PLANET, RING, SUN, PlanetaryLines, path_weight, planetary_lines
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.signal.any_data import takes_data

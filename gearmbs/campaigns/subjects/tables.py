@@ -1,0 +1,404 @@
+"""Nested tables, as of a TOML file, as the subject of a campaign: drivetrains, planetary sets, bearings on mounts."""
+
+from __future__ import annotations
+
+import copy
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.subjects.base import (
+    FAILED,
+    Kept,
+    Outcome,
+    SignalSpec,
+    Subject,
+    kept_by_functions,
+    tooth_fault_unit,
+)
+from gearmbs.schema.described import measures_of
+from gearmbs.schema.files import read_toml
+from gearmbs.schema.messages import check_keys, chosen
+from gearmbs.units import si_unit, to_si
+
+
+class TablesSubject(Subject):
+    """Nested tables, as of a TOML file, whose entries factors change: ``"meshes.stage 1.backlash"``.
+
+    A factor has the unit of the table's own entry; entries that are plain numbers, or not there, take numbers in SI.
+
+    Parameters
+    ----------
+    tables : mapping
+        As the file holds them.
+    """
+
+    def __init__(self, tables: Mapping[str, Any]) -> None:
+        self.tables = copy.deepcopy(dict(tables))
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> TablesSubject:
+        """Return the subject of a TOML file."""
+        return cls(read_toml(path, CampaignError))
+
+    def settings(self) -> dict[str, Any]:
+        """Return the tables."""
+        return {"tables": self.tables}
+
+    @classmethod
+    def from_settings(cls, settings: dict[str, Any]) -> TablesSubject:
+        """Return the subject of a plan, which holds the tables or names their file."""
+        return cls.from_file(settings["file"]) if "file" in settings else cls(settings["tables"])
+
+    def base(self) -> dict[str, Any]:
+        """Return the tables."""
+        return copy.deepcopy(self.tables)
+
+    def unit_of(self, path: str) -> str:
+        """Return the SI unit of an entry, "1" for plain numbers and texts."""
+        *sections, name = path.split(".")
+        place: Any = self.tables
+        for k, section in enumerate(sections):
+            if not isinstance(place, Mapping) or section not in place:
+                where = ".".join(sections[:k]) or "the file"
+                raise CampaignError(f"{path}: {where} has no {section!r}; it has {', '.join(map(str, place))}")
+            place = place[section]
+        return si_unit(place.get(name)) or "1"
+
+    def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
+        """Return the SI unit of a parameter of a fault of a tooth."""
+        return tooth_fault_unit(table, key) if path.rpartition(".")[2] in ("fault", "faults") else "1"
+
+    def check(self, data: dict[str, Any], name: str) -> Any:
+        """Return what the tables describe."""
+        return self.made({**data, "name": name} if "name" in data else data)
+
+    @abstractmethod
+    def made(self, tables: dict[str, Any]) -> Any:
+        """Return what tables describe.
+
+        Raises
+        ------
+        ValueError
+            Naming the wrong entry.
+        """
+
+    @abstractmethod
+    def span_and_rate(self, thing: Any) -> tuple[float, float]:
+        """Return the length of a record, s, and its sampling rate, Hz."""
+
+    @abstractmethod
+    def channels(self, thing: Any) -> dict[str, str]:
+        """Return the signals that can be kept and their units."""
+
+    def signals(self, keep: Sequence[str], things: Sequence[Any]) -> list[SignalSpec]:
+        """Return the arrays of the signals, as long as the longest corner's."""
+        specs = []
+        for item in keep:
+            if not item.startswith("signal:"):
+                continue
+            name = item.removeprefix("signal:")
+            known = self.channels(things[0])
+            chosen(known, name, "keep: ", CampaignError, "signal")
+            spans, rates = zip(*(self.span_and_rate(thing) for thing in things))
+            if len(set(rates)) > 1:
+                several = ", ".join(f"{rate:g}" for rate in sorted(set(rates)))
+                raise CampaignError(
+                    f"keep: {item!r} would have the sampling rates {several} Hz; give the record's rate"
+                )
+            specs.append(
+                SignalSpec(name, (name,), int(np.ceil(max(spans) * rates[0] - 1e-6)) + 1, rates[0], known[name])
+            )
+        return specs
+
+    def explain(self, error: Exception) -> Outcome:
+        """Return how a case that raised has ended."""
+        from gearmbs.studies import SimulationFailed
+
+        if isinstance(error, SimulationFailed):
+            return Outcome(FAILED, str(error)[:2000], "Loosen the tolerance, or make run_up and settling longer.")
+        return super().explain(error)
+
+
+def told(progress: Callable[[float], None], span: float) -> Callable[[float], None]:
+    """Return a progress function of the simulated time."""
+    return lambda t: progress(min(1.0, t / span))
+
+
+def scalars(name: str, values: Any) -> dict[str, float]:
+    """Return mean, RMS about it, least and largest value of a series."""
+    x = np.asarray(values, dtype=float)
+    return {f"{name}.mean": x.mean(), f"{name}.rms": x.std(), f"{name}.min": x.min(), f"{name}.max": x.max()}
+
+
+def in_si(tree: Any) -> Any:
+    """Return a tree whose texts with units are numbers in SI.
+
+    Hertz are left apart: 10 Hz may stand where plain numbers are rad/s.
+    """
+    if isinstance(tree, dict):
+        return {key: in_si(value) for key, value in tree.items()}
+    if isinstance(tree, (list, tuple)):
+        return [in_si(value) for value in tree]
+    unit = si_unit(tree)
+    if unit is None:
+        return tree
+    value = float(to_si(tree, unit))
+    return [value, unit] if unit == "Hz" else value
+
+
+# Drivetrains.
+
+
+class DrivetrainSubject(TablesSubject):
+    """Drivetrains of a TOML file, rolling bearings and faults of teeth included.
+
+    Keeps ``harmonics`` (``SIGNAL.MESH.K``: RMS of the mesh harmonics of mesh forces, bearing forces and sensors),
+    ``forces`` (mean, RMS, least and largest normal force, transmission error and pairs in contact of each mesh, and
+    force of each bearing), ``signal:NAME`` of a sensor, and ``record``.
+    """
+
+    kind: ClassVar[str] = "drivetrain"
+    keeps: ClassVar[tuple[str, ...]] = ("harmonics", "forces", "record")
+
+    def made(self, tables: dict[str, Any]) -> Any:
+        """Return the drivetrain and its run."""
+        from gearmbs.drivetrain.drivetrain import make_description
+        from gearmbs.studies.case.tooth_faults import tooth_fault
+        from gearmbs.studies.trains.trains import check_record
+
+        found = make_description(tables, str(tables.get("name", "drivetrain")), tooth_fault)
+        check_record(found.train, found.run)
+        return found
+
+    def canonical(self, thing: Any) -> Any:
+        """Return the parts and pairs with their defaults and the run in SI, without the name."""
+        from gearmbs.studies.trains.trains import described
+
+        train = {key: value for key, value in described(thing.train).items() if key not in ("name", "kind")}
+        for mesh in train["meshes"]:
+            mesh["settings"] = described(thing.train.pairs[mesh["name"]])
+        return in_si({"train": train, "run": described(thing.run)})
+
+    def span_and_rate(self, thing: Any) -> tuple[float, float]:
+        """Return the length of a record, s, and its sampling rate, Hz."""
+        return float(thing.run.duration), float(thing.run.output_rate(thing.train))
+
+    def channels(self, thing: Any) -> dict[str, str]:
+        """Return the sensors and their units."""
+        return {sensor.name: sensor.unit for sensor in thing.train.sensors}
+
+    def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+        """Return the record."""
+        from gearmbs.studies.trains.trains import run_train
+
+        span = thing.train.run_up + thing.run.settling + thing.run.duration
+        return run_train(thing.train, thing.run, progress=told(progress, span))
+
+    def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
+        """Return of a record what is kept."""
+        kept = Kept(numbers=kept_by_functions(keep, record))
+        if "harmonics" in keep:
+            levels = record["mesh_rms"].transpose("signal", "mesh", "harmonic")
+            for (i, j, k), value in np.ndenumerate(levels.values):
+                kept.numbers[f"{levels.signal.values[i]}.{levels.mesh.values[j]}.{k + 1}"] = float(value)
+        if "forces" in keep:
+            for mesh in record.mesh.values:
+                for name in ("normal_force", "transmission_error", "pairs_back"):
+                    kept.numbers |= scalars(f"{mesh}.{name}", record[name].sel(mesh=mesh).values)
+            for bearing in record.bearing.values:
+                size = np.linalg.norm(record["bearing_force"].sel(bearing=bearing).values, axis=1)
+                kept.numbers |= scalars(f"{bearing}.force", size)
+        for item in keep:
+            if item.startswith("signal:"):
+                name = item.removeprefix("signal:")
+                kept.signals[name] = np.atleast_2d(record["measured"].sel(sensor=name).values)
+        return kept
+
+    def partial(self, error: Exception) -> Any:
+        """Return the record up to where the integrator stopped."""
+        from gearmbs.studies import SimulationFailed
+
+        return error.partial() if isinstance(error, SimulationFailed) else None
+
+
+# Planetary sets.
+
+
+class PlanetarySubject(TablesSubject):
+    """Planetary sets of a TOML file.
+
+    Keeps ``forces`` (mean, RMS, least and largest force of each mesh of sun and ring, share of each planet, and force
+    past the sensor on the ring), ``signal:ring_sensor``, and ``record``.
+    """
+
+    kind: ClassVar[str] = "planetary"
+    keeps: ClassVar[tuple[str, ...]] = ("forces", "record")
+
+    def made(self, tables: dict[str, Any]) -> Any:
+        """Return the set and its run, and the table of the pins as it was given."""
+        from gearmbs.studies.trains.planetary import planetary_run
+
+        tables.pop("name", None)
+        return planetary_run(tables), tables.get("pins")
+
+    def canonical(self, thing: Any) -> Any:
+        """Return the set with its defaults and the run in SI; the pins, which become a function, as their table."""
+        from gearmbs.studies.trains.trains import described
+
+        run, pins = thing
+        speeds = {member: float(to_si(speed, "angular speed")) for member, speed in run.speeds.items()}
+        tree = described(replace(run, pins=None, speeds=speeds))
+        tree["gears"].pop("name", None)
+        return in_si({"run": tree, "pins": pins})
+
+    def span_and_rate(self, thing: Any) -> tuple[float, float]:
+        """Return the length of a record, s, and its sampling rate, Hz."""
+        return float(thing[0].duration), float(thing[0].rate)
+
+    def channels(self, thing: Any) -> dict[str, str]:
+        """Return the one signal."""
+        return {"ring_sensor": "N"}
+
+    def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+        """Return the record."""
+        from gearmbs.studies.trains.planetary import run_planetary
+
+        run = thing[0]
+        return run_planetary(run, told(progress, run.run_up + run.settling + run.duration))
+
+    def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
+        """Return of a record what is kept."""
+        kept = Kept(numbers=kept_by_functions(keep, record))
+        if "forces" in keep:
+            for planet in record.planet.values:
+                for mesh in record.mesh.values:
+                    force = record["force"].sel(mesh=mesh, planet=planet).values
+                    kept.numbers |= scalars(f"{mesh}-planet {planet}.force", force)
+                kept.numbers |= scalars(f"planet {planet}.share", record["share"].sel(planet=planet).values)
+            kept.numbers |= scalars("ring_sensor", record["ring_sensor"].values)
+        if "signal:ring_sensor" in keep:
+            kept.signals["ring_sensor"] = np.atleast_2d(record["ring_sensor"].values)
+        return kept
+
+
+# Rolling bearings in a housing on mounts.
+
+
+RUN = {"settling": 0.05, "duration": 0.5, "rate": 12800.0, "tolerance": 1e-6}
+"""How a rig is run: s, s, Hz, and the local error allowed a step."""
+
+UNITS = {"settling": "time", "duration": "time", "rate": "frequency", "tolerance": "dimensionless"}
+CHANNELS = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class BearingCase:
+    """A bearing, its defects, the settings of its rig and of the run."""
+
+    bearing: Any
+    defects: tuple[Any, ...]
+    rig: dict[str, Any]
+    run: dict[str, float]
+
+    def mechanism(self) -> Any:
+        """Return the mechanism that is simulated."""
+        from gearmbs.studies import bearing_rig
+
+        return bearing_rig(self.bearing, defects=list(self.defects), **self.rig)
+
+
+class BearingSubject(TablesSubject):
+    """Rolling bearings on the rig of `gearmbs.studies.bearing_rig`.
+
+    The tables are ``bearing`` (a designation), ``rig`` (keywords of `bearing_rig`), ``defects`` (a list of tables with
+    the ``kind`` of `gearmbs.bearings.DEFECTS` and its parameters) and ``run`` (`RUN`). Keeps ``levels`` (RMS, kurtosis
+    and crest factor of the housing's acceleration), ``signal:x``, ``signal:y``, ``signal:z``, and ``record``.
+    """
+
+    kind: ClassVar[str] = "bearing"
+    keeps: ClassVar[tuple[str, ...]] = ("levels", "record")
+
+    def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
+        """Return the SI unit of a parameter of a defect."""
+        from gearmbs.bearings import DEFECTS
+
+        kind = DEFECTS.get(str(table.get("kind")))
+        measure = measures_of(kind).get(key) if path == "defects" and kind is not None else None
+        return "1" if measure is None else measure.unit
+
+    def made(self, tables: dict[str, Any]) -> BearingCase:
+        """Return the bearing and all about it; the rig is built once, which checks it."""
+        from gearmbs.bearings import Bearing
+        from gearmbs.bearings.defects import as_defects
+
+        check_keys(tables, ("name", "bearing", "rig", "defects", "run"), "the file", ValueError)
+        given = tables.get("run", {})
+        check_keys(given, RUN, "run", ValueError)
+        run = RUN | {key: float(to_si(value, UNITS[key], f"run.{key}")) for key, value in given.items()}
+        case = BearingCase(
+            Bearing.from_designation(str(tables.get("bearing", ""))),
+            as_defects(tables.get("defects", ())),
+            dict(tables.get("rig", {})),
+            run,
+        )
+        case.mechanism()
+        return case
+
+    def canonical(self, thing: BearingCase) -> Any:
+        """Return the bearing's geometry, the defects, and rig and run with their defaults in SI."""
+        import inspect
+
+        from gearmbs.studies import bearing_rig
+        from gearmbs.studies.trains.trains import described
+
+        defaults = {
+            name: p.default for name, p in inspect.signature(bearing_rig).parameters.items() if p.default is not p.empty
+        }
+        rig = defaults | thing.rig
+        rig["speed"] = float(to_si(rig["speed"], "angular speed"))
+        return in_si(
+            {"bearing": described(thing.bearing), "defects": described(thing.defects), "run": thing.run, "rig": rig}
+        )
+
+    def span_and_rate(self, thing: BearingCase) -> tuple[float, float]:
+        """Return the length of a record, s, and its sampling rate, Hz."""
+        return thing.run["duration"], thing.run["rate"]
+
+    def channels(self, thing: BearingCase) -> dict[str, str]:
+        """Return the directions of the housing's acceleration."""
+        return dict.fromkeys(CHANNELS, "m/s^2")
+
+    def run(self, thing: BearingCase, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+        """Return the acceleration of the housing."""
+        import xarray as xr
+
+        from gearmbs.studies import housing_signal
+
+        run = thing.run
+        end = run["settling"] + run["duration"]
+        solution = thing.mechanism().simulate(end, rate=run["rate"], tol=run["tolerance"], progress=told(progress, end))
+        if not solution.success:
+            raise RuntimeError(solution.message)
+        signal = housing_signal(solution, start=run["settling"])
+        return xr.Dataset({"acceleration": signal.drop_vars(["channel_units", "units"], errors="ignore")})
+
+    def reduce(self, thing: BearingCase, record: Any, keep: Sequence[str]) -> Kept:
+        """Return of a record what is kept."""
+        kept = Kept(numbers=kept_by_functions(keep, record))
+        for channel in CHANNELS:
+            x = np.asarray(record["acceleration"].sel(channel=channel).values, dtype=float)
+            if "levels" in keep:
+                rest = x - x.mean()
+                rms = float(rest.std())
+                kept.numbers[f"rms.{channel}"] = rms
+                kept.numbers[f"kurtosis.{channel}"] = float(np.mean(rest**4)) / rms**4 if rms > 0.0 else float("nan")
+                kept.numbers[f"crest.{channel}"] = float(np.abs(rest).max()) / rms if rms > 0.0 else float("nan")
+            if f"signal:{channel}" in keep:
+                kept.signals[channel] = np.atleast_2d(x)
+        return kept

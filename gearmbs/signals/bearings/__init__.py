@@ -1,1 +1,0 @@
-"""Diagnosis of rolling bearings from recordings."""

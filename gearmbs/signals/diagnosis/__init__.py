@@ -1,0 +1,1 @@
+"""Diagnosis of rolling bearings and of planetary sets from recordings."""

@@ -1,1 +1,0 @@
-"""Averages and diagnosis of planetary sets."""
