@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from gearmbs.dae.integrators.messages import HOPELESS, WINDOW, StallWatch
+from gearmbs.dae.integrators.driver import HOPELESS, WINDOW, StallWatch
 from gearmbs.dae.result import Status
 from gearmbs.dae.solve import solve_dae
 
