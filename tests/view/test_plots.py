@@ -70,7 +70,9 @@ def test_order_plot_marks_the_mesh_orders(signal):
 def test_averages_share_their_axes_and_count_teeth(signal):
     phase = signals.phase_from_speed(signal, signal.attrs["speed"])
     average = signals.time_synchronous_average(signal, phase)[:, [0]]
-    figure = average_plot({"healthy": average, "chipped": 2.0 * average}, teeth=29, title="One revolution")
+    figure = average_plot(
+        {"healthy": average, "chipped": average.copy(data=2.0 * average.values)}, teeth=29, title="One revolution"
+    )
     one, two = figure.axes
     assert one.get_ylim() == two.get_ylim()
     assert one.get_ylabel() == "acceleration, m/s²"

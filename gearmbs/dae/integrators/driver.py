@@ -256,7 +256,7 @@ class Run:
             return hopeless
         needed = watch.steps_needed(st.steps, st.t, st.t_end)
         if needed:
-            told = messages.stalled(self.problem, st.t, watch.progress, needed, st.worst_error)
+            told = messages.stalled(self.problem, st.t, watch.progress, needed, st.worst_error, self._noise())
             return Status.STALLED, told
         if watch.looking:
             chatter = watch.look(st.t, st.y, st.yp, st.w_error)

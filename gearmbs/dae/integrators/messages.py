@@ -267,12 +267,12 @@ def below_rounding(problem: DAEProblem, t: float, unknown: int, value: float, to
     )
 
 
-def stalled(problem: DAEProblem, t: float, progress: float, needed: float, worst: int) -> str:
+def stalled(problem: DAEProblem, t: float, progress: float, needed: float, worst: int, noise: float = 0.0) -> str:
     """Explain a run that goes on without getting anywhere."""
     return (
         f"{Status.STALLED.sentence} Near t = {t:.9g} {WINDOW} steps went {progress:.3g}, mostly because of "
-        f"{unknown_name(problem, worst)}; at that rate the end is {needed:.1g} steps away. "
-        f"{advice(problem, Status.STALLED)}"
+        f"{unknown_name(problem, worst)}; at that rate the end is {needed:.1g} steps away."
+        f"{_rounding(noise) or f' {advice(problem, Status.STALLED)}'}"
     )
 
 
