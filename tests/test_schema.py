@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import pytest
-from gearmbs.drivetrain.description import make_description
+from gearmbs.drivetrain.drivetrain import make_description
 from pydantic import ValidationError
 
 import gearmbs

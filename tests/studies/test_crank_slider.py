@@ -66,7 +66,7 @@ def test_eccentric_wheel_has_its_first_sidebands():
     """By `analyse` on the recorded speed: the lines one crank order beside each mesh harmonic rise, no others."""
     beside = []
     for some in ((), (faults.Eccentricity(wheel="driven", amount="80 um"),)):
-        # the first sidebands of the healthy pair are the integrator's errors alone: -52 to -58 dB at 1e-6, -59 to -66 at 1e-7
+        # the first sidebands of the healthy pair are the integrator's errors alone: -59 to -66 dB at 1e-7
         _, record = recorded(*some, duration=4.8, tolerance=1e-7)
         report = analyse(train_signal(record, "speed"), wheel=2)
         lines = report.sidebands.squeeze("channel")
