@@ -46,6 +46,7 @@ def test_kernels_are_declared_one_way():
             assert not re.search(r"from numba import .*\bnjit\b|numba\.njit\(", path.read_text("utf-8")), path
 
 
+@pytest.mark.slow
 def test_entries_and_parts(found):
     """Whatever has a signature is an entry, or is reached from one; helpers are reached from one."""
     entries = calls.entries(found)
@@ -95,6 +96,7 @@ print(rotation_matrix.ready() is rotation_matrix)
 """
 
 
+@pytest.mark.slow
 def test_a_program_says_that_it_compiles(tmp_path):
     """Missing: helpers compile what the program has imported, and it tells so; there: not a word.
 
@@ -143,6 +145,7 @@ run_case(make_case({"operation": {"duration": "0.3 s", "settling": "0 s"}}))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", [PENDULUM, PAIR])
 def test_what_a_run_needs_is_known_at_once(program):
     """Kernels that were loaded, or late kernels called, after the first one was would be compiled in a second round."""
@@ -151,6 +154,7 @@ def test_what_a_run_needs_is_known_at_once(program):
     assert not subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/").strip()
 
 
+@pytest.mark.slow
 def test_looking_for_calls_imports_nothing():
     """Packages whose names are imported late stay as they are: their kernels would be compiled, too."""
     code = "import sys; from gearmbs.kernels.calls import entries, kernels; import gearmbs.mechanism.solve.simulate; "
@@ -160,6 +164,7 @@ def test_looking_for_calls_imports_nothing():
     assert not subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/").strip()
 
 
+@pytest.mark.slow
 def test_failing_helpers(monkeypatch):
     """What a helper cannot compile is told with its traceback."""
     kernel = calls.find("gearmbs.dae.equations.kinematics.rotation", "rotation_matrix")
@@ -179,6 +184,7 @@ def missing(monkeypatch):
     return calls.find("gearmbs.dae.equations.kinematics.rotation", "rotation_matrix")
 
 
+@pytest.mark.slow
 def test_announced_once(missing, monkeypatch, capsys):
     """A program may lack kernels again and again, as it imports more."""
     monkeypatch.setattr(compiling, "compile_entries", lambda wanted, report: report("1/1 part 0.1 s"))
@@ -188,6 +194,7 @@ def test_announced_once(missing, monkeypatch, capsys):
     assert said == "gearmbs: compiling numerical kernels that are not on disk yet; they are kept there\n"
 
 
+@pytest.mark.slow
 def test_helpers_that_fail_are_not_started_again(missing, monkeypatch, capsys):
     started = []
     monkeypatch.setattr(sys, "executable", "/does/not/exist")
@@ -258,6 +265,7 @@ print(len(used), *sorted(used - entries))
 """
 
 
+@pytest.mark.slow
 def test_what_a_run_of_the_bench_calls_is_compiled_ahead():
     """Each kernel that Python calls in it is an entry of the compile command, which makes nothing else to be called."""
     done = subprocess.run([sys.executable, "-c", NEEDED], capture_output=True, text=True, check=True, timeout=300)

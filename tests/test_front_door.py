@@ -60,6 +60,7 @@ def test_loads_what_is_used(code, without):
     assert not loaded(code) & set(without)
 
 
+@pytest.mark.slow
 def test_a_case_loads_nothing_of_scipy():
     """`scipy.signal` takes longer to load than many a case to run; sparse matrices are made when a model is."""
     code = "from gearmbs.studies import Case, run_case; import sys; "

@@ -129,6 +129,7 @@ def package(tmp_path):
     return Package(tmp_path)
 
 
+@pytest.mark.slow
 def test_edits(package):
     """What is called stands in another file; callers are compiled again when, and only when, it changes."""
     assert package.call() == [7.0, ["caller", "scaled"]]
@@ -148,6 +149,7 @@ def test_edits(package):
     assert package.call() == [7.0, []]
 
 
+@pytest.mark.slow
 def test_fields_of_named_tuples(package):
     """Types of the same name whose fields change places are other types."""
     expression = "callers.second(callees.Pair(first=1.0, second=2.0))"
@@ -156,6 +158,7 @@ def test_fields_of_named_tuples(package):
     assert package.call(expression) == [2.0, ["second"]]
 
 
+@pytest.mark.slow
 def test_errors_and_conversions(package):
     """From the cache as from the compiler: exceptions arrive, and arguments that do not fit are refused."""
     package.write(
@@ -176,6 +179,7 @@ def test_errors_and_conversions(package):
     assert package.call(expression) == [expected, []]
 
 
+@pytest.mark.slow
 def test_two_processes(package):
     """Processes that start together compile each kernel once, and both get it."""
     together = [package.start("callers.caller(3.0)") for _ in range(3)]
@@ -186,6 +190,7 @@ def test_two_processes(package):
     assert left == {".entry", ".part"}
 
 
+@pytest.mark.slow
 def test_named_folder(package, tmp_path):
     package.environment["NUMBA_CACHE_DIR"] = str(tmp_path / "elsewhere")
     assert package.call() == [7.0, ["caller", "scaled"]]
@@ -194,6 +199,7 @@ def test_named_folder(package, tmp_path):
     assert not (package.folder / "__pycache__" / "kernels").exists()
 
 
+@pytest.mark.slow
 def test_folders_that_cannot_be_written(package, tmp_path):
     """What is there is used; what is not goes to the user's folder, or is compiled for the process alone."""
     assert package.call() == [7.0, ["caller", "scaled"]]
@@ -218,6 +224,7 @@ def test_folders_that_cannot_be_written(package, tmp_path):
     assert package.call() == [10.0, ["caller", "scaled"]]
 
 
+@pytest.mark.slow
 def test_damaged_files(package):
     """A file that was cut short, or holds what nothing can be rebuilt from, is compiled anew."""
     package.call()
@@ -303,6 +310,7 @@ def test_lock_after_it_was_removed(tmp_path):
     assert not path.exists()
 
 
+@pytest.mark.slow
 def test_numba_calls_kernels(package):
     """A user's own numba function may call a kernel that calls others."""
     package.write(
@@ -313,6 +321,7 @@ def test_numba_calls_kernels(package):
     assert package.call(expression) == [14.0, []]
 
 
+@pytest.mark.slow
 def test_importing_looks_at_no_files(package):
     """Nothing is compiled, loaded or looked for before a kernel is called."""
     package.write("__init__", "")
@@ -320,6 +329,7 @@ def test_importing_looks_at_no_files(package):
     assert not (package.folder / "__pycache__" / "kernels").exists()
 
 
+@pytest.mark.slow
 def test_kernels_as_arguments(package):
     """A kernel handed to a user's numba function as a typed pointer, inside compiled code."""
     package.write(
@@ -367,6 +377,7 @@ def tried(kernel, x):
 """
 
 
+@pytest.mark.slow
 def test_late_kernels(package):
     """What a caller need not call is not compiled for it; an edit of it leaves the caller as it is."""
     package.edit("callers", "    return x[k]\n", "    return x[k]\n" + LATE)
@@ -379,6 +390,7 @@ def test_late_kernels(package):
     assert package.call("callers.cautious(11.0)") == [33.0, ["scaled", "seldom"]]
 
 
+@pytest.mark.slow
 def test_late_kernels_that_cannot_be_compiled(package):
     """The caller raises an error, and does so again when it is called again."""
     package.edit("callers", "    return x[k]\n", "    return x[k]\n" + LATE)

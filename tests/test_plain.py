@@ -126,6 +126,7 @@ def package(tmp_path_factory):
     return Package(tmp_path_factory.mktemp("plain"))
 
 
+@pytest.mark.slow
 def test_kernels_of_every_kind(package):
     """Late kernels, addresses, structs and lanes; a C function that raises spoils its numbers."""
     done = package.run(PROGRAM)
@@ -144,6 +145,7 @@ def test_kernels_of_every_kind(package):
     assert "in the plain mode" in done.stderr
 
 
+@pytest.mark.slow
 def test_an_edit_of_what_a_kernel_uses_is_seen(package):
     """numba's own cache looks at the file of the kernel alone; kept kernels are found again."""
     program = """
@@ -157,6 +159,7 @@ def test_an_edit_of_what_a_kernel_uses_is_seen(package):
     assert package.run(program).stdout == "3.0 1\n"
 
 
+@pytest.mark.slow
 def test_kernels_are_compiled_ahead(package):
     """What Python calls, and what is called by its address, each as it will be asked for; a run finds them."""
     package.write("numbers", "FACTOR = 3.0  # in a folder of its own")
@@ -258,6 +261,7 @@ OWN_STAGES = {"cache", "jit", "lanes", "late", "library", "pointers", "views"}
 """Modules that the plain mode does not import."""
 
 
+@pytest.mark.slow
 def test_the_plain_mode_names_no_private_part():
     own = {FOLDER / f"{name}.py" for name in OWN_STAGES}
     named = {path: parts for path in FOLDER.parent.rglob("*.py") if (parts := named_by(path))}

@@ -29,6 +29,7 @@ def signal():
     return gm.make_signal(np.sin(np.arange(64.0)), 640.0, units="m/s^2")
 
 
+@pytest.mark.slow
 def test_everything_is_saved_with_one_word(tmp_path):
     """Each is there under its name, in folders that are made, and is read again where there is a reader."""
     solution = pendulum().simulate(0.05)
@@ -108,6 +109,7 @@ def test_a_film_without_ffmpeg_says_what_to_do(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_films_play(tmp_path):
     """As many pictures as instants, of one even size."""

@@ -11,10 +11,10 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import pytest
-from gearmbs.drivetrain.drivetrain import make_description
 from pydantic import ValidationError
 
 import gearmbs
+from gearmbs.drivetrain.drivetrain import make_description
 from gearmbs.gears import GearSpec
 from gearmbs.schema.described import Described, _hints, _readers, make, measures_of
 from gearmbs.schema.files import read_toml, toml_table

@@ -64,6 +64,7 @@ def test_plain_values():
     assert python_scalar((np.int64(3),)) == (np.int64(3),)
 
 
+@pytest.mark.slow
 def test_tests_ask_for_names_values_and_remedies_not_for_sentences():
     """An edit of English must not cost tests; `says` asks for words in any order."""
     wrong = []

@@ -149,6 +149,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_two_patches_carry_half_each(name, tmp_path):
     """What stands on two places has two tracks, each with half of the weight, where it stands."""

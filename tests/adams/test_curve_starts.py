@@ -87,6 +87,7 @@ def cross(a, b):
     return a[0] * b[1] - a[1] * b[0]
 
 
+@pytest.mark.slow
 def test_two_cams_drive_each_other():
     """Energy, the geometry and the normal force on both, from a start with velocities, over two analyses."""
     lowest, highest = 1.5, 3.0
@@ -195,6 +196,7 @@ def cam(**given):
     return run_deck(parse_deck(HEAD.format("METER") + matrix(1, 1.0, 1.0) + text), end=0.5, steps=10, tol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_speed_that_contradicts_what_drives_the_cam_is_left_out():
     drive = "MOTION/1, JOINT=1, FUNCTION=3*TIME"
     expected, found = cam(drive=drive), cam(drive=drive, vel=", VEL=0")

@@ -61,6 +61,7 @@ def lift(angle, reach):
     return OFF * s + root, first, second
 
 
+@pytest.mark.slow
 def test_a_point_follows_a_cam():
     height = np.sqrt(RADIUS**2 - OFF**2) + 0.1
     cam = "CURVE/1, CLOSED, CURVE_POINTS, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=20, JFLOAT=32"
@@ -86,6 +87,7 @@ def test_a_point_follows_a_cam():
     assert np.abs(force[:, 0] * normal[:, 1] - force[:, 1] * normal[:, 0]).max() < 1e-3 * RADIUS * np.abs(force).max()
 
 
+@pytest.mark.slow
 def test_a_roller_follows_a_cam():
     height = np.sqrt((RADIUS + ROLLER) ** 2 - OFF**2) + 0.1
     matrices = matrix(1, circle(RADIUS, OFF)) + "\n" + matrix(2, circle(ROLLER))

@@ -79,6 +79,7 @@ def lines_of(text: str) -> dict[str, int]:
     return {key: n for n, line in enumerate(text.splitlines(), 1) for key in WRONG if f"{{{key}}}" in line}
 
 
+@pytest.mark.slow
 def test_every_expression_is_checked_before_a_kernel_is_compiled(tmp_path):
     given = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", PROGRAM], env=given, capture_output=True, text=True, timeout=120)

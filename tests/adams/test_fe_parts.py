@@ -58,6 +58,7 @@ def test_a_small_force_bends_it_by_its_own_moment(component, moment):
     np.testing.assert_allclose(found[{"FY": 2, "FZ": 3}[component]], expected, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_moment_bends_it_to_a_quarter_of_a_circle():
     turn = np.pi / 2
     torque = turn * E * IZZ / LENGTH
@@ -87,6 +88,7 @@ def test_distributed_loads():
         np.testing.assert_allclose(found[3], 1e-3 * unit * expected, rtol=6e-3)
 
 
+@pytest.mark.slow
 def test_turned_sections_and_frames():
     """Principal axes at 45 degrees through IYZ, and the part turned about x by as much, are the same beam."""
     mean, half = 0.5 * (IYY + IZZ), 0.5 * (IYY - IZZ)
@@ -117,6 +119,7 @@ def test_it_swings_as_the_same_beam_in_python_and_goes_on():
     np.testing.assert_allclose(result.request(1)[:, 1:4], expected, atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "along", "out"), [("XY", "FY", 3), ("ZX", "FZ", 2)])
 def test_a_plane_beam_bends_in_its_plane_alone(kind, along, out):
     across = "FZ" if along == "FY" else "FY"

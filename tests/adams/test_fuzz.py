@@ -40,6 +40,7 @@ def run(cases: int, seed: int) -> None:
         outcome(parse_script, mutated(SCRIPT, rng, 6))
 
 
+@pytest.mark.slow
 def test_mutated_decks():
     run(1200, 1)
 
@@ -49,6 +50,7 @@ def test_mutated_decks_in_tens_of_thousands():
     run(40_000, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [range(0, 200), range(200, 400), range(400, 600)], ids=str)
 def test_mutated_decks_are_built_or_refused(seeds):
     """A slice of what ``python -m tests.adams.fuzz`` carries through."""
@@ -61,6 +63,7 @@ def test_mutated_decks_run_or_end_with_an_error():
     assert not failed
 
 
+@pytest.mark.slow
 def test_mildly_changed_decks_run_or_end_with_an_error():
     """A slice of ``python -m tests.adams.fuzz --mild --share 1``: most are run to their end."""
     found = [fuzz.outcome(seed, 1.0, mild=True) for seed in range(150)]

@@ -154,6 +154,7 @@ def test_names_and_units_in_netcdf(tmp_path):
         np.testing.assert_allclose(force, data["request_5"].sel(request_5_column="F4"), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_files_are_named_by_the_script(tmp_path):
     (tmp_path / "pend.adm").write_text(PENDULUM)
     (tmp_path / "go.acf").write_text("pend\nfirst\nSIM/DYN, END=0.1, STEPS=2\n")

@@ -89,6 +89,7 @@ def test_a_load_case_moves_the_bar_as_a_force_at_its_node(folder):
     np.testing.assert_allclose(found, expected, atol=1.5e-3 * np.abs(expected - expected[0]).max())
 
 
+@pytest.mark.slow
 def test_the_load_is_that_of_python_and_of_a_routine(folder, bar):
     text = "1000*TIME*(1-TIME)"
     with_case = run_deck(deck(folder, f"{CLAMP}MFORCE/1,FLEX_BODY=1,CASE_INDEX=2,SCALE={text}"), end=0.01, steps=10)

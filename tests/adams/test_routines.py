@@ -78,6 +78,7 @@ def test_values_are_those_of_the_expression_to_the_last_digit_at_all_times():
     np.testing.assert_array_equal(found.request(3)[:, 1], found.request(2)[:, 1])
 
 
+@pytest.mark.slow
 def test_forces_of_several_components():
     def both(call):
         x, y, z = call.sysary("TDISP", 20, 1, 1)
@@ -106,6 +107,7 @@ END
 TORQUES = "TX={0}*SIN(3*TIME)\\TY=-{0}*WY(20,1,20)\\TZ={0}*DX(20,1)"
 
 
+@pytest.mark.slow
 def test_torques_by_routines():
     """VTORQUE, and the torques of a GFORCE."""
 
@@ -132,6 +134,7 @@ def test_torques_by_routines():
         np.testing.assert_allclose(found.request(1), expected.request(1), atol=2e-8)
 
 
+@pytest.mark.slow
 def test_a_sensor_by_a_routine_and_a_compiled_routine():
     """The analysis ends where SENSUB passes its value; what numba has compiled is called with numbers and arrays."""
     from numba import njit
@@ -147,6 +150,7 @@ def test_a_sensor_by_a_routine_and_a_compiled_routine():
     np.testing.assert_allclose(found.request(1), plain.request(1), atol=2e-7)
 
 
+@pytest.mark.slow
 def test_variables_states_motions_and_requests():
     text = """VARIABLE/1, FUNCTION=USER(0.3)
 DIFF/1, IC=1, FUNCTION=USER(-2)

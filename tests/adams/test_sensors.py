@@ -141,6 +141,7 @@ def test_stops_of_a_mechanism():
         m.simulate(1.0, stops=[StopAt("height")], integrator="IDA")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "scale", "g"), [("SECOND", 1.0, "-10"), ("MILLISECOND", 1e-3, "-1E-5")])
 def test_a_sensor_fires_where_its_function_jumps(unit, scale, g):
     """A sawtooth passes its value downwards after a quarter of each tooth, and jumps up through it at the end."""
@@ -163,6 +164,7 @@ def test_a_sensor_fires_where_a_function_of_the_position_jumps():
     assert result.t[-1] == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_puts_its_function_back_for_ever_is_ended():
     sensor = "SENSOR/1, GE, VALUE=0.5, FUNCTION=TIME-SENVAL(1), EVALUATE=SENVAL(1)+1E-12, ERROR=1E-13"
     with pytest.raises(DeckError, match=says("SENSOR/1", "TIME = 0.5")):
@@ -199,6 +201,7 @@ def pulled(sensor, commands="SIMULATE/STATICS, END=2, STEPS=20\n"):
     return run_deck(parse_deck(SPRING.format(sensor=sensor)), parse_script("m\no\n" + commands))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("relation", ["GE", "EQ"])
 def test_sequences_of_equilibria_are_watched(relation):
     """z = 0.1 t^2 passes 0.1234 m at t = sqrt(1.234)."""
@@ -215,6 +218,7 @@ def test_sequences_of_equilibria_are_watched(relation):
     assert message_text(result).count(f"is {relation} 0.1234") == 2
 
 
+@pytest.mark.slow
 def test_a_sequence_of_equilibria_returns_and_halts():
     two = "SIMULATE/STATICS, END=2, STEPS=20\nSIM/DYN, DUR=0.1, STEPS=1\n"
     result = pulled("SENSOR/1, GE, VALUE=0.1, FUNCTION=DZ(20), RETURN", two)

@@ -106,6 +106,7 @@ def sampled_output(call):
     return 2.0 * call.xd[0] + call.xd[1]
 
 
+@pytest.mark.slow
 def test_a_discrete_controller_against_its_difference_equation():
     # between samples the force is constant: the cart's motion is known in closed form
     routines = {"gse_update": update, "gse_output": sampled_output}
@@ -215,6 +216,7 @@ REQUEST/2, FORCE, I=20, J=32, RM=32
 STIFF = [300.0, 400.0, 500.0, 20.0, 30.0, 40.0]
 
 
+@pytest.mark.slow
 def test_a_field_by_a_routine_is_a_bushing():
     def field(call):
         return [-k * q - 0.01 * k * v for k, q, v in zip(STIFF, call.displacement, call.velocity)]

@@ -122,6 +122,7 @@ PAIRS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_a_gear_pair_is_the_very_pair_again(name, tmp_path):
     pair = PAIRS[name]
@@ -176,6 +177,7 @@ def test_changed_laws_are_taken_and_remarked(tmp_path):
     assert any("no longer those of the pair" in d.message for d in deck.diagnostics)
 
 
+@pytest.mark.slow
 def test_damaged_comments_are_named(tmp_path):
     write_deck(rig(PAIRS["plain"]), tmp_path / "g.adm", gears="solids")
     lines = (tmp_path / "g.adm").read_text().splitlines()

@@ -159,6 +159,7 @@ REQUEST/1, F2=DZ(20,1)\\F3=AZ(30,31)
 """
 
 
+@pytest.mark.slow
 def test_compiled_routines_are_given_what_their_element_gives():
     expected = run(SHAFTS.format("SCALES=1,-0.4"), {})
     found = run(SHAFTS.format("FUNCTION=USER(0.4)"), {"cousub": compiled_coupler})

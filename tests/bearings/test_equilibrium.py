@@ -192,6 +192,7 @@ def lean(state) -> np.ndarray:
     return np.concatenate([state.displacement[:3], turn * (np.sin(angle) / angle if angle else 1.0)])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:angular contact bearing.* against its sense")
 def test_places_are_those_of_an_independent_minimisation():
     """Of random bearings, loads of 1 N to 30 kN and clearances: verdict, deflection and element forces."""
@@ -228,6 +229,7 @@ def test_places_are_those_of_an_independent_minimisation():
         assert 0.02 < np.mean(verdicts) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [0.1, 5.0, 20.0, 1000.0])
 def test_light_loads_across_a_clearance(load):
     """In every direction, also just between two balls, as by marching down from a heavy load."""

@@ -39,6 +39,7 @@ def test_energy_closes_with_loose_rings(part):
     assert solution.energy_balance().attrs["relative_imbalance"] < 1e-6
 
 
+@pytest.mark.slow
 def test_stiff_and_narrow_seat_is_a_fixed_ring():
     places = []
     for fit in ([], [LooseFit(clearance="0.02 um", stiffness=2e10, creep=1e3)]):

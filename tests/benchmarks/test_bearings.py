@@ -7,6 +7,7 @@ import pytest
 from benchmarks import bearings
 
 
+@pytest.mark.slow
 def test_every_kind_is_measured():
     rows = bearings.measure_whole(1, 0.1, report=lambda text: None)
     assert [row["kind"] for row in rows] == list(bearings.KINDS)

@@ -18,6 +18,7 @@ ENERGY = {"A01": 1e-6, "A02": 1e-5, "A03": 1e-6, "A04": 1e-6, "A05": 1e-3, "slid
 OTHERS = [n for n in iftomm.PROBLEMS if n != "slider crank" and "long" not in n]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OTHERS)
 def test_problem(name):
     outcome = iftomm.run(name)
@@ -41,6 +42,7 @@ def test_a_pendulum_over_two_thousand_seconds():
     assert outcome.energy < 1e-3
 
 
+@pytest.mark.slow
 def test_forty_windows_that_lie_flat_twenty_times():
     """A02 as the library defines it (81 bodies, ADAMS's own run), which asks for 1e-3.
 
@@ -65,6 +67,7 @@ def test_independent_solutions_are_those_of_the_library():
             assert value == pytest.approx(published.value, abs=5e-6)
 
 
+@pytest.mark.slow
 def test_spatial_slider_crank():
     """The submissions differ from each other (8e-4 to 2e-2); the nearest, F. Gonzalez's, from ours by 4.2e-5 in 5 s."""
     outcome = iftomm.run("slider crank")

@@ -24,6 +24,7 @@ def run(out, parts, **options):
     return runner.run(parts, out, report=lines.append, **settings), lines
 
 
+@pytest.mark.slow
 def test_a_part_is_measured_saved_and_found_again(tmp_path):
     first, lines = run(tmp_path, ["precision"], only=SOME)
     assert lines == [f"precision - {SOME}"]
@@ -50,6 +51,7 @@ def test_a_part_is_measured_saved_and_found_again(tmp_path):
     assert lines == [f"precision - {SOME}"]
 
 
+@pytest.mark.slow
 def test_a_half_written_part_is_measured_again(tmp_path):
     run(tmp_path, ["precision"], only=SOME)
     part = next((tmp_path / "parts").iterdir())
@@ -58,6 +60,7 @@ def test_a_half_written_part_is_measured_again(tmp_path):
     assert lines == [f"precision - {SOME}"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_peers")
 def test_missing_peers_are_named(tmp_path):
     outcome, _ = run(tmp_path, ["precision"], only="slider crank - ")
@@ -74,12 +77,14 @@ def test_missing_peers_are_named(tmp_path):
         assert f"{method}: {package} is not installed (slider crank)" in text
 
 
+@pytest.mark.slow
 def test_ida_reaches_the_reference(tmp_path):
     outcome, _ = run(tmp_path, ["precision"], only="slider crank - IDA SI1")
     rows = outcome["parts"]["precision"]["results"][0]["rows"]
     assert min(row["error"] for row in rows) < 1e-5
 
 
+@pytest.mark.slow
 def test_size_part_fits_an_exponent(tmp_path, monkeypatch):
     monkeypatch.setattr(size, "SPAN", 1.0)
     monkeypatch.setattr(size, "GRID_TOLERANCES", (1e-4,))
@@ -94,11 +99,13 @@ def test_size_part_fits_an_exponent(tmp_path, monkeypatch):
     assert "Exponent of time per step" in text
 
 
+@pytest.mark.slow
 def test_contact_part(tmp_path):
     outcome, _ = run(tmp_path, ["contact"], only="healthy, no friction")
     assert outcome["parts"]["contact"]["results"][0]["jacobian_us"] > 0
 
 
+@pytest.mark.slow
 def test_whole_residual_at_many_slices(tmp_path):
     outcome, _ = run(tmp_path, ["contact"], only="whole residual, healthy")
     (row,) = outcome["parts"]["contact"]["results"]
@@ -107,6 +114,7 @@ def test_whole_residual_at_many_slices(tmp_path):
     assert "whole residual of the study's model" in (tmp_path / "results.md").read_text()
 
 
+@pytest.mark.slow
 def test_unknown_parts_and_the_command_line(tmp_path, capsys):
     with pytest.raises(SystemExit):
         runner.main(["gears"])

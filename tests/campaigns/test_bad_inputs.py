@@ -138,6 +138,7 @@ def unruly(x: float) -> dict:
     return {"x": 5.0, "status": 7.0, "wave": np.ones(4)}
 
 
+@pytest.mark.slow
 def test_cases_that_go_wrong_in_odd_ways(tmp_path):
     """None of them ends the run, none takes the place of a column."""
     subject = FunctionSubject(unruly, {"x": 0}, signals={"wave": (4, 1.0)})
@@ -157,6 +158,7 @@ def test_cases_that_go_wrong_in_odd_ways(tmp_path):
     assert list(done["result.status"]) == [7.0, 7.0]
 
 
+@pytest.mark.slow
 def test_a_script_without_a_guard_runs(tmp_path):
     """New processes import modules; they do not run the script again."""
     script = tmp_path / "script.py"
@@ -176,6 +178,7 @@ def _make(path: str) -> None:
     make_folder(path, make_plan(function(), ranges(), n=64, unit=2, keep=["numbers", "signal:wave"]))
 
 
+@pytest.mark.slow
 def test_made_by_several_at_once(tmp_path):
     """Whoever comes second takes up what is there; nobody clears what another one has begun."""
     context = multiprocessing.get_context("fork")
@@ -283,6 +286,7 @@ def test_questions_put_wrongly(tmp_path):
         assert words in str(error.value)
 
 
+@pytest.mark.slow
 def test_a_grid_tells_what_decides(tmp_path):
     """Parts of variance by hand: y = a + b + c on levels, and an interaction in the total indices."""
     kinds = choose("x3", low=0.0, high=2.0)

@@ -100,6 +100,7 @@ def test_workers_that_are_jobs(tmp_path, batch, undisturbed):
     assert digest(campaign) == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "number"), [("slurm", "SLURM_ARRAY_TASK_ID"), ("pbs", "PBS_ARRAY_INDEX")])
 def test_elements_of_a_job_array(tmp_path, system, number, undisturbed):
     """The printed script, run once for each element as a batch system does, in any order."""

@@ -110,6 +110,7 @@ def test_each_specimen_keeps_one_state():
     assert sorted(np.unique(labels[kept], return_counts=True)[1]) == [8, 8, 8]
 
 
+@pytest.mark.slow
 def test_a_leak_looks_like_skill():
     """Labels that belong to specimens by chance: nothing can be learned, and the random split seems to."""
     generator = np.random.default_rng(0)
@@ -139,6 +140,7 @@ def test_features_do_not_know_the_gain():
     np.testing.assert_allclose(features(x, RATE, 16.7, 29), features(7.0 * x + 3.0, RATE, 16.7, 29), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_classifier_on_recordings():
     """Simulated windows whose second feature tells the states, and recordings where it does as well."""
     generator = np.random.default_rng(0)

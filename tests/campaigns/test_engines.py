@@ -40,6 +40,7 @@ def start(path) -> subprocess.Popen:
     return subprocess.Popen([sys.executable, str(script), str(path)], env=environment, start_new_session=True)
 
 
+@pytest.mark.slow
 def test_kills_of_driver_and_workers(tmp_path, undisturbed):
     campaign = small(tmp_path / "c", "burning", n=64)
     generator = random.Random(5)

@@ -58,6 +58,7 @@ def test_sobol_estimators_on_fixed_numbers():
         assert found.total[k] == pytest.approx(np.mean((z[:, 0] - z[:, k + 1]) ** 2) / 2 / variance, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_confidence_covers_the_spread_over_seeds():
     found = [sobol_indices(_values(qmc_free(256, seed)), NAMES, seed=seed) for seed in range(40)]
     inside = [np.abs(f.total - TOTAL) <= f.total_confidence for f in found]
@@ -72,6 +73,7 @@ def qmc_free(n, seed):
     return np.stack(rows, axis=1).reshape(-1, 3)
 
 
+@pytest.mark.slow
 def test_control_variates_narrow_the_intervals_around_the_same_truth():
     """Over independent designs: a fraction of the width, no bias, and intervals that cover."""
     truth = np.array([FIRST, TOTAL])
@@ -146,6 +148,7 @@ def test_response_surface_tells_its_own_error():
         fit_surface(u[:4], u[:4, 0], ["a", "b"])
 
 
+@pytest.mark.slow
 def test_from_campaign_to_report(tmp_path):
     campaign = Campaign(tmp_path / "c", make_plan(function(), ranges(), "saltelli", n=256, unit=512))
     campaign.run(workers=0)
@@ -159,6 +162,7 @@ def test_from_campaign_to_report(tmp_path):
         campaign.sensitivity("z")
 
 
+@pytest.mark.slow
 def test_condition_map(tmp_path):
     campaign = small(tmp_path / "c", n=512, unit=256, keep=["numbers"])
     campaign.run(workers=0)
@@ -224,6 +228,7 @@ def test_chaos_of_a_polynomial_is_exact():
         fit_chaos(u[:3], x[:3], ["x", "y", "z"])
 
 
+@pytest.mark.slow
 def test_one_factor_studies(tmp_path):
     factors = [Factor(name, -1.0, 1.0, levels=5) for name in ("x1", "x2")]
     campaign = Campaign(tmp_path / "c", make_plan(function(), factors, "one at a time", unit=16))
@@ -237,6 +242,7 @@ def test_one_factor_studies(tmp_path):
     assert "One factor after the other" in campaign.report(tmp_path / "r.html", ["y"]).read_text()
 
 
+@pytest.mark.slow
 def test_bounds_hold_the_truth_however_bad_the_surrogate():
     """Ishigami's total indices, from points as they are, and with noise that no surrogate explains."""
     pytest.importorskip("sklearn")
@@ -267,6 +273,7 @@ def _with_noise(u):
     return _values(u) + 2.6 * np.random.default_rng(int(1e6 * u[0, 0])).standard_normal(len(u))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("function", "truth"),
     [
@@ -307,6 +314,7 @@ def test_bounds_of_noise_are_all_there_is(monkeypatch):
     assert found.sure_high.tolist() == found.high.tolist() == [1.0] * 3
 
 
+@pytest.mark.slow
 def test_bounds_of_a_few_levels():
     """Two values of a factor: y = x1 + 3 x2, whose parts are 1/12 and 9/4 of 28/12 ... in closed form."""
     pytest.importorskip("sklearn")

@@ -34,6 +34,7 @@ def undisturbed(tmp_path_factory):
     return digest(campaign)
 
 
+@pytest.mark.slow
 def test_same_bits_from_processes_and_parts(tmp_path, undisturbed):
     one = small(tmp_path / "one")
     one.run(workers=2)
@@ -57,6 +58,7 @@ def test_extension_keeps_what_is_there(tmp_path):
     np.testing.assert_array_equal(campaign.open().wave, whole.open().wave)
 
 
+@pytest.mark.slow
 def test_equal_cases_of_another_campaign_are_taken_over(tmp_path):
     first = small(tmp_path / "first")
     first.run(workers=0)
@@ -80,6 +82,7 @@ def moody(tmp_path, **moods) -> Campaign:
     return Campaign(tmp_path / "c", make_plan(subject, (), "list", **settings))
 
 
+@pytest.mark.slow
 def test_failures_are_told_apart_and_harm_nobody(tmp_path):
     campaign = moody(tmp_path, impossible=1, fails=1, endless=1, hungry=1)
     status = campaign.run(workers=0)
@@ -95,6 +98,7 @@ def test_failures_are_told_apart_and_harm_nobody(tmp_path):
     assert (campaign.table[campaign.table.mood == "good"].status == "done").all()
 
 
+@pytest.mark.slow
 def test_a_case_that_kills_its_worker_is_found(tmp_path):
     campaign = moody(tmp_path, deadly=1)
     status = campaign.run(workers=1)

@@ -124,6 +124,7 @@ def kernel_support(function, y):
     return first.h, grad, np.triu(hess)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", [involute_support, corner_support])
 def test_support_functions_against_complex_step(function):
     def gradient(y):

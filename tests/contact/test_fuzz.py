@@ -16,11 +16,13 @@ def run(pair, slices, count, seed=2):
     assert found["jump"] <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slices", [1, 11])
 def test_fifty_thousand(slices):
     run(GearPair.paper(), slices, 50_000, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(KINDS)[1:])
 def test_other_kinds_of_wheels(kind):
     run(*pair_of(kind), 20_000 if "helical" not in kind else 8_000)

@@ -169,6 +169,7 @@ CYLINDRICAL = {
 """Pairs, slices, and how much their axes lean."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CYLINDRICAL)
 def test_no_jumps_of_internal_and_helical_wheels(name):
     pair, slices, lean = CYLINDRICAL[name]
@@ -192,6 +193,7 @@ def test_no_jumps_on_many_paths(name):
     assert worst_jump(pair, slices, 4000, seed=2)[0] < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("z1", "z2", "slices"), [(17, 38, 1), (17, 38, 7), (18, 120, 1)])
 def test_corners_inside_the_base_circle(z1, z2, slices):
     # at the base circle the flank goes on as a plane, whose normal is off by depth over base radius, 1e-4 / 16 mm
@@ -200,6 +202,7 @@ def test_corners_inside_the_base_circle(z1, z2, slices):
     assert jump < 6e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "slope"), [(Eccentricity(), 1e-3), (GradedFlanks(grade=7), 6e-3), (Pit(), 0.1)])
 def test_deviating_flanks_kink_where_a_corner_takes_over(fault, slope):
     # the gap of a flank with a deviation is continuous; its slope steps by that of the deviation along the profile:
@@ -209,6 +212,7 @@ def test_deviating_flanks_kink_where_a_corner_takes_over(fault, slope):
     assert jump < slope
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("slices", "bound"), [(1, 1e-4), (9, 5e-2)])
 @pytest.mark.parametrize("internal", [False, True])
 def test_tips_in_roots(internal, slices, bound):

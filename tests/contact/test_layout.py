@@ -68,6 +68,7 @@ def test_scratch_needs_no_preparation_and_nothing_is_written_beyond_it(slices):
         assert np.array_equal(*results)
 
 
+@pytest.mark.slow
 def test_powers_are_good_to_rounding():
     rng = np.random.default_rng(4)
     x = 10.0 ** rng.uniform(-12, 1, 4000)

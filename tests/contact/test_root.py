@@ -108,6 +108,7 @@ def root_depth(wheels, state):
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DISPLACED)
 def test_depth_against_search(name):
     wheels, shift = DISPLACED[name]
@@ -164,6 +165,7 @@ def gradient(contact, state, share):
     return np.array(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("misalignment", "slices"), [("0 deg", 1), ("1 deg", 1), ("0.3 deg", 7)])
 @pytest.mark.parametrize("kind", ["external", "ring"])
 def test_jacobian_and_energy(kind, misalignment, slices):

@@ -121,6 +121,7 @@ def test_gaps_at_random_poses(name):
     assert max(worst.values()) < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["29/29 at +3 mm", "17/38"])
 def test_no_pair_is_overlooked(name):
     pair = PAIRS[name]

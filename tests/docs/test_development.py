@@ -27,12 +27,14 @@ def reasons():
     return found
 
 
+@pytest.mark.slow
 def test_every_reason_to_skip_is_in_the_table():
     found = reasons()
     assert len(found) > 20
     assert not unknown_skips(found)
 
 
+@pytest.mark.slow
 def test_every_row_is_needed():
     texts = [*reasons().values(), "could not import 'ansys.mapdl.reader'"]
     assert not [words for words in allowed_reasons() if not any(words in text for text in texts)]

@@ -34,6 +34,7 @@ def is_kernel(node: ast.FunctionDef) -> bool:
     return any(re.search(r"njit|kernel|compiled|entry", ast.unparse(d)) for d in node.decorator_list)
 
 
+@pytest.mark.slow
 def test_kernels_with_many_arguments_document_them():
     bare = []
     for path, node in functions():
@@ -45,6 +46,7 @@ def test_kernels_with_many_arguments_document_them():
     assert not bare
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["dae/integrators", "dae/linalg", "contact"])
 def test_functions_are_short(folder):
     long = []

@@ -84,6 +84,7 @@ def test_no_page_is_outside_the_tables_of_contents():
         assert relative.name in listed or relative.parts[0] == "theory" or relative.name == "index", relative
 
 
+@pytest.mark.slow
 def test_readme_example(in_folder):
     """The lines of the README run and draw a revolution of the healthy pair and of the one with a fault."""
     readme = ROOT / "README.md"
@@ -125,6 +126,7 @@ def _examples(path, folder):
         INTEGRATORS.update(known)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", [p for p in WITH_EXAMPLES if p.name in QUICK], ids=name_of)
 def test_quick_examples(path, in_folder):
     _examples(path, in_folder)

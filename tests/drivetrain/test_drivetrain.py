@@ -406,6 +406,7 @@ def test_what_cannot_be_is_refused_in_one_line(what, monkeypatch):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_speeds_in_the_mean_over_a_common_period():
     """Two stages of other teeth: the mean ratio is (z1/z2)(z3/z4)."""
     w = 300 * np.pi / 30

@@ -136,6 +136,7 @@ def twisted(clutch, twist, speed=0.0):
     return torque_at(clutch, speed, (twist,), angle=twist)
 
 
+@pytest.mark.slow
 def test_clutch_stages_and_dead_band():
     soft = ElasticClutch(name="c", first="a", second="b", stiffness=100.0, cubic=4e4, second_stiffness=900.0,
                          second_stage=0.05, transition=0.01)  # fmt: skip

@@ -65,6 +65,7 @@ def any_pair(rng):
     return GearPair(one, two, backlash=0.1 * module, torque=LIGHT, friction=FlankFriction.none())
 
 
+@pytest.mark.slow
 def test_own_stiffness_is_that_of_the_standard_in_the_mean():
     """The kernel's quasi-static mesh stiffness against c_gamma b, and the damping ratio of the bare wheels on it."""
     rng = np.random.default_rng(seed())

@@ -73,6 +73,7 @@ def test_matrices_and_nodes_of_ansys(reader):
     np.testing.assert_allclose(same.stiffness.toarray(), k)
 
 
+@pytest.mark.slow
 def test_files_of_ansys_that_lie_are_named(reader, tmp_path):
     ids = np.arange(1, 9)
     corners, full = body(ids)

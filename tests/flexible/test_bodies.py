@@ -20,6 +20,7 @@ def prism(around: int) -> float:
     return around / (2 * np.pi) * np.sin(2 * np.pi / around)
 
 
+@pytest.mark.slow
 def test_a_wheel_has_the_mass_of_its_section_and_a_web_that_gives_way():
     def wheel(web):
         return thin_rimmed_wheel("20 mm", "40 mm", "90 mm", "100 mm", "20 mm", web, modes=8, around=16)
@@ -83,6 +84,7 @@ def test_a_carrier_is_twisted_by_its_planets():
     assert twist[None] > 1e-7
 
 
+@pytest.mark.slow
 def test_a_carrier_twists_by_its_pins_as_it_is_round():
     carrier = planet_carrier("30 mm", "120 mm", "12 mm", 3, "80 mm", "24 mm", modes=12)
     assert list(carrier.seats) == ["bore", "pin 1", "pin 2", "pin 3"]

@@ -156,6 +156,7 @@ def test_princeton_beam_with_the_torsion_constant_of_another_program(angle, publ
     np.testing.assert_allclose(found, published, rtol=6e-3)
 
 
+@pytest.mark.slow
 def test_princeton_beam_converges_with_the_square_of_the_elements():
     coarse, middle, fine = (princeton(13.345, 45, n, SECTION_OF_FOUR_CELLS) for n in (8, 16, 32))
     np.testing.assert_allclose((coarse - middle) / (middle - fine), 4.0, rtol=0.15)
@@ -213,6 +214,7 @@ def spun_beam(elements):
     return lag_of(solution, beam.last), solution.t
 
 
+@pytest.mark.slow
 def test_spin_up_of_nodal_beams_converges_to_the_published_lag():
     """-0.5737 m at 6.765 s; errors fall with the square of the element's length."""
     coarse, fine = (spun_beam(n) for n in (8, 16))
@@ -261,6 +263,7 @@ def supported(m, seats):
     return np.sort(found.frequencies[np.array(found.kinds) == "oscillating"])[:8]
 
 
+@pytest.mark.slow
 def test_modes_and_beams_agree_in_small_motion():
     """A round bar on springs: reduced finite elements against nodes and beams, extrapolated to short elements."""
     diameter, length = 0.05, 1.0

@@ -42,6 +42,7 @@ def test_reduction_is_that_of_a_free_body():
     np.testing.assert_allclose(i.angular_momentum, 0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_bending_pairs_stay_whole():
     """A shaft that is the same in all directions must not get an axis of preference from the choice of modes."""
     for count in range(4, 12):
@@ -55,6 +56,7 @@ def test_bending_pairs_stay_whole():
         assert frequencies.size - len(lateral) <= 3
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:shaft. . modes are kept")
 def test_equal_spans_do_not_part_pairs_either():
     """Held modes of two equal spans come in fours."""
@@ -65,6 +67,7 @@ def test_equal_spans_do_not_part_pairs_either():
         assert len(single) <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.0, 4000 * np.pi / 30])
 def test_integrals_of_the_turning_frame_give_the_whirl_seen_from_rest(speed):
     """In a frame that turns with the shaft w -+ speed, by Coriolis and centrifugal terms of the integrals only."""

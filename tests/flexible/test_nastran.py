@@ -394,6 +394,7 @@ def record_ends(data):
         yield at
 
 
+@pytest.mark.slow
 def test_op4_files_that_lie_are_named(tmp_path, bar):
     superelement(tmp_path, bar)
     file = tmp_path / "bar.op4"

@@ -232,6 +232,7 @@ def test_more_modes_are_never_worse(body, method):
     assert worst[-1] < 0.05 * worst[0]
 
 
+@pytest.mark.slow
 def test_what_modes_counts():
     """Shapes with held seats beside the static ones; by frequency likewise; the slowest alone only if asked for."""
     model, seats = rotor_body()

@@ -110,6 +110,7 @@ def ring():
     return model, Interface("rim", list(model.ids), "average")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", [square_plate, ring])
 def test_meshes_that_are_alike_in_several_planes(body):
     model, seat = body()

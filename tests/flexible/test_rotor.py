@@ -54,6 +54,7 @@ def test_example_of_friswell_at_rest_and_at_4000_rpm():
     np.testing.assert_allclose(coarse.modes("4000 rpm", 5).frequencies, printed, atol=0.005)
 
 
+@pytest.mark.slow
 def test_critical_speeds_of_friswell_are_where_whirl_meets_the_speed():
     rotor = friswell()
     found = rotor.critical_speeds(5)

@@ -85,6 +85,7 @@ def test_the_generator_is_that_of_the_planes_of_bending():
     assert generator(body.modal, np.array([1.0, 0.0, 0.0])) is None
 
 
+@pytest.mark.slow
 def test_waves_round_a_ring_turn_by_their_number_as_far_as_integrals_tell():
     pytest.importorskip("skfem")
     from gearmbs.flexible import Interface, reduce_model, ring_mesh, solid_model

@@ -24,6 +24,7 @@ def test_healthy_pattern_is_even_and_carries_the_load():
     assert pattern.roll_length[20, 0] == pytest.approx(pair.driver.base_radius * np.tan(np.radians(20)), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotation", [1, -1])
 def test_shares_of_a_tooth_and_the_next_add_up(rotation):
     pattern = contact_pattern(GearPair.paper(rotation=rotation), 100.0, points=400)

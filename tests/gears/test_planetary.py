@@ -254,6 +254,7 @@ def test_a_pin_error_shifts_load_by_the_linear_value():
     assert shift[0] == pytest.approx(shift[2], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_willis_in_a_simulation_with_tooth_contact():
     # in the steady state all repeats with the mesh: the mean over whole mesh cycles is exact
     damped = ContactLaw.linear("3e8 N/m", "20000 N*s/m", "10 um")

@@ -91,6 +91,7 @@ def test_few_teeth_of_difference():
     assert kinematic_transmission_error(pair, 40).peak_to_peak < 1e-12
 
 
+@pytest.mark.slow
 def test_corners_of_a_ring_leave_slowly():
     # with ten teeth of difference a corner stays within 60 um of its mate for two pitches beyond the path
     pair = GearPair(GearSpec(60, "2 mm"), GearSpec.ring(70, "2 mm", addendum="1.6 mm"), **ELASTIC)

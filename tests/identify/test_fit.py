@@ -32,6 +32,7 @@ def test_covariance_is_that_of_the_jacobian():
     assert found.chi_square == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
 def test_coverage_over_two_hundred_measurements(known):
     """The 95 % interval holds the truth in 95 +- 3 % of the measurements, parameter by parameter together."""

@@ -60,6 +60,7 @@ def measured():
     return pd.DataFrame(rows, columns=["case", "channel", "harmonic", "value", "sigma"]), cases
 
 
+@pytest.mark.slow
 def test_backlash_of_a_healthy_pair_cannot_be_told(measured):
     table, cases = measured
     with pytest.raises(IdentifyError, match=says("fault.backlash")):

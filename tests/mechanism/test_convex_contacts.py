@@ -199,6 +199,7 @@ def test_along_no_direction_do_two_solids_overlap_less():
         assert told[4] >= 0.2 * least - 4e-3
 
 
+@pytest.mark.slow
 def test_the_load_is_the_gradient_of_what_is_stored():
     rng, touched = np.random.default_rng(6), 0
     while touched < 25:

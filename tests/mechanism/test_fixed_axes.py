@@ -132,6 +132,7 @@ def test_jacobian(make):
     np.testing.assert_allclose(dense, expected, atol=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_states_and_counted_angles():
     lump, full = (with_states().simulate(0.8, lump=on, **TIGHT) for on in (True, False))
     assert lump.problem.n == 7

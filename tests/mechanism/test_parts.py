@@ -62,6 +62,7 @@ def test_parts_before_anything_was_evaluated(tumbler):
     np.testing.assert_allclose(together, series(fresh), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_parts_of_equilibria():
     """Of equilibria the parts hold the static reactions and not those of a motion."""
     m = Mechanism("hanging", gravity=(0, 0, -9.81))

@@ -88,6 +88,7 @@ def test_a_short_record_is_told_from_a_weak_line():
         assert [note[:68] for note in notes] == ["The speed is taken as constant: a record of 10 revolutions is too sh"]
 
 
+@pytest.mark.slow
 def test_the_right_speed_of_a_weaker_stage_is_not_doubted():
     """A second mesh, six times as strong, of a shaft that turns at 0.37 times the speed; the speed of that one is."""
     t = np.arange(8 * 12800) / 12800.0
@@ -191,6 +192,7 @@ def test_analysis_errors():
         analyse(record()[:, [1]], tacho="tacho")
 
 
+@pytest.mark.slow
 def test_second_wheel_follows_its_own_shaft():
     t = np.arange(8 * 12800) / RATE
     angle = 2 * np.pi * 30.0 * t
@@ -203,6 +205,7 @@ def test_second_wheel_follows_its_own_shaft():
     assert second.gmf == pytest.approx(first.gmf)
 
 
+@pytest.mark.slow
 def test_analyse_file_and_its_progress(tmp_path):
     path = write_signal(record()[:, [0]], tmp_path / "x.csv.gz")
     stages = []

@@ -169,6 +169,7 @@ def test_several_bearings_and_ratios():
     assert "| output | case | outer race |" in report.to_markdown()
 
 
+@pytest.mark.slow
 def test_speed_that_varies_is_followed_in_angle():
     speed = SHAFT * (1.0 + 0.15 * np.sin(2 * np.pi * 0.3 * TIME))
     turns = np.cumsum(speed) / RATE

@@ -88,6 +88,7 @@ def test_speeds_that_cannot_be(speed, said):
         phase_from_speed(make_signal(np.zeros(100), 100.0), speed)
 
 
+@pytest.mark.slow
 def test_angular_resampling_through_standstill_is_short_and_free_of_aliases():
     t = times()
     signal, angle = run_up(0.0)
@@ -147,6 +148,7 @@ def test_order_map_keeps_orders_in_their_columns():
     np.testing.assert_allclose(found.values[:, np.argmin(np.abs(orders - 29)), 0], 1.0, atol=0.2)
 
 
+@pytest.mark.slow
 def test_the_same_from_a_tacho_a_channel_of_speed_and_an_angle():
     signal, angle = run_up(0.0)
     speed = speed_curve(RUN_UP).at(times()) / RPM
@@ -217,6 +219,7 @@ def test_campbell_finds_the_critical_speeds():
         campbell([0.0], [1.0, 2.0])
 
 
+@pytest.mark.slow
 def test_analysis_of_a_pair_that_speeds_up_follows_it_in_angle():
     signal, _ = run_up()
     report = analyse(signal, 29)

@@ -31,6 +31,7 @@ def run(*words):
     return CliRunner().invoke(app, [str(word) for word in words])
 
 
+@pytest.mark.slow
 def test_one_command_from_csv_to_a_gmf_table(tmp_path):
     path = write(tmp_path, "x.csv")
     result = run("analyse", path, "--teeth", TEETH, "--channel", "housing")
@@ -39,6 +40,7 @@ def test_one_command_from_csv_to_a_gmf_table(tmp_path):
     assert "| 1 x GMF |" in result.output
 
 
+@pytest.mark.slow
 def test_a_report_that_cannot_be_written_names_its_own_path(tmp_path):
     path = write(tmp_path, "x.csv")
     (tmp_path / "report.md").mkdir()
@@ -49,6 +51,7 @@ def test_a_report_that_cannot_be_written_names_its_own_path(tmp_path):
     assert f"{tmp_path / 'report.md'}: " in words
 
 
+@pytest.mark.slow
 def test_report_tables_and_figures_go_where_they_are_told(tmp_path):
     path = write(tmp_path, "x.mat")
     options = ("--tacho", "pulse", "--tables", tmp_path / "tables", "--figures", tmp_path / "figures")
@@ -64,6 +67,7 @@ def test_report_tables_and_figures_go_where_they_are_told(tmp_path):
     assert "wrote" in result.output
 
 
+@pytest.mark.slow
 def test_compare_writes_bars_for_measured_states(tmp_path):
     files = {state: write(tmp_path, f"{state}.csv.gz", second) for state, second in (("healthy", 0.5), ("worn", 1.0))}
     words = [word for state, path in files.items() for word in ("--experiment", f"low:{state}={path}")]
@@ -111,6 +115,7 @@ def test_commands_for_measurements_need_no_kernels(tmp_path):
     assert (tmp_path / "x.md").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", ["--out", "--tables", "--figures"])
 def test_a_report_that_cannot_be_written_is_printed(tmp_path, monkeypatch, option):
     path = write(tmp_path, "x.csv")
@@ -133,6 +138,7 @@ def test_tooth_counts():
     assert tooth_counts("32, 80") == (32, 80)
 
 
+@pytest.mark.slow
 def test_a_record_without_teeth_has_a_report(tmp_path):
     path = write(tmp_path, "x.csv")
     result = run("analyse", path, "--speed", "1800 rpm", "--figures", tmp_path / "f", "--tables", tmp_path / "t")
@@ -143,6 +149,7 @@ def test_a_record_without_teeth_has_a_report(tmp_path):
     assert (tmp_path / "t" / "spectrum.csv").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_is_one_series(tmp_path):
     folder = tmp_path / "run"
     folder.mkdir()
@@ -181,6 +188,7 @@ def test_an_option_that_a_message_names_is_not_named_again(tmp_path):
         assert text.count("--speed") == 1
 
 
+@pytest.mark.slow
 def test_the_command_line_answers_what_is_asked(tmp_path):
     t = np.arange(25600) / RATE
     x = np.cos(2 * np.pi * 960 * t)

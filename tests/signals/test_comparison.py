@@ -35,6 +35,7 @@ def cases(factor=1.0, states=BASE, mean=0.0):
     }
 
 
+@pytest.mark.slow
 def test_a_model_that_is_the_experiment_times_a_factor_agrees_perfectly():
     report = compare(cases(), cases(0.02, mean=55.0))
     np.testing.assert_allclose(report.data["model"], report.data["experiment"], rtol=1e-6)
@@ -49,6 +50,7 @@ def test_a_model_that_is_the_experiment_times_a_factor_agrees_perfectly():
     )
 
 
+@pytest.mark.slow
 def test_scaling_scopes():
     model = {
         "low": {s: tone(a, 0.5 if s == "healthy" else 1.0) for s, a in BASE.items()},
@@ -64,6 +66,7 @@ def test_scaling_scopes():
     assert each.sel(low_fault).item() == pytest.approx(1.0, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_disagreement_is_counted():
     # the model turns misalignment's second harmonic down instead of up: pairs (h, m) and (m, d) flip, (h, d) stays
     model_states = {**BASE, "misaligned": (1.1, 0.1, 0.3)}
@@ -78,6 +81,7 @@ def test_disagreement_is_counted():
     assert "Agreement of model and experiment" in text
 
 
+@pytest.mark.slow
 def test_expectations_of_the_paper():
     table = compare(cases()).expectations()
     assert table["as_expected"].all()
@@ -93,6 +97,7 @@ def test_expectations_of_the_paper():
     assert "## In short\n\n- misaligned: at load low" in report.to_markdown()
 
 
+@pytest.mark.slow
 def test_summary_says_what_repeats_at_every_load():
     """x 2 is +6.0 dB at both loads, x 0.5 then x 2 does not repeat; 1.2 is +1.6 dB, within 3 dB."""
     states = {
@@ -117,6 +122,7 @@ def test_channels_that_contradict_each_other_are_named():
     assert "rises on 1 and falls on 1 of 2 channels" in report.to_markdown()
 
 
+@pytest.mark.slow
 def test_cases_of_one_side_only_are_left_out_and_named():
     experiment = cases()
     experiment["odd"] = experiment["low"]
@@ -131,6 +137,7 @@ def test_cases_of_one_side_only_are_left_out_and_named():
     assert "Left out" in report.to_markdown()
 
 
+@pytest.mark.slow
 def test_tables_have_bars_side_by_side():
     tables = compare(cases(), cases(2.0)).tables()
     assert tables["harmonics"].columns.tolist()[-2:] == ["experiment", "model"]
@@ -157,6 +164,7 @@ def test_level_distance():
     assert level_distance(np.array([2.0]), np.array([2.0])) == 0.0
 
 
+@pytest.mark.slow
 def test_compare_files(tmp_path):
     paths = {"low": {}}
     for state, amplitudes in BASE.items():

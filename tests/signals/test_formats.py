@@ -108,6 +108,7 @@ def test_the_command_line_lists_the_table():
     assert ", ".join(TABLE) in told
 
 
+@pytest.mark.slow
 def test_no_other_module_names_formats():
     """Outside their own modules, by name or ending; names that mean other things elsewhere are left out."""
     for name in ("uff58", "tdms", "lvm", "feather", "mat7", "unv"):

@@ -30,6 +30,7 @@ def periodic(rate, gmf, amplitudes, seconds=1.0, mean=0.0, phase=0.3):
     return mean + sum(a * np.cos(2 * np.pi * k * gmf * t + k * phase) for k, a in enumerate(amplitudes, 1))
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(
     rpm=st.floats(600.0, 2500.0),

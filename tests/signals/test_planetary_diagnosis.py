@@ -41,6 +41,7 @@ def simulated(*where, turns=9.0):
     return run_planetary(run)
 
 
+@pytest.mark.slow
 def test_a_planet_is_named_from_the_simulated_record():
     record = read("planet.nc")
     report = analyse(record)
@@ -84,6 +85,7 @@ def pulses(part, noise=0.05, turns=20, sharpness=4.0, seed=0, teeth=(23, 31, 85)
     return signal.assign_coords(angle=("time", 2 * math.pi * theta))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["sun", "planet", "ring"])
 def test_pulses_at_the_kinematic_orders(part):
     report = diagnose_planetary(pulses(part), (23, 31, 85))
@@ -121,6 +123,7 @@ def test_what_the_teeth_hide_is_said():
     assert sum("is not told" in note for note in report.notes) == 2
 
 
+@pytest.mark.slow
 def test_the_report_shows_itself(tmp_path):
     report = diagnose_planetary(pulses("planet"), (23, 31, 85))
     assert "planet 2" in report.verdict

@@ -76,6 +76,7 @@ def test_a_short_rest_is_left_out_and_a_short_file_is_not(tmp_path):
     assert [part.sizes["time"] for part in sections(path, 60.0)] == [64000]
 
 
+@pytest.mark.slow
 def test_files_of_others_with_a_time_column(tmp_path):
     t = np.arange(300_000) / 10_000.0
     pd.DataFrame({"time [ms]": 1e3 * t, "a [V]": np.sin(t)}).to_csv(tmp_path / "x.csv", index=False)
@@ -90,6 +91,7 @@ def test_files_of_others_with_a_time_column(tmp_path):
         list(sections(tmp_path / "y.csv", 8.0))
 
 
+@pytest.mark.slow
 def test_what_is_missing_or_damaged_is_named(tmp_path):
     np.savetxt(tmp_path / "x.csv", np.ones((1000, 2)), delimiter=",", header="a,b", comments="")
     with pytest.raises(MissingMetadataError, match="rate is missing"):

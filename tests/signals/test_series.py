@@ -38,6 +38,7 @@ def folder(tmp_path):
     return place
 
 
+@pytest.mark.slow
 def test_a_folder_becomes_one_table_in_the_order_of_its_numbers(folder):
     table = series(folder, speed="1500 rpm")
     assert table["file"].tolist() == [f"snap_{k}.csv" for k in range(12)]
@@ -50,6 +51,7 @@ def test_a_folder_becomes_one_table_in_the_order_of_its_numbers(folder):
     assert series(str(folder / "snap_1*.csv"))["file"].tolist() == ["snap_1.csv", "snap_10.csv", "snap_11.csv"]
 
 
+@pytest.mark.slow
 def test_labels_sections_teeth_and_channels(folder):
     loads = series({50: folder / "snap_0.csv", 100: folder / "snap_1.csv"}, teeth=TEETH, speed="1500 rpm")
     assert loads["label"].tolist() == [50, 100]
@@ -60,6 +62,7 @@ def test_labels_sections_teeth_and_channels(folder):
     assert by_channel["channel"].tolist() == ["acc"]
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_read_is_a_row_with_the_reason(folder):
     (folder / "snap_5.csv").write_text("nothing\n")
     table = series(folder)
@@ -115,6 +118,7 @@ def test_killed_and_taken_up_again_it_is_the_same_table(folder, tmp_path):
         series(folder, store=other, speed="1600 rpm")
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_ends_neither_the_work_nor_its_table(folder, tmp_path, monkeypatch):
     """The journal is given up with a remark; a table without room is kept elsewhere, and the error says where."""
     monkeypatch.chdir(tmp_path)
@@ -139,6 +143,7 @@ def test_a_disk_that_fills_up_ends_neither_the_work_nor_its_table(folder, tmp_pa
     pd.testing.assert_frame_equal(pd.read_csv(kept), whole, check_dtype=False)
 
 
+@pytest.mark.slow
 def test_files_that_come_later_or_change_are_analysed_by_calling_again(folder, tmp_path):
     store = tmp_path / "t.csv"
     series(folder, store=store)

@@ -65,6 +65,7 @@ def test_round_solids_are_exact(tmp_path, solid, kind, sizes):
     assert shape.offset == pytest.approx([0, 0, middle], abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("solid", "exact"),
     [
@@ -207,6 +208,7 @@ def test_truncated_files_end_with_a_place(tmp_path):
             read_solid(path)
 
 
+@pytest.mark.slow
 def test_damaged_files_are_read_or_named(tmp_path):
     """Whatever stands in a file, it is a solid or an error of one kind."""
     pytest.importorskip("pythoncdt")

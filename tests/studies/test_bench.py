@@ -60,6 +60,7 @@ def test_wrong_settings(motor, words):
         bench_train(state="ill")
 
 
+@pytest.mark.slow
 def test_wheels_of_one_shaft_add_or_cancel_as_the_phasors_say():
     """Two stiff meshes on one shaft, driven by their kinematic errors: lines add in phase, cancel in opposition."""
     from tests.studies.phasors import shaft_line

@@ -70,6 +70,7 @@ def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch, keep_handle
     assert (tmp_path / "soft.partial.nc").exists()
 
 
+@pytest.mark.slow
 def test_a_failed_case_of_the_study_is_kept(tmp_path, monkeypatch, keep_handlers):
     """The case that failed and those finished before it are files, the study is not."""
     monkeypatch.setattr(

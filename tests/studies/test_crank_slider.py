@@ -51,6 +51,7 @@ def recorded(*some, duration=2.4, tolerance=1e-6):
     return slider, run_train(slider.train(), run, mechanism=slider.build())
 
 
+@pytest.mark.slow
 def test_broken_tooth_shows_once_a_turn_of_its_wheel():
     slider, record = recorded(faults.BrokenTooth(wheel="driven", lost=0.9, tooth=7))
     rate = record.attrs["run_rate"]

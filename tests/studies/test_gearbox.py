@@ -121,6 +121,7 @@ def test_report_and_figures(study, tmp_path):
         run_gearbox(GearboxSettings(motor="induction"))
 
 
+@pytest.mark.slow
 def test_a_train_follows_a_curve_from_a_file(tmp_path):
     """A coast-down of one stage, from a file: levels along it instead of one at a mean speed."""
     text = """

@@ -34,6 +34,7 @@ tooth = 3
 """
 
 
+@pytest.mark.slow
 def test_run_on_the_command_line(tmp_path):
     place = tmp_path / "set.toml"
     place.write_text(FILE)
@@ -58,6 +59,7 @@ def test_a_file_holds_a_set(tmp_path):
     assert run.pins.radial == 2e8
 
 
+@pytest.mark.slow
 def test_analyse_on_the_command_line(tmp_path):
     from gearmbs.signals import PlanetaryModel, write_signal
 
@@ -113,6 +115,7 @@ def differential():
     )
 
 
+@pytest.mark.slow
 def test_a_differential_set_turns_freely():
     data = run_planetary(differential())
     speeds = data["speed"].isel(time=-1)

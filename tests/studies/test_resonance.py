@@ -79,6 +79,7 @@ def study():
     )
 
 
+@pytest.mark.slow
 def test_jumps_of_both_models(study):
     """Jump frequencies up and down within 2 % of a model of one degree of freedom without the package's code."""
     jumps = study.jumps()
@@ -104,6 +105,7 @@ def test_amplitudes_outside_of_the_hysteresis_do_not_depend_on_the_direction(stu
         assert there[0] == pytest.approx(there[1], rel=0.03)
 
 
+@pytest.mark.slow
 def test_slower_sweeps_jump_at_the_same_place(study):
     slow = replace(study.settings, cycles=8000)
     for direction in DIRECTIONS:
@@ -138,6 +140,7 @@ def test_loads_of_both_models_are_printed():
     assert "Other: no load from 1 to 1000 N m" in text
 
 
+@pytest.mark.slow
 def test_report_and_figure(study, tmp_path):
     text = study.report()
     assert "| up |" in text
@@ -157,6 +160,7 @@ def test_wrong_settings(changes, words):
         ResonanceSettings(**changes)
 
 
+@pytest.mark.slow
 def test_both_directions_side_by_side(monkeypatch):
     monkeypatch.setattr("gearmbs.studies.presets.resonance.separation_loads", lambda settings: {})
     settings, told = ResonanceSettings(cycles=300), {}

@@ -33,6 +33,7 @@ def invoked(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("teeth", [None, 23])
 def test_a_run_up_is_drawn_over_time_speed_and_order(run_up, teeth):
     report = analyse(run_up, teeth=teeth, speed_channel="n")
@@ -44,6 +45,7 @@ def test_a_run_up_is_drawn_over_time_speed_and_order(run_up, teeth):
     assert [line.get_label() for line in figures["orders"].axes[0].lines][:2] == ["order 23", "order 46"]
 
 
+@pytest.mark.slow
 def test_strongest_orders_are_those_of_the_record(run_up):
     kept = run_up.sel(channel=["housing"])
     phase = gm.signals.shaft_phase(run_up, speed_channel="n")
@@ -66,6 +68,7 @@ def test_analyse_and_waterfall_draw_a_run_up(run_up, tmp_path):
     assert wanted <= {path.name for path in (tmp_path / "two").iterdir()}
 
 
+@pytest.mark.slow
 def test_units_of_single_channels(tmp_path):
     (tmp_path / "up.csv").write_text("t,a [g],n\n" + "\n".join(f"{t:.6f},{v:.5f},{60 * s:.4f}" for t, v, s in zip(
         TIME, np.cos(23 * ANGLE), SPEED)))  # fmt: skip
@@ -82,6 +85,7 @@ def test_units_of_single_channels(tmp_path):
     assert "write its unit, rpm, Hz or rad/s, into its label, 'n [rpm]'" in result.output
 
 
+@pytest.mark.slow
 def test_waterfall_of_records_of_constant_speed(tmp_path):
     files = []
     for k, turns in enumerate((10.0, 20.0)):
@@ -100,6 +104,7 @@ def test_waterfall_of_records_of_constant_speed(tmp_path):
     assert "--steps divides the speed of one run-up" in invoked("waterfall", *files, *speeds, "--steps", "5").output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [("--speed-channel", "n"), ("--tacho", "pulse", "--pulses", "2")])
 def test_waterfall_of_records_that_hold_their_speed(tmp_path, told):
     files = []
@@ -155,6 +160,7 @@ def test_sweep_refuses_in_one_line(tmp_path, arguments, words):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_campbell_of_a_drivetrain(tmp_path):
     train = tmp_path / "train.toml"
     train.write_text(TEXT.partition("[housings.box]")[0])

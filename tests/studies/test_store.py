@@ -65,6 +65,7 @@ def test_nothing_is_left_where_nothing_can_be_written(tmp_path, monkeypatch):
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of file sizes are POSIX")
 def test_a_file_that_cannot_grow_does_not_end_the_program(tmp_path):
     """The format's own library ends the process when a write fails; the system refuses files above 4 kB here."""
@@ -106,6 +107,7 @@ def test_the_size_of_a_record_is_foreseen(tmp_path):
     assert 0.6 * size < record_size(case) < 1.3 * size
 
 
+@pytest.mark.slow
 def test_finished_cases_are_taken_up(tmp_path, monkeypatch):
     """Of three cases two are stored; one call later only the third is computed, and a changed case again."""
     cases = [Case(name=f"z = {z}", gears={"teeth": (z, 29)}, operation=SHORT) for z in (25, 27, 31)]
@@ -130,6 +132,7 @@ def test_finished_cases_are_taken_up(tmp_path, monkeypatch):
     assert stored_record(tmp_path, cases[0]) is None
 
 
+@pytest.mark.slow
 def test_two_calls_share_the_cases(tmp_path, monkeypatch):
     """The case that another call is at work on comes from there; that of one that was killed is computed here."""
     monkeypatch.setattr(engine, "POLL", 0.0)
@@ -184,6 +187,7 @@ def test_errors_can_be_kept(tmp_path, monkeypatch):
         run_cases(cases, errors="forget")
 
 
+@pytest.mark.slow
 def test_a_full_disk_stops_no_case(full_disk):
     cases = [Case(name="one", operation=SHORT), Case(name="two", operation=SHORT)]
     with pytest.warns(StorageWarning, match="No space left") as told:
@@ -223,6 +227,7 @@ def _refuse_in(folder):
     return refuse
 
 
+@pytest.mark.slow
 def test_a_record_on_bearings_is_told_from_one_on_joints(tmp_path):
     case = Case(name="one", operation=SHORT)
     spall = {"kind": "spall", "width": "1 mm", "angle": "249 deg"}
@@ -250,6 +255,7 @@ def test_a_record_on_bearings_is_told_from_one_on_joints(tmp_path):
         case_mechanism(case, "6206", each={"bearing 3": {}})
 
 
+@pytest.mark.slow
 def test_a_record_without_an_ending_is_recognised(tmp_path):
     """By its first bytes; and what is no record is refused by its name."""
     from gearmbs.signals.files.simulated import read_any

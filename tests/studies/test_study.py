@@ -93,6 +93,7 @@ def test_files_appear_whole_or_not_at_all(tmp_path):
     assert [p.name for p in target.parent.iterdir()] == ["result.txt"]
 
 
+@pytest.mark.slow
 def test_study_on_short_records(short_study, tmp_path):
     """The whole chain of `gearmbs paper` on 60 ms a case: 29 mesh periods."""
     paths = short_study.save(tmp_path)
@@ -144,6 +145,7 @@ def test_action_equals_reaction(short_study):
     assert float(abs(total).max()) < 1e-6
 
 
+@pytest.mark.slow
 def test_exchange_with_measurements(short_study, tmp_path):
     path = tmp_path / "paper.nc"
     write_dataset(path, short_study.records)
@@ -240,6 +242,7 @@ def test_command_paper_refuses_nonsense():
     assert "negative backlash" in result.output
 
 
+@pytest.mark.slow
 def test_start_one_tooth_later_and_other_output_rate_change_nothing():
     """GMF RMS within 0.5 %: run-up settling longer by one mesh period; output at 64 kHz instead of 51.2 kHz."""
     period = 1.0 / Case().mesh_frequency
@@ -253,6 +256,7 @@ def test_start_one_tooth_later_and_other_output_rate_change_nothing():
         np.testing.assert_allclose(values.values, reference.values, rtol=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [{}, {"misalignment": "1 deg"}, {"centre_distance_error": "3 mm"}])
 def test_energy_balance(fault):
     """Work in less dissipation less stored, within 1e-6 of the work, once the powers are sampled finely enough."""
@@ -265,6 +269,7 @@ def test_energy_balance(fault):
     assert balance.attrs["relative_imbalance"] < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [{}, {"misalignment": "1 deg"}], ids=["healthy", "misaligned"])
 def test_gear_and_shaft_as_one_body_make_the_same_record(fault):
     case = Case(operation=SHORT, fault=fault, solver={"tolerance": 1e-9})

@@ -20,6 +20,7 @@ def speeds(tmp_path_factory):
     return folder, sweep(Case(name="pair", operation=SHORT), "operation.speed", SPEEDS, folder=folder)
 
 
+@pytest.mark.slow
 def test_records_of_all_values_fit_together(speeds):
     """One rate for all, that of the fastest; a row of the table for each; names that tell."""
     _, study = speeds
@@ -35,6 +36,7 @@ def test_records_of_all_values_fit_together(speeds):
     assert [s.attrs["speed"] for s in study.signals()] == pytest.approx([30 * np.pi, 60 * np.pi, 90 * np.pi])
 
 
+@pytest.mark.slow
 def test_it_is_taken_up_where_it_stopped(speeds, monkeypatch):
     folder, study = speeds
     monkeypatch.setattr(simulation, "simulate_case", None)
@@ -42,6 +44,7 @@ def test_it_is_taken_up_where_it_stopped(speeds, monkeypatch):
     assert again.table().drop(columns="ms a mesh cycle").equals(study.table().drop(columns="ms a mesh cycle"))
 
 
+@pytest.mark.slow
 def test_it_shows_and_saves_itself(speeds, tmp_path):
     _, study = speeds
     figure = study.plot()

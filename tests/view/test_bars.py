@@ -48,6 +48,7 @@ def test_bars_are_drawn_into_given_axes_and_leave_the_settings_alone(table):
     assert dict(matplotlib.rcParams) == before
 
 
+@pytest.mark.slow
 def test_figures_need_no_pyplot():
     import subprocess
     import sys
@@ -90,6 +91,7 @@ def test_missing_values_are_said_to_be_missing(table):
     assert texts.count("no data") == 1
 
 
+@pytest.mark.slow
 def test_comparison_has_a_panel_for_each_load_and_side(table):
     loads = xr.concat([table, 2 * table], "load").assign_coords(load=["low", "high"])
     data = xr.Dataset({"experiment": loads, "model": 1.5 * loads}, attrs={"units": "m/s^2"})
@@ -106,6 +108,7 @@ def test_comparison_has_a_panel_for_each_load_and_side(table):
         comparison_bars(data[["model"]])
 
 
+@pytest.mark.slow
 def test_files_are_whole_or_not_there(table, tmp_path):
     paths = save_figure(gmf_bars(table), tmp_path / "deep" / "figure_5.v2")
     assert [p.name for p in paths] == ["figure_5.v2.png", "figure_5.v2.svg"]

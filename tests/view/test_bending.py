@@ -139,6 +139,7 @@ def test_deflections_at_a_node(run):
         solution.deflection(solution.system.mechanism.ground.marker((0, 0, 0)))
 
 
+@pytest.mark.slow
 def test_stresses_are_drawn(run):
     model, solution = run
     q = solution.modal_coordinates("shaft")

@@ -41,6 +41,7 @@ def test_a_signal_is_drawn_with_labels(signal, draw, settings, labels):
     assert len(png_bytes(figure, 50)) > 5000
 
 
+@pytest.mark.slow
 def test_computed_maps_are_drawn_as_they_are(signal):
     assert order_map_plot(order_map(signal)).axes
     assert waterfall_plot(waterfall(signal)).axes
@@ -81,6 +82,7 @@ def test_wrong_calls_name_the_argument(signal, call, said):
         call(signal)
 
 
+@pytest.mark.slow
 def test_a_waterfall_has_a_scale(signal):
     """The bar beside the lines is as tall as the highest of them, and says how much that is, as a peak."""
     figure = waterfall_plot(signal, channel="b")

@@ -97,6 +97,7 @@ def test_wrong_views_are_named(options, message):
         mesh_view(GearPair.paper(), **options)
 
 
+@pytest.mark.slow
 def test_views_of_tilted_faulty_and_unloaded_pairs():
     tilted = GearPair.paper(misalignment="1 deg", backlash="0.4 mm", centre_distance_error="3 mm", rotation=-1)
     assert_readable(mesh_view(tilted, title="tilted"))

@@ -53,6 +53,7 @@ def test_the_helix_turns_the_sections():
         assert np.hypot(*(top[:, :2] - point).T).min() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WHEELS)
 def test_step_is_a_closed_shell(name, tmp_path):
     check_shell(WHEELS[name], tmp_path)

@@ -140,6 +140,7 @@ def test_thinned_teeth_are_written_thinner():
     assert one - two == pytest.approx(cut, rel=0.05)
 
 
+@pytest.mark.slow
 def test_faults_are_in_the_solid():
     pair = GearPair.paper(backlash="0.1 mm")
     whole = gear_solid(pair.wheels[0]).volume

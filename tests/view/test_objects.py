@@ -84,6 +84,7 @@ def test_a_mechanism_that_cannot_be_assembled_is_drawn_all_the_same():
     assert mechanism_plot(m).axes[0].get_title(loc="left") == "nothing yet: 0 bodies"
 
 
+@pytest.mark.slow
 def test_a_solution_shows_what_moves():
     solution = four_bar().simulate(0.2)
     figure = solution.plot()
@@ -98,6 +99,7 @@ def test_a_solution_shows_what_moves():
     assert solution_plot(still.simulate(0.01)).axes
 
 
+@pytest.mark.slow
 def test_reports_draw_and_save_themselves(tmp_path):
     t = np.arange(51200) / 12800.0
     teeth, shaft = 30, 10.0

@@ -47,6 +47,7 @@ def test_time_plot_shows_the_span_with_units(signal):
     assert_readable(figure)
 
 
+@pytest.mark.slow
 def test_spectrum_marks_the_mesh_lines_and_sidebands(signal):
     figure = spectrum_plot(signals.spectrum(signal), gmf=GMF, sideband=GMF / 29, maximum=2000.0)
     ax = figure.axes[0]
@@ -59,6 +60,7 @@ def test_spectrum_marks_the_mesh_lines_and_sidebands(signal):
     assert len(spectrum_plot(signals.spectrum(signal), gmf=GMF, maximum=600.0).axes[0].texts) == 1
 
 
+@pytest.mark.slow
 def test_order_plot_marks_the_mesh_orders(signal):
     phase = signals.phase_from_speed(signal, signal.attrs["speed"])
     spectrum = signals.order_spectrum(signals.angular_resample(signal, phase))
@@ -84,6 +86,7 @@ def test_averages_share_their_axes_and_count_teeth(signal):
     assert average_plot(average).axes[0].get_xlabel() == "revolution, from the record's first sample"
 
 
+@pytest.mark.slow
 def test_teeth_that_an_average_does_not_have_are_told(signal):
     average = signals.time_synchronous_average(signal, signals.phase_from_speed(signal, signal.attrs["speed"]))[:, [0]]
     unknown = average.copy()
@@ -211,6 +214,7 @@ def ratios():
     )
 
 
+@pytest.mark.slow
 def test_map_names_axes_in_drawing_units_and_marks_failed_runs(ratios):
     figure = sensitivity_map(ratios, centre=1.0, log=True, title="Does misalignment raise the 2nd harmonic?")
     left, right, bar = figure.axes

@@ -166,6 +166,7 @@ def test_animation_shows_the_forces_of_the_simulation(solution, tmp_path):
         mesh_animation(solution, element="other")
 
 
+@pytest.mark.slow
 def test_animation_as_gif(tmp_path):
     from PIL import Image
 

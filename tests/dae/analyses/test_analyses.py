@@ -331,6 +331,7 @@ def test_kinematics_refuse_degrees_of_freedom():
         kinematic(pendulum(0.1), np.linspace(0.0, 1.0, 3))
 
 
+@pytest.mark.slow
 def test_kinematics_name_the_time_of_locking():
     m = Mechanism("reach")
     crank = m.body("crank", 1.0, (0.1, 0.1, 0.1))
@@ -375,6 +376,7 @@ def test_script_with_statics_then_dynamics_and_modes():
     assert "Performing Static Simulation" in message_text(result)
 
 
+@pytest.mark.slow
 def test_quasi_static_sequence_follows_a_driven_crank():
     """A weight hung from a crank that turns three times: it hangs below the crank's end; the drive carries m g cos."""
     m = Mechanism("crane", gravity=(0, 0, -10.0))
@@ -391,6 +393,7 @@ def test_quasi_static_sequence_follows_a_driven_crank():
         quasi_static(m, np.array([1.0, 0.0]))
 
 
+@pytest.mark.slow
 def test_quasi_static_snap_through():
     """A weight on a spring between side walls, pushed down: past the flat position it snaps to the other side."""
     m = Mechanism("snap")

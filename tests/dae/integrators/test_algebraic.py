@@ -100,6 +100,7 @@ def test_dense_output_and_outputs_are_one_and_travel(method):
     np.testing.assert_array_equal(again(times), travelled(times))
 
 
+@pytest.mark.slow
 def test_an_output_does_not_depend_on_the_others():
     @njit
     def loop(t, y, yp, out):
@@ -145,6 +146,7 @@ def test_the_run_ends_at_the_occurrence_asked_for_within_a_step(method, occurren
     assert result.t[-1] == pytest.approx(exact, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_a_branch_is_followed():
     """z^2 = 1 + 0.8 sin 30 t has two roots; a straight guess over a radian is near either of them."""
 

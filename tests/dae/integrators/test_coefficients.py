@@ -27,6 +27,7 @@ def formula(t, past, k):
     return np.concatenate(([gamma], (slope - gamma * value)[: k + 1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", ORDERS)
 def test_uniform_steps_give_the_classical_formulas(k):
     h = 0.37
@@ -35,6 +36,7 @@ def test_uniform_steps_give_the_classical_formulas(k):
     assert abs(h * weights[k + 1]) < 1e-11  # the point that only the predictor uses drops out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", ORDERS)
 def test_error_constant_on_uniform_steps(k):
     # gamma h = H_k and T = (k + 1) h, so r/(1 + r) = 1/(1 + (k + 1) H_k); for k = 1 a third
@@ -114,6 +116,7 @@ def test_local_error_estimate_within_a_factor_three(k, seed):
     assert 1 / 3 < abs(estimate / true) < 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", ORDERS)
 def test_step_for_error_hits_its_target(k):
     nodes = -np.cumsum(np.random.default_rng(k).uniform(0.5, 1.5, 8))

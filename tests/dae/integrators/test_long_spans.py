@@ -36,6 +36,7 @@ def summed_from_the_left(t, y, yp, out):
     out[2] = y[0] + y[1] + y[2] - 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tol", [1e-9, 1e-10])
 def test_terms_that_cancel_late_end_the_digits(tol):
     """At the end 0.04 y[0] and 1e4 y[1] y[2] of 1e-9 cancel to 1e-19.
@@ -106,6 +107,7 @@ def test_a_repair_is_told():
     assert "moved onto the equations: x by -0.0001" in result.message
 
 
+@pytest.mark.slow
 def test_a_start_that_cannot_be_repaired_is_refused():
     """No real y has y^2 = -1."""
 
@@ -121,6 +123,7 @@ def test_a_start_that_cannot_be_repaired_is_refused():
     assert "z" in result.message
 
 
+@pytest.mark.slow
 def test_equations_set_aside_for_good_are_no_success():
     """From t = 1 on the second equation reads 1 = 0: whatever the tolerance, the run must not reach its end unsaid."""
 

@@ -167,6 +167,7 @@ def test_chain_of_index_three_passes_at_the_level_of_rounding(loops, tol):
         assert st.noise_limited == 0
 
 
+@pytest.mark.slow
 def test_a_tolerance_below_rounding_is_told():
     """At 1e-12 some tenth of a radian before the singular position is already lost in rounding."""
     reference = chain_problem(160, 2.0)

@@ -62,6 +62,7 @@ def test_jacobian_in_every_form(compiled, kind):
     assert result.y[-1, 0] == pytest.approx(np.cos(6.0), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_jacobian_by_coloured_differences_on_a_band():
     n = 60
 
@@ -157,6 +158,7 @@ def test_terminal_must_be_a_count(terminal):
         solve_dae(falling, (0.0, 1.0), [10.0, 0.0], events=event)
 
 
+@pytest.mark.slow
 def test_directions_and_several_events():
     """cos crosses zero downward at pi/2 + 2 k pi and upward at 3 pi/2 + 2 k pi; sin - 1/2 both ways."""
 
@@ -199,6 +201,7 @@ def test_a_jump_is_found_to_rounding(below, above):
     assert result.t[-1] >= 0.7312
 
 
+@pytest.mark.slow
 def test_restart_at_an_event():
     """A spring that acts on one side only: the run lands on each contact, beyond which orders are low again."""
 
@@ -222,6 +225,7 @@ def test_restart_at_an_event():
         assert orders[after] <= 2
 
 
+@pytest.mark.slow
 def test_masks_and_names_and_dense_output():
     result = solve_dae(
         njit(robertson), (0.0, 10.0), [1.0, 0.0, 0.0], rtol=1e-6, atol=1e-10, dense_output=True, names=["a", "b", "c"]
@@ -256,6 +260,7 @@ def test_index_three_with_the_positions_under_control(method):
     assert np.median(np.abs(off)) < 1e-2
 
 
+@pytest.mark.slow
 def test_rates_are_worked_out():
     result = solve_dae(njit(oscillator), (0.0, 1.0), [1.0, 0.0], p=[4.0])
     np.testing.assert_allclose(result.yp[0], [0.0, -4.0], atol=1e-9)

@@ -49,6 +49,7 @@ def belt(t, y, yp, out):
     out[1] = yp[1] + y[0] + 10.0 * np.sign(y[1] - 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 @pytest.mark.parametrize(
     ("equations", "start", "named"), [(sliding, [1.0], "y[0] = "), (belt, [0.0, 0.0], "y[1] = 1:")]
@@ -77,6 +78,7 @@ def test_the_same_jump_with_a_width_runs(width, method):
     assert result.y[-1, 0] == pytest.approx(width * np.arctanh(0.5 * np.sin(10.0)), abs=1e-2 * width + 1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 def test_vibrations_and_impacts_are_not(method):
     """A vibration of 3000 periods, and a ball on a stiff floor."""

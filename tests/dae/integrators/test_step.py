@@ -90,6 +90,7 @@ def test_a_step_lands_on_the_next_stop():
     assert st.n_past >= past
 
 
+@pytest.mark.slow
 def test_a_step_below_its_limit_is_a_failure_named_by_what_failed():
     st = opened(warm())
     st.h_min = 1.0
@@ -127,6 +128,7 @@ def test_too_many_steps_and_a_full_buffer_stop_before_a_step_is_opened():
     assert not st.open
 
 
+@pytest.mark.slow
 def test_the_prediction_is_the_polynomial_through_the_newest_points():
     st = opened(warm())
     k = st.order
@@ -139,6 +141,7 @@ def test_the_prediction_is_the_polynomial_through_the_newest_points():
     assert st.gamma == bdf.leading_coefficient(st.t_new, t, k)
 
 
+@pytest.mark.slow
 def test_the_matrix_is_kept_until_the_leading_coefficient_has_drifted():
     run = warm()
     st = opened(run)
@@ -169,6 +172,7 @@ def test_pivots_that_no_longer_fit_are_chosen_anew():
     assert st.h == st.h_wanted
 
 
+@pytest.mark.slow
 def test_the_corrector_solves_the_equations_of_the_step():
     run = warm()
     st = opened(run)
@@ -213,6 +217,7 @@ def test_a_stale_matrix_is_renewed_before_the_step_is_shortened():
     assert st.drop_level == 1
 
 
+@pytest.mark.slow
 def test_an_error_above_the_tolerance_is_refused_with_its_unknown():
     run = warm()
     st = opened(run)
@@ -230,6 +235,7 @@ def test_an_error_above_the_tolerance_is_refused_with_its_unknown():
     assert st.open
 
 
+@pytest.mark.slow
 def test_an_accepted_step_is_the_newest_point():
     run = warm()
     st = opened(run)
@@ -249,6 +255,7 @@ def test_an_accepted_step_is_the_newest_point():
     assert (st.n_past, st.order) == (1, 1)
 
 
+@pytest.mark.slow
 def test_the_size_wanted_before_landing_is_taken_up_again():
     st = opened(warm())
     st.n_past, st.order = 1, 1  # no history to choose a size from
@@ -260,6 +267,7 @@ def test_the_size_wanted_before_landing_is_taken_up_again():
     assert st.h == 4.0 * st.step
 
 
+@pytest.mark.slow
 def test_an_order_is_raised_only_after_order_plus_one_steps():
     st = warm(40).state
     st.order, st.since_change = 2, 0
@@ -280,6 +288,7 @@ def test_noise_is_counted_until_it_has_left_the_history():
     assert st.noise_limited == 2
 
 
+@pytest.mark.slow
 def test_weights_follow_tolerances_and_steps():
     st = warm(rtol=1e-3).state
     y = np.linspace(-2.0, 3.0, len(st.y))

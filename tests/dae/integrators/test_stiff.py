@@ -28,6 +28,7 @@ def run(problem: StiffProblem, tol: float, method: str = "WSTIFF", **options) ->
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_digits_grow_with_the_tolerance(name, method):
@@ -43,6 +44,7 @@ def test_digits_grow_with_the_tolerance(name, method):
     assert (errors < 60.0 * TOLERANCES + FLOOR.get(name, 0.0)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_no_more_steps_than_ida(name):
     problem = PROBLEMS[name]

@@ -27,6 +27,7 @@ def pattern(a: sp.csc_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return a.indptr.astype(np.int64), a.indices.astype(np.int64), a.data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("front", [0, 1, 70])
 @pytest.mark.parametrize("tail", [24, 25, 26, 27, 32, 41, 64])
 def test_solutions_are_those_of_the_matrix(front, tail):

@@ -27,6 +27,7 @@ def solve_once(matrix, b):
     return x
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=80, deadline=None)
 @given(st.integers(1, 40), st.floats(0.02, 0.4), st.integers(0, 10_000))
 def test_random_matrices_with_a_hidden_transversal(n, density, seed):
@@ -156,6 +157,7 @@ def test_fill_of_a_chain_is_linear():
     assert counts[1] / counts[0] < 4.6
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=40, deadline=None)
 @given(st.integers(2, 12), st.integers(0, 10_000))
 def test_equilibration_brings_entries_near_one(n, seed):
@@ -196,6 +198,7 @@ def test_noise_in_place_of_zeros_does_not_spoil_the_scaling():
     assert np.linalg.cond(scaled) < 10.0
 
 
+@pytest.mark.slow
 def test_growing_entries_ask_for_stricter_pivots():
     """A band of entries 1 and 0.011: pivots of a hundredth of their column let entries grow 1e7 times, a tenth 60."""
     rng = np.random.default_rng(1390)

@@ -47,6 +47,7 @@ def test_pivots_that_rounding_has_blurred_are_looked_at_again(monkeypatch):
     np.testing.assert_array_equal(initial._sparse_rows(scaled), expected)
 
 
+@pytest.mark.slow
 def test_long_chain_has_no_redundant_rows():
     """A squared distance between rows falls with the cube of the length; it is not taken for zero."""
     m = Mechanism("chain", gravity=(0, 0, -9.81))

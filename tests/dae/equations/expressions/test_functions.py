@@ -105,6 +105,7 @@ def spline_at(data, method, x, z=0.0, order=0):
     return np.array([spline_value(spline_table(data, method), 0, order, float(v), z)[0] for v in np.atleast_1d(x)])
 
 
+@pytest.mark.slow
 def test_cubic_spline_reproduces_cubics_and_is_smooth():
     x = np.array([-1.0, 0.0, 0.7, 2.0, 2.5, 4.0])
     exact = SplineData(tuple(x), (tuple(x**3 - 2 * x**2 + 3),))

@@ -41,6 +41,7 @@ def test_velocities(world):
     assert world.value(world.compile("VR(1,2)")) == pytest.approx(u @ r / np.linalg.norm(r), rel=1e-13)
 
 
+@pytest.mark.slow
 def test_accelerations_are_the_rates_of_velocities(world):
     # d/dt of a relative velocity along axes fixed in frame l is the acceleration seen in l
     w = world.omega(L)
