@@ -130,12 +130,13 @@ class _Compiler:
             )
 
     def index_all_markers(self) -> None:
-        for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
-            for marker in body.markers:
-                self.marker_index[id(marker)] = self.builder.add_marker(
-                    self.body_index[id(body)], marker.position - body.com, marker.orientation, body.shape_at(marker)
-                )
-                self.marker_names.append(marker.name)
+        owners = (self.mechanism.ground, *self.mechanism.bodies.values())
+        places = [(body, marker, body.shape_at(marker)) for body in owners for marker in body.markers]
+        for body, marker, shape in places:
+            self.marker_index[id(marker)] = self.builder.add_marker(
+                self.body_index[id(body)], marker.position - body.com, marker.orientation, shape
+            )
+            self.marker_names.append(marker.name)
 
     def index(self, marker: Marker) -> int:
         return self.marker_index[id(marker)]

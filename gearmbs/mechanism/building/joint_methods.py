@@ -268,9 +268,11 @@ class JointMethods:
 
     def _add_joint(self, joint: jt.Joint) -> jt.Joint:
         self._check_name(joint.name)
-        for marker in (joint.i, joint.j):
-            self._check_body(f"joint '{joint.name}'", marker.body)
-            marker.body.check(joint)
+        bodies = joint.i.body, joint.j.body
+        for body in bodies:
+            self._check_body(f"joint '{joint.name}'", body)
+        for body in bodies:
+            body.check(joint)
         self.joints[joint.name] = joint
         return joint
 

@@ -145,6 +145,8 @@ class Section(BaseModel, metaclass=_OneError):
     @classmethod
     def _number(cls, value: Any, info: Any) -> Any:
         """Refuse true and false where a number is meant."""
+        if not isinstance(value, (bool, list, tuple)):
+            return value
         field = cls.model_fields[info.field_name]
         if counts(field.annotation) and not any(isinstance(item, Measure) for item in field.metadata):
             return no_truth(value)
