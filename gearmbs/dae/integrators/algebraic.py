@@ -224,7 +224,10 @@ def _evaluate_matrix(functions, part, t, y, yp, h, idata, rdata, work):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _is_beyond(functions, part, t, y, yp, idata, rdata, work):
-    """Return whether the equations at a breakpoint are those behind it, where other rows than constraints jump."""
+    """Return whether the equations at a breakpoint are those behind it, where other rows than constraints jump.
+
+    The parameters are those of `settle`.
+    """
     res, f = part.res, part.here
     before, behind = 0.0, 0.0
     functions.residual(t, y, yp, res, idata, rdata, work)
