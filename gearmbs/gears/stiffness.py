@@ -267,7 +267,7 @@ def half_plane_foundation(gear: GearSpec, beta: np.ndarray, lever: np.ndarray, t
 
 
 def rim_compliance(gear: GearSpec, supports: int, beta: np.ndarray, lever: np.ndarray) -> np.ndarray:
-    """Compliance of a ring's rim under the load of a tooth half-way between two bolts [6]_, m/N.
+    """Compliance of a ring's rim under the load of a tooth half-way between two bolts, by Chen and Shao, m/N.
 
     Parameters
     ----------

@@ -361,15 +361,16 @@ def _drifting(balanced: Balanced, null: np.ndarray, left: np.ndarray) -> int:
     terms = np.abs(balanced.first)
     n = balanced.mass.shape[0]
     terms[:n, :n] = balanced.damping_terms
-    # of the terms, and of the directions: neither null space is known better
-    terms = np.abs(left).T @ terms @ (np.abs(null) + 1.0)
-    rounding = 10.0 * balanced.tolerance * float(terms.max(initial=0.0))
-    _, sizes, right = np.linalg.svd(resisted)
+    turned, sizes, right = np.linalg.svd(resisted)
+    ends, starts = np.abs(left @ turned), np.abs(null @ right.T)
     motions = null[:n] @ right.T
+    # of the terms, and of the directions: neither null space is known better. Each motion by the terms it meets: what
+    # spins fast beside it has larger ones
+    rounding = 10.0 * balanced.tolerance * np.einsum("nk,nm,mk->k", ends, terms, starts + 1.0)
     # gyroscopic couples of a spin of rounding size dissipate nothing
     dissipated = np.abs(np.einsum("nk,nm,mk->k", motions, balanced.damping, motions))
     inertia = np.einsum("nk,nm,mk->k", motions, balanced.mass, motions)
-    return int(np.sum((sizes <= rounding) | ((sizes <= SLOWEST * inertia) & (dissipated <= rounding))))
+    return int(np.sum((sizes <= rounding) | ((sizes <= SLOWEST * inertia) & (dissipated <= rounding.max()))))
 
 
 def _rigid(balanced: Balanced, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

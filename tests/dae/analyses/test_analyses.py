@@ -470,3 +470,15 @@ def test_a_soft_damper_on_a_large_inertia_decays(inertia, damping, beside):
     found = linear_modes(m)
     assert found.kinds == ["rigid"] * (1 + beside) + ["damped rigid"]
     assert found.eigenvalues[-1].real == pytest.approx(-damping / inertia, rel=1e-6)
+
+
+@pytest.mark.parametrize(("fast", "slow"), [(10.0, 1.0), (300.0, 1.0), (1000.0, 0.5), (1e4, 10.0), (1000.0, 1e-2)])
+def test_what_spins_slowly_nutates_beside_what_spins_fast(fast, slow):
+    """Two rotors apart: I_t w' = i (I_a Omega) w at right angles to the spin, 2/3 Omega here."""
+    m = Mechanism("rotors")
+    for name, speed, x in (("fast", fast, 0.0), ("slow", slow, 1.0)):
+        rotor = m.body(name, 1.0, (0.03, 0.03, 0.02), position=(x, 0.0, 0.0), angular_velocity=(0.0, 0.0, speed))
+        m.spherical(f"{name} end", rotor, m.ground, at=(x, 0.0, 0.0))
+    found = linear_modes(m)
+    nutations = np.sort(np.abs(found.eigenvalues[found.oscillating].imag))
+    np.testing.assert_allclose(nutations, [2.0 / 3.0 * speed for speed in (slow, fast)], rtol=1e-6)
