@@ -179,6 +179,42 @@ def test_free_body_has_six_rigid_modes():
     assert np.all(found.frequencies == 0.0)
 
 
+def wound(axes: np.ndarray, torque: float, kind: str) -> Mechanism:
+    """A body turned about its pin's z by a torque on springs that count full turns; all of it placed by ``axes``."""
+    m = Mechanism("wound")
+    body = m.body("body", 1.0, (0.2, 0.3, 0.25), orientation=axes)
+    m.spherical("pin", body, m.ground, at=(0, 0, 0))
+    i, j = body.marker(name="I"), m.ground.marker((0, 0, 0), axes, name="J")
+    if kind == "bushing":
+        m.bushing("seat", i, j, stiffness=(0, 0, 0), torsional_stiffness=(50, 60, 5))
+    else:
+        m.load("spring", i, m.ground.marker((0, 0, 0), name="reaction"), tz="-5 * AZ(I, J)", rm=j)
+        tip, held = body.marker((0, 0, 1)), m.ground.marker(axes @ (0, 0, 3))
+        m.spring_damper("stay", tip, held, stiffness=60.0, length=1.0)
+    m.load("drive", body.marker(name="end"), m.ground.marker((0, 0, 0), name="base"), tz=str(torque), rm=j)
+    return m
+
+
+@pytest.mark.parametrize("kind", ["bushing", "load"])
+@pytest.mark.parametrize("torque", [10.0, 20.0, 20.0 + 10.0 * np.pi], ids=["no turn", "past half", "one turn more"])
+def test_modes_at_an_equilibrium_keep_its_counted_turns(torque, kind):
+    """About z sqrt(5 / 0.25); sideways stays of 60 N * 3 m, or springs with K = diag(50, 60) turned by torque / 5."""
+    aslant = np.linalg.qr(np.random.default_rng(7).normal(size=(3, 3)))[0]
+    aslant *= np.linalg.det(aslant)
+    if kind == "load":
+        expected = np.sqrt([20.0, 60.0 * 1.5 / 0.3, 60.0 * 1.5 / 0.2])
+    else:
+        expected = {10.0: [4.4721, 13.0562, 17.1265]}.get(torque, [4.4721, 13.3004, 16.8121])
+    for axes in (np.eye(3), aslant):
+        m = wound(axes, torque, kind)
+        rest = static_equilibrium(m)
+        ways = [linear_modes(m, at=rest), linear_modes(m, at="equilibrium")]
+        static_equilibrium(m, move=True)
+        ways.append(linear_modes(m))
+        for found in ways:
+            assert np.abs(found.eigenvalues) == pytest.approx(expected, rel=1e-5)
+
+
 @pytest.mark.parametrize("stiffness", [1e6, 1e9, 1e12])
 def test_a_slow_mode_is_found_beside_fast_ones(stiffness):
     """A pendulum and 10 g on a bushing of up to 1.6 MHz: a ratio of the squares of 1e13."""
