@@ -506,3 +506,44 @@ def test_a_soft_damper_on_a_large_inertia_decays(inertia, damping, beside):
     found = linear_modes(m)
     assert found.kinds == ["rigid"] * (1 + beside) + ["damped rigid"]
     assert found.eigenvalues[-1].real == pytest.approx(-damping / inertia, rel=1e-6)
+
+
+@pytest.mark.parametrize("first", range(0, 60, 15))
+def test_chains_in_space_have_the_modes_of_their_springs_and_no_others(first):
+    """Free points and bodies on stiff line springs: their lengths are rounding off, which is no stiffness sideways."""
+    for seed in range(first, first + 15):
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(2, 6))
+        masses = np.exp(rng.uniform(np.log(0.003), np.log(80.0), n))
+        stiffnesses, decay = 10 ** rng.uniform(4, 9, n - 1), 10 ** rng.uniform(-6, -3)
+        points, places = rng.random(n) < 0.5, rng.normal(size=(n, 3))
+        m = Mechanism("chain")
+        parts = [
+            m.point_mass(f"p{k}", mass, at=place)
+            if point
+            else m.body(f"b{k}", mass, (0.01, 0.011, 0.012), position=place)
+            for k, (mass, place, point) in enumerate(zip(masses, places, points))
+        ]
+        springs = [(k, k + 1, stiffness) for k, stiffness in enumerate(stiffnesses)]
+        if seed % 3 == 0:
+            # a soft one to the ground has a mode still
+            springs.append((0, n, 10 ** rng.uniform(0, 2)))
+        at = np.vstack([places, rng.normal(size=3) + 5.0])
+        ends = [*(part.marker() for part in parts), m.ground.marker(at[n])]
+        stretch = np.zeros((len(springs), n + 1, 3))
+        for row, (i, j, stiffness) in zip(stretch, springs):
+            m.spring_damper(f"s{i}{j}", ends[i], ends[j], stiffness=stiffness, damping=decay * stiffness)
+            row[j] = np.sqrt(stiffness) * (at[j] - at[i]) / np.linalg.norm(at[j] - at[i])
+            row[i] = -row[j]
+        # M^-1/2 K M^-1/2 = Y^T Y; s^2 + decay w^2 s + w^2 = 0
+        half = (stretch[:, :n] / np.sqrt(masses)[:, None]).reshape(len(springs), 3 * n)
+        squares = np.linalg.svd(half, compute_uv=False) ** 2
+        fast = -0.5 * (decay * squares + np.emath.sqrt((decay * squares) ** 2 - 4.0 * squares))
+        wanted = np.concatenate([fast, squares / fast])
+        found = linear_modes(m)
+        values = np.concatenate([found.eigenvalues, found.eigenvalues[found.oscillating].conj()])
+        values = values[values != 0.0]
+        assert found.kinds.count("rigid") == int((6 - 3 * points).sum()) - len(springs), seed
+        assert values.size == wanted.size, seed
+        for value in wanted:
+            assert np.abs(values - value).min() <= 1e-6 * abs(value), seed
