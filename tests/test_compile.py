@@ -64,6 +64,7 @@ def test_entries_and_parts(found):
     assert not [calls.address(k) for k in found if k.declared is not None and k not in reached]
 
 
+@pytest.mark.slow
 def test_a_mechanism_does_not_need_the_contact(found):
     """No kernel of the equations or integrators calls one of the contact."""
     for kernel in found:

@@ -37,6 +37,7 @@ def loaded(code: str) -> set[str]:
     return set(subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/").split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "without"),
     [
@@ -92,6 +93,7 @@ def test_packages_are_found_without_importing_them():
     assert found == [f"gearmbs.{name}" for name in names.split()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module_first", [False, True])
 @pytest.mark.parametrize("name", ["gears.planetary_mechanism", "identify.fit"])
 def test_modules_do_not_take_the_place_of_functions(name, module_first):

@@ -175,6 +175,7 @@ def test_kernels_are_compiled_ahead(package):
     package.write("numbers", NUMBERS)
 
 
+@pytest.mark.slow
 def test_one_process_compiles_at_a_time(package):
     """numba's cache mixes up what two processes write of one function; a kernel that compiles another may go on."""
     program = """
@@ -213,6 +214,7 @@ NEWER = f"import importlib.metadata as m; m.version = lambda name: '{NEWEST_KNOW
 MOVED = "import numba.core.codegen as moved; del moved.JITCodeLibrary"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("before", "says"),
     [

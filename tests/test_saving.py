@@ -95,6 +95,7 @@ def test_no_archive_is_called_an_array(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_other_things_are_refused(tmp_path):
     with pytest.raises(TypeError, match=says("int", "saved")):
         gm.save(3, tmp_path / "three.nc")
@@ -121,6 +122,7 @@ def test_films_play(tmp_path):
         assert f"frame={count:5d}" in told.stderr.replace(f"frame= {count:4d}", f"frame={count:5d}")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_what_ffmpeg_refuses_is_told(tmp_path):
     with pytest.raises(RuntimeError, match="ffmpeg failed: "):

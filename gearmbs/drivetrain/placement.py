@@ -214,7 +214,7 @@ def assembled(train: Drivetrain) -> Layout:
     Raises
     ------
     DrivetrainError
-        If wheels whose angles are given overlap, or a phase cannot be had.
+        If wheels whose angles are given overlap, or a phase cannot be reached.
     """
     pairs = train.pairs
     places, directions = seats(train, pairs)

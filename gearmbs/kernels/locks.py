@@ -11,7 +11,7 @@ from typing import IO
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold a lock that stands at a path; where locks or the path cannot be had, go on without."""
+    """Hold a lock that stands at a path; where there are no locks or the path cannot be written, go on without."""
     try:
         stream = _locked(path)
     except (ImportError, OSError):

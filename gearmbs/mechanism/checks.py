@@ -1,4 +1,4 @@
-"""Bodies that joints leave no motion, as a second hinge about another axis does: a remark for who did not mean it."""
+"""Remarks on mechanisms that may not be meant: bodies that joints lock, positions where degrees of freedom change."""
 
 from __future__ import annotations
 

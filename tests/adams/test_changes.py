@@ -25,6 +25,7 @@ def run(body: str, *commands: str, **options):
     return run_deck(parse_deck(model(PENDULUM + body)), parse_script("\n".join(commands)), **options)
 
 
+@pytest.mark.slow
 def test_counted_angles_go_on_in_the_next_analysis():
     """A torsion spring of k = 1.1e-2 wound up at 10 rad/s: AZ = 100 sin(t/10), beyond three turns."""
     body = "SPRINGDAMPER/1,ROTATIONAL,I=21,J=11,KT=1.1E-2\nREQUEST/1,F2=AZ(21,11)\\F3=SPDP(1,0,8,11)\n"

@@ -31,6 +31,7 @@ ONCE = "m\no\nSIMULATE/DYNAMICS, END=1.5, STEPS=15\n"
 THRICE = "m\no\n" + "".join(f"SIMULATE/DYNAMICS, END={t}, STEPS=5\n" for t in (0.5, 1.0, 1.5))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("moves", "more", "sensor", "script"),
     [

@@ -101,6 +101,7 @@ def test_a_roller_follows_a_cam():
     assert np.abs(result.force("cvcv", 1)[:, 1] - 1e-3 * MASS * (SPEED**2 * second + G)).max() < 2e-2
 
 
+@pytest.mark.slow
 def test_analyses_go_on_along_the_curve_and_it_may_be_left():
     height = np.sqrt(RADIUS**2 - OFF**2)
     cam = "CURVE/1, CLOSED, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=20, JFLOAT=32"

@@ -58,6 +58,7 @@ def test_mutated_decks_are_built_or_refused(seeds):
     assert not failed
 
 
+@pytest.mark.slow
 def test_mutated_decks_run_or_end_with_an_error():
     failed = {seed: found for seed in range(1000, 1030) if (found := fuzz.outcome(seed, 1.0)).startswith("failed")}
     assert not failed
@@ -78,6 +79,7 @@ def test_every_truncation_of_a_deck():
         outcome(parse_script, SCRIPT[:cut])
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.one_of(st.text(max_size=200), st.lists(st.sampled_from([*SPICE, "MARKER/1", "QP=", "JOINT"])).map("".join)))
 def test_random_text(text):

@@ -272,6 +272,7 @@ def test_whatever_a_routine_raises_is_told_with_its_statement():
         run(PULLED.format("USER(1)"), {"sfosub": broken})
 
 
+@pytest.mark.slow
 def test_commands_may_change_a_deck_with_routines_of_fields_couplers_and_systems():
     deck = parse_deck("""routines in all places, and a force that changes
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND

@@ -90,6 +90,7 @@ def test_times_are_in_the_decks_unit():
     assert result.segments[0].solution.t[-1] == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_a_sequence_of_equilibria():
     """A pendulum pulled aside by 2 t N hangs at tan a = 2 t/(m g); then the start of a swing is reported."""
     body = "PART/2,MASS=2,CM=20,IP=1,1,1\nMARKER/20,PART=2,QP=0,0,-1\nMARKER/21,PART=2,REULER=0,90D,0\n"

@@ -138,6 +138,7 @@ def _listed(node: ast.AST, prose: set[int]) -> set[str]:
     return found | {classes[p.attr] for p in parts if isinstance(p, ast.Attribute) and p.attr in classes}
 
 
+@pytest.mark.slow
 def test_no_other_module_lists_statements():
     """A statement is a class and a function with its row: nothing else names three of them in one breath."""
     found = []

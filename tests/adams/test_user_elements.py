@@ -57,6 +57,7 @@ def compiled_deriv(time, x, xd, u, parameters):
     return np.array([x[1], -parameters[1] * x[0] - parameters[0] * x[1] + 2.0 * u[0] - u[1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "routines",
     [
@@ -70,6 +71,7 @@ def test_state_equations_are_those_of_a_linear_system(routines):
     np.testing.assert_allclose(found.request(1), expected.request(1), atol=1e-8)
 
 
+@pytest.mark.slow
 def test_names_of_interfaces_are_looked_for():
     text = CART + LOOP + GSE.replace("USER(3, 5)", "USER(3, 5)\\INTERFACE=lib::mine, lib::shown, lib::none, lib::samp")
     found, expected = run(text, {"mine": deriv, "shown": output}), run(CART + LOOP + LSE)
@@ -155,6 +157,7 @@ def test_a_coupler_by_a_routine_is_that_of_its_scales():
     np.testing.assert_allclose(routine.request(1), linear.request(1), atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mixed", [False, True])
 def test_a_coupler_that_is_not_linear(mixed):
     def separate(call):
@@ -179,6 +182,7 @@ def test_a_coupler_that_is_not_linear(mixed):
     assert rows[:, 1] == pytest.approx(exact.y[0], abs=2e-7)
 
 
+@pytest.mark.slow
 def test_a_coupler_of_three_mixed_displacements():
     """A slide whose place is the product of two angles, one of which turns freely, one is driven by a torque."""
     text = SHAFTS.replace("{spin}", ", WZ=0.5").format(coupler="COUPLER/1, JOINTS=1,2,3, FUNCTION=USER(0.4)")

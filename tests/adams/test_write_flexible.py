@@ -52,6 +52,7 @@ def test_a_body_of_a_neutral_file_moves_as_before(tmp_path, coupling):
     np.testing.assert_allclose(found.modal_velocities(name)[0, 1], 1e-3, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_markers_off_the_nodes_become_nodes_without_mass(tmp_path):
     """A neutral file has masses at nodes, so that the inertia is off by what falls with the square of their number."""
     errors = []

@@ -76,6 +76,7 @@ def test_cage_turns_as_ideal_rolling_says():
         assert turned == pytest.approx(DEEP.ftf * (1.0 - slip) * SPEED * 0.2, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("defect", "order", "slip"),
     [
@@ -106,6 +107,7 @@ def test_lines_of_defects_are_where_kinematics_put_them(defect, order, slip):
         assert report.accused[0].slip == pytest.approx(-slip, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_varying_compliance_shakes_the_housing_at_the_ball_pass_frequency():
     solution = bearing_rig(DEEP, speed=SPEED, radial_load=300.0).simulate(0.7, rate=6400, tol=1e-7)
     place = solution.com_position("housing")[solution.t >= 0.2, 0]
@@ -124,6 +126,7 @@ def test_ball_in_a_spall_loses_what_the_geometry_says():
         assert statics.at(place).element_loads[1] == pytest.approx(sound.element_loads[1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_shaking_grows_with_the_width():
     levels = []
     for width in (0.3e-3, 0.6e-3, 1.2e-3):
@@ -161,6 +164,7 @@ def test_modes_have_the_stiffness_at_the_load():
     np.testing.assert_allclose(found, expected, rtol=3e-3)
 
 
+@pytest.mark.slow
 def test_stiffer_rings_bring_the_pair_back_to_its_joints():
     """Relative displacement of the wheels falls as 1/stiffness^(2/3), the mesh force tends to that with joints."""
     pair = GearPair.paper(backlash="0.1 mm")
@@ -210,6 +214,7 @@ def test_lives_follow_from_the_loads_of_a_run():
         bearing_lives(rig, solution, start=9.0)
 
 
+@pytest.mark.slow
 def test_harmonics_of_the_pair_tend_to_those_with_joints():
     """A whole case on bearings of growing stiffness: its mesh harmonics come near as 1/stiffness^(2/3)."""
     from gearmbs.studies import Case, case_mechanism, run_case

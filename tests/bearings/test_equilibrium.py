@@ -280,6 +280,7 @@ def test_what_rollers_carry_ends_at_the_cone_of_their_normals():
             statics.under([size, 0.0, 0.999 * just * size])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, 20.0])
 def test_mechanisms_rest_where_the_bearing_alone_does(size):
     bearing = Bearing.from_designation("6205/C3")

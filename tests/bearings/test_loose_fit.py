@@ -30,6 +30,7 @@ def test_ring_lies_where_the_load_puts_it():
     assert abs(housing[0] - ring[0]) == pytest.approx(20e-6 + abs(carried) / 2e8, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["outer", "inner"])
 def test_energy_closes_with_loose_rings(part):
     fit = LooseFit(part=part, clearance="10 um")

@@ -59,6 +59,7 @@ def test_forty_windows_that_lie_flat_twenty_times():
     assert np.median([outcome.error for outcome in outcomes]) < 1e-4
 
 
+@pytest.mark.slow
 def test_independent_solutions_are_those_of_the_library():
     """To its six digits: 1000 s of the pendulum, 20 s of the forty windows."""
     for name, solution in (("A01", references.pendulum), ("A02 long", lambda t: references.four_bars(t, 40))):
@@ -95,6 +96,7 @@ def test_ten_windows_pass_the_flat_position():
     np.testing.assert_allclose(height, references.four_bars(t, 10)[:, 1], atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loops", [2, 40])
 @pytest.mark.parametrize("tol", [1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
 def test_many_windows_at_any_tolerance(loops, tol):

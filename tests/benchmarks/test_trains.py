@@ -17,6 +17,7 @@ def test_shares_of_a_step_and_the_exponent():
     assert "grows with the power 1.10" in text
 
 
+@pytest.mark.slow
 def test_every_model_is_measured():
     rows = trains.measure(1, 0.002, report=lambda text: None)
     assert [row["model"] for row in rows][:3] == ["healthy pair", "bench, joints", "bench, elastic bearings"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
@@ -30,6 +31,7 @@ def call(*words: object, code: int = 0) -> str:
     return result.output
 
 
+@pytest.mark.slow
 def test_from_plan_to_end(tmp_path):
     (tmp_path / "p.toml").write_text(PLAN)
     folder = tmp_path / "p.campaign"

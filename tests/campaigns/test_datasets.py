@@ -123,6 +123,7 @@ def test_a_leak_looks_like_skill():
     assert "chance" in str(found["by specimen"])
 
 
+@pytest.mark.slow
 def test_one_specimen_gives_no_interval():
     x, labels = np.arange(40.0)[:, None], np.repeat(["a", "b"], 20)
     found = score(classifier().fit(x, labels), x, labels, np.zeros(40, dtype=int))

@@ -22,6 +22,7 @@ def campaign(tmp_path_factory):
     return campaign
 
 
+@pytest.mark.slow
 def test_what_is_kept(campaign):
     table, data = campaign.table, campaign.open()
     assert list(table.status) == ["done"] * 2
@@ -130,6 +131,7 @@ def test_a_deck_in_a_plans_file(tmp_path):
         load_plan(tmp_path / "p.toml")
 
 
+@pytest.mark.slow
 def test_variables_of_a_deck_as_factors(tmp_path):
     """A constant VARIABLE, by its id and by its name, and a place in the script."""
     deck = DECK.replace("I=2, J=4", "I=5, J=4").replace("${mass}", "2").replace(

@@ -45,6 +45,7 @@ def test_same_bits_from_processes_and_parts(tmp_path, undisturbed):
     assert digest(two) == undisturbed
 
 
+@pytest.mark.slow
 def test_extension_keeps_what_is_there(tmp_path):
     campaign = small(tmp_path / "c", n=20)
     campaign.run(workers=0)
@@ -123,6 +124,7 @@ def test_stop_at_the_first_failure(tmp_path):
         Campaign(tmp_path / "c", plan).run(workers=0)
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_run_and_loses_nothing(tmp_path, monkeypatch, undisturbed):
     import pyarrow.parquet as pq
 

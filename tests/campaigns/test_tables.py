@@ -49,6 +49,7 @@ SET = {
 }
 
 
+@pytest.mark.slow
 def test_a_drivetrain(tmp_path):
     factors = [
         Factor("loads.brake.torque", "80 N m", "120 N m"),
@@ -86,6 +87,7 @@ def test_equal_drivetrains_have_equal_keys():
     assert key(meshes__mesh__backlash="0.11 mm") != same
 
 
+@pytest.mark.slow
 def test_a_planetary_set(tmp_path):
     factors = [Factor("operation.torques.carrier", "20 N m", "40 N m")]
     plan = make_plan(PlanetarySubject(SET), factors, "grid", keep=["forces", "signal:ring_sensor"], unit=2)

@@ -132,6 +132,7 @@ def gap_of_rounding(pair, place, row, bounds, section):
     return 1e-3 * minimize(distance, found.x, bounds=limits, method="Nelder-Mead", options=options).fun
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_section_gap_against_search(name):
     pair = PAIRS[name]

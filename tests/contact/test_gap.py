@@ -54,6 +54,7 @@ PAIRS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_section_gap_against_search(name):
     pair = PAIRS[name]

@@ -178,6 +178,7 @@ def test_no_jumps_of_internal_and_helical_wheels(name):
     assert jump < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PERFECT)
 def test_no_jumps(name):
     pair, slices = PERFECT[name]

@@ -98,6 +98,7 @@ def random_frames(contact, rng):
     return frames
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_gaps_at_random_poses(name):
     pair = PAIRS[name]

@@ -57,6 +57,7 @@ def test_claims_of_a_made_up_table(scripts):
     assert verdicts.sum().to_dict() == {"misaligned": 3, "distance": 2, "load": 2, "all": 1}
 
 
+@pytest.mark.slow
 def test_figures_show_themselves_in_a_notebook(scripts):
     """Figures carry their picture with them, also where nothing has set up matplotlib."""
     import claims

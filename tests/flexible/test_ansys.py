@@ -58,6 +58,7 @@ def body(ids, **changed):
     return corners, FullFile(parts["dofs"], parts["k"], parts["m"])
 
 
+@pytest.mark.slow
 def test_matrices_and_nodes_of_ansys(reader):
     ids = np.array([4, 7, 8, 9, 11, 20, 21, 22])
     corners, full = body(ids)
@@ -119,6 +120,7 @@ def test_files_of_ansys_that_lie_are_named(reader, tmp_path):
         read_ansys(tmp_path / "odd.full", nodes)
 
 
+@pytest.mark.slow
 def test_terms_are_counted_and_a_reader_that_breaks_down_is_survived(reader):
     ids = np.arange(1, 9)
     corners, full = body(ids)

@@ -44,6 +44,7 @@ def pulled(load, elements):
     return static_equilibrium(m)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [0.2, 1.0, 3.0, 10.0])
 def test_a_cantilever_bends_as_the_elastica(load):
     found = pulled(load, 40)
@@ -73,6 +74,7 @@ def test_a_torque_at_the_end_bends_a_rod_into_a_circle(turns):
     np.testing.assert_allclose(place, [np.sin(angle) / angle, 0.0, -(1.0 - np.cos(angle)) / angle], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_way_by_steps_of_time_leads_to_the_same_place():
     m, beam = rod(12)
     m.load("pull", beam.last, m.ground.marker(), rm=m.ground.marker(), fz=f"-{3.0 * SECTION.bending[0]}*TIME")
@@ -80,6 +82,7 @@ def test_the_way_by_steps_of_time_leads_to_the_same_place():
     np.testing.assert_allclose(pulled(3.0, 12).com_position("rod.12"), steps, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pulls", "turns"])
 def test_what_has_no_equilibrium_is_still_named(kind):
     """A rod on a hinge, and one that a force follows round for ever."""

@@ -29,6 +29,7 @@ def shaft(elements: int = 12) -> Shaft:
     return Shaft([ShaftSection(1.5, 0.05)], discs, {"A": 0.0, "B": 1.5}, MATERIAL, elements)
 
 
+@pytest.mark.slow
 def test_reduction_is_that_of_a_free_body():
     model = shaft().model()
     reduced = reduce_model(model, modes=40).slowest(10)
@@ -151,6 +152,7 @@ def test_markers_between_the_stations_and_off_the_axis_follow_the_section():
         model.shapes(np.array([0, 0, 1.2]))
 
 
+@pytest.mark.slow
 def test_modes_of_the_mechanism_are_those_of_the_rotor():
     """At rest, on springs: linear modes of the modal body against all degrees of freedom."""
     rotor = Rotor(shaft(), [Support("A", 1e6), Support("B", 1e6)])
@@ -194,6 +196,7 @@ def test_modes_are_selected_by_what_they_give_to_the_seats():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torque", [10.0, 1.0, 0.1])
 def test_steps_are_those_of_the_whole_matrix(torque, monkeypatch):
     """A sudden torque on a free bar: what the corrector's matrix leaves out must not reach the estimate of the error.

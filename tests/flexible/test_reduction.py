@@ -62,6 +62,7 @@ def test_reductions_converge_from_above_and_keep_static_flexibility(kind, method
     assert report.converged_up_to(0.5) > 0.0
 
 
+@pytest.mark.slow
 def test_slow_modes_lack_flexibility_under_torques():
     """A bar clamped at one end and pinned at the other: its mean deflection by weight is w L^4 / (320 EI)."""
     steel = ElasticMaterial(youngs_modulus=2.1e11, shear_modulus=8e10, density=7850.0)

@@ -37,6 +37,7 @@ def plain(elements: int) -> Rotor:
     return Rotor(shaft, [Support("A", PINNED), Support("B", PINNED)])
 
 
+@pytest.mark.slow
 def test_example_of_friswell_at_rest_and_at_4000_rpm():
     """Rows of ROSS 2.3.0 with 48 elements; the book prints 86.66, 274.31, 716.78 and 85.39, 87.80, 251.78, 294.71."""
     rest = friswell().modes(0.0, 6).frequencies

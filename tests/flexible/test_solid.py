@@ -12,6 +12,7 @@ from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_mod
 skfem = pytest.importorskip("skfem")
 
 
+@pytest.mark.slow
 def test_a_free_bar_of_solids_bends_and_stretches_as_a_bar():
     length, depth, e, rho = 1.0, 0.05, 2e11, 7800.0
     model = solid_model(block_mesh((depth, depth, length), (1, 1, 10)), ElasticMaterial(e, 0.0, rho))
@@ -27,6 +28,7 @@ def test_a_free_bar_of_solids_bends_and_stretches_as_a_bar():
     assert np.abs(frequencies / stretching - 1).min() < 1e-3
 
 
+@pytest.mark.slow
 def test_a_thin_ring_has_the_frequencies_of_the_closed_form():
     """w_n^2 = E I n^2 (n^2 - 1)^2 / (rho A R^4 (n^2 + 1)) in the plane of the ring."""
     radius, thick, wide, e, rho = 0.2, 0.01, 0.02, 2.1e11, 7850.0
@@ -39,6 +41,7 @@ def test_a_thin_ring_has_the_frequencies_of_the_closed_form():
         assert np.sum(np.abs(frequencies / closed - 1) < 0.02) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0004])
 def test_modes_of_thin_plates_take_few_iterations(monkeypatch, thickness):
     """Against all eigenvalues, as far as these are known: to the roundoff of the largest."""

@@ -86,6 +86,7 @@ def test_silence_where_nothing_is_lost_or_nothing_turns(model, kind, options):
     assert remarks(lambda: linear_modes(carrying(model, kind, **options))) == []
 
 
+@pytest.mark.slow
 def test_silence_for_a_disc_of_the_shaft_and_for_seats_of_unknown_flexibility():
     from dataclasses import replace
 

@@ -124,6 +124,7 @@ def test_von_mises_and_what_is_refused():
     assert bare.recovery is None
 
 
+@pytest.mark.slow
 def test_given_stresses_follow_the_modes():
     model = BAR.modal_model().slowest(6)
     values = np.random.default_rng(3).normal(size=(6, 2, 6))

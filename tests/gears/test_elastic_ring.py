@@ -124,6 +124,7 @@ def test_sidebands_of_the_carrier_at_a_fixed_sensor():
     assert others.max() < 0.02 * min(lower, upper)
 
 
+@pytest.mark.slow
 def test_a_stiff_rim_is_a_rigid_ring():
     stiff = ElasticRim(waves=3, youngs_modulus=2.1e15, damping_ratio=1.0)
     forces = []

@@ -306,6 +306,7 @@ def test_broken_tooth_touches_lower_down():
     assert mine[:, 6].max() <= roll_length * (1 + 1e-12)
 
 
+@pytest.mark.slow
 def test_severity_shows_in_the_mesh():
     def swing(fault):
         pair = GearPair.paper().with_faults(fault)
@@ -327,6 +328,7 @@ def test_severity_shows_in_the_mesh():
     assert np.linalg.norm(swing(TipRelief())) < 1e-12
 
 
+@pytest.mark.slow
 def test_sidebands_around_the_mesh_frequency():
     # one point per tooth quarter over a revolution: line 29 is the mesh frequency, 28 and 30 its sidebands
     def lines(**changes):

@@ -132,6 +132,7 @@ def test_a_module_of_metres_is_a_forgotten_unit():
         GearSpec(teeth=20, module="3")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "unit"),
     [

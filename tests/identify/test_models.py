@@ -12,6 +12,7 @@ from tests.identify.levels import CASES, run_stored
 FRICTION = Free("friction.dynamic", 0.05, 0.01, 0.2, also={"friction.static": 2.0})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planted", ["skew", "inclination"])
 def test_the_plane_of_a_misalignment_is_chosen(planted, monkeypatch):
     """From six noisy numbers of one recording of a sensor of unknown gain, with friction unknown, too."""

@@ -85,6 +85,7 @@ def bushed(*ratios: float) -> Mechanism:
     return m
 
 
+@pytest.mark.slow
 def test_what_is_over_damped_has_no_natural_frequency_and_no_critical_speed():
     rng = np.random.default_rng(seed())
     speeds = np.linspace(0.0, 3000.0, 7)

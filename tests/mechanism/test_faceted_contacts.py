@@ -53,6 +53,7 @@ def on_plane(shape, law):
     return load
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_the_load_does_not_jump_when_patches_join(law):
     load = on_plane(two_bumps(), LAWS[law])
@@ -67,6 +68,7 @@ def test_the_load_does_not_jump_when_patches_join(law):
     assert found[-1][1][0] == pytest.approx(work, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_no_energy_is_gained_around_a_loop(law):
     load = on_plane(two_bumps(), LAWS[law])

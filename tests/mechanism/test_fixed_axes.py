@@ -118,6 +118,7 @@ def with_states() -> Mechanism:
     return m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [rotor, lambda: rotor(True), with_states])
 def test_jacobian(make):
     problem, _ = reduced(make())

@@ -57,6 +57,7 @@ def test_without_deformation_the_block_creeps():
     assert np.linalg.norm(solution.com_velocity("block")[-1]) == pytest.approx(creep, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deformation", [0.0, 1e-6])
 def test_pendulum_with_a_dry_pin(deformation):
     """Swings of I a'' = -g L sin a -+ mu r |R|, R the pin force, integrated by half swings of one sign each."""
@@ -225,6 +226,7 @@ def test_moments_press_a_slide(change):
     np.testing.assert_allclose(2.0 * a[5:], (30 - 0.1 * normal)[5:], rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tol", [1e-7, 1e-8])
 def test_a_slide_that_jams_ends_the_run(tol):
     """Friction's part 0.1 * 0.1 m |a|/overlap reaches m |a| where the overlap is 0.01 m: no motion goes beyond."""

@@ -490,6 +490,7 @@ def test_right_derivatives_beside_kinks_and_jumps_are_not_refused(place, monkeyp
         bumped(0, place, tuple(10.0 ** rng.uniform(-4, 9, 3))).compile()
 
 
+@pytest.mark.slow
 def test_derivatives_given_beside_a_function_are_compared_too():
     @njit
     def opposite(t, frames, states, parameters, jac):

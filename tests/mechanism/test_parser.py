@@ -83,6 +83,7 @@ def combined(inner):
 PYTHON = {"SIN": math.sin, "COS": math.cos, "ABS": abs, "ATAN": math.atan, "TANH": math.tanh, "MAX": max, "PI": math.pi}
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.recursive(LEAVES, combined, max_leaves=12), st.floats(0.1, 3.0))
 def test_arithmetic_agrees_with_python(text, t):

@@ -137,6 +137,7 @@ def test_a_wrong_speed_is_not_followed(size, speed):
     assert f"{speed:.1f} rpm" in said[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["signal", "file", "call"])
 def test_speed_and_teeth_that_contradict_the_record_are_told(tmp_path, way):
     own = record(seconds=2.0)[:, [0]]

@@ -220,6 +220,7 @@ def test_what_is_missing_is_asked_for():
         diagnose_bearing(data, "6205", "60000 rpm")
 
 
+@pytest.mark.slow
 def test_a_modulation_at_the_cages_turns_may_be_another_shafts():
     """A wheel with one high tooth on a shaft of 0.4 times the speed: not told from a cage unless shafts are known."""
     ratio = LINES.ftf
@@ -327,6 +328,7 @@ def run(*words):
     return CliRunner().invoke(app, [str(word) for word in words])
 
 
+@pytest.mark.slow
 def test_one_command_names_the_race(tmp_path):
     from gearmbs.signals import write_signal
 
@@ -375,6 +377,7 @@ torque = "10 N m"
 """
 
 
+@pytest.mark.slow
 def test_bearings_and_shafts_of_a_drivetrain(tmp_path):
     from gearmbs.signals import write_signal
 
@@ -404,6 +407,7 @@ def test_says_what_is_wrong(tmp_path, words, message):
     assert message in " ".join(result.output.split())
 
 
+@pytest.mark.slow
 def test_the_report_shows_draws_and_saves_itself(tmp_path):
     report = diagnose_bearing(record(3.0 * pulses(LINES.bpfo * SHAFT)), "6205", f"{SHAFT} Hz", shafts=[])
     figure = report.plot()
@@ -416,6 +420,7 @@ def test_the_report_shows_draws_and_saves_itself(tmp_path):
     assert "data:image/svg+xml" in report.save(tmp_path / "bearing.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_level_that_cannot_be_measured_is_left_open_with_the_length_that_is_needed():
     """The outer race's line 1.6 Hz beside a shaft's: told apart from (2.5 + 0.5)/(1.6 - 0.03) s on."""
     order = 3.0 + 1.6 / SHAFT

@@ -108,6 +108,7 @@ def test_angular_resampling_through_standstill_is_short_and_free_of_aliases():
     assert angular_resample(signal, phase).sizes["angle"] < 10 * signal.sizes["time"]
 
 
+@pytest.mark.slow
 def test_rest_in_the_middle_costs_nothing():
     points = [(0, 0), (2, 100.0), (3, 0), (4, 0), (5, 100.0)]
     angle = speed_curve(points).angle(times())
@@ -236,6 +237,7 @@ def test_analysis_of_a_pair_that_speeds_up_follows_it_in_angle():
     assert first == pytest.approx(0.3 / math.sqrt(2), rel=0.02)
 
 
+@pytest.mark.slow
 def test_orders_of_what_becomes_a_signal():
     signal, _ = run_up()
     table = pd.DataFrame({"time": signal["time"].values, "a": signal.values[:, 0], "b": signal.values[:, 0]})

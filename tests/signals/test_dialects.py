@@ -471,6 +471,7 @@ WORDS = (
 SIGNS = (",", ";", "\t", " ", ":", "=", '"', "\ufeff", "\u00b5", "[", "]", "\r", "0x", "-", "_", "e")
 
 
+@pytest.mark.slow
 def test_headers_made_of_anything_give_a_signal_or_one_line(tmp_path):
     """Headers thrown together from a fixed seed: never another error than the package's own, never a warning."""
     rng = np.random.default_rng(20240229)

@@ -100,6 +100,7 @@ def test_bare_single_channel_round_trip(tmp_path, format):
     assert "teeth" not in back.attrs
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(
     values=st.lists(st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=2, max_size=20),
@@ -405,6 +406,7 @@ def test_damage_anywhere_is_named_or_harmless(tmp_path, format):
     assert all(str(path) in text for text in said)
 
 
+@pytest.mark.slow
 def test_rounded_times_are_no_uneven_clock_if_the_rate_is_known(tmp_path):
     """Times in whole milliseconds at 12.8 kHz repeat 12 or 13 times each."""
     t = np.round(np.arange(200_000) / 12800.0, 3)

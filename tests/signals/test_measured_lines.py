@@ -47,6 +47,7 @@ def test_mesh_frequency_without_a_known_speed(record):
     assert report.gmf == pytest.approx(gmf, abs=1.0)
 
 
+@pytest.mark.slow
 def test_what_the_broken_tooth_does_by_the_measured_levels():
     """As of the records: of harmonics 1 to 3 stay within 3 dB on 3, 2 and 2 of 4 channels, under load on 3, 2 and 3."""
     t = np.arange(round(2.0 * RATE)) / RATE

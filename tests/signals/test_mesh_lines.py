@@ -43,6 +43,7 @@ def record(seed: int):
     return make_signal(x, RATE), teeth, (gmf, common * gmf), fair
 
 
+@pytest.mark.slow
 def test_wrong_mesh_lines_are_doubted():
     fair = right = 0
     for seed in range(80):

@@ -79,6 +79,7 @@ def checks(report):
     return [note for note in report.notes if note.startswith("CHECK")]
 
 
+@pytest.mark.slow
 def test_half_or_double_the_speed_is_remarked():
     assert checks(analyse(pair(), 32, rate=RATE, speed="1500 rpm")) == []
     assert checks(analyse(pair(), 32, rate=RATE)) == []
@@ -112,6 +113,7 @@ def test_rates_and_speeds_that_no_machine_has_are_remarked():
     assert any("check its unit" in note for note in checks(analyse(machine(), speed="0.5 rpm")))
 
 
+@pytest.mark.slow
 def test_states_as_arrays_and_loads_left_out():
     report = compare({"healthy": pair(), "worn": 2 * pair()}, rate="12.8 kHz", teeth=32, units="m/s^2")
     assert float(report.changes().sel(state="worn").mean()) == pytest.approx(20 * math.log10(2), abs=0.01)

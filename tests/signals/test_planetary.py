@@ -82,6 +82,7 @@ def test_faults_make_lines_at_their_orders(fault):
     assert np.abs(beside - np.round(beside)).min(axis=1).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("teeth", [(23, 31, 85), (24, 30, 84)])
 @pytest.mark.parametrize("which", ["planet", "sun"])
 def test_averages_find_the_faulty_tooth(which, teeth):

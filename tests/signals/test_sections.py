@@ -129,6 +129,7 @@ def test_trend_follows_what_changes(tmp_path):
     assert {"start_s", "gmf_hz", "channel", "band_1", "level", "fm4", "note"} <= set(table.columns)
 
 
+@pytest.mark.slow
 def test_sections_without_a_mesh_line_are_gaps_with_a_reason(tmp_path):
     whole = record(12.0)
     whole[51200:102400] = np.random.default_rng(0).standard_normal((51200, 2))
@@ -160,6 +161,7 @@ def test_memory_does_not_grow_with_the_file(tmp_path, name):
     assert peaks[1] < 0.8 * record(120.0).nbytes
 
 
+@pytest.mark.slow
 def test_command(tmp_path):
     path = write_signal(record(10.0), tmp_path / "x.wav")
     result = CliRunner().invoke(app, ["trend", str(path), "--section", "5 s", "--out", str(tmp_path / "trend.csv")])

@@ -90,6 +90,7 @@ def test_order_tracking_of_a_run_up_gives_one_line():
     assert order_spectrum(angular, scaling="density").attrs["units"] == "(m/s^2)^2/order"
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(f0=st.floats(10.0, 40.0), change=st.floats(0.6, 1.6), teeth=st.integers(10, 40))
 def test_average_keeps_what_turns_with_the_shaft(f0, change, teeth):
@@ -148,6 +149,7 @@ def test_average_by_the_mesh_line_needs_no_tacho():
     assert lines[33] == pytest.approx(depth / 2, rel=3e-2)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(
     rpm=st.floats(300.0, 3000.0),

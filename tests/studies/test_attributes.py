@@ -24,6 +24,7 @@ def test_every_quantity_has_its_unit():
     assert "gears_addendum_units" not in text
 
 
+@pytest.mark.slow
 def test_the_study_keeps_units_and_remarks():
     study = run_paper(Case(operation={"run_up": 0.03, "settling": 0.01, "duration": 0.06}), workers=2)
     records = study.records

@@ -165,6 +165,7 @@ def test_loose_tolerances_of_ida_are_remarked():
     assert remarks(Case(shafts=thick, gears={"bore_radius": "30 mm"})) == []
 
 
+@pytest.mark.slow
 def test_wrong_settings_are_found_without_compiling():
     """In a fresh interpreter: a typing error, an impossible pair and a band too high, and numba is not imported."""
     code = (

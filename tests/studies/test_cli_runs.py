@@ -42,6 +42,7 @@ def signalled_after(fraction, number):
     return bars
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "kill"])
 def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypatch, keep_handlers, integrator, number):
@@ -60,6 +61,7 @@ def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypat
         assert part.force_2.attrs["units"] == "N"
 
 
+@pytest.mark.slow
 def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch, keep_handlers):
     path = tmp_path / "soft.toml"
     path.write_text(CASE)
@@ -104,6 +106,7 @@ def test_wrong_options_leave_no_files(tmp_path, options, words, keep_handlers):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_remarks_on_an_unusual_case(tmp_path, keep_handlers):
     path = tmp_path / "apart.toml"
     path.write_text("[operation]\nrun_up = '30 ms'\nduration = '60 ms'\n[fault]\ncentre_distance_error = '3 mm'\n")

@@ -30,6 +30,7 @@ def test_the_file_is_the_pair():
     assert other.speeds["crank"] == pytest.approx(100.0 * np.pi / 30.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tol", [1e-6, 1e-7])
 def test_four_flank_changes_a_turn(tol):
     """The flank that carries, by the impulse over 20 degrees of the crank: unloaded wheels clatter where it changes."""

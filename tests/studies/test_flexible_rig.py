@@ -17,6 +17,7 @@ def run(coupling="full", stiffer=1.0, time=0.07, rate=2000):
     return solution
 
 
+@pytest.mark.slow
 def test_shafts_bend_and_twist_by_the_tooth_force():
     # the energy balance sums powers over the outputs
     solution = run(rate=8000)

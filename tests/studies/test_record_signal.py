@@ -20,6 +20,7 @@ def records():
     return {case.name: run_case(case) for case in (healthy, broken)}
 
 
+@pytest.mark.slow
 def test_a_broken_tooth_is_a_local_fault_to_the_indicators(records):
     found = {name: analyse(record_signal(record, "line_of_action")) for name, record in records.items()}
     # 29 teeth at 40 turns a second
@@ -28,6 +29,7 @@ def test_a_broken_tooth_is_a_local_fault_to_the_indicators(records):
         assert found["broken"].indicators[name].item() > 3.0 * found["healthy"].indicators[name].item(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", range(cases(3)))
 def test_a_broken_tooth_shows_at_its_number(case):
     """Any tooth of either wheel, whatever the numbers of teeth, the speed and the settling."""

@@ -20,6 +20,7 @@ def run_up():
     return case, run_case(case)
 
 
+@pytest.mark.slow
 def test_the_record_begins_at_rest_and_follows_the_curve(run_up):
     case, record = run_up
     t = record.signal_time.values - 0.1
@@ -112,6 +113,7 @@ def test_a_run_up_of_hardly_a_turn_is_refused():
         check_record(case)
 
 
+@pytest.mark.slow
 def test_from_a_file_on_the_command_line(tmp_path):
     path = tmp_path / "up.toml"
     path.write_text('[operation]\nspeed = [["0 s", "0 rpm"], ["0.4 s", "1800 rpm"]]\nrun_up = "30 ms"\n')

@@ -125,6 +125,7 @@ def test_study_on_short_records(short_study, tmp_path):
     assert len(rows) == 1 + 2 * 3 * 4 * 2 * 3
 
 
+@pytest.mark.slow
 def test_misalignment_and_distance_raise_the_harmonics(short_study):
     """Line of action, low load: two-flank contact makes 2 x GMF dominate; +3 mm raises all three."""
     assert [c.held for c in short_study.claims("line_of_action")[:2]] == [True, True]
@@ -159,6 +160,7 @@ def test_exchange_with_measurements(short_study, tmp_path):
         model_signals(path, "sideways")
 
 
+@pytest.mark.slow
 def test_only_lines_at_multiples_of_the_mesh_frequency():
     """Frictionless healthy pair: between the lines everything is 80 dB below the first.
 
@@ -222,6 +224,7 @@ def test_failure_keeps_what_was_computed(monkeypatch):
     assert caught.value.solution is solution
 
 
+@pytest.mark.slow
 def test_command_run_and_its_errors(tmp_path):
     runner = CliRunner()
     path = tmp_path / "mine.toml"

@@ -130,6 +130,7 @@ def test_turns_are_counted_over_long_steps():
     np.testing.assert_allclose(found - found[0], angle - angle[0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_report_and_view(train, record):
     text = train_report(train, record)
     for words in ("## Speeds and frequencies", "| mesh | mesh | GMF | 500 |", "## Bearings", "| laser | m/s |",
@@ -168,6 +169,7 @@ def test_figure_names_lines_by_the_kinematic_table(train, record):
         train_spectrum(train, record.assign(mesh_track=record.mesh_rms))
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path):
     path = tmp_path / "train.toml"
     quick = TEXT.replace('duration = "0.2 s"', 'duration = "0.02 s"\nsettling = 0.0\ntolerance = 1e-6')

@@ -50,6 +50,7 @@ def test_discs_by_moments_have_the_size_of_the_plain_disc_with_them():
     np.testing.assert_allclose(by_moments.outline(), Shaft(SHAFT.sections, [plain]).outline(), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_facets_are_turned_outwards():
     pytest.importorskip("skfem")
     model = reduce_model(solid_model(block_mesh((0.3, 0.2, 0.02), (4, 3, 1))), [], modes=6, method="free")
@@ -81,6 +82,7 @@ def test_a_bent_body_is_drawn_where_its_markers_are(run):
     assert "deflections" not in scene.title
 
 
+@pytest.mark.slow
 def test_the_default_factor_makes_bending_visible(run):
     _, solution = run
     scene = solution_scene(solution, start=0.0, frames=20)

@@ -82,6 +82,7 @@ def test_step_surfaces_lie_on_the_helicoid(name):
     assert away == pytest.approx(exact, abs=2e-10)
 
 
+@pytest.mark.slow
 def test_files(tmp_path):
     for name in ("ring", "helical ring"):
         assert write_stl(WHEELS[name], tmp_path / f"{name}.stl").stat().st_size > 1000

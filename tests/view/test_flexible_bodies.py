@@ -10,6 +10,7 @@ from gearmbs.view import deformation_animation, deformed_plot, modal_energy_plot
 SHAFT = Shaft([ShaftSection("1 m", "100 mm")], seats={"A": 0.0, "B": 1.0})
 
 
+@pytest.mark.slow
 def test_a_mode_is_drawn_and_moves(tmp_path):
     model = SHAFT.modal_model().slowest(6)
     figure = deformed_plot(model, np.eye(model.modes)[0])
@@ -31,6 +32,7 @@ def test_a_mode_is_drawn_and_moves(tmp_path):
         mode_animation(model, 7)
 
 
+@pytest.mark.slow
 def test_faces_are_coloured_by_their_deflection():
     pytest.importorskip("skfem")
     model = reduce_model(solid_model(block_mesh((0.3, 0.2, 0.02), (4, 3, 1))), [], modes=6, method="free")

@@ -122,6 +122,7 @@ def test_stl_of_the_bore_and_units(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.stl", "in.stl"]
 
 
+@pytest.mark.slow
 def test_stl_of_a_pair_stands_where_the_pair_stands(tmp_path):
     pair = GearPair.paper(misalignment="1 deg", backlash="0.4 mm", centre_distance_error="3 mm")
     solid = read_stl(write_stl(pair, tmp_path / "pair.stl"))

@@ -14,6 +14,7 @@ def gears():
     return planetary((24, 30, 84), "1.5 mm", 3, helix_angle="12 deg")
 
 
+@pytest.mark.slow
 def test_wheels_and_carrier_have_their_colours(gears, tmp_path):
     scene = planetary_scene(gears, planetary_mechanism(gears, speeds={"carrier": 1.0}, run_up=0))
     colours = {part.name: part.colour for part in scene.parts}
@@ -34,6 +35,7 @@ def test_the_carrier_keeps_clear_of_the_wheels(gears):
     assert points[:, 2].max() > 0.5 * gears.planet.face_width
 
 
+@pytest.mark.slow
 def test_a_simulated_set_moves(gears):
     rig = planetary_mechanism(gears, speeds={"carrier": 20.0, "sun": 90.0}, held=None, run_up=0)
     scene = planetary_scene(gears, rig.simulate(0.002, rate=2000), start=0.0, stop=0.002)

@@ -255,6 +255,7 @@ def pair():
     return GearPair.paper(backlash="0.1 mm")
 
 
+@pytest.mark.slow
 def test_transmission_error_and_stiffness_over_cycles(pair):
     errors = {
         "healthy": loaded_transmission_error(pair, points=40),

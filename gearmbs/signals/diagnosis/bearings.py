@@ -183,7 +183,7 @@ def diagnose_bearing(
         ``channels`` and ``gaps`` as there.
     bearing : Bearing, str, mapping, BearingLines, or a sequence of these
         See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds. Those
-        that are alike and turn alike have the same lines and are told as one, "a or b".
+        that are alike and turn alike have the same lines and are reported as one, "a or b".
     speed : float, str or curve, optional
         Of the inner ring's shaft, rad/s or text; default the signal's. Of a curve, as for `speed_curve`, the angle is
         taken, see ``phase``.

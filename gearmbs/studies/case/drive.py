@@ -15,14 +15,16 @@ from gearmbs.units import to_si
 def drive_angle(speed: Any, run_up: float, start: float, sense: int = 1) -> TimeFunction:
     """Return the driver's angle over time, rad; see `gearmbs.studies.run.rig.gear_rig`."""
     if not _is_curve(speed):
-        return _constant(speed.item() if isinstance(speed, np.ndarray) else speed, run_up, sense)
+        return _constant(
+            sense * to_si(speed.item() if isinstance(speed, np.ndarray) else speed, "angular speed", "speed"), run_up
+        )
     return polyline_integral(*_after_run_up(speed, "angular speed", "speed", run_up, start, sense), soft_start=True)
 
 
-@lru_cache(maxsize=64, typed=True)
-def _constant(speed: Any, run_up: float, sense: int) -> TimeFunction:
+@lru_cache(maxsize=64)
+def _constant(speed: float, run_up: float) -> TimeFunction:
     """Return the angle of a constant speed, which one run asks for several times."""
-    return ramp(sense * to_si(speed, "angular speed", "speed"), over=run_up)
+    return ramp(speed, over=run_up)
 
 
 def load_torque(torque: Any, run_up: float, start: float, sense: int = 1) -> TimeFunction:

@@ -81,6 +81,7 @@ def test_a_contact_never_pulls(method):
     np.testing.assert_allclose(result.y[:, 2], 1000.0 * np.maximum(0.0, np.cos(times) - 0.5) ** 1.5, atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", BDF)
 def test_dense_output_and_outputs_are_one_and_travel(method):
     options = {"rtol": 1e-7, "atol": 1e-7, "method": method}

@@ -45,6 +45,7 @@ def test_error_constant_on_uniform_steps(k):
     assert constant == pytest.approx(1 / (1 + (k + 1) * harmonic), rel=1e-12)
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(st.integers(1, 6), st.lists(st.floats(0.3, 3.0), min_size=7, max_size=7), st.integers(0, 1000))
 def test_formula_differentiates_polynomials_of_its_order(k, gaps, seed):
@@ -55,6 +56,7 @@ def test_formula_differentiates_polynomials_of_its_order(k, gaps, seed):
     assert weights @ values == pytest.approx(polynomial.deriv()(0.0), abs=1e-9 * np.abs(weights * values).sum())
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(st.integers(1, 7), st.lists(st.floats(0.2, 2.0), min_size=8, max_size=8))
 def test_divided_difference_of_a_power(count, gaps):

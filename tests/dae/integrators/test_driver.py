@@ -70,6 +70,7 @@ def test_threads_give_the_same_result():
         assert_same(expected, result)
 
 
+@pytest.mark.slow
 def test_the_loop_releases_the_gil():
     """While a run is inside the compiled loop another thread goes on counting."""
     long_chunk = 2_000_000
@@ -119,6 +120,7 @@ def test_ctrl_c_keeps_what_was_computed_and_resumes_bit_identically(monkeypatch)
     assert signal.getsignal(signal.SIGINT) is before
 
 
+@pytest.mark.slow
 def test_ctrl_c_is_heeded_in_the_first_steps():
     """Where each step takes long, the first of them must not be hundreds."""
     calls = []
@@ -204,6 +206,7 @@ def test_breakpoints_are_landed_on_and_cost_nothing_where_nothing_jumps():
     assert result.stats.steps <= solve_wstiff(pendulum(), TIMES, tol=1e-6).stats.steps + 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 def test_a_jump_at_a_breakpoint_restarts_at_order_one(method):
     """A unit mass on a unit spring, pushed by turns: ten jumps of its acceleration."""

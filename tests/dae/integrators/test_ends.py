@@ -154,6 +154,7 @@ def solve(ending: Ending, tol: float, until: float, method: str, most: int = 100
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("families", [endings, poles], ids=lambda families: families.__name__)
 @pytest.mark.parametrize("method", METHODS)
 def test_no_run_succeeds_beyond_the_end_and_its_twin_does(method, families):

@@ -15,6 +15,7 @@ from tests.dae.integrators.problems import pendulum
 from tests.says import says
 
 
+@pytest.mark.slow
 def test_singular_jacobian_names_the_unknown():
     @njit
     def residual(t, y, yp, out):
@@ -29,6 +30,7 @@ def test_singular_jacobian_names_the_unknown():
     assert result.t.tolist() == [0.0]
 
 
+@pytest.mark.slow
 def test_jacobian_that_becomes_singular_for_good():
     """Nothing determines z from t = 1 on, and its equation cannot be satisfied."""
 
@@ -71,6 +73,7 @@ def driven(t, y, yp, out):
     out[1] = y[0] - np.sin(t)
 
 
+@pytest.mark.slow
 def test_inconsistent_start_without_rates():
     """The rates that are worked out must not swallow the jump, here from 0.5 to sin 0 = 0."""
     result = solve_dae(driven, (0.0, 1.0), [0.5, 1.0], names=["place", "speed"])
@@ -153,6 +156,7 @@ def test_nan_from_a_user_function(compiled):
     assert "division by zero" in result.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("last", [1e-6, 0.01, 1.0])
 def test_nan_from_a_time_on_is_named_whatever_the_time(last):
     @njit
@@ -174,6 +178,7 @@ def test_nan_at_the_start():
     assert result.stats.steps == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False])
 def test_an_event_function_that_is_not_finite_is_named(compiled):
     """The root of a negative number from t = 1 on: its crossings would never be seen."""
@@ -260,6 +265,7 @@ def test_ida_called_directly_checks_its_arguments(change, names):
         solve_ida(pendulum(), [0.0, 1.0], **change)
 
 
+@pytest.mark.slow
 def test_the_error_told_is_of_the_step_that_failed():
     """The rates jump without end: the error test fails down to HMIN, and the sentence gives an error above one."""
 
@@ -297,6 +303,7 @@ def test_ida_reports_an_exception_of_the_residual():
     assert "KeyError: 'stiffness'" in result.message
 
 
+@pytest.mark.slow
 def test_step_at_hmin_names_the_dominating_unknown():
     @njit
     def residual(t, y, yp, out):
@@ -309,6 +316,7 @@ def test_step_at_hmin_names_the_dominating_unknown():
     assert "HMIN" in result.message
 
 
+@pytest.mark.slow
 def test_blow_up_stops_close_to_the_pole():
     @njit
     def residual(t, y, yp, out):
@@ -320,6 +328,7 @@ def test_blow_up_stops_close_to_the_pole():
     assert result.y[-1, 0] > 1e3
 
 
+@pytest.mark.slow
 def test_a_jump_of_an_algebraic_unknown_is_passed():
     """z jumps from 0 to 1 at t = 0.5, so q ends at 0.5."""
 
@@ -334,6 +343,7 @@ def test_a_jump_of_an_algebraic_unknown_is_passed():
         assert result.y[-1, 0] == pytest.approx(0.5, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_corrector_that_cannot_converge():
     """A Jacobian of the wrong sign and size."""
 
@@ -376,6 +386,7 @@ def test_equations_without_derivatives_are_named():
     assert solve_dae(residual, (0.0, 1.0), [0.0], error_mask=np.ones(1, bool)).success
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 @pytest.mark.parametrize("start", [[1.0, 0.0], [0.0, 1e6]])
 def test_a_tolerance_below_rounding_is_refused(start, method):

@@ -19,6 +19,7 @@ def robertson(t, y, yp, out):
 ROBERTSON_40 = np.array([0.7158270688, 9.185534765e-6, 0.2841637457])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
 @pytest.mark.parametrize("compiled", [True, False])
 def test_robertson(method, compiled):
@@ -51,6 +52,7 @@ def oscillator_entries(t, y, yp, cj, out, p):
     out[0], out[1], out[2], out[3] = cj, p[0], -1.0, cj
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("kind", ["differences", "dense", "entries"])
 def test_jacobian_in_every_form(compiled, kind):
@@ -99,6 +101,7 @@ def height(t, y, yp):
     return y[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False])
 def test_terminal_event(compiled):
     wrap = njit if compiled else (lambda f: f)
@@ -118,6 +121,7 @@ def test_terminal_event(compiled):
     np.testing.assert_allclose(result.y_events[0][0], result.y[-1], atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 def test_terminal_counts_occurrences(compiled, method):

@@ -54,6 +54,7 @@ def opened(run):
     return st
 
 
+@pytest.mark.slow
 def test_the_window_slides_and_keeps_the_newest_points():
     st = warm(0).state
     times, values = [st.t], [newest_point(st).copy()]
@@ -106,6 +107,7 @@ def test_a_step_below_its_limit_is_a_failure_named_by_what_failed():
     assert step.choose_end(st) == run_state.FAIL_TOO_MANY_REJECTIONS
 
 
+@pytest.mark.slow
 def test_a_step_refused_too_often_is_named_by_what_failed_most():
     st = opened(warm())
     st.nan_fails = step.MAX_FAILS
@@ -163,6 +165,7 @@ def test_the_matrix_is_kept_until_the_leading_coefficient_has_drifted():
     np.testing.assert_allclose(st.matrix, exact, atol=1e-7 * st.gamma)
 
 
+@pytest.mark.slow
 def test_pivots_that_no_longer_fit_are_chosen_anew():
     run = warm()
     st = opened(run)
@@ -310,6 +313,7 @@ def test_weights_that_depend_on_nothing_are_left_alone():
     assert (st.w_error == 7.0).all()
 
 
+@pytest.mark.slow
 def test_a_refused_step_counts_as_a_kink_for_some_steps():
     run = warm()
     st = opened(run)

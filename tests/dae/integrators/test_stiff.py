@@ -59,6 +59,7 @@ def test_no_more_steps_than_ida(name):
             assert result.stats.residuals <= 1.3 * ida.stats.residuals
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 def test_the_amplifier_does_not_collapse_at_tight_tolerances(method):
     """Orders 5 and 6 take 10^(2/6) to 10^(2/5) = 2.2 to 2.5 times the steps for two digits more."""

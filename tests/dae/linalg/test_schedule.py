@@ -80,6 +80,7 @@ def same_bits(a: sp.csc_array, drop: float = 0.0) -> LUPlan:
     return plan
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=40, deadline=None)
 @given(st.integers(1, 40), st.floats(0.0, 0.08), st.integers(0, 10_000))
 def test_random_matrices(n, density, seed):

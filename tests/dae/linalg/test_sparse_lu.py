@@ -172,6 +172,7 @@ def test_equilibration_brings_entries_near_one(n, seed):
     assert scaled.max() < 4.0
 
 
+@pytest.mark.slow
 def test_noise_in_place_of_zeros_does_not_spoil_the_scaling():
     """Entries that geometry makes zero hold rounding noise of any size; the rest is as well conditioned as before."""
     rng = np.random.default_rng(5)
@@ -219,6 +220,7 @@ def test_growing_entries_ask_for_stricter_pivots():
     assert np.abs(dense @ out - dense @ x).max() < 100.0 * 11 * 2.2e-16 * np.abs(dense).max() * np.abs(out).max()
 
 
+@pytest.mark.slow
 def test_fill_that_does_not_fit_is_told_and_given_room():
     """A scattered matrix fills up; with a small pool lines are moved together, until there is no room at all."""
     rng = np.random.default_rng(4)

@@ -123,6 +123,7 @@ def test_cubic_spline_reproduces_cubics_and_is_smooth():
     np.testing.assert_allclose(got, reference(np.linspace(2, 4, 33)), atol=1e-10)
 
 
+@pytest.mark.slow
 def test_akima_agrees_with_scipy():
     x = np.array([0.0, 1.0, 1.5, 3.0, 4.0, 6.0, 7.0])
     y = np.array([0.0, 2.0, 1.0, 1.0, 5.0, 4.0, 4.0])
