@@ -49,6 +49,17 @@ def allowed_motions(constraint: np.ndarray) -> np.ndarray:
     return basis
 
 
+NEIGHBOURS = 3
+"""Points at which rounding is tried: with one, changes of some coefficients would vanish by chance."""
+
+LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
+"""Change of coordinates that is lost in the sums that lead to the length of a spring."""
+
+JUMP = 1e-9
+"""Change of a coefficient, of the largest, by changes of `LAST_DIGITS` above which it is no rounding: that of a spring
+is 2e-15 times its distance from the origin over its length."""
+
+
 @dataclass
 class Reduced:
     """M x'' + C x' + K x + H z = 0 and z' = P x + Q x' + S z in the motions the constraints allow.
@@ -96,7 +107,7 @@ def reduce(instant: Instant) -> Reduced:
     kept[inner.size - instant.differential.size :] = instant.differential
     loads, z = inner[~kept], inner[kept]
 
-    def eliminate(target: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def eliminate(target: np.ndarray, columns: np.ndarray, full: np.ndarray = full) -> tuple[np.ndarray, np.ndarray]:
         """Derivative of the target rows with the loads following their definitions, and the size of its terms."""
         direct = full[np.ix_(target, columns)]
         if not loads.size:
@@ -107,6 +118,8 @@ def reduce(instant: Instant) -> Reduced:
 
     try:
         (stiffness, stiffness_terms), (damping, damping_terms) = eliminate(force, q), eliminate(force, v)
+        nearby = [eliminate(force, q, instant.matrix(near).toarray())[0] for near in _neighbours(instant)]
+        stiffness_terms = stiffness_terms + _uncertain(stiffness, stiffness_terms, nearby)
         state_force = eliminate(force, z)[0]
         state_q, state_v, state_z = (-eliminate(z, columns)[0] for columns in (q, v, z))
         force_reaction, state_reaction = eliminate(force, rows)[0], -eliminate(z, rows)[0]
@@ -157,6 +170,29 @@ def reduce(instant: Instant) -> Reduced:
         state_v @ basis,
         state_z,
     )
+
+
+def _neighbours(instant: Instant) -> list[np.ndarray]:
+    """Return points y that rounding cannot tell from the present one: lengths and angles differ by the last digits."""
+    moves, turns, end = (instant.at[name] for name in ("R", "theta", "q_f"))
+    size = np.zeros(instant.y.size)
+    size[moves:turns] = max(instant.system.length, float(np.abs(instant.y[moves:turns]).max(initial=0.0)))
+    size[turns:end] = 1.0
+    # coordinates that differ one by one in their signs, so that no motion of the whole is among the changes
+    signs = np.random.default_rng(1).uniform(-1.0, 1.0, (NEIGHBOURS, size.size))
+    return [instant.y + LAST_DIGITS * row * size for row in signs]
+
+
+def _uncertain(stiffness: np.ndarray, terms: np.ndarray, nearby: list[np.ndarray]) -> np.ndarray:
+    """Return what its differences from those nearby add to the terms of a stiffness.
+
+    The force in a spring as long as when it is free, k (l - l0), is the rounding of l, and its stiffness sideways
+    k (l - l0) / l has no terms that tell how large this may be.
+    """
+    change = np.max([np.abs(one - stiffness) for one in nearby], axis=0)
+    # a contact that just touches comes and goes; this is no rounding
+    change[~(change <= JUMP * terms.max(initial=0.0))] = 0.0
+    return change / ROUNDING
 
 
 def _free(instant: Instant, constraint: np.ndarray) -> np.ndarray:
@@ -254,7 +290,8 @@ class Spectrum:
 
 def balance(reduced: Reduced) -> Balanced:
     """Scale coordinates and states of a linearised mechanism."""
-    inertia, resisted = np.diag(reduced.mass), np.diag(reduced.stiffness_terms)
+    inertia = np.diag(reduced.mass)
+    resisted = _resisted(reduced.stiffness_terms, inertia)
     n, q = inertia.size, reduced.state_state.shape[0]
     rates = np.sqrt(np.divide(resisted, inertia, out=np.full(n, np.inf), where=inertia > 0.0))
     rates[(inertia <= 0.0) & (resisted <= 0.0)] = 0.0
@@ -276,6 +313,21 @@ def balance(reduced: Reduced) -> Balanced:
     terms = scale[:, None] * reduced.damping_terms * scale
     tolerance = max(ROUNDING * np.sqrt(n + q), (SLOWEST / usual) ** 2)
     return Balanced(scale, mass, damping, stiffness, terms, static, first, tolerance)
+
+
+def _resisted(terms: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """Return the size of the terms of each coordinate's stiffness, so large that terms between two are of size one.
+
+    The moment of a spring about its end, which is rounding, has no terms on the diagonal. Of two coordinates the one
+    that is resisted less takes what is between them.
+    """
+    own = np.diag(terms).copy()
+    between = np.maximum(terms, terms.T) ** 2
+    order = np.argsort(-np.divide(own, inertia, out=np.zeros_like(own), where=inertia > 0.0), kind="stable")
+    for k, weaker in enumerate(order):
+        stronger = order[:k][own[order[:k]] > 0.0]
+        own[weaker] = max(own[weaker], (between[weaker, stronger] / own[stronger]).max(initial=0.0))
+    return own
 
 
 def free_motions(reduced: Reduced) -> tuple[bool, np.ndarray]:

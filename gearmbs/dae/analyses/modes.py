@@ -115,8 +115,10 @@ class Modes:
         return f"Modes({parts}{span}, {'stable' if self.stable else 'unstable'})"
 
 
-def linear_modes(system: System) -> Modes:
+def linear_modes(place: System | Instant) -> Modes:
     """Return the linear modes of a system at its present pose and velocity, time functions frozen at ``system.t0``.
+
+    Angles count from where they start; those of an instant, as of an equilibrium, keep the turns counted so far.
 
     At a position of equilibrium they are the small vibrations. Elsewhere they are the instantaneous eigenvalues
     with the loads' own changes. What spins is described in axes that do not turn with it (see
@@ -136,7 +138,7 @@ def linear_modes(system: System) -> Modes:
         If a body with modal coordinates spins that is not alike about this axis: they turn with it, so that its own
         modes are not those of its whirl.
     """
-    instant = Instant(system, "I3")
+    instant = place if isinstance(place, Instant) else Instant(place, "I3")
     instant.y = instant.settle(instant.y)
     _warn_of_turning_modes(instant)
     reduced = reduce(instant)
@@ -161,7 +163,7 @@ def linear_modes(system: System) -> Modes:
         ratios,
         kinds,
         _unit(instant.spatial(reduced.basis @ motions)),
-        system.body_names,
+        instant.system.body_names,
     )
 
 

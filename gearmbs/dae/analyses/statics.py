@@ -198,6 +198,13 @@ class Snapshot:
         copies = (instant.y.copy(), instant.idata.copy(), instant.rdata.copy())
         return cls(instant.system, instant.problem, instant.t, *copies)
 
+    def instant(self) -> Instant:
+        """Return the time and the unknowns as they were, with the turns counted on the way there."""
+        instant = Instant(self.system, "I3")
+        instant.t, instant.y = self.t, self.y.copy()
+        instant.idata, instant.rdata = self.idata.copy(), self.rdata.copy()
+        return instant
+
     @staticmethod
     def result(message: str, iterations: int, rows: Sequence[Snapshot]) -> DAEResult:
         """Return snapshots as what an integrator would have stored."""
@@ -230,6 +237,10 @@ class EquilibriumSolution(Solution):
     def of(cls, rows: Sequence[Snapshot], message: str, iterations: int) -> EquilibriumSolution:
         """Return the solution of snapshots of equilibria."""
         return cls(rows, Snapshot.result(message, iterations, rows))
+
+    def instant(self, row: int = 0) -> Instant:
+        """Return one of the equilibria with its unknowns and counted turns."""
+        return self._rows[row].instant()
 
     def counted(self, row: int = 0) -> dict[tuple[str, int, int], float]:
         """Return all counted angles at one time, rad, by function and markers I and J."""
@@ -453,9 +464,7 @@ def quasi_static(system: System, times: np.ndarray, *, tol: float = 1e-10, max_i
     """
     if times.size == 0 or not np.all(np.diff(times) > 0.0):
         raise ModelError("times: give increasing times")
-    static_equilibrium(system, tol=tol, max_iterations=max_iterations)
-    instant = Instant(system, "I3")
-    instant.y = instant.settle(instant.stop(instant.y))
+    instant = static_equilibrium(system, tol=tol, max_iterations=max_iterations).solution.instant()
     rows, total = [], 0
     for target in times:
         step = float(target) - instant.t

@@ -83,7 +83,7 @@ def _warn_of_friction(mechanism: Mechanism) -> None:
 
 
 def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
-    """Make an equilibrium, at rest, the initial position of the mechanism it was found for."""
+    """Make an equilibrium, at rest, the initial position of the mechanism it was found for, with its counted turns."""
     if list(mechanism.bodies) != list(equilibrium.body_names):
         raise ModelError(f"the equilibrium is not one of mechanism '{mechanism.name}': its bodies differ")
     for row, body in zip(equilibrium.pose, mechanism.bodies.values()):
@@ -100,6 +100,11 @@ def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
     own = mechanism.every_state
     for value, state in zip(states[states.size - len(own) :], own):
         state.start = float(value)
+    system = equilibrium.solution.system
+    frames = (system.mechanism.ground, *system.mechanism.bodies.values())
+    names = {system.marker_index.get(id(marker)): marker.name for body in frames for marker in body.markers}
+    for (function, i, j), angle in equilibrium.solution.counted().items():
+        mechanism.turns[function, names.get(i, ""), names.get(j, "")] = angle
 
 
 @waiting("equilibrium")
@@ -158,10 +163,10 @@ def linear_modes(mechanism: Mechanism, *, t: float = 0.0, at: StaticResult | str
         if at not in ("initial", "equilibrium"):
             raise ModelError(f"at = {at!r}; choose 'initial', 'equilibrium' or give a StaticResult")
         system = mechanism.compile(t)
-        if at == "equilibrium":
-            _statics.static_equilibrium(system)
-        return _modes.linear_modes(system)
-    return _modes.linear_modes(at.solution.system)
+        if at == "initial":
+            return _modes.linear_modes(system)
+        at = _statics.static_equilibrium(system)
+    return _modes.linear_modes(at.solution.instant())
 
 
 @waiting("kinematics")

@@ -179,6 +179,42 @@ def test_free_body_has_six_rigid_modes():
     assert np.all(found.frequencies == 0.0)
 
 
+def wound(axes: np.ndarray, torque: float, kind: str) -> Mechanism:
+    """A body turned about its pin's z by a torque on springs that count full turns; all of it placed by ``axes``."""
+    m = Mechanism("wound")
+    body = m.body("body", 1.0, (0.2, 0.3, 0.25), orientation=axes)
+    m.spherical("pin", body, m.ground, at=(0, 0, 0))
+    i, j = body.marker(name="I"), m.ground.marker((0, 0, 0), axes, name="J")
+    if kind == "bushing":
+        m.bushing("seat", i, j, stiffness=(0, 0, 0), torsional_stiffness=(50, 60, 5))
+    else:
+        m.load("spring", i, m.ground.marker((0, 0, 0), name="reaction"), tz="-5 * AZ(I, J)", rm=j)
+        tip, held = body.marker((0, 0, 1)), m.ground.marker(axes @ (0, 0, 3))
+        m.spring_damper("stay", tip, held, stiffness=60.0, length=1.0)
+    m.load("drive", body.marker(name="end"), m.ground.marker((0, 0, 0), name="base"), tz=str(torque), rm=j)
+    return m
+
+
+@pytest.mark.parametrize("kind", ["bushing", "load"])
+@pytest.mark.parametrize("torque", [10.0, 20.0, 20.0 + 10.0 * np.pi], ids=["no turn", "past half", "one turn more"])
+def test_modes_at_an_equilibrium_keep_its_counted_turns(torque, kind):
+    """About z sqrt(5 / 0.25); sideways stays of 60 N * 3 m, or springs with K = diag(50, 60) turned by torque / 5."""
+    aslant = np.linalg.qr(np.random.default_rng(7).normal(size=(3, 3)))[0]
+    aslant *= np.linalg.det(aslant)
+    if kind == "load":
+        expected = np.sqrt([20.0, 60.0 * 1.5 / 0.3, 60.0 * 1.5 / 0.2])
+    else:
+        expected = {10.0: [4.4721, 13.0562, 17.1265]}.get(torque, [4.4721, 13.3004, 16.8121])
+    for axes in (np.eye(3), aslant):
+        m = wound(axes, torque, kind)
+        rest = static_equilibrium(m)
+        ways = [linear_modes(m, at=rest), linear_modes(m, at="equilibrium")]
+        static_equilibrium(m, move=True)
+        ways.append(linear_modes(m))
+        for found in ways:
+            assert np.abs(found.eigenvalues) == pytest.approx(expected, rel=1e-5)
+
+
 @pytest.mark.parametrize("stiffness", [1e6, 1e9, 1e12])
 def test_a_slow_mode_is_found_beside_fast_ones(stiffness):
     """A pendulum and 10 g on a bushing of up to 1.6 MHz: a ratio of the squares of 1e13."""
@@ -482,3 +518,44 @@ def test_what_spins_slowly_nutates_beside_what_spins_fast(fast, slow):
     found = linear_modes(m)
     nutations = np.sort(np.abs(found.eigenvalues[found.oscillating].imag))
     np.testing.assert_allclose(nutations, [2.0 / 3.0 * speed for speed in (slow, fast)], rtol=1e-6)
+
+
+@pytest.mark.parametrize("first", range(0, 60, 15))
+def test_chains_in_space_have_the_modes_of_their_springs_and_no_others(first):
+    """Free points and bodies on stiff line springs: their lengths are rounding off, which is no stiffness sideways."""
+    for seed in range(first, first + 15):
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(2, 6))
+        masses = np.exp(rng.uniform(np.log(0.003), np.log(80.0), n))
+        stiffnesses, decay = 10 ** rng.uniform(4, 9, n - 1), 10 ** rng.uniform(-6, -3)
+        points, places = rng.random(n) < 0.5, rng.normal(size=(n, 3))
+        m = Mechanism("chain")
+        parts = [
+            m.point_mass(f"p{k}", mass, at=place)
+            if point
+            else m.body(f"b{k}", mass, (0.01, 0.011, 0.012), position=place)
+            for k, (mass, place, point) in enumerate(zip(masses, places, points))
+        ]
+        springs = [(k, k + 1, stiffness) for k, stiffness in enumerate(stiffnesses)]
+        if seed % 3 == 0:
+            # a soft one to the ground has a mode still
+            springs.append((0, n, 10 ** rng.uniform(0, 2)))
+        at = np.vstack([places, rng.normal(size=3) + 5.0])
+        ends = [*(part.marker() for part in parts), m.ground.marker(at[n])]
+        stretch = np.zeros((len(springs), n + 1, 3))
+        for row, (i, j, stiffness) in zip(stretch, springs):
+            m.spring_damper(f"s{i}{j}", ends[i], ends[j], stiffness=stiffness, damping=decay * stiffness)
+            row[j] = np.sqrt(stiffness) * (at[j] - at[i]) / np.linalg.norm(at[j] - at[i])
+            row[i] = -row[j]
+        # M^-1/2 K M^-1/2 = Y^T Y; s^2 + decay w^2 s + w^2 = 0
+        half = (stretch[:, :n] / np.sqrt(masses)[:, None]).reshape(len(springs), 3 * n)
+        squares = np.linalg.svd(half, compute_uv=False) ** 2
+        fast = -0.5 * (decay * squares + np.emath.sqrt((decay * squares) ** 2 - 4.0 * squares))
+        wanted = np.concatenate([fast, squares / fast])
+        found = linear_modes(m)
+        values = np.concatenate([found.eigenvalues, found.eigenvalues[found.oscillating].conj()])
+        values = values[values != 0.0]
+        assert found.kinds.count("rigid") == int((6 - 3 * points).sum()) - len(springs), seed
+        assert values.size == wanted.size, seed
+        for value in wanted:
+            assert np.abs(values - value).min() <= 1e-6 * abs(value), seed
