@@ -73,9 +73,9 @@ WIDER, WIDENINGS = 30.0, 5
 shrink with the tolerance and are far shorter than what changes in the constraints."""
 SPAN_OF_SLOPES = 2e-3
 """The same for the slopes of algebraic unknowns, which may vary much faster than the step tells: by radians over it."""
-CLOSER, UNLIKE = 0.25, 10.0
-"""Part of the step over which an output at the start is solved for once more, and by how many tolerances it may differ:
-each is known to one."""
+CLOSER, NEARER = 0.25, 0.75
+"""Part of the step over which an output at the start is solved for once more, and part of the distance to a value given
+there that is left where it is the limit: 1/2 of t^1.5, while smooth constraints lead to one value over both."""
 RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
 MAX_POINTS = 8
@@ -640,8 +640,8 @@ class AlgebraicOutputs:
     ) -> None:
         """Settle the output at the start in place, in a step of about ``h``; what cannot be stays as it was given.
 
-        The run may have passed some of the breakpoints ``stops`` by then. Where differences over a shorter step give
-        something else, a constraint has no smooth rate there, as t^1.5 at 0.
+        The run may have passed some of the breakpoints ``stops`` by then. A value given that differences over shorter
+        steps approach stays: a constraint has no smooth rate there, as t^1.5 at 0.
         """
         part = self.part
         kept = part.failures, part.t_first, part.t_last
@@ -649,9 +649,11 @@ class AlgebraicOutputs:
         given, closer = (y.copy(), yp.copy()), (y.copy(), yp.copy())
         self.settle_after(t, y, yp, h, t, y, idata)
         if part.any_lifted:
+            failures = part.failures
             self.settle_after(t, *closer, CLOSER * h, t, closer[0], idata)
-            if (np.abs(closer[0] - y) > UNLIKE * (part.atol + part.rtol * np.abs(y))).any():
-                y[:], yp[:] = given
+            if part.failures == failures:
+                limit = np.abs(closer[0] - given[0]) < NEARER * np.abs(y - given[0])
+                y[limit], yp[limit] = given[0][limit], given[1][limit]
         part.failures, part.t_first, part.t_last = kept
 
     def settle_after(

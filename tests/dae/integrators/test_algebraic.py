@@ -287,3 +287,17 @@ def test_a_multiplier_that_starts_without_a_slope_stays_as_given(method):
     found = solve_dae(rooted, (0.0, 1.0), [0.0, 0.0], method=method, t_eval=[0.0, 0.25, 1.0])
     assert found.success, found.message
     np.testing.assert_allclose(found.y[:, 1], [0.0, 0.75, 1.5], atol=1e-6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-11])
+def test_a_multiplier_guessed_at_the_start_is_solved_for(rtol, method):
+    """Also where rounding of the constraint, x = 1000 + sin 30 t, is more than its tolerance."""
+
+    def swinging(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = y[0] - 1000.0 - np.sin(30.0 * t)
+
+    found = solve_dae(swinging, (0.0, 0.2), [1000.0, 0.0], method=method, t_eval=[0.0, 0.2], rtol=rtol, atol=rtol)
+    assert found.success, found.message
+    np.testing.assert_allclose(found.y[:, 1], 30.0 * np.cos(30.0 * found.t), rtol=1e-5)
