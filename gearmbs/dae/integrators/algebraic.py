@@ -24,6 +24,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -72,6 +73,9 @@ WIDER, WIDENINGS = 30.0, 5
 shrink with the tolerance and are far shorter than what changes in the constraints."""
 SPAN_OF_SLOPES = 2e-3
 """The same for the slopes of algebraic unknowns, which may vary much faster than the step tells: by radians over it."""
+CLOSER, NEARER = 0.25, 0.75
+"""Part of the step over which an output at the start is solved for once more, and part of the distance to a value given
+there that is left where it is the limit: 1/2 of t^1.5, while smooth constraints lead to one value over both."""
 RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
 MAX_POINTS = 8
@@ -107,7 +111,9 @@ class AlgebraicPart(Struct):
     any_rates: bool
     factored: bool
     rtol: float
-    t_first: float  # breakpoints on either side: beyond them constraints may have other derivatives
+    t_start: float  # ends of the run: a table may end with it
+    t_end: float
+    t_first: float  # breakpoints or ends on either side: beyond them constraints may have other derivatives
     t_last: float
     failures: int  # instants at which the iteration did not converge
     first_failure: float
@@ -246,7 +252,8 @@ def _slopes(functions, part, t, y, yp, s, f, idata, rdata, work):
     """Write the derivatives by time of all rows along y', where y' itself is kept: (8 (1) - (2))/(12 s) [3]_.
 
     (1) and (2) are the differences between the rows s and 2 s later and earlier; next to a breakpoint all rows are of
-    this side of it. The slopes are written to ``f``; the other parameters are those of `settle`.
+    this side of it, and next to an end of the run of the inside. The slopes are written to ``f``; the other parameters
+    are those of `settle`.
     """
     moved, res = part.y_moved, part.res
     f[: part.count] = 0.0
@@ -254,7 +261,7 @@ def _slopes(functions, part, t, y, yp, s, f, idata, rdata, work):
     if part.t_first <= t <= part.t_last:
         s = min(s, (part.t_last - part.t_first) / 8.0)
         side = 1.0 if t - 2.0 * s < part.t_first else -1.0 if t + 2.0 * s > part.t_last else 0.0
-        if t == part.t_last and _is_beyond(functions, part, t, y, yp, idata, rdata, work):
+        if t == part.t_last < part.t_end and _is_beyond(functions, part, t, y, yp, idata, rdata, work):
             side = 1.0
     for j in range(4 if side == 0.0 else 5):
         d = (1.0, -1.0, 2.0, -2.0)[j] * s if side == 0.0 else side * j * s
@@ -541,6 +548,8 @@ def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
     """Return room for m equations among those of n unknowns, with ``nnz`` entries, ``entries`` of them in these."""
     return AlgebraicPart(
         count=m,
+        t_start=-np.inf,
+        t_end=np.inf,
         t_first=-np.inf,
         t_last=np.inf,
         **{name: np.zeros(m, dtype=np.int64) for name in ("rows", "lifted", "cols", "rates", "pivots")},
@@ -560,7 +569,7 @@ def _nothing() -> AlgebraicPart:
 
 
 class AlgebraicOutputs:
-    """What is solved for at outputs of a problem, and what is not.
+    """What is solved for at outputs of a problem in a run between two ``ends``, and what is not.
 
     Attributes
     ----------
@@ -571,7 +580,7 @@ class AlgebraicOutputs:
         Those that hang on too many others.
     """
 
-    def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float) -> None:
+    def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float, ends: tuple[float, float]) -> None:
         self.problem = problem
         wanted, solved = chosen(problem)
         self.left = np.empty(0, dtype=np.int64)
@@ -588,6 +597,7 @@ class AlgebraicOutputs:
         self.left, self.coupled = found.left, found.coupled
         if len(found.rows):
             self.part = self._made(found, atol, rtol)
+            self.part.t_start, self.part.t_end = ends
 
     def _made(self, found: Structure, atol: np.ndarray, rtol: float) -> AlgebraicPart:
         """Return the compiled loop's part of it."""
@@ -619,11 +629,32 @@ class AlgebraicOutputs:
         """The functions of the problem, bound together for compiled code."""
         return bind(self.problem.residual, self.problem.jacobian, no_hook, no_events)
 
-    def settle_start(self, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray) -> None:
-        """Settle the output at the start in place, in a step of about ``h``; what cannot be stays as it was given."""
-        failures = self.part.failures
+    def settle_start(
+        self,
+        t: float,
+        y: np.ndarray,
+        yp: np.ndarray,
+        h: float,
+        idata: np.ndarray,
+        stops: Sequence[float] | np.ndarray,
+    ) -> None:
+        """Settle the output at the start in place, in a step of about ``h``; what cannot be stays as it was given.
+
+        The run may have passed some of the breakpoints ``stops`` by then. A value given that differences over shorter
+        steps approach stays: a constraint has no smooth rate there, as t^1.5 at 0.
+        """
+        part = self.part
+        kept = part.failures, part.t_first, part.t_last
+        part.t_first, part.t_last = t, stops[0] if len(stops) else part.t_end
+        given, closer = (y.copy(), yp.copy()), (y.copy(), yp.copy())
         self.settle_after(t, y, yp, h, t, y, idata)
-        self.part.failures = failures
+        if part.any_lifted:
+            failures = part.failures
+            self.settle_after(t, *closer, CLOSER * h, t, closer[0], idata)
+            if part.failures == failures:
+                limit = np.abs(closer[0] - given[0]) < NEARER * np.abs(y - given[0])
+                y[limit], yp[limit] = given[0][limit], given[1][limit]
+        part.failures, part.t_first, part.t_last = kept
 
     def settle_after(
         self, t: float, y: np.ndarray, yp: np.ndarray, h: float, t_old: float, y_old: np.ndarray, idata: np.ndarray

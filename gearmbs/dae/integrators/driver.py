@@ -80,7 +80,7 @@ class Run:
         self.steps_given = options.first_step is not None, options.min_step is not None
         outputs, end = output_times(t_eval, float(problem.t0), t_end)
         every_step = t_eval is None
-        self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, options.rtol)
+        self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, options.rtol, (problem.t0, end))
         self.state = initial_state(problem, options, outputs, end, every_step or options.dense_output)
         self.state.constrained = self.algebraic.is_constrained
         self.records = Records(problem, self.state, options, every_step, self.algebraic)

@@ -268,10 +268,11 @@ class _Run:
         self.atol = np.where(problem.error_mask | own, options.tol * problem.atol_scale, UNCONTROLLED)
         self.branch = IdaBranch(problem, self.calls, self.idata, self.rdata, self.atol, options.rtol, float(times[0]))
         self.rows = _Rows(times, problem, every_step)
-        self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, max(options.rtol, SMALLEST_RTOL))
+        self.t, self.end = ends = float(times[0]), float(times[-1])
+        rtol = max(options.rtol, SMALLEST_RTOL)
+        self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, rtol, ends)
         """What is solved for at outputs, which IDA interpolates."""
         self.epochs = [(0, self.idata.copy())]
-        self.t, self.end = float(times[0]), float(times[-1])
         self.stops = options.stops(self.t, self.end)
 
     @property
@@ -369,7 +370,7 @@ class _Run:
             step = h if np.isfinite(h) and h > 0.0 else float(rows.t[last] - rows.t[last - 1])
             output = float(rows.t[k]), rows.y[k], rows.yp[k], step
             if k == 0:
-                settler.settle_start(*output, self.idata)
+                settler.settle_start(*output, self.idata, self.stops)
             else:
                 settler.settle_after(*output, float(rows.t[k - 1]), rows.y[k - 1], self.idata)
 
@@ -412,8 +413,8 @@ class _Run:
         o = self.options
         first, last = beside(self.t, self.end - self.t), beside(self.stop, self.stop - self.t)
         settled = self.algebraic.part
-        settled.t_first = self.t if self.t in self.stops else -np.inf
-        settled.t_last = self.stop if self.stop < self.end else np.inf
+        settled.t_first = self.t if self.t in self.stops else settled.t_start
+        settled.t_last = self.stop
         self.calls.first = self.t + first if self.t in self.stops else -np.inf
         self.calls.last = self.stop - last if self.stop < self.end else np.inf
         settings = {

@@ -137,7 +137,7 @@ class Records:
         if self.algebraic.is_needed and st.next_output and st.outputs[0] == self.problem.t0 and st.steps:
             # the first steps are far shorter than what changes
             first = float(self.steps[0][1][:START_STEPS].max()) or st.step
-            self.algebraic.settle_start(st.outputs[0], st.y_out[0], st.yp_out[0], first, self.tables[0][1])
+            self.algebraic.settle_start(st.outputs[0], st.y_out[0], st.yp_out[0], first, self.tables[0][1], st.stops)
 
     def _at_steps(
         self, t: np.ndarray, is_step: np.ndarray, rows: np.ndarray, sol: DenseOutput
@@ -197,8 +197,8 @@ class Between:
             mine = np.flatnonzero((np.maximum(valid, 0) == k) & (pieces == piece))
             idata = self.tables[k][1]
             among = self.algebraic.part
-            among.t_first = self.stops[piece - 1] if piece > 0 else -np.inf
-            among.t_last = self.stops[piece] if piece < len(self.stops) else np.inf
+            among.t_first = self.stops[piece - 1] if piece > 0 else among.t_start
+            among.t_last = self.stops[piece] if piece < len(self.stops) else among.t_end
             if mine.size:
                 part, slopes = y[mine], yp[mine]
                 self.algebraic.settle_on_steps(times[mine], ends[mine], orders, nodes, rows, part, slopes, idata)

@@ -400,8 +400,8 @@ def deliver(functions, st, part):
         cut, action = locate_events(functions, st, part)
         if not end_of_step(st):
             return s.FAIL_NOT_FINITE
-    part.t_first = st.stops[st.next_stop - 1] if st.next_stop > 0 else -np.inf
-    part.t_last = st.stops[st.next_stop] if st.next_stop < st.stops.shape[0] else np.inf
+    part.t_first = st.stops[st.next_stop - 1] if st.next_stop > 0 else part.t_start
+    part.t_last = st.stops[st.next_stop] if st.next_stop < st.stops.shape[0] else part.t_end
     write_outputs(functions, st, part, cut)
     if action != RECORD and cut < st.t_new:
         cut_step(functions, st, part, cut)
