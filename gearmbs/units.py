@@ -208,6 +208,19 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
     return number
 
 
+def truth(value: Any, field: str = "value") -> bool:
+    """Return a truth value, of Python or numpy, as ``bool``.
+
+    Raises
+    ------
+    ValueError
+        For anything else, of which Python takes the text "false" for true; the message names the field.
+    """
+    if not (isinstance(value, bool) or (getattr(value, "shape", None) == () and str(value.dtype) == "bool")):
+        raise ValueError(f"{field} is {value!r}; give true or false")
+    return bool(value)
+
+
 def si_unit(text: Any) -> str | None:
     """Return the SI unit of a text that is a number with a unit, for `to_si`; None for anything else.
 
