@@ -177,7 +177,7 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
     Raises
     ------
     ValueError
-        For text that is not a number with a unit, unknown units, units of another dimension, and NaN.
+        For text that is not a finite number with a unit, unknown units, units of another dimension, and NaN.
     TypeError
         For anything that is neither a number nor text.
 
@@ -197,6 +197,8 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
         number = value if isinstance(value, Given) else float(value)
     elif isinstance(value, str):
         number = Given(_parse(value, target, field), value.strip())
+        if math.isinf(number):
+            raise ValueError(f"{field}: {value!r} is not finite; give a finite number in {target}")
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
         number = _parse(f"{float(value.magnitude)!r} {value.units!s}", target, field)
     else:
@@ -204,6 +206,19 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
     if math.isnan(number):
         raise ValueError(f"{field}: got NaN; give a finite number in {target}")
     return number
+
+
+def truth(value: Any, field: str = "value") -> bool:
+    """Return a truth value, of Python or numpy, as ``bool``.
+
+    Raises
+    ------
+    ValueError
+        For anything else, of which Python takes the text "false" for true; the message names the field.
+    """
+    if not (isinstance(value, bool) or (getattr(value, "shape", None) == () and str(value.dtype) == "bool")):
+        raise ValueError(f"{field} is {value!r}; give true or false")
+    return bool(value)
 
 
 def si_unit(text: Any) -> str | None:
@@ -276,7 +291,12 @@ def _parse(text: str, target: str, field: str) -> float:
         quantity = registry.Quantity(quantity, "dimensionless")
     if not isinstance(quantity.magnitude, Real):
         raise ValueError(f"{field}: cannot read {text!r} as a number with a unit; write for example '1 {example}'")
-    wanted = registry.Quantity(1.0, target)
+    try:
+        wanted = registry.Quantity(1.0, target)
+    except Exception:
+        raise ValueError(
+            f"{field}: {target!r} is no unit; give one such as 'm^3', or a dimension: {', '.join(DIMENSIONS)}"
+        ) from None
     if quantity.dimensionless and not wanted.dimensionless:
         raise ValueError(f"{field}: {text!r} has no unit; write for example '{text.strip()} {example}'")
     if wanted.units == registry.radian and quantity.dimensionless and quantity.unitless:
@@ -289,16 +309,14 @@ def _parse(text: str, target: str, field: str) -> float:
             f"{field}: {text!r} has an angle in its unit where a quantity in {target} is expected{hint}; write for "
             f"example '1 {example}'"
         )
-    turns = _turns(quantity, registry, text, target, field)
-    if turns is not None:
-        return turns
     try:
-        return float(quantity.to(target).magnitude)
+        number = float(quantity.to(target).magnitude)
     except pint.DimensionalityError:
         raise ValueError(
             f"{field}: {text!r} is in {quantity.units:~} where a quantity in {target} is expected; write for example "
             f"'1 {example}'"
         ) from None
+    return _in_radians(number, quantity, wanted, text, target, field)
 
 
 def _fault(text: str) -> str:
@@ -335,22 +353,38 @@ def _remedy(text: str, target: str) -> str:
     return f"write for example '1 {USUAL.get(target, target)}'"
 
 
-def _turns(quantity: Any, registry: Any, text: str, target: str, field: str) -> float | None:
+def _in_radians(number: float, quantity: Any, wanted: Any, text: str, target: str, field: str) -> float:
     """Tell turns from radians, which the parser takes for the same: 30 Hz are 30 turns a second, not 30 rad/s.
 
-    None where it does not matter.
+    Units in Hz count turns where radians are wanted, and angles are turns where Hz are: with the same power of the
+    angle, else neither is told from the other. Energy is also torque times angle: J/rad^2 is N m/rad.
     """
-    if target not in ("rad/s", "Hz") or not quantity.check("1/[time]"):
-        return None
+    (hertz, angle), (in_hertz, in_angle) = _angles(quantity), _angles(wanted)
     names = str(quantity.units)
-    angular = ANGULAR.search(names) is not None
-    if target == "Hz":
-        return float(quantity.to("rad/s").magnitude) / math.tau if angular else None
-    if angular:
-        return None
-    if "hertz" in names or "minute" in names:
-        return float(quantity.to("1/s").magnitude) * math.tau
-    raise ValueError(f"{field}: {text!r} may be turns or radians; write 'rpm', 'Hz' or 'rad/s'")
+    if in_angle and (hertz or angle):
+        energy = "joule" in names or "watt" in names
+        if hertz + angle in (in_angle, in_angle - 1.0 if energy else in_angle):
+            return number * math.tau**hertz
+    elif in_hertz and angle:
+        if hertz + angle == in_hertz:
+            return number / math.tau**angle
+    elif target == "rad/s" and "minute" in names:
+        return number * math.tau
+    elif target != "rad/s" and not (in_angle and "minute" in names):
+        return number
+    if target == "rad/s" and not angle:
+        raise ValueError(f"{field}: {text!r} may be turns or radians; write 'rpm', 'Hz' or 'rad/s'")
+    raise ValueError(
+        f"{field}: {text!r} has another power of the angle, in turns or radians, than {target}; write for example "
+        f"'1 {USUAL.get(target, target)}'"
+    )
+
+
+def _angles(quantity: Any) -> tuple[float, float]:
+    """Return the powers of Hz and of angles in a unit."""
+    powers = dict(quantity.unit_items())
+    hertz = sum(power for name, power in powers.items() if "hertz" in name)
+    return hertz, sum(power for name, power in powers.items() if ANGULAR.search(name))
 
 
 SLOWEST_WAVE, FASTEST_WAVE = 20.0, 2e4

@@ -270,3 +270,48 @@ l = {kind = "torque", shaft = "b", torque = "10 N m"}
 t = {kind = "torque", shaft = "b", torque = "2*pi + 100*SIN(2*pi*TIME)"}
 pump = {kind = "pump", shaft = "b", displacement = "300 cm^3", pressure = "20 bar"}
 """
+
+
+def test_flags_are_true_or_false_alone():
+    """Python takes the text "false" for true."""
+    for wrong in ("false", "no", 0, 1, 1.0, np.array([True])):
+        with pytest.raises(ValueError, match=says("gear.internal", "give true or false")):
+            GearSpec(70, "3 mm", internal=wrong)
+        with pytest.raises(ValueError, match=says("GearPair.root_contact", "give true or false")):
+            gearmbs.GearPair(GearSpec(20, "3 mm"), GearSpec(40, "3 mm"), root_contact=wrong)
+        with pytest.raises(MachineError, match=says("Machine.closed", "give true or false")):
+            Machine(speed=1.0, closed=wrong)
+    for wrong in ("false", 0, 1):
+        with pytest.raises(CaseError, match=says("lump", "give true or false")):
+            Case(solver={"lump": wrong}, friction={"enabled": wrong})
+    for right in (True, False, np.bool_(True), np.bool_(False)):
+        assert GearSpec(70, "3 mm", internal=right).internal is bool(right)
+        assert Machine(speed=1.0, closed=right).closed is bool(right)
+        assert Case(solver={"lump": right}).solver.lump is bool(right)
+        pair = gearmbs.GearPair(GearSpec(20, "3 mm"), GearSpec(40, "3 mm"), root_contact=right)
+        assert pair.root_contact == right
+
+
+def test_truth_is_no_number():
+    wheels = GearSpec(20, "3 mm"), GearSpec(40, "3 mm")
+    for name in ("slices", "rotation"):
+        with pytest.raises(ValueError, match=says(f"GearPair.{name}", "True")):
+            gearmbs.GearPair(*wheels, **{name: True})
+        assert getattr(gearmbs.GearPair(*wheels, **{name: 1}), name) == 1
+    m = gearmbs.Mechanism("m")
+    for number, at in enumerate(((True, 0, 0), [np.bool_(True), 0, 0], np.array([True, False, False]))):
+        with pytest.raises(ValueError, match=says("at", "true or false")):
+            m.point_mass(f"wrong{number}", 1.0, at=at)
+    assert m.point_mass("right", 1.0, at=(1, "10 mm", np.float64(0.0))).position[0] == 1.0
+
+
+def test_values_over_time_are_numbers_texts_or_functions():
+    class Day:
+        """Anything else, as TOML's dates are."""
+
+    torque = {"name": "l", "shaft": "out"}
+    for wrong in (Day(), ["80 N m"], {"a": 1}, (1.0, 2.0), None, np.array([1.0, 2.0])):
+        with pytest.raises(ValueError, match=says("load 'l'", "torque", "give a finite number")):
+            gearmbs.drivetrain.TorqueLoad(torque=wrong, **torque)
+    for right in (80, 80.0, np.float64(80.0), np.array(80.0), "80 N m", "80*SIN(TIME)", gearmbs.mechanism.ramp(1.0)):
+        gearmbs.drivetrain.TorqueLoad(torque=right, **torque)

@@ -15,7 +15,7 @@ from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
 from gearmbs.schema.messages import chosen
 from gearmbs.schema.quantities import Measure
-from gearmbs.units import Quantity, doubt_of_density
+from gearmbs.units import Quantity, doubt_of_density, truth
 
 LONG = 30.0
 """Lengths of a shaft from here on, m, look like millimetres: no gearbox has such; a ship has several."""
@@ -262,7 +262,7 @@ def _ideal(
     UserWarning
         Of misaligned wheels whose own stiffness is asked for: it is that of parallel ones.
     """
-    parting = bool(given.pop("ideal_backlash", False))
+    parting = truth(given.pop("ideal_backlash", False), "ideal_backlash")
     curves = {key: given.pop(key) for key in ("stiffness_curve", "error") if key in given}
     pair = GearPair(driver, driven, **given)
     stiffness, ratio = own.get("stiffness", "iso"), own.get("damping_ratio")

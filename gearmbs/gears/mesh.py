@@ -11,7 +11,7 @@ from typing import Literal, Protocol
 from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.modifications import Fault
-from gearmbs.units import Quantity, shown, to_si
+from gearmbs.units import Quantity, shown, to_si, truth
 
 # Contact and friction laws as users define them; the compiled forms are in ``gearmbs.contact.laws``.
 
@@ -261,7 +261,10 @@ class ContactModel(Written):
             raise ValueError(
                 f"{owner}.stiffness_curve is {self.stiffness_curve!r}; choose 'constant' or 'potential-energy'"
             )
-        if self.slices is not None and not (isinstance(self.slices, int) and self.slices >= 1):
+        if self.root_contact is not None:
+            truth(self.root_contact, f"{owner}.root_contact")
+        counted = isinstance(self.slices, int) and not isinstance(self.slices, bool)
+        if self.slices is not None and not (counted and self.slices >= 1):
             raise ValueError(f"{owner}.slices is {self.slices!r}; give an integer of 1 or more")
 
     def face_slices(self, geometry: PairGeometry, faults: Iterable[Fault] = ()) -> int:
@@ -349,7 +352,7 @@ class OperatingPoint(Written):
                 f"{owner}.torque is {self.torque:g} N m; give its size (0 up): it acts against the motion, whose sense "
                 "is that of rotation, 1 or -1"
             )
-        if self.rotation not in (1, -1):
+        if self.rotation not in (1, -1) or isinstance(self.rotation, bool):
             raise ValueError(f"{owner}.rotation is {self.rotation!r}; give 1 or -1")
 
     def normal_force(self, geometry: PairGeometry) -> float:

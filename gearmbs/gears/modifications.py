@@ -16,7 +16,7 @@ import numpy as np
 from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.spec import GearSpec, convert_fields
-from gearmbs.units import Quantity, shown, to_si
+from gearmbs.units import Quantity, shown, to_si, truth
 
 # Deviations of the tooth flanks of one wheel, to which every fault adds its own; packed into the contact tables.
 
@@ -165,7 +165,7 @@ class Fault(Written):
             elif item.name == "teeth":
                 value = _tooth_numbers(value, place)
             elif isinstance(item.default, bool):
-                value = _switch(value, place)
+                value = truth(value, place)
             elif isinstance(item.default, int):
                 value = _whole(value, place, self.least.get(item.name))
             elif isinstance(item.default, float):
@@ -469,19 +469,6 @@ def _real(value: Any, field: str) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not math.isfinite(value):
         raise ValueError(f"{field} is {value!r}; give a finite number")
     return float(value)
-
-
-def _switch(value: Any, field: str) -> bool:
-    """Return a truth value as ``bool``.
-
-    Raises
-    ------
-    ValueError
-        For anything else; the message names the field.
-    """
-    if not isinstance(value, (bool, np.bool_)):
-        raise ValueError(f"{field} is {value!r}; give true or false")
-    return bool(value)
 
 
 def _choice(value: Any, field: str, choices: tuple[Any, ...]) -> Any:

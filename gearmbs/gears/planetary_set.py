@@ -142,7 +142,7 @@ class PlanetarySet(Written):
                 f"PlanetarySet.ring has {self.ring.teeth} teeth and {inner.name} {inner.teeth}: they do not fit into "
                 "it; give the ring more teeth"
             )
-        if self.rotation not in (1, -1):
+        if self.rotation not in (1, -1) or isinstance(self.rotation, bool):
             raise ValueError(f"PlanetarySet.rotation is {self.rotation!r}; give 1 or -1")
         if self.carrier_radius is None:
             object.__setattr__(self, "carrier_radius", PairGeometry(self.sun, self.planet).nominal_centre_distance)

@@ -10,7 +10,7 @@ from numbers import Real
 from typing import Any, Literal
 
 from gearmbs._shown import Shown, Written
-from gearmbs.units import Given, Quantity, doubt_of_material, shown, to_si
+from gearmbs.units import Given, Quantity, doubt_of_material, shown, to_si, truth
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
 
@@ -163,6 +163,7 @@ class GearSpec(Shown, Written):
                 f"{self.name}.profile_shift is {shift!r}; give the coefficient x, a number: 0.5 for half a module"
             )
         object.__setattr__(self, "profile_shift", float(shift))
+        object.__setattr__(self, "internal", truth(self.internal, f"{self.name}.internal"))
         if not isinstance(self.material, Material):
             raise ValueError(
                 f"{self.name}.material is {self.material!r}; give a Material, such as Material('2.1e5 MPa', 0.3, "
@@ -241,7 +242,7 @@ class GearSpec(Shown, Written):
     ) -> GearSpec:
         """Wheel from its tip and root radii instead of addendum and dedendum."""
         name = str(others.get("name", "gear"))
-        inwards = teeth < 0 or bool(others.get("internal", False))
+        inwards = teeth < 0 or truth(others.get("internal", False), f"{name}.internal")
         helix = to_si(others.get("helix_angle", 0.0), "angle", f"{name}.helix_angle")
         pitch = 0.5 * abs(teeth) * to_si(module, "length", f"{name}.module") / math.cos(helix)
         tip = to_si(tip_radius, "length", f"{name}.tip_radius")

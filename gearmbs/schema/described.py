@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, TypeVar, Union, get_args, get_origi
 
 from gearmbs._shown import Written
 from gearmbs.schema.messages import UNKNOWN, check_keys, faults, line, path_of, remedy
-from gearmbs.schema.quantities import Measure, counts, no_truth
+from gearmbs.schema.quantities import Measure, counts, flag, no_truth
 
 T = TypeVar("T")
 
@@ -84,6 +84,8 @@ def _readers(kind: Any) -> dict[str, Any]:
         allowed = taken(hint | None if name in optional else hint)
         if name not in measures and counts(hint):
             allowed = Annotated[allowed, BeforeValidator(no_truth)]
+        elif hint in (bool, bool | None):
+            allowed = Annotated[allowed, BeforeValidator(flag)]
         # pydantic wants no settings for a class alone
         return TypeAdapter(allowed, config=None if is_dataclass(hint) and name not in optional else config)
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import cached_property, lru_cache
 from numbers import Real
 from typing import TYPE_CHECKING, Any, get_args
 
-from gearmbs.units import DIMENSIONS, si_unit, to_si
+from gearmbs.units import DIMENSIONS, si_unit, to_si, truth
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
@@ -282,6 +282,14 @@ def no_truth(value: Any) -> Any:
     return value
 
 
+def flag(value: Any) -> Any:
+    """Return true, false or None; pydantic takes texts and numbers for truth values as well."""
+    try:
+        return None if value is None else truth(value)
+    except ValueError:
+        raise ValueError("give true or false") from None
+
+
 @dataclass(frozen=True)
 class OverTime:
     """A value over time: a number, a text with a unit or an expression, or an object that gives one.
@@ -301,9 +309,15 @@ class OverTime:
 
     def read(self, value: Any) -> Any:
         """Return the value, a number if it is finite; a text that is a number alone has no unit."""
+        if getattr(value, "shape", None) == () and not hasattr(value, "units"):
+            # an array of one number
+            value = value.item()
         asked = "give a finite number, a quantity with its unit or an expression of time"
         if isinstance(value, bool) or (isinstance(value, Real) and not math.isfinite(value)):
             raise OutOfRange(asked, f"{value}; {asked}")
+        if not (isinstance(value, Real | str) or is_dataclass(value) or hasattr(value, "magnitude")):
+            # a function of time is a dataclass, a quantity of pint has a magnitude; lists, tables and dates are neither
+            raise OutOfRange(asked, f"{value!r}; {asked}")
         if isinstance(value, str):
             try:
                 float(value)

@@ -258,9 +258,9 @@ def quantise(signal: xr.DataArray, *, bits: int, full_scale: float) -> xr.DataAr
     xarray.DataArray
         Attribute `clipped` counts the samples outside the range.
     """
-    if not 2 <= bits <= 32:
+    if isinstance(bits, bool) or not 2 <= bits <= 32:
         raise SignalError(f"bits: must lie between 2 and 32, got {bits!r}")
-    if not (math.isfinite(full_scale) and full_scale > 0.0):
+    if isinstance(full_scale, bool) or not (math.isfinite(full_scale) and full_scale > 0.0):
         raise SignalError(f"full_scale: must be positive, got {full_scale!r}")
     step = 2.0 * full_scale / 2.0**bits
     counts = np.rint(signal.values / step)

@@ -120,6 +120,63 @@ def test_turns_are_not_radians_and_usual_spellings(text, dimension, value):
     assert to_si(text, dimension) == pytest.approx(value, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("1 Hz", "rad/s", math.tau),
+        ("1 Hz", "Hz", 1.0),
+        ("1 Hz", "1/s", 1.0),
+        ("1 rpm", "rad/s", math.tau / 60.0),
+        ("1 Hz/s", "rad/s^2", math.tau),
+        ("2 kHz/s", "rad/s^2", 2e3 * math.tau),
+        ("60 rpm/s", "rad/s^2", math.tau),
+        ("60 rpm/s", "Hz/s", 1.0),
+        ("360 deg/s^2", "Hz/s", 1.0),
+        ("1 kHz/s", "Hz/s", 1e3),
+        ("1 Hz^2", "rad^2/s^2", math.tau**2),
+        ("60 rpm", "1/min * rad", math.tau * 60.0),
+        ("1 N m/Hz", "N*m*s/rad", 1.0 / math.tau),
+        ("1 N m/rpm", "N*m*s/rad", 60.0 / math.tau),
+        ("1 N m s/turn", "N*m*s/rad", 1.0 / math.tau),
+        ("1 N m s/deg", "N*m*s/rad", 180.0 / math.pi),
+        ("1 N m s", "N*m*s/rad", 1.0),
+        ("1 N m/Hz^2", "N*m*s^2/rad^2", math.tau**-2),
+        ("1 m/Hz", "m*s/rad", 1.0 / math.tau),
+        ("1 J/rad^2", "N*m/rad", 1.0),
+        ("1 W/Hz^2", "N*m*s/rad", math.tau**-2),
+        ("20 N/Hz", "N*s", 20.0),
+        ("1 cm^3/turn", "m^3/rad", 1e-6 / math.tau),
+        ("50 mm*Hz", "speed", 0.05),
+        ("2 turn", "angle", 2.0 * math.tau),
+        ("4 kHz*s", "dimensionless", 4e3),
+    ],
+)
+def test_turns_inside_compound_units(text, unit, value):
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "fault"),
+    [
+        ("1 deg^2", "angle", "power of the angle"),
+        ("1 deg^2/s", "rad/s", "power of the angle"),
+        ("1 1/min/s", "rad/s^2", "power of the angle"),
+        ("1 N m min", "N*m*s/rad", "power of the angle"),
+        ("inf m", "length", "finite"),
+        ("1e400 m", "length", "finite"),
+        ("-1e400 N/m", "N/m", "finite"),
+        ("1 K", "temperature", "'temperature' is no unit"),
+        ("1 L", "volume", "'m^3'"),
+    ],
+)
+def test_turns_that_may_be_radians_and_what_is_not_finite(text, unit, fault):
+    with pytest.raises(ValueError, match=says("field", fault)):
+        to_si(text, unit, "field")
+    assert to_si("1 L", "m^3") == pytest.approx(1e-3)
+    assert to_si("1 K", "K") == 1.0
+    assert to_si("1e300 m", "length") == 1e300
+
+
 def test_a_reciprocal_second_may_be_either():
     with pytest.raises(ValueError, match=says("'Hz'", "'rad/s'", "write 'rpm'")):
         to_si("30 1/s", "angular speed", "speed")

@@ -100,6 +100,8 @@ def quantities(value: Any, unit: str, field: str, factor: float = 1.0) -> np.nda
     ModelError
         If an entry is not a number or a text with the unit expected.
     """
+    if _holds_truth(value):
+        raise ModelError(f"{field}: {value!r} holds true or false; give numbers")
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -115,6 +117,13 @@ def quantities(value: Any, unit: str, field: str, factor: float = 1.0) -> np.nda
         return np.array(rows, dtype=float)
     except ValueError:
         raise ModelError(f"{field}: {value!r} has rows of different lengths") from None
+
+
+def _holds_truth(value: Any) -> bool:
+    """Whether a number, or one of nested sequences, is true or false, which arrays take for 1 and 0."""
+    if isinstance(value, list | tuple):
+        return any(map(_holds_truth, value))
+    return isinstance(value, bool) or getattr(value, "dtype", None) == np.bool_
 
 
 def any_quantity(value: Any, field: str, dimensions: Sequence[str] = VALUES) -> float:

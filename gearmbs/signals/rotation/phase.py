@@ -138,7 +138,7 @@ def phase_from_tacho(
         raise SignalError(f"channel: name the tacho channel, one of {names}")
     if channel is not None and channel not in names:
         raise SignalError(f"channel: there is no {channel!r}, only {names}")
-    if not (math.isfinite(pulses_per_rev) and pulses_per_rev > 0.0):
+    if isinstance(pulses_per_rev, bool) or not (math.isfinite(pulses_per_rev) and pulses_per_rev > 0.0):
         raise SignalError(f"pulses_per_rev: must be positive, got {pulses_per_rev!r}")
     pulses = signal.values[:, names.index(channel) if channel is not None else 0]
     low, high = np.percentile(pulses, [1.0, 99.0])

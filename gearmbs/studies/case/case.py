@@ -29,7 +29,7 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from gearmbs._shown import Shown
 from gearmbs.dae.methods import DEFAULT, FORMULATIONS, INTEGRATORS
 from gearmbs.schema.files import read_toml, toml_table
-from gearmbs.schema.quantities import SHOWN, Measure, two
+from gearmbs.schema.quantities import SHOWN, Measure, flag, two
 from gearmbs.studies.case import section as q
 from gearmbs.studies.case.section import CaseError, CaseWarning, Section, measures_of
 from gearmbs.units import to_si
@@ -297,7 +297,7 @@ class FrictionSettings(Section):
 
     section: ClassVar[str] = "friction"
 
-    enabled: bool = True
+    enabled: Annotated[bool, BeforeValidator(flag)] = True
     static: float = Field(default=0.1, ge=0)
     dynamic: float = Field(default=0.05, ge=0)
     static_speed: q.SlidingSpeed = 0.1
@@ -335,7 +335,7 @@ class Solver(Section):
     tolerance: float | None = None
     output_rate: q.SamplingRate = None
     signal_rate: q.SamplingRate = None
-    lump: bool = False
+    lump: Annotated[bool, BeforeValidator(flag)] = False
 
     @cached_property
     def used_tolerance(self) -> float:
