@@ -14,6 +14,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import ForceElement
 from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.parts.point_mass import PointMass
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
@@ -226,6 +227,30 @@ def warn_of_spin(bodies: Mapping[str, Body], solution: Solution) -> None:
                 f"body '{name}' turned at {fastest:.4g} rad/s across its long axis, more than {body.spin_limit:.4g}: "
                 "its modes lack the stiffening by centrifugal force; reduce it with spin=, or take large beams "
                 "(gearmbs.flexible.add_beam)",
+                stacklevel=4,
+            )
+
+
+LEVER = 1e-9
+"""m; a torque below the force's over this lever is the rounding of one that was to be zero."""
+
+
+def warn_of_lost_torques(elements: Mapping[str, Any], solution: Solution) -> None:
+    """Warn where a force of the user's own wrote a torque that acts, or whose reaction acts, on a point mass."""
+    for name, element in elements.items():
+        if element.kind != "force":
+            continue
+        # of more than two markers the first one's wrench alone is known by the force's name
+        markers = element.markers[:2] if len(element.markers) <= 2 else element.markers[:1]
+        massed = [m.body.name for m in markers if isinstance(m.body, PointMass)]
+        if not massed:
+            continue
+        force, torque = (float(np.abs(part).max(initial=0.0)) for part in solution.load(name))
+        if torque > LEVER * force:
+            warnings.warn(
+                f"force '{name}': its torque of up to {torque:.4g} N m on the point mass '{massed[0]}' did nothing, "
+                f"for a point mass does not turn; leave it out, or give an inertia: m.body('{massed[0]}', mass=..., "
+                "inertia=...)",
                 stacklevel=4,
             )
 

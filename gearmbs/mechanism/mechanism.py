@@ -306,7 +306,8 @@ class Mechanism(JointMethods, LoadMethods, Shown):
               marker's axes), velocity of the origin ``[12:15]``, angular velocity ``[15:18]``
             * ``wrench[0]``: force and torque on the body of the first marker at its origin. Of two markers, the second
               one's body takes the reaction at the same point, of one marker the ground does. More than two: each has
-              a wrench of its own, ``wrench[k]``.
+              a wrench of its own, ``wrench[k]``. A torque on a point mass, which does not turn, does nothing; a run
+              warns of that of the first wrench at its end.
             * ``rates[k]``: the derivative of a differential state, the value of an algebraic one, differential ones
               first
             * ``diagnostics[k]``: what else is to be told

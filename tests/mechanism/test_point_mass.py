@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -469,3 +471,24 @@ def test_a_name_in_use_is_refused():
     m = two_masses()
     with pytest.raises(ModelError, match=says("left", "in use")):
         m.point_mass("left", 1.0)
+
+
+def _turning(t, frames, states, parameters, wrench, rates, diagnostics):
+    wrench[0, 0] = 1.0
+    wrench[0, 5] = parameters[0]
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_torque_of_ones_own_on_a_point_mass_is_told(swapped):
+    """It vanished, and so did its reaction, without a word."""
+    for torque in (3.0, 0.0):
+        m = Mechanism("m")
+        parts = [m.point_mass("p", 2.0), m.body("b", 1.0, (0.1, 0.1, 0.1), position=(0, 1, 0))]
+        i, j = parts[::-1] if swapped else parts
+        m.force("f", _turning, i.marker(), j.marker(), parameters=[torque])
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            m.simulate(0.02, rate=100)
+        said = [str(w.message) for w in told if "did nothing" in str(w.message)]
+        assert len(said) == (torque > 0.0)
+        assert all("force 'f'" in words and "3 N m" in words and "'p'" in words for words in said)

@@ -50,7 +50,7 @@ class PointMass(Body):
     def check(self, part: Joint | ForceElement | Load) -> None:
         """Raise a ModelError for a joint that holds its orientation, or a load with a torque.
 
-        A function of the user's own may write a torque, which has no effect.
+        A function of the user's own may write a torque, which has no effect; a run warns of it at its end.
         """
         label = f"{part.kind.replace('_', ' ')} '{part.name}'"
         inertia = f"or give it an inertia: m.body('{self.name}', mass=..., inertia=...)"

@@ -21,7 +21,13 @@ from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
 from gearmbs.kernels.jit import njit
-from gearmbs.mechanism.checks import locking_remark, refuse_overlaps, warn_of_spin, warn_of_stiff_seats
+from gearmbs.mechanism.checks import (
+    locking_remark,
+    refuse_overlaps,
+    warn_of_lost_torques,
+    warn_of_spin,
+    warn_of_stiff_seats,
+)
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
@@ -245,6 +251,7 @@ def simulate(
     if stream is not None:
         return _closed(stream, solution, name)
     warn_of_spin(mechanism.bodies, solution)
+    warn_of_lost_torques(mechanism.elements, solution)
     return solution
 
 
