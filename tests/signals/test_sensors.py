@@ -172,3 +172,15 @@ def test_a_measured_chain_keeps_the_gear_mesh_harmonics(tmp_path):
     acceleration = convert(back, "acceleration", band=(100.0, 5000.0))
     expected = 2 * math.pi * gmf * np.array([1.0, 1.0, 0.75]) / math.sqrt(2)  # a = w v, w = k times the first
     np.testing.assert_allclose(gmf_rms(acceleration)["orders"][:, 0], expected, rtol=3e-3)
+
+
+def test_truth_is_no_range_and_no_number_of_pulses():
+    from gearmbs.signals import phase_from_tacho, quantise, to_signal
+
+    pulses = to_signal(np.tile([0.0, 0.0, 1.0, 1.0], 10), rate=40.0, units="V")
+    with pytest.raises(SignalError, match=r"full_scale.*True"):
+        quantise(pulses, bits=8, full_scale=True)
+    with pytest.raises(SignalError, match=r"pulses_per_rev.*True"):
+        phase_from_tacho(pulses, pulses_per_rev=True)
+    assert quantise(pulses, bits=8, full_scale=1).shape == pulses.shape
+    assert phase_from_tacho(pulses, pulses_per_rev=1).size > 0
