@@ -331,6 +331,8 @@ def _fault(text: str) -> str:
         return f"has {unknown[0]!r} in it, which is no part of a number or a unit"
     if re.match(r"[+-]\s*[+-]", text):
         return "has two signs"
+    if number is not None and re.match(r"\s*\(\s*[.\d]", text[number.end() :]):
+        return "has a number in brackets behind another, as an uncertainty is printed"
     if SIDE_BY_SIDE.search(text) or (number is not None and re.match(r"[.\d]", text[number.end() :])):
         return "has two numbers side by side"
     return ""

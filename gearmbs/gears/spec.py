@@ -6,7 +6,7 @@ import math
 import warnings
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, Literal
 
 from gearmbs._shown import Shown, Written
@@ -169,6 +169,8 @@ class GearSpec(Shown, Written):
                 f"{self.name}.material is {self.material!r}; give a Material, such as Material('2.1e5 MPa', 0.3, "
                 "'7850 kg/m^3')"
             )
+        if isinstance(self.teeth, Integral) and not isinstance(self.teeth, bool):
+            object.__setattr__(self, "teeth", int(self.teeth))
         if isinstance(self.teeth, int) and self.teeth < 0:
             object.__setattr__(self, "teeth", -self.teeth)
             object.__setattr__(self, "internal", True)

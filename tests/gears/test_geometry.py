@@ -247,3 +247,8 @@ def test_geometry_is_kept_and_not_handed_on_to_copies():
     wider = pair.with_changes(centre_distance_error="1 mm")
     assert wider.centre_distance == pytest.approx(pair.centre_distance + 1e-3, abs=1e-15)
     assert wider.contact_ratio < pair.contact_ratio
+
+
+def test_teeth_counted_by_numpy_are_teeth():
+    assert [GearSpec(np.int64(n), "3 mm").teeth for n in (20, -70)] == [20, 70]
+    assert GearSpec(np.int64(-70), "3 mm").internal

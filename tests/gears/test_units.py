@@ -266,6 +266,8 @@ def test_odd_texts_that_can_be_read(text, unit, value):
     ("text", "unit", "fault"),
     [
         ("3 mm 2", "length", "two numbers"),
+        ("48(2) N m", "torque", "uncertainty"),
+        ("210(5) GPa", "pressure", "uncertainty"),
         ("2 m/s 3", "speed", "two numbers"),
         ("1 000 mm", "length", "two numbers"),
         ("1\u202f000 mm", "length", "two numbers"),
