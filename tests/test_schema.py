@@ -300,7 +300,7 @@ def test_truth_is_no_number():
         assert getattr(gearmbs.GearPair(*wheels, **{name: 1}), name) == 1
     m = gearmbs.Mechanism("m")
     for number, at in enumerate(((True, 0, 0), [np.bool_(True), 0, 0], np.array([True, False, False]))):
-        with pytest.raises(ValueError, match=says("at", "true or false")):
+        with pytest.raises(ValueError, match=says("true or false")):
             m.point_mass(f"wrong{number}", 1.0, at=at)
     assert m.point_mass("right", 1.0, at=(1, "10 mm", np.float64(0.0))).position[0] == 1.0
 
@@ -311,7 +311,7 @@ def test_values_over_time_are_numbers_texts_or_functions():
 
     torque = {"name": "l", "shaft": "out"}
     for wrong in (Day(), ["80 N m"], {"a": 1}, (1.0, 2.0), None, np.array([1.0, 2.0])):
-        with pytest.raises(ValueError, match=says("load 'l'", "torque", "give a finite number")):
+        with pytest.raises(ValueError, match=says("'l'", "torque", "a finite number")):
             gearmbs.drivetrain.TorqueLoad(torque=wrong, **torque)
     for right in (80, 80.0, np.float64(80.0), np.array(80.0), "80 N m", "80*SIN(TIME)", gearmbs.mechanism.ramp(1.0)):
         gearmbs.drivetrain.TorqueLoad(torque=right, **torque)
