@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -99,6 +100,21 @@ FUNCTIONS_TYPE = FunctionsType(list(FIELDS.items()))
 @njit(FUNCTIONS_TYPE(*FIELDS.values()), cache=True)
 def _bind(residual, jacobian, hook, events):
     return Functions(residual, jacobian, hook, events)
+
+
+class FourFunctions(NamedTuple):
+    """The functions themselves: what is bound is counted by each compiled function that is handed it."""
+
+    residual: Any
+    jacobian: Any
+    hook: Any
+    events: Any
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def unbound(functions):
+    """Return the four functions, not counted; what binds them must outlive them."""
+    return FourFunctions(functions.residual, functions.jacobian, functions.hook, functions.events)
 
 
 @lru_cache(maxsize=BOUND)

@@ -47,6 +47,7 @@ from gearmbs.dae.integrators.run_state import (
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.dae.problem import HISTORY_CHANGED
+from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import bits_of, double_of
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE
@@ -487,12 +488,12 @@ def close_step(functions, st):
     nogil=True,
     error_model="numpy",
 )
-def advance(functions, st, part, plan, factors, max_accepted):
+def advance(bound, st, part, plan, factors, max_accepted):
     """Take at most ``max_accepted`` accepted steps.
 
     Parameters
     ----------
-    functions : Functions
+    bound : Functions
         Residual, Jacobian, hook and events.
     st : RunState
         State, read and written.
@@ -507,6 +508,7 @@ def advance(functions, st, part, plan, factors, max_accepted):
     code : int
         RUNNING, DONE, TERMINAL, PAUSED, REPIVOT, BUFFER_FULL or a failure of `gearmbs.dae.integrators.run_state`.
     """
+    functions = unbound(bound)
     accepted = 0
     while accepted < max_accepted:
         code = open_step(st)

@@ -117,13 +117,12 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def write_row(k, at, multipliers, records, idata, tab):
-    """Write reactions and poses of row k of the records, from its unknowns ``at`` and up-to-date tables."""
-    rows = records.force.shape[1]
-    force = matrix_at(records.force, 3 * rows * k, rows, 3)
-    moment = matrix_at(records.moment, 3 * rows * k, rows, 3)
+def write_row(k, at, multipliers, forces, moments, pose, idata, tab):
+    """Write reactions and pose of row k from its unknowns ``at`` and up-to-date tables; the pose is a row already."""
+    rows = idata[T.H_ROWS]
+    force, moment = matrix_at(forces, 3 * rows * k, rows, 3), matrix_at(moments, 3 * rows * k, rows, 3)
     loads_of_rows(multipliers, idata, tab, force, moment)
-    poses(at, tab.at, tab.code, tab.kin, vector_at(records.pose, records.pose.shape[1] * k, records.pose.shape[1]))
+    poses(at, tab.at, tab.code, tab.kin, pose)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -147,7 +146,8 @@ def _evaluate(
     idata, slots, vals, t = uncounted(idata), uncounted(slots), uncounted(vals), uncounted(t)
     rhs, at, factored, allowed = uncounted(rhs), uncounted(at), uncounted(factored), uncounted(allowed)
     pair = matrix_at(pair, 0, 4, size)
-    elements, columns = records.loads.shape[1], records.loads.shape[2]
+    elements, columns, width = records.loads.shape[1], records.loads.shape[2], records.pose.shape[1]
+    forces, moments = uncounted(records.force), uncounted(records.moment)
     tab = T.unpack(idata, rdata, work)
     only_assemble = last < first or idata[T.H_MODE] != NUMBERS
     if not only_assemble:
@@ -204,7 +204,8 @@ def _evaluate(
                 break
             if renew_reactions(at, vector_at(solution, base, rows), idata, tab) <= 1e-12:
                 break
-        write_row(k, at, vector_at(solution, base, rows), records, idata, tab)
+        pose = vector_at(records.pose, width * k, width)
+        write_row(k, at, vector_at(solution, base, rows), forces, moments, pose, idata, tab)
     return last
 
 
