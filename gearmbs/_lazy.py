@@ -1,15 +1,18 @@
-"""Names of a package that are imported when they are first used, so that importing the package loads nothing heavy."""
+"""Names that are looked after when they are used: late ones, which load nothing heavy before, and former ones."""
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import gc
 import importlib
 import os
 import sys
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from types import ModuleType
+from typing import Any
 
 # the interpreter looks for cycles among all modules once more while it ends, which takes as long as importing them
 atexit.register(gc.freeze)
@@ -83,3 +86,25 @@ def late(package: str) -> list[str]:
     module.__dict__["_homes"] = homes
     module.__class__ = _LatePackage
     return sorted(homes)
+
+
+def former_name(old: str, method: Callable[..., Any], remedy: str) -> Callable[..., Any]:
+    """Return a method that warns and calls the one that took its place.
+
+    Parameters
+    ----------
+    old : str
+        The former name.
+    method : callable
+        The method of today.
+    remedy : str
+        What to write instead, after "is deprecated: ".
+    """
+
+    @functools.wraps(method)
+    def call(self: Any, *args: Any, **kwargs: Any) -> Any:
+        warnings.warn(f"{type(self).__name__}.{old} is deprecated: {remedy}", DeprecationWarning, stacklevel=2)
+        return method(self, *args, **kwargs)
+
+    call.__name__, call.__doc__ = old, f"Deprecated: {remedy}."
+    return call

@@ -16,9 +16,8 @@ from pydantic import ValidationError
 import gearmbs
 from gearmbs.drivetrain.drivetrain import make_description
 from gearmbs.gears import GearSpec
-from gearmbs.schema.described import Described, _hints, _readers, make, measures_of
+from gearmbs.schema.described import Described, _hints, _readers, check_keys, chosen, make, measures_of
 from gearmbs.schema.files import read_toml, toml_table
-from gearmbs.schema.messages import check_keys, chosen
 from gearmbs.schema.quantities import Measure, OneOf, OverTime, counts
 from gearmbs.studies import Case, CaseError
 from gearmbs.studies.case.case import Contact, FrictionSettings, Gears, Operation, Shafts, Solver

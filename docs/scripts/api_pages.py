@@ -137,10 +137,16 @@ MORE = {
         "gearmbs.campaigns.cluster": ["DaskRunner", "batch_cluster", "job_script"],
         "gearmbs.campaigns.results": ["export"],
         "gearmbs.campaigns.sobol_bounds": EVERYTHING,
-        "gearmbs.campaigns.subjects.claims": EVERYTHING,
         "gearmbs.campaigns.surrogates": ["response_surface"],
         "gearmbs.campaigns.sensitivity": ["sensitivity", "campaign_chaos", "one_factor_studies"],
-        "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],
+        "gearmbs.campaigns.subjects.pair": [
+            "ClaimsSubject",
+            "canonical_case",
+            "contact_numbers",
+            "harmonics",
+            "indicators",
+            "ratios",
+        ],
     },
     "gearmbs.identify": {
         "gearmbs.identify.fit": EVERYTHING,

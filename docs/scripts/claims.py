@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from gearmbs.campaigns import Campaign, PolynomialChaos, fit_chaos, load_plan, total_bounds
+from gearmbs.campaigns.folder import read_ledger
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
-from gearmbs.campaigns.status import read_ledger
 from gearmbs.files import whole_file, write_whole
 from gearmbs.signals import COMPONENTS
 from gearmbs.studies.presets.paper_cases import MUCH

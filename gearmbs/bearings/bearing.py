@@ -40,8 +40,7 @@ from gearmbs.bearings.laws_kernel import (
     in_series,
     line_contact,
 )
-from gearmbs.schema.described import Described
-from gearmbs.schema.messages import check_keys
+from gearmbs.schema.described import Described, check_keys
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_material, to_si
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from gearmbs.bearings.kinds import BearingError, require
 from gearmbs.bearings.layout import angles, drop, node_count, rounded
-from gearmbs.schema.described import Described, make, measures_of
-from gearmbs.schema.messages import chosen
+from gearmbs.schema.described import Described, chosen, make, measures_of
 from gearmbs.schema.quantities import Measure, OneOf
 from gearmbs.units import Quantity
 

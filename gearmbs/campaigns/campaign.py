@@ -12,10 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
+from gearmbs.campaigns.folder import CampaignStatus, Folder, extend_folder, make_folder, read_status
 from gearmbs.campaigns.plan import Plan
 from gearmbs.campaigns.settings import CampaignError, limit, whole
-from gearmbs.campaigns.status import CampaignStatus, read_status
 from gearmbs.progress import alone, bars, watched
 
 if TYPE_CHECKING:
@@ -97,8 +96,8 @@ class Campaign:
             If workers die again and again over the same unit, or with ``on_failure="stop"`` at the first failed case.
         """
         from gearmbs.campaigns.cluster import DaskRunner
+        from gearmbs.studies.run.engine import here, processes
         from gearmbs.studies.run.parallel import available_cores
-        from gearmbs.studies.run.workers import here, processes
 
         where: Any
         if workers is not None:
@@ -122,7 +121,7 @@ class Campaign:
         minutes : float, optional
             Start no unit after so long.
         """
-        from gearmbs.studies.run.workers import here
+        from gearmbs.studies.run.engine import here
 
         if not 1 <= whole(part, "part", 0) <= whole(parts, "parts", 1):
             raise CampaignError(f"part {part} of {parts}: give a part from 1 to {parts}")
@@ -231,7 +230,7 @@ class Campaign:
         sweep : bool
             Remove the litter of killed workers, and ledgers whose data are damaged, so that `run` does them again.
         """
-        from gearmbs.campaigns.status import check_folder
+        from gearmbs.campaigns.folder import check_folder
 
         return check_folder(self.folder, sweep=sweep)
 
@@ -254,7 +253,7 @@ def _of_minutes(minutes: float | None) -> float | None:
 
 
 def _has_failures(folder: Folder, unit: int) -> bool:
-    from gearmbs.campaigns.status import read_ledger
+    from gearmbs.campaigns.folder import read_ledger
 
     entry = read_ledger(folder.ledger(unit))
     return bool(entry and entry["failed"])

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gearmbs.campaigns.settings import CampaignError, whole
-from gearmbs.studies.run.workers import DEATH, FAILURE, ONE_THREAD, Message, Work, one_thread, outcome, silent
+from gearmbs.studies.run.engine import DEATH, FAILURE, ONE_THREAD, Message, Work, one_thread, outcome, silent
 
 # Job scripts for Slurm and PBS.
 
@@ -108,7 +108,7 @@ class DaskRunner:
         return sum(self.client.nthreads().values()) or 1
 
     def __call__(self, work: Work, units: Iterable[int], _workers: int) -> Iterator[Message]:
-        """Yield the messages of units as they end; see `gearmbs.studies.run.workers`.
+        """Yield the messages of units as they end; see `gearmbs.studies.run.engine`.
 
         Raises
         ------

@@ -18,8 +18,7 @@ from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.settings import whole as whole_number
 from gearmbs.campaigns.subjects.base import Subject
 from gearmbs.files import python_scalar
-from gearmbs.schema.described import make
-from gearmbs.schema.messages import chosen
+from gearmbs.schema.described import chosen, make
 from gearmbs.units import to_si
 
 Columns = dict[str, np.ndarray]

@@ -26,8 +26,8 @@ from gearmbs.campaigns.factors import (
 from gearmbs.campaigns.settings import CampaignError, check_settings, satisfied, texts, whole
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
 from gearmbs.files import python_scalar
+from gearmbs.schema.described import chosen
 from gearmbs.schema.files import read_toml
-from gearmbs.schema.messages import chosen
 
 FORMAT = 1
 ALL_CORNERS = 6

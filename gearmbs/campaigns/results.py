@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.folder import Folder
+from gearmbs.campaigns.folder import REMEDY, Folder
 from gearmbs.campaigns.settings import CampaignError
-from gearmbs.campaigns.status import REMEDY
 from gearmbs.files import whole_file, write_whole
 
 if TYPE_CHECKING:

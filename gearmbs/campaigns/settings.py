@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.schema.messages import check_keys
+from gearmbs.schema.described import check_keys
 from gearmbs.schema.quantities import Measure
 
 # The error of campaigns.

@@ -8,6 +8,7 @@ from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import roll_under_corner
 from gearmbs.contact.helical_sections import edge_normals, edge_sections
 from gearmbs.contact.places import level, level_corner
+from gearmbs.contact.records import kernel
 from gearmbs.contact.sections import (
     LARGEST_TURN,
     NEAR_BASE,
@@ -29,7 +30,6 @@ from gearmbs.contact.support import (
     normal_turn,
     tilt_of,
 )
-from gearmbs.kernels.records import kernel
 
 # Distance of two lines, each parallel to one wheel's axis: tip corners against arcs and planes of the mate.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.records import inlined, kernel
 from gearmbs.contact.sections import (
     LARGEST_TURN,
     NEWTON_END,
@@ -35,7 +36,6 @@ from gearmbs.contact.support import (
     screw_of,
     tilt_of,
 )
-from gearmbs.kernels.records import inlined, kernel
 
 EDGE_STEPS = 6  # of Newton's method for the place of a tip edge in a section
 EDGE_END = 1e-9  # rad; a further step would turn the edge by about the square of it

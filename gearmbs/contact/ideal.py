@@ -20,12 +20,11 @@ from gearmbs.contact.kernel import relative_twist, slopes_of_sums, wheel_frame, 
 from gearmbs.contact.laws import normal_law
 from gearmbs.contact.loads import clear_sums, mirror
 from gearmbs.contact.pose import pose_rates, relative_pose
-from gearmbs.contact.records import options_at, pair_at, scratch_at
+from gearmbs.contact.records import kernel, options_at, pair_at, scratch_at
 from gearmbs.contact.search import facing_teeth, middle_section, open_side, set_twist
 from gearmbs.contact.sections import gap_rates
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.records import kernel
 from gearmbs.kernels.structs import vector_at
 
 STIFFNESS, DAMPING, DEPTH, COSINE, BACKLASH, PLACES, TABLES = range(7)

@@ -8,13 +8,12 @@ from gearmbs.contact import layout as L
 from gearmbs.contact.loads import add_product, add_transposed_product, clear_sums, mirror
 from gearmbs.contact.pair import side_contacts
 from gearmbs.contact.pose import pose_columns, pose_rate_slopes, pose_rates, pose_wrench, relative_pose
-from gearmbs.contact.records import options_at, pair_at, scratch_at
+from gearmbs.contact.records import inlined, kernel, options_at, pair_at, scratch_at
 from gearmbs.contact.root import root_contacts
 from gearmbs.contact.search import open_side, set_twist
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_COLUMNS, FRAME_P, FRAME_V, FRAME_W
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import caller
-from gearmbs.kernels.records import inlined, kernel
 from gearmbs.kernels.structs import matrix_at, vector_at
 
 COUPLED = 1e-10

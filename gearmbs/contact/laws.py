@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.records import inlined, kernel
 from gearmbs.dae.equations.loads.forces import friction_over_speed, impact, stored_energy
-from gearmbs.kernels.records import inlined, kernel
 
 LAW_HUNT_CROSSLEY = L.LAW_HUNT_CROSSLEY
 FRICTION_ADAMS = L.FRICTION_ADAMS

@@ -7,6 +7,7 @@ import numpy as np
 from gearmbs.contact import layout as L
 from gearmbs.contact.laws import friction_law
 from gearmbs.contact.places import end_roll, lay_directions, lay_slopes, limit_slopes
+from gearmbs.contact.records import inlined, kernel, summing
 from gearmbs.contact.slices import (
     Cut,
     end_force,
@@ -18,7 +19,6 @@ from gearmbs.contact.slices import (
     touching_parts,
 )
 from gearmbs.dae.equations.loads.forces import friction_over_speed
-from gearmbs.kernels.records import inlined, kernel, summing
 
 
 @kernel

@@ -18,7 +18,7 @@ from gearmbs.contact.loads import (
     total_force,
 )
 from gearmbs.contact.places import contact_points, end_roll, helical_points, limit_slopes, limit_value, roll_difference
-from gearmbs.contact.records import rows_of, strip_at
+from gearmbs.contact.records import inlined, kernel, rows_of, strip_at
 from gearmbs.contact.search import (
     face_pair,
     facing_teeth,
@@ -33,7 +33,6 @@ from gearmbs.contact.search import (
 )
 from gearmbs.contact.sections import gap_rates, set_sections
 from gearmbs.contact.slices import centroid_force, law_of, plane_force
-from gearmbs.kernels.records import inlined, kernel
 
 # What bears in the sections of one tooth pair: flanks, or the corner of either tooth; and its deviations.
 

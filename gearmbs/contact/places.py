@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.records import inlined, kernel
 from gearmbs.contact.sections import LARGEST_TURN, NEAR_BASE
 from gearmbs.contact.support import (
     corner_curvatures,
@@ -24,7 +25,6 @@ from gearmbs.contact.support import (
     screw_of,
     tilt_of,
 )
-from gearmbs.kernels.records import inlined, kernel
 
 
 @kernel

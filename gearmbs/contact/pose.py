@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.kernels.records import kernel
+from gearmbs.contact.records import kernel
 
 
 @kernel

@@ -31,11 +31,10 @@ from gearmbs.contact.corners import (
 )
 from gearmbs.contact.loads import add_normal, strip_forces, total_force
 from gearmbs.contact.pair import count_pair, set_limits, strip_count
-from gearmbs.contact.records import strip_at
+from gearmbs.contact.records import kernel, strip_at
 from gearmbs.contact.search import facing_teeth
 from gearmbs.contact.sections import gap_rates
 from gearmbs.contact.slices import elastic_law, law_of, plane_force
-from gearmbs.kernels.records import kernel
 
 FAR = 1.0  # a gap, m, for parts that do not face each other
 ON_CIRCLE, ON_ARC, ON_FLANK, UNDER_ARC = range(4)

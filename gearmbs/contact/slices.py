@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.laws import normal_law, power, pressure
-from gearmbs.contact.records import strip_at
-from gearmbs.kernels.records import inlined, kernel, summing
+from gearmbs.contact.records import inlined, kernel, strip_at, summing
 from gearmbs.kernels.views import before
 
 POINTS = (0.1127016653792583, 0.5, 0.8872983346207417)

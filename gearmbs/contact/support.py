@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearmbs.kernels.records import inlined
+from gearmbs.contact.records import inlined
 
 GENTLE = 0.02
 """Turns of the normal below this are taken from a series."""

@@ -329,7 +329,7 @@ class RigidCoupling(Coupling):
 class ElasticClutch(Coupling):
     """An elastic clutch: T = k_1 d + k_3 d^3, a second stage, damping, and a dead band in which it is silent.
 
-    The equations are those of `gearmbs.drivetrain.torque_laws`.
+    The equations are those of `gearmbs.drivetrain.torque_element`.
 
     Parameters
     ----------

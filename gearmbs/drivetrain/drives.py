@@ -14,8 +14,7 @@ import numpy as np
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import ShaftTorque, slopes
-from gearmbs.drivetrain.torque_laws import TOLD
+from gearmbs.drivetrain.torque_element import TOLD, ShaftTorque, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term

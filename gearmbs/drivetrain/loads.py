@@ -12,8 +12,7 @@ import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
 from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import ShaftTorque, slopes
-from gearmbs.drivetrain.torque_laws import LOST, TOLD
+from gearmbs.drivetrain.torque_element import LOST, TOLD, ShaftTorque, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.schema.quantities import Measure, OneOf, OverTime

@@ -13,7 +13,7 @@ from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
-from gearmbs.schema.messages import chosen
+from gearmbs.schema.described import chosen
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_density, truth
 

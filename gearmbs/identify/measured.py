@@ -12,9 +12,8 @@ import numpy as np
 
 from gearmbs.identify.cases import COLUMNS, CaseProblem
 from gearmbs.identify.parameters import Free, IdentifyError
-from gearmbs.schema.described import make
+from gearmbs.schema.described import check_keys, make
 from gearmbs.schema.files import read_toml
-from gearmbs.schema.messages import check_keys
 
 if TYPE_CHECKING:
     import pandas as pd

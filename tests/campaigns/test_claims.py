@@ -8,7 +8,7 @@ import xarray as xr
 
 from gearmbs.campaigns import Campaign, load_plan, make_plan
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
-from gearmbs.campaigns.subjects.claims import ClaimsSubject, ratios
+from gearmbs.campaigns.subjects.pair import ClaimsSubject, ratios
 from tests.docs.support import DOCS
 
 

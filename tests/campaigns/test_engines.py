@@ -14,8 +14,8 @@ import time
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError
-from gearmbs.campaigns.case_runner import TimeLimitReached, limited
 from gearmbs.campaigns.cluster import batch_cluster, job_script
+from gearmbs.campaigns.work import TimeLimitReached, limited
 from tests.campaigns.support import digest, small
 from tests.says import says
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from gearmbs.campaigns import load_plan
-from gearmbs.campaigns.subjects.claims import ratios
+from gearmbs.campaigns.subjects.pair import ratios
 from gearmbs.files import python_scalar
 from tests.docs.support import DOCS
 

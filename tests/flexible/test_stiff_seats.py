@@ -103,7 +103,7 @@ def test_silence_for_a_disc_of_the_shaft_and_for_seats_of_unknown_flexibility():
 @pytest.mark.parametrize(("slowest", "count"), [(4, 2), (None, 0)])
 def test_teeth_turn_a_shaft_without_torsion(monkeypatch, slowest, count):
     from gearmbs.studies import Case
-    from gearmbs.studies.run.flexible_rig import flexible_rig
+    from gearmbs.studies.run.rig import flexible_rig
 
     pair = Case().pair()
     whole = Shaft.modal_model

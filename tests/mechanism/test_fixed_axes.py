@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gearmbs.dae.model.member_tables import TURN_ROOT
+from gearmbs.dae.model.members import TURN_ROOT
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.building.lumping import lumped
 from gearmbs.studies import Case, simulate_case

@@ -25,7 +25,8 @@ from gearmbs.mechanism import (
     quasi_static,
     static_equilibrium,
 )
-from gearmbs.mechanism.forces import derivatives, functions
+from gearmbs.mechanism.forces import functions
+from gearmbs.mechanism.forces import functions as derivatives
 from gearmbs.mechanism.parts.joints import JOINTS, JointKind
 from tests.says import says
 

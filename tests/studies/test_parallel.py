@@ -12,10 +12,9 @@ import pytest
 import xarray as xr
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
-from gearmbs.studies.run.engine import WorkerDied, claimed, run_jobs, take
+from gearmbs.studies.run.engine import DEATH, RESULT, WorkerDied, claimed, here, processes, run_jobs, take, threads
 from gearmbs.studies.run.simulation import simulate_case
 from gearmbs.studies.run.store import RecordFolder
-from gearmbs.studies.run.workers import DEATH, RESULT, here, processes, threads
 from tests.says import says
 from tests.studies.jobs import (
     Unreadable,

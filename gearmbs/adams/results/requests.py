@@ -12,8 +12,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.dae.analyses.statics import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.expressions import eval_gradient
-from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
-from gearmbs.dae.equations.expressions.opcodes import ExpressionError
+from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_R, ExpressionError
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.equations.kinematics.update import AXES as ANGLE_NAMES
 from gearmbs.dae.results.frames import frame_motion

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gearmbs.campaigns.settings import CampaignError
-from gearmbs.schema.messages import chosen
+from gearmbs.schema.described import chosen
 from gearmbs.units import DIMENSIONS
 
 KINDS = {
@@ -26,7 +26,7 @@ KINDS = {
     "drivetrain": "gearmbs.campaigns.subjects.tables:DrivetrainSubject",
     "planetary": "gearmbs.campaigns.subjects.tables:PlanetarySubject",
     "bearing": "gearmbs.campaigns.subjects.tables:BearingSubject",
-    "paper claims": "gearmbs.campaigns.subjects.claims:ClaimsSubject",
+    "paper claims": "gearmbs.campaigns.subjects.pair:ClaimsSubject",
 }
 """Subjects that come with the package; a plan may also name one as ``"module:Class"``."""
 

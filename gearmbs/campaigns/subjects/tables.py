@@ -21,9 +21,8 @@ from gearmbs.campaigns.subjects.base import (
     kept_by_functions,
     tooth_fault_unit,
 )
-from gearmbs.schema.described import measures_of
+from gearmbs.schema.described import check_keys, chosen, measures_of
 from gearmbs.schema.files import read_toml
-from gearmbs.schema.messages import check_keys, chosen
 from gearmbs.units import si_unit, to_si
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs._deprecation import former_name
+from gearmbs._lazy import former_name
 from gearmbs.dae.analyses.eigenvalues import free_motions, reduce
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.relaxation import DENSE_LIMIT, LARGEST_TURN, ROUNDING_STEP, Relaxation, describe

@@ -30,8 +30,18 @@ from gearmbs.dae.equations.kinematics.rotation import KIN_R, KIN_W, POSE_A, POSE
 from gearmbs.dae.equations.kinematics.update import track, turns_are_counted, update_markers
 from gearmbs.dae.equations.outputs.accelerations import ROW_PARTIAL, ROW_RECORD, apply_loads
 from gearmbs.dae.equations.unknowns import SI2
-from gearmbs.dae.model.member_tables import MEMBERS_TYPE, TURN_I, TURN_J, TURN_ROOT, TURN_ROWS, TURN_SIDE, Members
-from gearmbs.dae.model.members import deduct_loads, internal_reactions, move_member
+from gearmbs.dae.model.members import (
+    MEMBERS_TYPE,
+    TURN_I,
+    TURN_J,
+    TURN_ROOT,
+    TURN_ROWS,
+    TURN_SIDE,
+    Members,
+    deduct_loads,
+    internal_reactions,
+    move_member,
+)
 from gearmbs.dae.model.records import RECORDS_TYPE, Records
 from gearmbs.dae.model.start import turns_of_one
 from gearmbs.dae.problem import DAEProblem

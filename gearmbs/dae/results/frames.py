@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.equations.expressions.marker_motion import ACC_A, ACC_ALPHA
+from gearmbs.dae.equations.expressions.opcodes import ACC_A, ACC_ALPHA
 from gearmbs.dae.equations.kinematics.rotation import (
     KIN_A,
     KIN_AXES,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from gearmbs._deprecation import former_name
+from gearmbs._lazy import former_name
 from gearmbs._shown import Shown, html_table
 from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model import evaluator as outputs
@@ -28,7 +28,7 @@ from gearmbs.progress import waiting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.dae.model.member_tables import Members
+    from gearmbs.dae.model.members import Members
 
 
 # A solution as a table for notebooks.

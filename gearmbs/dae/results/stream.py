@@ -12,7 +12,7 @@ from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, Status
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.member_tables import Members
+    from gearmbs.dae.model.members import Members
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, PART_SIZE, Solution
 
 AXIS_PART_SIZE = 1024

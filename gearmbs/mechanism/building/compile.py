@@ -304,7 +304,7 @@ class _Compiler:
             raise ModelError(f"{element.kind} '{element.name}': its compiled() fails with {reason}") from error
         if type(element).__module__.partition(".")[0] != "gearmbs" or getattr(element, "derivatives", None) is not None:
             # what the package's own elements have is tested with the package
-            from gearmbs.mechanism.forces.derivatives import check_derivatives
+            from gearmbs.mechanism.forces.functions import check_derivatives
 
             check_derivatives(element, made)
         self.force_names += [f"{element.name}[{k}]" for k in range(1, wrenches)]

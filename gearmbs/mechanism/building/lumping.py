@@ -17,13 +17,13 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model.fixed_axes import Axis, fixed_axis_problem, starting_values
-from gearmbs.dae.model.member_tables import TURN_COLUMNS, TURN_I, TURN_J, TURN_ROOT, TURN_ROWS, TURN_SIDE
+from gearmbs.dae.model.members import TURN_COLUMNS, TURN_I, TURN_J, TURN_ROOT, TURN_ROWS, TURN_SIDE
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.joints import Joint, Row
 from gearmbs.mechanism.parts.modal import ModalBody
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.member_tables import Members
+    from gearmbs.dae.model.members import Members
     from gearmbs.dae.model.system import System
     from gearmbs.dae.problem import DAEProblem
     from gearmbs.mechanism.mechanism import Mechanism
@@ -372,7 +372,7 @@ class _Lumping:
     # --- the way back --------------------------------------------------------------------------------
 
     def _members(self, system: System, edges: list[tuple[int, int, Joint]]) -> Members:
-        from gearmbs.dae.model import member_tables as mb
+        from gearmbs.dae.model import members as mb
 
         n = len(self.bodies)
         names = {name: k + 1 for k, name in enumerate(system.body_names)}

@@ -116,7 +116,7 @@ class MatrixForce(ForceElement):
         return any(np.any(part[rows]) for part in (self.stiffness, self.damping, self.preload))
 
     def compiled(self) -> Compiled:
-        from gearmbs.mechanism.forces.matrix_kernel import WORK, matrix_force
+        from gearmbs.mechanism.forces.spring_kernel import WORK, matrix_force
 
         # an angle without stiffness is not looked at: it may be undetermined, as AX is when z_I stands across
         used = [axis for axis in range(3) if np.any(self.stiffness[:, 3 + axis])]

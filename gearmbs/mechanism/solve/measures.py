@@ -9,7 +9,7 @@ import numpy as np
 from gearmbs._shown import html_table, readable
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions import ExpressionError
-from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion

@@ -35,7 +35,7 @@ from gearmbs.progress import time_bar
 from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.member_tables import Members
+    from gearmbs.dae.model.members import Members
     from gearmbs.dae.model.system import System
 
 # Ends of a simulation where an expression passes a value.

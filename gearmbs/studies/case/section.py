@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
 
-from gearmbs.schema.messages import OWN, faults, path_of, remedy
+from gearmbs.schema.described import OWN, faults, path_of, remedy
 from gearmbs.schema.quantities import Measure, counts, no_truth
 from gearmbs.units import NUMBER
 from gearmbs.wording import did_you_mean

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearmbs.gears import faults
 from gearmbs.gears.tables import tooth_deviations
-from gearmbs.schema.messages import check_keys
+from gearmbs.schema.described import check_keys
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import xarray as xr
 from gearmbs._shown import Shown, html_table
 from gearmbs.dae.result import SolverStats
 from gearmbs.files import write_whole
-from gearmbs.schema.messages import chosen
+from gearmbs.schema.described import chosen
 from gearmbs.signals import COMPONENTS, rms_factor
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.case.case import Case, CaseError, make_case

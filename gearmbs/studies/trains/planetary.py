@@ -18,9 +18,8 @@ from gearmbs.drivetrain.parts import contact_law
 from gearmbs.gears import ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
 from gearmbs.gears.planetary_mechanism import PinBearing
 from gearmbs.mechanism import Mechanism
-from gearmbs.schema.described import Described
+from gearmbs.schema.described import Described, check_keys
 from gearmbs.schema.files import read_toml
-from gearmbs.schema.messages import check_keys
 from gearmbs.schema.quantities import Measure
 from gearmbs.signals import fixed_sensor
 from gearmbs.studies.case.section import CaseError

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.integrals import external, integral
-from gearmbs.dae.equations.expressions.marker_motion import KIN_V, KIN_W
 from gearmbs.dae.equations.expressions.measure_gradients import (
     cosine_gradient,
     euler_parameter_gradient,
@@ -25,6 +24,7 @@ from gearmbs.dae.equations.expressions.measures import (
     relative_vector,
     resolve,
 )
+from gearmbs.dae.equations.expressions.opcodes import KIN_V, KIN_W
 from gearmbs.dae.equations.expressions.scalar import binary, unary, unwrap_angle
 from gearmbs.dae.equations.expressions.splines import spline_value
 from gearmbs.kernels.jit import njit

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.marker_motion import KIN_W
 from gearmbs.dae.equations.expressions.measures import (
     ARM_I,
     ARM_J,
@@ -16,6 +15,7 @@ from gearmbs.dae.equations.expressions.measures import (
     relative_vector,
     resolve,
 )
+from gearmbs.dae.equations.expressions.opcodes import KIN_W
 from gearmbs.kernels.jit import njit
 
 

@@ -8,7 +8,6 @@ the length of one), so its Hessian is e_ab . X + e_a . X_b + e_b . X_a + e . X_a
 from __future__ import annotations
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.marker_motion import KIN_AXES
 from gearmbs.dae.equations.expressions.measures import (
     ARM_I,
     ARM_J,
@@ -18,6 +17,7 @@ from gearmbs.dae.equations.expressions.measures import (
     relative_vector,
     resolve,
 )
+from gearmbs.dae.equations.expressions.opcodes import KIN_AXES
 from gearmbs.kernels.jit import njit
 
 

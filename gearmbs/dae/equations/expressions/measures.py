@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.marker_motion import ACC_A, ACC_ALPHA, KIN_A, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.expressions.opcodes import ACC_A, ACC_ALPHA, KIN_A, KIN_R, KIN_V, KIN_W
 from gearmbs.kernels.jit import njit
 
 # scratch of one leaf: vectors of three

@@ -1,4 +1,4 @@
-"""Instruction codes and layout of an expression tape.
+"""Instruction codes and layout of an expression tape, and the columns of the tables of bodies that it reads.
 
 A tape is two flat arrays.  ``ints`` holds a header, the lists of bodies and algebraic unknowns the
 expression depends on, and the instructions; ``floats`` holds constants and spline tables.
@@ -29,6 +29,23 @@ HEAD_SIZE = 9
 
 WIDTH = 10
 """Integers an instruction takes: code, operands a b c d e, gradient slots of up to four bodies."""
+
+KIN_R = 0
+"""Columns of the kinematics table, one row a body, row 0 the ground: position of the body frame's origin."""
+KIN_V = 3
+"""Velocity of the origin."""
+KIN_A = 6
+"""Orientation, row-major 3x3: columns are the body axes in global components."""
+KIN_W = 15
+"""Global angular velocity."""
+KIN_AXES = 18
+"""The three Euler axes a_1, a_2, a_3 in global components; only second derivatives read them."""
+
+ACC_A = 0
+"""Columns of the acceleration table: acceleration of the body frame's origin."""
+ACC_ALPHA = 3
+"""Global angular acceleration."""
+
 
 # leaves
 CONST = 0

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_R, KIN_V, KIN_W
 from gearmbs.kernels.jit import njit
 
 KIN_AXES = 18

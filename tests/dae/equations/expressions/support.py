@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gearmbs.dae.equations.expressions import eval_gradient, eval_request, eval_second, eval_time, eval_value
-from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Scope
 
