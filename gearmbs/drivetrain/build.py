@@ -15,7 +15,7 @@ from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, require, told_of
 from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Shaft, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
-from gearmbs.gears.geometry import turn_z
+from gearmbs.gears.geometry import MM, turn_z
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import Body, Marker
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 # What cannot be, found before anything is compiled.
 
 
-MM = 1e3
-"""Millimetres a metre, for messages."""
 COAXIAL = 1e-6
 """Distance, m, up to which axes are one and faces touch without overlap: far below any gap of a drawing."""
 HELD = 1e-9

@@ -16,7 +16,7 @@ import numpy as np
 
 from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh, Shaft
-from gearmbs.gears.geometry import turn_z
+from gearmbs.gears.geometry import MM, turn_z
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 CLOSED = 1e-6
 """Largest distance between what two ways round a closed chain give, m, and angle, rad."""
 ANGLE_STEPS = 30
-MM = 1e3
-"""Millimetres a metre, for messages."""
 
 
 class Seat(NamedTuple):

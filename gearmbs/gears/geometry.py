@@ -33,7 +33,7 @@ SHORTEST_FACE = 1e-6
 """Common face width, m, from which on wheels are side by side: the contact blends the ends of faces over as much."""
 
 MM = 1e3
-"""Millimetres a metre, for messages."""
+"""Millimetres a metre, for messages, axes and files."""
 
 
 @dataclass(frozen=True)

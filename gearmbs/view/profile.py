@@ -15,6 +15,7 @@ from scipy.interpolate import make_interp_spline
 
 from gearmbs.files import write_whole
 from gearmbs.gears import GearPair, GearSpec
+from gearmbs.gears.geometry import MM
 from gearmbs.gears.spec import involute
 from gearmbs.progress import waiting
 
@@ -24,8 +25,6 @@ TOLERANCE = 1e-6
 FEWEST = 4
 """Least number of chords a curved piece is cut into."""
 
-MM = 1e3
-"""Millimetres a metre, the unit of the file."""
 CHORD_TOLERANCE = 1e-7
 """Distance between a profile and its chords, m, where none is given: a tenth of a micrometre, finer than wheels are
 made."""

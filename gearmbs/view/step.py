@@ -15,6 +15,7 @@ from scipy.interpolate import make_interp_spline
 
 from gearmbs.files import write_whole
 from gearmbs.gears import GearPair, GearSpec
+from gearmbs.gears.geometry import MM
 from gearmbs.progress import waiting
 from gearmbs.view.profile import DEGREE, SPLINE_POINTS, Arc, Edge, Line, Spline, backwards, bore_edges, profile_edges
 from gearmbs.view.solid import title_of
@@ -27,8 +28,6 @@ from gearmbs.view.solid import title_of
 # surfaces and edges share these splines, so that the shell closes without gaps.
 
 
-MM = 1e3
-"""Millimetres a metre, the unit of the file."""
 UP = (0.0, 0.0, 1.0)
 DOWN = (0.0, 0.0, -1.0)
 STATIONS_PER_RADIAN = 12

@@ -1,7 +1,8 @@
-"""What the names, ids and functions in a deck's expressions stand for, before a mechanism is built and after.
+"""What the names, ids and functions in a deck's expressions stand for.
 
-Known before: ``deck_scope``. Functions that mechanisms do not have become others: SENVAL, CURVE, ARYVAL of variables,
-MODE, and accelerations. `AdamsModel` is the mechanism with the way back from its names to the deck's ids.
+Checks need no mechanism for it (``deck_scope``); `AdamsModel` is the mechanism with the way back from its names to the
+deck's ids. Functions that mechanisms do not have become others: SENVAL, CURVE, ARYVAL of variables, MODE, and
+accelerations.
 """
 
 from __future__ import annotations

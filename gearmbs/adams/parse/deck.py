@@ -1,6 +1,4 @@
-"""A deck: its typed statements, its units in SI, and remarks on what was not understood; what its statements read of
-others, and what goes with those that are left out.
-"""
+"""A deck: its typed statements, their units in SI, what each reads of others, and what goes when one is left out."""
 
 from __future__ import annotations
 

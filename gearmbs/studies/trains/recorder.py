@@ -1,4 +1,4 @@
-"""What the record of a drivetrain is made from, taken from the solution while it is being computed; its meshes' speeds.
+"""What the record of a drivetrain is made from, taken from the solution while it is being computed.
 
 Harmonics of a mesh are told at the mean speed of the record. Where a motor slips, that is not the nominal speed, and
 the record says so. Where the speed changes by up to `STRAY` over the record, levels that it would lower follow the

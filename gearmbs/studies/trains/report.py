@@ -1,4 +1,4 @@
-"""What is shown of a drivetrain: the report of its record, its spectrum and 3-D view, its modes under load."""
+"""What is shown of a drivetrain: report, spectrum, 3-D view and Campbell diagram."""
 
 from __future__ import annotations
 

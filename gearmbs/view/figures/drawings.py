@@ -15,7 +15,7 @@ from matplotlib.patches import FancyBboxPatch, PathPatch, Polygon
 from matplotlib.path import Path
 
 from gearmbs.gears import GearPair, GearSpec
-from gearmbs.gears.pair import Placement
+from gearmbs.gears.geometry import MM, Placement
 from gearmbs.units import shown
 from gearmbs.view.figures.style import (
     BLACK,
@@ -36,8 +36,6 @@ from gearmbs.view.solid import pair_deviations, section_outline
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism
 
-MM = 1e3
-"""Millimetres a metre, the unit of the axes."""
 TOLERANCE = 2e-6
 """Distance, m, between an outline and its chords: below the width of a drawn line at any size of a page."""
 ARROW = 1.6

@@ -12,14 +12,12 @@ from gearmbs.dae.equations.kinematics.rotation import KIN_V, KIN_W
 from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.outputs.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD, tape_row_rates
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR
+from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import vector_at
 
 ROUNDED_POSITION, ROUNDED_RATE = 1e-14, 1e-12
 """Violation of a constraint, m or rad, and its rate, m/s or rad/s, up to which no output is projected."""
-
-EPS = 2.220446049250313e-16
-"""Rounding of a prescribed motion, by which its row is off: an angle grows with the turns."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -39,6 +37,7 @@ def are_satisfied(phi, tab):
         row = ROW_RECORD * r
         rounded, function = ROUNDED_POSITION, tab.row[r, T.ROW_FUNCTION]
         if function >= 0:
+            # a prescribed motion is rounded: an angle grows with the turns
             rounded += EPS * abs(tab.fval[function, 0])
         satisfied &= abs(phi[row + ROW_PHI]) <= rounded
         satisfied &= abs(phi[row + ROW_RATE]) <= ROUNDED_RATE
