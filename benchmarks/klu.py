@@ -193,7 +193,7 @@ def problems() -> dict[str, Callable[[], tuple]]:
 def planetary_run(duration: float) -> Any:
     """Return the planetary set of `benchmarks.planetary`."""
     from gearmbs.gears import ContactLaw, planetary
-    from gearmbs.studies.trains.planetary import PlanetaryRun
+    from gearmbs.studies.planetary import PlanetaryRun
 
     law = ContactLaw.impact()
     gears = planetary((24, 30, 84), "1.5 mm", 3, backlash_sun="0.05 mm", backlash_ring="0.05 mm", contact=law)
@@ -299,7 +299,7 @@ def job(name: str) -> None:
     """Run a model once, with all that is recorded of it."""
     from gearmbs.gears import GearPair
     from gearmbs.studies import Case, flexible_rig, run_case
-    from gearmbs.studies.trains.planetary import run_planetary
+    from gearmbs.studies.planetary import run_planetary
 
     if name in ("healthy", "misaligned"):
         fault = {"misalignment": "1 deg"} if name == "misaligned" else {}

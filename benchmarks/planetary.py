@@ -15,8 +15,8 @@ from collections.abc import Callable
 from gearmbs.gears import ContactLaw, planetary, planetary_mechanism
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import paper_cases, run_case
+from gearmbs.studies.planetary import PlanetaryRun, run_planetary
 from gearmbs.studies.run.simulation import case_mechanism
-from gearmbs.studies.trains.planetary import PlanetaryRun, run_planetary
 
 SPAN = 0.4
 """Simulated seconds of a mechanism, and of a record after the settling."""

@@ -89,7 +89,7 @@ CIRCLES = {
     ("drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.placement",
      "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
-    ("mechanism.building.compile", "mechanism.building.lumping", "mechanism.checks", "mechanism.forces.friction",
+    ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",
     ("campaigns.campaign", "campaigns.report", "campaigns.results", "campaigns.sensitivity",

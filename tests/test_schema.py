@@ -199,9 +199,6 @@ def _fault_of(read: Callable, *values: float, **named: float) -> str:
 
 def test_true_is_no_number_in_any_description():
     """Of every field that measures or counts; 1.0 is not refused for its kind."""
-    import gearmbs.drivetrain
-    import gearmbs.studies.presets.resonance
-    import gearmbs.studies.trains.planetary  # noqa: F401
 
     tried = 0
     for kind in _described():

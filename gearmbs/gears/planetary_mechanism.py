@@ -87,7 +87,7 @@ def planetary_mechanism(
     pins : Support or callable, optional
         Springs between planets and carrier, or a function that makes the force element of a pin's bearing from its name
         and two markers, of the pin and of the planet's bore, z along the axis;
-        `gearmbs.studies.trains.planetary.rolling_pins` makes one for rolling bearings. By default planets turn in
+        `gearmbs.studies.planetary.rolling_pins` makes one for rolling bearings. By default planets turn in
         revolute joints.
     masses : mapping, optional
         Mass, kg, and moments of inertia (or that about z), kg m^2, of "sun", "planet", "carrier", "ring".

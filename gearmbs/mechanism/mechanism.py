@@ -12,12 +12,12 @@ from gearmbs._shown import Shown
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.building.joint_methods import JointMethods
-from gearmbs.mechanism.building.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.forces.friction import FrictionForce, add_friction, friction_of
 from gearmbs.mechanism.forces.functions import FunctionForce, function_force
+from gearmbs.mechanism.joint_methods import JointMethods
 from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.language.user_functions import UserFunction
+from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
@@ -466,7 +466,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         ModelError
             If the mechanism has no bodies, or an expression cannot be read.
         """
-        from gearmbs.mechanism.building.compile import compile_mechanism
+        from gearmbs.mechanism.compile import compile_mechanism
 
         return compile_mechanism(self, t0)
 

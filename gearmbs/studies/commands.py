@@ -60,7 +60,7 @@ def bench(
     with guarded():
         from gearmbs.studies.presets.bench import PRESSURES, SENSORS, STATES, BenchSettings, bench_train, run_bench
         from gearmbs.studies.presets.paper_cases import paper_cases
-        from gearmbs.studies.trains.trains import RunSettings, check_record
+        from gearmbs.studies.trains import RunSettings, check_record
 
         settings = BenchSettings(
             speed=speed, bearing_stiffness=stiffness, motor=motor, phase=phase, pump_teeth=pump_teeth
@@ -274,7 +274,7 @@ def run_planetary_set(file: Path, out: Path | None) -> None:
     """Simulate a planetary set; write its record and say how the load is shared."""
     with guarded():
         from gearmbs.studies.case.section import CaseError
-        from gearmbs.studies.trains.planetary import load_planetary, run_planetary
+        from gearmbs.studies.planetary import load_planetary, run_planetary
 
         found = load_planetary(file)
         try:
@@ -297,7 +297,7 @@ def run_planetary_set(file: Path, out: Path | None) -> None:
 def run_drivetrain(file: Path, out: Path | None) -> None:
     """Simulate a drivetrain; write its record, a report, a 3-D view and a spectrum with its lines named."""
     with guarded():
-        from gearmbs.studies.trains.trains import check_record, load_train
+        from gearmbs.studies.trains import check_record, load_train
 
         found = load_train(file)
         train, settings = found.train, found.run
@@ -305,8 +305,8 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
 
         from gearmbs.files import write_whole
         from gearmbs.signals.files.simulated import holds_speed
-        from gearmbs.studies.trains.report import train_report, train_scene, train_spectrum
-        from gearmbs.studies.trains.trains import run_train
+        from gearmbs.studies.train_views import train_report, train_scene, train_spectrum
+        from gearmbs.studies.trains import run_train
         from gearmbs.view import save_figure
 
         target = out or file.with_suffix(".nc")
@@ -413,7 +413,7 @@ def campbell(
 
         from gearmbs.drivetrain.drivetrain import read_description
         from gearmbs.signals import critical_speeds
-        from gearmbs.studies.trains.report import train_campbell
+        from gearmbs.studies.train_views import train_campbell
         from gearmbs.units import to_si
         from gearmbs.view import campbell_plot
 

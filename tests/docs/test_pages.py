@@ -12,7 +12,7 @@ import typer
 from gearmbs.cli import app
 from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.studies import load_case
-from gearmbs.studies.trains.planetary import load_planetary
+from gearmbs.studies.planetary import load_planetary
 from tests.docs.support import DOCS, FENCE, ROOT, blocks, links, notebooks, pages, run_blocks
 
 ALL = [ROOT / "README.md", *pages()]

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from gearmbs.dae.model.members import TURN_ROOT
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.building.lumping import lumped
+from gearmbs.mechanism.lumping import lumped
 from gearmbs.studies import Case, simulate_case
 from tests.mechanism.test_lumping import TIGHT, agree, exact_reactions
 from tests.mechanism.test_own_forces import maxwell

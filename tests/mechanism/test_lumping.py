@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gearmbs.mechanism import Mechanism, Mode
-from gearmbs.mechanism.building.lumping import lumped
+from gearmbs.mechanism.lumping import lumped
 
 TIGHT = {"tol": 1e-10, "rate": 50.0}
 

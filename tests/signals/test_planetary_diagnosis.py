@@ -9,7 +9,7 @@ import xarray as xr
 from gearmbs.gears import ContactLaw, FlankFriction, faults, planetary
 from gearmbs.signals import MissingMetadataError, SignalError, analyse, diagnose_planetary, make_signal, planetary_lines
 from gearmbs.signals.diagnosis.planetary_averages import path_weight
-from gearmbs.studies.trains.planetary import PlanetaryRun, run_planetary
+from gearmbs.studies.planetary import PlanetaryRun, run_planetary
 from tests.make_records import read
 from tests.says import says
 

@@ -3,7 +3,7 @@
 import pytest
 
 from gearmbs.drivetrain import Drivetrain
-from gearmbs.studies.trains.trains import described, load_train
+from gearmbs.studies.trains import described, load_train
 
 
 def agrees_with_its_file(name: str, train: Drivetrain) -> None:

@@ -9,7 +9,7 @@ from gearmbs.drivetrain import DrivetrainError, RunSettings, SpeedDrive, TorqueL
 from gearmbs.gears import GearSpec
 from gearmbs.signals.analysis.campbell import critical_speeds
 from gearmbs.studies import GearboxSettings, gearbox_choices, industrial_gearbox, run_gearbox, train_modes, train_report
-from gearmbs.studies.trains.trains import run_train
+from gearmbs.studies.trains import run_train
 from tests.drivetrain.support import stage
 from tests.says import says
 from tests.studies.presets import agrees_with_its_file

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from gearmbs.cli import app
 from gearmbs.studies import CaseError
-from gearmbs.studies.trains.planetary import interaction, load_planetary, planetary_run, run_planetary
+from gearmbs.studies.planetary import interaction, load_planetary, planetary_run, run_planetary
 
 FILE = """
 [planetary]

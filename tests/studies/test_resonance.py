@@ -20,7 +20,7 @@ from gearmbs.studies.presets.resonance import (
     separation_loads,
     sweep_resonance,
 )
-from gearmbs.studies.trains.trains import load_train
+from gearmbs.studies.trains import load_train
 from tests.make_records import read
 from tests.says import says
 from tests.studies.presets import agrees_with_its_file

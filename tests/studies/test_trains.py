@@ -29,8 +29,8 @@ from gearmbs.signals import analyse
 from gearmbs.signals.analysis.bands import harmonic_amplitudes
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.studies import run_train, run_trains, train_report, train_scene, train_signal, train_spectrum
-from gearmbs.studies.trains.recorder import HeldSpeed, by_angle, counted_turns
-from gearmbs.studies.trains.trains import check_record, load_train
+from gearmbs.studies.train_record import HeldSpeed, by_angle, counted_turns
+from gearmbs.studies.trains import check_record, load_train
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_description import TEXT
 from tests.says import says

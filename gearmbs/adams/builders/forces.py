@@ -13,10 +13,10 @@ from gearmbs.adams.builders.flexible import LOADS, flexible_body
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.mechanism.building.load_methods import beam_stiffness
 from gearmbs.mechanism.forces.friction import INPUTS, KINDS
 from gearmbs.mechanism.forces.modal_force import add_modal_force
 from gearmbs.mechanism.forces.springs import Beam, Bushing, Field, MatrixForce
+from gearmbs.mechanism.load_methods import beam_stiffness
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.modal import ModalBody
 

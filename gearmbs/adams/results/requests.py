@@ -18,7 +18,7 @@ from gearmbs.dae.equations.kinematics.update import AXES as ANGLE_NAMES
 from gearmbs.dae.results.frames import frame_motion
 from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit
-from gearmbs.mechanism.building.compile import starting_angles
+from gearmbs.mechanism.compile import starting_angles
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.series import expression_values
 from gearmbs.mechanism.language.syntax import Scope

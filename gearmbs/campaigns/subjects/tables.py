@@ -169,7 +169,7 @@ class DrivetrainSubject(TablesSubject):
         """Return the drivetrain and its run."""
         from gearmbs.drivetrain.drivetrain import make_description
         from gearmbs.studies.case.tooth_faults import tooth_fault
-        from gearmbs.studies.trains.trains import check_record
+        from gearmbs.studies.trains import check_record
 
         found = make_description(tables, str(tables.get("name", "drivetrain")), tooth_fault)
         check_record(found.train, found.run)
@@ -177,7 +177,7 @@ class DrivetrainSubject(TablesSubject):
 
     def canonical(self, thing: Any) -> Any:
         """Return the parts and pairs with their defaults and the run in SI, without the name."""
-        from gearmbs.studies.trains.trains import described
+        from gearmbs.studies.trains import described
 
         train = {key: value for key, value in described(thing.train).items() if key not in ("name", "kind")}
         for mesh in train["meshes"]:
@@ -194,7 +194,7 @@ class DrivetrainSubject(TablesSubject):
 
     def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Return the record."""
-        from gearmbs.studies.trains.trains import run_train
+        from gearmbs.studies.trains import run_train
 
         span = thing.train.run_up + thing.run.settling + thing.run.duration
         return run_train(thing.train, thing.run, progress=told(progress, span))
@@ -241,14 +241,14 @@ class PlanetarySubject(TablesSubject):
 
     def made(self, tables: dict[str, Any]) -> Any:
         """Return the set and its run, and the table of the pins as it was given."""
-        from gearmbs.studies.trains.planetary import planetary_run
+        from gearmbs.studies.planetary import planetary_run
 
         tables.pop("name", None)
         return planetary_run(tables), tables.get("pins")
 
     def canonical(self, thing: Any) -> Any:
         """Return the set with its defaults and the run in SI; the pins, which become a function, as their table."""
-        from gearmbs.studies.trains.trains import described
+        from gearmbs.studies.trains import described
 
         run, pins = thing
         speeds = {member: float(to_si(speed, "angular speed")) for member, speed in run.speeds.items()}
@@ -266,7 +266,7 @@ class PlanetarySubject(TablesSubject):
 
     def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Return the record."""
-        from gearmbs.studies.trains.planetary import run_planetary
+        from gearmbs.studies.planetary import run_planetary
 
         run = thing[0]
         return run_planetary(run, told(progress, run.run_up + run.settling + run.duration))
@@ -354,7 +354,7 @@ class BearingSubject(TablesSubject):
         import inspect
 
         from gearmbs.studies import bearing_rig
-        from gearmbs.studies.trains.trains import described
+        from gearmbs.studies.trains import described
 
         defaults = {
             name: p.default for name, p in inspect.signature(bearing_rig).parameters.items() if p.default is not p.empty

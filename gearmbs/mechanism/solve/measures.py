@@ -146,7 +146,7 @@ class Measures:
 
     def expression(self, text: str) -> np.ndarray:
         """Return the values of an expression, in the mechanism's units, shape (m,)."""
-        from gearmbs.mechanism.building.compile import scope_of, starting_angles
+        from gearmbs.mechanism.compile import scope_of, starting_angles
         from gearmbs.mechanism.language.library import compile_expression
         from gearmbs.mechanism.language.series import expression_values
 

@@ -193,7 +193,7 @@ def simulate(
         fixed axes, its angles alone; default the mechanism's ``lump``, which only some presets set, and not with
         ``stops``. Results are about all bodies and joints as without it; reactions inside are recovered exactly. Where
         that is not possible, as with any body that deforms, all bodies are integrated, and the solution's ``message``
-        says why. See `gearmbs.mechanism.building.lumping.lumped`.
+        says why. See `gearmbs.mechanism.lumping.lumped`.
     stops : sequence of StopAt
         The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
         stop. Not with integrators without events, as IDA, and not with ``lump``.
@@ -291,7 +291,7 @@ def _prepared(
     one, why = None, ""
     if lump:
         # kernels of bodies that turn about fixed axes are compiled by those alone who ask for it
-        from gearmbs.mechanism.building.lumping import lumped, why_not_lumped
+        from gearmbs.mechanism.lumping import lumped, why_not_lumped
 
         one = lumped(mechanism, t_start)
         why = "" if one else why_not_lumped(mechanism)

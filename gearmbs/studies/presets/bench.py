@@ -29,7 +29,7 @@ from gearmbs.studies.presets.paper import PaperStudy, run_paper, verdict_table
 from gearmbs.studies.presets.paper_cases import Claim, judge
 from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.run.store import save_study
-from gearmbs.studies.trains.trains import run_trains, train_signal
+from gearmbs.studies.trains import run_trains, train_signal
 from gearmbs.units import Quantity, to_si
 
 PRESSURES = {"low": 1e6, "high": 5e6}

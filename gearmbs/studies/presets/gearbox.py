@@ -27,8 +27,8 @@ from gearmbs.gears import ContactLaw, GearPair, GearSpec
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.presets.files import BenchChoice, choices, on_mounts, preset_train, with_values
 from gearmbs.studies.run.store import save_study
-from gearmbs.studies.trains.report import mesh_orders, train_modes, train_report
-from gearmbs.studies.trains.trains import run_trains
+from gearmbs.studies.train_views import mesh_orders, train_modes, train_report
+from gearmbs.studies.trains import run_trains
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from gearmbs.signals import spectrum
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import held_speed, holds_speed
 from gearmbs.studies.run.record import flank_shares
-from gearmbs.studies.trains.recorder import STRAY
-from gearmbs.studies.trains.trains import train_signal
+from gearmbs.studies.train_record import STRAY
+from gearmbs.studies.trains import train_signal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -29,7 +29,7 @@ from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
-from gearmbs.studies.trains.recorder import (
+from gearmbs.studies.train_record import (
     CONTACT,
     TURN,
     HeldSpeed,
@@ -95,7 +95,7 @@ def run_train(
         tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft;
         by ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal``
         (the normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the record's mean
-        speed, and NaN where the speed is not steady, see `gearmbs.studies.trains.recorder`; of a run-up or coast-down
+        speed, and NaN where the speed is not steady, see `gearmbs.studies.train_record`; of a run-up or coast-down
         (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the same at 60 moments. The attribute
         ``remarks`` names speeds that are not the nominal ones.
 

@@ -1,1 +1,0 @@
-"""From a mechanism to the arrays that the equations are evaluated from."""

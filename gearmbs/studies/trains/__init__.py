@@ -1,1 +1,0 @@
-"""Studies of drivetrains and planetary sets."""
