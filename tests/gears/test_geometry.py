@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.gears import GearPair, GearSpec, PairGeometry, involute
+from gearmbs.gears import FlankFriction, GearPair, GearSpec, PairGeometry, involute
 from tests.says import says
 
 MM = 1e-3
@@ -171,6 +171,11 @@ BAD_PAIRS = {
     says("GearPair.misalignment", "57.296 deg", "'1 deg'"): {"misalignment": 1.0},
     says("GearPair.plane", "'sideways'", "choose 'skew'"): {"plane": "sideways"},
     says("GearPair.rotation", "2", "give 1"): {"rotation": 2},
+    says("GearPair.rotation", "1.0", "give 1"): {"rotation": 1.0},
+    says("GearPair.rotation", "True", "give 1"): {"rotation": True},
+    says("GearPair.friction", "True", "FlankFriction"): {"friction": True},
+    says("GearPair.friction", "0.05", "FlankFriction"): {"friction": 0.05},
+    says("GearPair.contact", "3e8", "ContactLaw"): {"contact": "3e8 N/m"},
     says("GearPair.slices", "0", "give"): {"slices": 0},
     says("GearPair.load", "'magic'", "choose 'slices'"): {"load": "magic"},
     "axial_shift": {"axial_shift": "25 mm"},
@@ -185,6 +190,11 @@ BAD_PAIRS = {
 def test_impossible_pairs_are_named(words):
     with pytest.raises(ValueError, match=words):
         GearPair.paper(**BAD_PAIRS[words])
+
+
+def test_senses_of_rotation_and_frictions_are_taken():
+    assert GearPair.paper(rotation=np.int64(-1)).operating_point.rotation == -1
+    assert GearPair.paper(friction=FlankFriction.none()).friction == FlankFriction.none()
 
 
 @settings(max_examples=60, derandomize=True, deadline=None)
