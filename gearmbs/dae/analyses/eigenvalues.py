@@ -14,7 +14,7 @@ it can be inverted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -353,6 +353,9 @@ def spectrum(reduced: Reduced) -> Spectrum:
         return Spectrum(*(np.zeros((0, 0)),) * 2, np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex))
     root = _mass_root(reduced, balanced)
     null, left, slowest = _null(balanced.static, balanced.tolerance)
+    # what is left of it there is rounding, whose root may be faster than motions that are damped only
+    rest = left @ (left.T @ balanced.static @ null) @ null.T
+    balanced = replace(balanced, static=balanced.static - rest)
     zeros = null.shape[1] + _drifting(balanced, null, left)
     values, vectors = _slow_first(balanced, root, zeros, slowest)
     values, vectors = _with_fast(balanced, root, values, vectors)
