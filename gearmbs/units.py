@@ -47,8 +47,9 @@ SPELLINGS = (
     (r"\b([kM]?)Nm\b", r"\1N*m"),
     (r"\bNmm\b", "N*mm"),
     (r"\b(?:RPM|[Uu]/min)\b", "rpm"),
+    (r"(?<![A-Za-z_])mils?\b", "thou"),
 )
-"""Usual ways of writing that the parser of units does not know."""
+"""Usual ways of writing that the parser of units does not know; a mil, 0.001 inch, it takes for an angle."""
 
 
 COMMON = {
@@ -297,8 +298,8 @@ def _parse(text: str, target: str, field: str) -> float:
         raise ValueError(
             f"{field}: {target!r} is no unit; give one such as 'm^3', or a dimension: {', '.join(DIMENSIONS)}"
         ) from None
-    if quantity.dimensionless and not wanted.dimensionless:
-        raise ValueError(f"{field}: {text!r} has no unit; write for example '{text.strip()} {example}'")
+    if quantity.unitless and not wanted.dimensionless:
+        raise ValueError(f"{field}: {text!r} has no unit; write for example '{quantity.magnitude:g} {example}'")
     if wanted.units == registry.radian and quantity.dimensionless and quantity.unitless:
         raise ValueError(f"{field}: {text!r} has no unit; write 'deg' or 'rad'")
     names = str(quantity.units)

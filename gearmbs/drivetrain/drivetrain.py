@@ -48,7 +48,6 @@ In TOML files or nested tables each kind of part is a table of named tables::
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -373,7 +372,6 @@ PAIR_KEYS = tuple(
     f.name for f in fields(GearPair) if f.init and f.name not in ("driver", "driven", "rotation", "torque")
 )
 HARMONICS = Measure(low=1, whole=True, remedy="give a whole number of mesh harmonics from 1 up")
-NUMERIC = re.compile(r"\b(int|float|Quantity)\b")
 GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name")
 
 
@@ -498,14 +496,6 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
     return _of_kind(where, chosen(kinds, str(given.pop("kind", usual)), f"{where}: ", DrivetrainError), name, given)
 
 
-def _refuse_truth(where: str, kind: type, given: Mapping[str, Any]) -> None:
-    """Refuse true and false, which Python takes for 1 and 0, where a number is meant."""
-    for known in fields(kind):
-        value = given.get(known.name)
-        if isinstance(value, bool) and NUMERIC.search(str(known.type)):
-            raise DrivetrainError(f"{where}: {known.name} is {value}; give a number, not true or false")
-
-
 def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
     with told_of(where):
         return make(kind, given, where, DrivetrainError, name=name)
@@ -516,7 +506,6 @@ def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
     material = {key: given.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in given}
     known = ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"]
     check_keys(given, known, where, DrivetrainError, shown=repr)
-    _refuse_truth(where, GearSpec, given)
     for key in ("teeth", "module"):
         require(key in given, f"{where}: {key} is missing")
     with told_of(where):
@@ -535,7 +524,6 @@ def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | Non
     own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
     known = ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"]
     check_keys(given, known, where, DrivetrainError, shown=repr)
-    _refuse_truth(where, GearPair, given)
     if "faults" in given:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None

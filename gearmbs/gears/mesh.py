@@ -6,7 +6,8 @@ import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field
-from typing import Literal, Protocol
+from numbers import Integral
+from typing import Any, Literal, Protocol
 
 from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
@@ -19,9 +20,10 @@ from gearmbs.units import Quantity, shown, to_si, truth
 LawKind = Literal["impact", "hunt-crossley", "linear", "hertz"]
 
 DAMPING_RATIO = 0.07
-"""Of a mesh where none is given: the geometric mean of 0.03 and 0.17, the range commonly quoted in the literature on
-gear dynamics for meshes of steel gears. It is a convention, no measurement of the gears at hand: their own ratio, if
-known, is the one to give, and amplitudes at a resonance are in inverse proportion to it."""
+"""Of a mesh where none is given: the geometric mean of 0.03 and 0.17, a range that is quoted for meshes of steel gears
+without the measurement behind it, which has not been found; 0.07 itself is what models of gears in the literature take.
+It is a convention, no measurement of the gears at hand: their own ratio, if known, is the one to give, and amplitudes
+at a resonance are in inverse proportion to it."""
 RATIO_DEPTH = 2e-6
 """Penetration, m, at which the damping by a ratio is fully on: what a tooth pair yields under 25 to 30 N/mm, less than
 gears carry; below it damping falls to nothing, so that flanks meet without a blow."""
@@ -255,6 +257,13 @@ class ContactModel(Written):
 
     # mypy may lose InitVar among modules that import each other for types
     def __post_init__(self, owner: str) -> None:  # type: ignore[override]
+        if not isinstance(self.law, ContactLaw):
+            raise ValueError(f"{owner}.contact is {self.law!r}; give a ContactLaw, such as ContactLaw.impact()")
+        if not isinstance(self.friction, FlankFriction):
+            raise ValueError(
+                f"{owner}.friction is {self.friction!r}; give a FlankFriction, such as FlankFriction(0.1, 0.05) or "
+                "FlankFriction.none()"
+            )
         if self.load not in ("slices", "adams"):
             raise ValueError(f"{owner}.load is {self.load!r}; choose 'slices' or 'adams'")
         if self.stiffness_curve not in ("constant", "potential-energy"):
@@ -314,6 +323,19 @@ class ContactModel(Written):
 # How a pair of wheels is driven and loaded.
 
 
+def sense_of_rotation(value: Any, field: str) -> int:
+    """Return 1 or -1, as an integer; fractions and truth values are none, also where they are equal to one.
+
+    Raises
+    ------
+    ValueError
+        For anything else; the message names the field.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or value not in (1, -1):
+        raise ValueError(f"{field} is {value!r}; give 1 or -1")
+    return int(value)
+
+
 @dataclass(frozen=True)
 class OperatingPoint(Written):
     """Load and sense of rotation of a pair.
@@ -352,8 +374,7 @@ class OperatingPoint(Written):
                 f"{owner}.torque is {self.torque:g} N m; give its size (0 up): it acts against the motion, whose sense "
                 "is that of rotation, 1 or -1"
             )
-        if self.rotation not in (1, -1) or isinstance(self.rotation, bool):
-            raise ValueError(f"{owner}.rotation is {self.rotation!r}; give 1 or -1")
+        object.__setattr__(self, "rotation", sense_of_rotation(self.rotation, f"{owner}.rotation"))
 
     def normal_force(self, geometry: PairGeometry) -> float:
         """Sum of normal forces that carries the load torque, N: F_n = T / (r_b2 cos beta_b)."""

@@ -19,7 +19,7 @@ import numpy as np
 from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.ideal_mesh import IdealMesh
-from gearmbs.gears.mesh import ContactLaw, FlankFriction
+from gearmbs.gears.mesh import ContactLaw, FlankFriction, sense_of_rotation
 from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, convert_fields
@@ -142,8 +142,7 @@ class PlanetarySet(Written):
                 f"PlanetarySet.ring has {self.ring.teeth} teeth and {inner.name} {inner.teeth}: they do not fit into "
                 "it; give the ring more teeth"
             )
-        if self.rotation not in (1, -1) or isinstance(self.rotation, bool):
-            raise ValueError(f"PlanetarySet.rotation is {self.rotation!r}; give 1 or -1")
+        sense_of_rotation(self.rotation, "PlanetarySet.rotation")
         if self.carrier_radius is None:
             object.__setattr__(self, "carrier_radius", PairGeometry(self.sun, self.planet).nominal_centre_distance)
         self._check_angles()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.gears import GearPair, GearSpec, PairGeometry, involute
+from gearmbs.gears import FlankFriction, GearPair, GearSpec, PairGeometry, involute
 from tests.says import says
 
 MM = 1e-3
@@ -165,19 +165,27 @@ def test_default_wheels_of_any_size_mesh(pressure, helix):
 
 
 BAD_PAIRS = {
-    "overlapping wheels": {"centre_distance_error": "-0.8 mm"},
-    "do not reach": {"centre_distance_error": "7 mm"},
+    says("88.0710", "increase centre_distance_error"): {"centre_distance_error": "-0.8 mm"},
+    says("95.8710", "reduce centre_distance_error"): {"centre_distance_error": "7 mm"},
     says("GearPair.backlash", "-0.1 mm", "give 0"): {"backlash": "-0.1 mm"},
     says("GearPair.misalignment", "57.296 deg", "'1 deg'"): {"misalignment": 1.0},
     says("GearPair.plane", "'sideways'", "choose 'skew'"): {"plane": "sideways"},
     says("GearPair.rotation", "2", "give 1"): {"rotation": 2},
+    says("GearPair.rotation", "1.0", "give 1"): {"rotation": 1.0},
+    says("GearPair.rotation", "True", "give 1"): {"rotation": True},
+    says("GearPair.friction", "True", "FlankFriction"): {"friction": True},
+    says("GearPair.friction", "0.05", "FlankFriction"): {"friction": 0.05},
+    says("GearPair.contact", "3e8", "ContactLaw"): {"contact": "3e8 N/m"},
     says("GearPair.slices", "0", "give"): {"slices": 0},
     says("GearPair.load", "'magic'", "choose 'slices'"): {"load": "magic"},
-    "axial_shift": {"axial_shift": "25 mm"},
+    says("GearPair.axial_shift", "25.0000", "less than 20"): {"axial_shift": "25 mm"},
     says("axial_shift", "-20.0000 mm"): {"axial_shift": "-20 mm"},
     says("GearPair.torque", "'100 N'", "'1 N*m'"): {"torque": "100 N"},
-    "module and pressure_angle": {"driven": GearSpec(29, "3 mm")},
-    "interference": {"driver": GearSpec(15, 95e-3 / 31), "driven": GearSpec(120, 95e-3 / 31)},
+    says("8.856394 mm", "module and pressure_angle"): {"driven": GearSpec(29, "3 mm")},
+    says("-0.6040", "interference", "addendum"): {
+        "driver": GearSpec(15, 95e-3 / 31),
+        "driven": GearSpec(120, 95e-3 / 31),
+    },
 }
 
 
@@ -185,6 +193,11 @@ BAD_PAIRS = {
 def test_impossible_pairs_are_named(words):
     with pytest.raises(ValueError, match=words):
         GearPair.paper(**BAD_PAIRS[words])
+
+
+def test_senses_of_rotation_and_frictions_are_taken():
+    assert GearPair.paper(rotation=np.int64(-1)).operating_point.rotation == -1
+    assert GearPair.paper(friction=FlankFriction.none()).friction == FlankFriction.none()
 
 
 @settings(max_examples=60, derandomize=True, deadline=None)

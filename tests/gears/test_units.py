@@ -256,6 +256,10 @@ def test_commas_in_numbers_are_refused(text):
         ("30 N m/deg", "N*m/rad", 1718.8733853924696),
         ("1 N m s^2/rad", "inertia", 1.0),
         ("60 N m rpm", "power", 6.283185307179586),
+        ("3 mils", "length", 7.62e-5),
+        ("0.5mil", "length", 1.27e-5),
+        ("2 mil/s", "speed", 5.08e-5),
+        ("2 milliradian", "angle", 2e-3),
     ],
 )
 def test_odd_texts_that_can_be_read(text, unit, value):
@@ -287,6 +291,9 @@ def test_odd_texts_that_can_be_read(text, unit, value):
         ("300 cm^3/rad", "m^3", "2 pi"),
         ("30 N m/rad", "torque", "an angle"),
         ("20 deg", "dimensionless", "an angle"),
+        ("2 deg", "length", "an angle"),
+        ("2 deg", "frequency", "in deg"),
+        ("3 mils", "angle", "in th"),
         ("20 degC", "length", "°C"),
         ("3 mm mm", "length", "mm ** 2"),
     ],
@@ -294,3 +301,9 @@ def test_odd_texts_that_can_be_read(text, unit, value):
 def test_odd_texts_that_would_be_read_wrongly(text, unit, fault):
     with pytest.raises(ValueError, match=says("gap", repr(text), fault, "'1 ")):
         to_si(text, unit, "gap")
+
+
+@pytest.mark.parametrize("text", ["2", "2 mm/mm", "2 %"])
+def test_a_number_without_a_unit_gets_one_in_the_hint(text):
+    with pytest.raises(ValueError, match=says("gap", repr(text), "no unit", "'2 mm'")):
+        to_si(text, "length", "gap")

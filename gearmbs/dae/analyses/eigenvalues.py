@@ -14,14 +14,14 @@ it can be inverted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cholesky, eig, qr, solve_triangular
 
 from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
-from gearmbs.dae.analyses.turning import OTHER_TURN, turning
+from gearmbs.dae.analyses.turning import turning
 from gearmbs.dae.problem import ModelError, SingularModelError
 
 if TYPE_CHECKING:
@@ -127,32 +127,30 @@ def reduce(instant: Instant) -> Reduced:
         raise ModelError("the applied loads and variables depend on each other in a singular way") from error
     # delta p' = d/dt of -(dG_eps/d theta) delta theta - ...: its velocity part is a damping
     moved = full[np.ix_(eps, instant.block("theta", "lambda"))]
-    constraint = full[np.ix_(rows, q)]
+    constraint, own_reaction = full[np.ix_(rows, q)], full[np.ix_(force, rows)]
     turn = turning(instant)
     if turn is None:
         damping[half:, half:] -= moved
         damping_terms[half:, half:] += np.abs(moved)
     else:
         # see `turning`: T delta phi for delta theta, and what the coefficients' own change adds
-        to, rate = turn.transform, turn.transform_rate
-        mass = to.T @ turn.momentum_rate
-        again = turning(instant, OTHER_TURN)
-        assert again is not None
-        rate_terms, of_damping, of_stiffness = turn.terms(again)
-        stiffness_terms = np.abs(to.T) @ (stiffness_terms @ np.abs(to) + damping_terms @ rate_terms + of_stiffness)
-        damping_terms = np.abs(to.T) @ (damping_terms @ np.abs(to) + np.abs(turn.momentum_place) + of_damping)
-        stiffness = to.T @ (turn.momentum_place_change + damping @ rate + stiffness @ to)
-        damping = to.T @ (turn.momentum_rate_change + turn.momentum_place + damping @ to)
+        to, rate, mass = turn.transform, turn.transform_rate, turn.mass
+        stiffness_terms = stiffness_terms @ np.abs(to) + damping_terms @ turn.rate_terms
+        stiffness_terms = np.abs(to.T) @ stiffness_terms + turn.stiffness_terms
+        damping_terms = np.abs(to.T) @ damping_terms @ np.abs(to) + turn.damping_terms
+        stiffness = to.T @ (damping @ rate + stiffness @ to) + turn.stiffness
+        damping = to.T @ damping @ to + turn.damping
         state_force = to.T @ state_force
         state_q, state_v = state_q @ to + state_v @ rate, state_v @ to
         constraint = constraint @ to
-        force_reaction = to.T @ force_reaction
+        force_reaction, own_reaction = to.T @ force_reaction, to.T @ own_reaction
     basis = _free(instant, constraint)
     absolute = np.abs(basis)
     projected = [basis.T @ force for force in (stiffness, damping, state_force)]
     # what constraints exert themselves does no work along the basis; loads that follow the reactions do
-    felt = basis.T @ force_reaction
-    felt[np.abs(felt) <= DEPENDENT * (absolute.T @ np.abs(force_reaction))] = 0.0
+    following = force_reaction - own_reaction
+    felt = basis.T @ following
+    felt[np.abs(felt) <= DEPENDENT * (absolute.T @ np.abs(following))] = 0.0
     if felt.any() or state_reaction.any():
         changes = _reactions(mass, constraint, force_reaction, (stiffness, damping, state_force))
         projected = [force + felt @ change for force, change in zip(projected, changes)]
@@ -355,6 +353,9 @@ def spectrum(reduced: Reduced) -> Spectrum:
         return Spectrum(*(np.zeros((0, 0)),) * 2, np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex))
     root = _mass_root(reduced, balanced)
     null, left, slowest = _null(balanced.static, balanced.tolerance)
+    # what is left of it there is rounding, whose root may be faster than motions that are damped only
+    rest = left @ (left.T @ balanced.static @ null) @ null.T
+    balanced = replace(balanced, static=balanced.static - rest)
     zeros = null.shape[1] + _drifting(balanced, null, left)
     values, vectors = _slow_first(balanced, root, zeros, slowest)
     values, vectors = _with_fast(balanced, root, values, vectors)
@@ -441,6 +442,8 @@ def _rigid(balanced: Balanced, motions: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _slow_first(balanced: Balanced, root: np.ndarray, zeros: int, slowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solve the inverted problem; return eigenvalues by magnitude, without the zeros, and their motions u."""
     n = balanced.mass.shape[0]
+    if zeros == n + balanced.static.shape[0]:
+        return np.zeros(0, dtype=complex), np.zeros((n, 0), dtype=complex)
     if not zeros:
         values, vectors = _inverted(balanced, root, 0.0)
         order = np.argsort(np.abs(values), kind="stable")

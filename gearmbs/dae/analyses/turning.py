@@ -14,8 +14,16 @@ Virtual work of small rotations puts T^T before the equations, which become
     T^T A1 delta phi'' + T^T (A1' + A0 + D T) delta phi' + T^T (A0' + D T' + S T) delta phi = 0,
 
 D and S the derivatives of the loads and constraint forces with respect to the velocities and the coordinates. The
-rates T', A1' and A0' are taken along a steady rotation, each body about its present angular velocity. Where all that
-turns is alike about its axis the coefficients are constant, and the eigenvalues are those of the whirl.
+rates T', A1' and A0' are taken along the present rotation of each body, its modal coordinates at rest in it. Where all
+that turns is alike about its axis the coefficients are constant, and the eigenvalues are those of the whirl.
+
+No difference quotients are needed. The axes turn each other, T' = -T B' T, and of the angular momentum L = J omega + C
+v_f, whose conjugate to the angles is B^T L, the change is delta L = J delta phi' - L~ delta phi + C delta v_f + G
+delta q_f, with a~ b = a x b. All of its coefficients turn with the body,
+
+    J' = omega~ J - J omega~,   C' = omega~ C,   L' = omega x L + J omega',   G' = omega~ G + G_omega',
+
+and what moves the axes in B^T L is W, (b_j x b_i) . L for j < i.
 
 Modal coordinates of a body that is alike about its axis are described likewise, delta q_f = exp(-Omega t G) delta r
 with the generator G of `gearmbs.dae.analyses.turning`, which is a further block of T.
@@ -23,15 +31,15 @@ with the generator G of `gearmbs.dae.analyses.turning`, which is a further block
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
-from scipy.linalg import expm
 
-from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
+from gearmbs.dae.analyses.kinematics import Instant
+from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_V
+from gearmbs.dae.equations.kinematics.rotation import KIN_ADOT, KIN_AXES, POSE_A, POSE_V, POSE_W
 
 # How the modes of a body that is alike about an axis turn with it, for the whirl of flexible bodies.
 #
@@ -140,7 +148,7 @@ def _changed(values: np.ndarray, k: int, m: int, modes: int) -> np.ndarray:
 
 
 def _commuted(axis: np.ndarray, values: np.ndarray) -> np.ndarray:
-    turn = np.cross(axis, np.eye(3)).T
+    turn = _skew(axis)
     return turn @ values - values @ turn
 
 
@@ -148,155 +156,100 @@ def _crossed(axis: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.cross(axis, values)
 
 
-EPS = float(np.finfo(float).eps)
-
-WEIGHTS = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
-"""Of five values, for their rate in the middle to fourth order."""
-REACH = 4
-
-TRUNCATION = 2.0 * math.factorial(5) / 30.0
-"""Error of a rate of rates, by the fourth power of the angle between the places: each rate has 1/30 of the fifth
-derivative, which of T, singular about one radian away, is about 5!."""
-ROUNDING_OF_RATES = float(np.abs(WEIGHTS).sum()) ** 2 * EPS
-"""The same from rounding, by the inverse square of that angle."""
-TURN = (0.5 * ROUNDING_OF_RATES / TRUNCATION) ** (1.0 / 6.0)
-"""Angle, rad, between the places at which rates are differenced: where the sum of both errors is least."""
-OTHER_TURN = 1.4 * TURN
-"""A second such angle: what rates differ by is their error, as rounding falls by half and truncation grows fourfold."""
-MISSED = 10.0
-"""Ratio of an error to this difference, at most: of entries that happen to differ by less than others."""
-
-
 @dataclass
 class Turning:
-    """The transformation and its rates at one instant.
+    """The transformation at one instant, and the inertial part of the equations in axes that do not turn.
 
     Attributes
     ----------
     transform, transform_rate : ndarray, shape (n, n)
         T and T', for all coordinates (R, theta, q_f).
-    momentum_rate, momentum_place : ndarray, shape (n, n)
-        A1 and A0.
-    momentum_rate_change, momentum_place_change : ndarray, shape (n, n)
-        A1' and A0'.
-    steps : ndarray, shape (n,)
-        Times between the places they are differenced over, of the body of each coordinate, s.
+    mass, damping, stiffness : ndarray, shape (n, n)
+        T^T A1, T^T (A1' + A0) and T^T A0'.
+    rate_terms, damping_terms, stiffness_terms : ndarray, shape (n, n)
+        Sums of the absolute values of the terms of T', ``damping`` and ``stiffness``.
     """
 
     transform: np.ndarray
     transform_rate: np.ndarray
-    momentum_rate: np.ndarray
-    momentum_place: np.ndarray
-    momentum_rate_change: np.ndarray
-    momentum_place_change: np.ndarray
-    steps: np.ndarray
-
-    def terms(self, other: Turning) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the sizes of the terms of the rates T', A1' and A0', from those with `OTHER_TURN`.
-
-        Of them errors are the part that is rounding in coefficients that are not differenced.
-        """
-        of_both = [
-            (turn.transform_rate, turn.momentum_rate_change, turn.momentum_place_change) for turn in (self, other)
-        ]
-        t, a1, a0 = (np.abs(one) + MISSED / ROUNDING * np.abs(one - two) for one, two in zip(*of_both, strict=True))
-        # both may be off alike by what the last digits are worth
-        digits = np.abs(WEIGHTS).sum() * EPS / ROUNDING / self.steps[:, None]
-        return t + digits * np.abs(self.transform), a1 + digits * np.abs(self.momentum_rate), a0
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    rate_terms: np.ndarray
+    damping_terms: np.ndarray
+    stiffness_terms: np.ndarray
 
 
-def turning(instant: Instant, angle: float = TURN) -> Turning | None:
-    """Return the transformation at an instant, its rates from places ``angle`` apart; None where no body turns."""
-    y = instant.y.copy()
+def turning(instant: Instant) -> Turning | None:
+    """Return the transformation at an instant; None where no body turns."""
     velocities = angular_velocities(instant)
-    fastest = float(np.abs(velocities).max(initial=0.0))
-    if not fastest > 0.0:
+    if not velocities.any():
         return None
-    accelerations = _angular_accelerations(instant, velocities)
-    own = np.maximum(np.abs(velocities).max(axis=1), np.sqrt(np.abs(accelerations).max(axis=1)))
-    own = np.where(own > 0.0, own, fastest)
-    step = angle / own
-    # a row for each coordinate, as that of its body
-    modes = instant.system.model.modes[1:]
-    turn = instant.system.model.counts.turning
-    rows = np.concatenate([np.repeat(step, 3), np.repeat(step[turn], 3), np.repeat(step, modes)])
-    spins = spinning_modes(instant, velocities)
-    places = [_moved(instant, y, velocities, accelerations, k * step) for k in range(-REACH, REACH + 1)]
-    transforms = np.array(
-        [_transform(instant, place, spins, k * step) for k, place in zip(range(-REACH, REACH + 1), places, strict=True)]
+    y, eps = instant.y.copy(), instant.block("eps", "v_f")
+    mass, place = _momenta(instant, y)
+    kin = tables.kinematics_in(instant.idata, instant.work)[1:].copy()
+    angles, modes = (instant.at[name] - instant.at["R"] for name in ("theta", "q_f"))
+    momenta = (mass[:, angles:] @ y[instant.block("eps", "R")])[angles:modes].reshape(-1, 3)
+    euler = instant.problem.yp0[eps].reshape(-1, 3)
+    to, turned, spin, couple, couple_rate, own, own_rate = (np.zeros_like(mass) for _ in range(7))
+    to[:] = np.eye(len(mass))
+    change = y.copy()
+    change[instant.block("u", "R")] = 0.0
+    for k, body in enumerate(instant.system.model.counts.turning):
+        three = slice(angles + 3 * k, angles + 3 * k + 3)
+        axes, rates = (kin[body, at : at + 9].reshape(3, 3) for at in (KIN_AXES, KIN_ADOT))
+        inverse = np.linalg.inv(axes.T)
+        momentum, acceleration = inverse.T @ momenta[k], axes.T @ euler[k] + rates.T @ y[eps].reshape(-1, 3)[k]
+        change[eps[3 * k : 3 * k + 3]] = inverse @ acceleration
+        driven = inverse.T @ mass[three, three] @ inverse @ acceleration
+        momentum_rate = np.cross(velocities[body], momentum) + driven
+        to[three, three], turned[three, three] = inverse, (rates.T @ inverse).T
+        spin[three, three] = _skew(velocities[body])
+        couple[three, three], couple_rate[three, three] = -_skew(momentum), -_skew(driven)
+        # each axis is turned by the angles before it
+        across = np.cross(axes[:, None], axes)
+        across_rate = np.cross(rates[:, None], axes) + np.cross(axes[:, None], rates)
+        own[three, three] = np.tril((across @ momentum).T, -1)
+        own_rate[three, three] = np.tril((across_rate @ momentum + across @ momentum_rate).T, -1)
+    mass = to.T @ mass @ to
+    couple[:, modes:] = (to.T @ place)[:, modes:]
+    couple_rate[:, modes:] = (to.T @ _momenta(instant, change)[1])[:, modes:]
+    modal, modal_change = _modal_rates(instant, velocities, len(mass))
+    rate, rate_terms = _added((-to, turned.T), (to, modal))
+    damping, damping_terms = _added(
+        (turned, mass), (spin, mass), (mass, spin.T), (2.0 * mass, modal), (couple,), (to.T, own, to)
     )
-    middle = range(REACH - 2, REACH + 3)
-    rates = np.array([_rate(transforms[k - 2 : k + 3], rows) for k in middle])
-    momenta = [_momenta(instant, places[k]) for k in middle]
-    first = np.array([mass @ transforms[k] for k, (mass, _) in zip(middle, momenta, strict=True)])
-    zeroth = np.array(
-        [mass @ rate + moved @ transforms[k] for k, rate, (mass, moved) in zip(middle, rates, momenta, strict=True)]
+    stiffness, stiffness_terms = _added(
+        (turned, mass, modal),
+        (turned, couple),
+        (spin, mass, modal),
+        (mass, spin.T, modal),
+        (mass, modal_change),
+        (spin, couple),
+        (couple, spin.T),
+        (couple_rate,),
+        (couple, modal),
+        (to.T, own_rate, to),
+        (-to.T, own, to, turned.T),
     )
-    instant.y = y
-    return Turning(transforms[REACH], rates[2], first[2], zeroth[2], _rate(first, rows), _rate(zeroth, rows), rows)
+    return Turning(to, rate, mass, damping, stiffness, rate_terms, damping_terms, stiffness_terms)
 
 
-def _rate(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return the rate in the middle of five values, in each row a step of its own apart."""
-    return np.tensordot(WEIGHTS, values, 1) / steps[:, None]
+def _added(*products: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return a sum of products of matrices, and that of the absolute values of its terms."""
+    values = [reduce(np.matmul, one) for one in products]
+    sizes = [reduce(np.matmul, map(np.abs, one)) for one in products]
+    return np.sum(values, axis=0), np.sum(sizes, axis=0)
 
 
-def _axes(instant: Instant, y: np.ndarray) -> np.ndarray:
-    """Return B of each body with angles, shape (turning, 3, 3): its columns are the axes of the angles."""
-    instant.y = y
-    return np.swapaxes(instant.axes()[instant.system.model.counts.turning], 1, 2)
+def _skew(vector: np.ndarray) -> np.ndarray:
+    """Return the matrix a~ with a~ b = a x b."""
+    return np.cross(vector, np.eye(3)).T
 
 
 def angular_velocities(instant: Instant) -> np.ndarray:
     """Return the global angular velocities, rad/s, shape (bodies, 3)."""
-    counts, y = instant.system.model.counts, instant.y
-    zeta = y[instant.block("eps", "v_f")].reshape(-1, 3)
-    velocities = np.zeros((counts.bodies, 3))
-    velocities[counts.turning] = np.einsum("bck,bk->bc", _axes(instant, y), zeta)
-    return velocities
-
-
-def _angular_accelerations(instant: Instant, velocities: np.ndarray) -> np.ndarray:
-    """Return the global angular accelerations, rad/s^2, shape (bodies, 3): B zeta' and what B changes along omega."""
-    y, eps, turn = instant.y.copy(), instant.block("eps", "v_f"), instant.system.model.counts.turning
-    axes = _axes(instant, y)
-    rates = instant.problem.yp0[eps].reshape(-1, 3)
-    size = np.abs(velocities).max(axis=1)
-    steps = TURN / np.where(size > 0.0, size, size.max())
-    still = np.zeros_like(velocities)
-    places = [_moved(instant, y, velocities, still, k * steps) for k in range(-2, 3)]
-    changed = _rate(np.array([place[eps].reshape(-1, 3) for place in places]), steps[turn])
-    instant.y = y
-    accelerations = np.zeros_like(velocities)
-    accelerations[turn] = np.einsum("bck,bk->bc", axes, rates - changed)
-    return accelerations
-
-
-def _moved(
-    instant: Instant, y: np.ndarray, velocities: np.ndarray, accelerations: np.ndarray, times: np.ndarray
-) -> np.ndarray:
-    """Return y after every body has turned for a time of its own with its angular velocity, by a Runge-Kutta step."""
-    turn = instant.system.model.counts.turning
-    velocities, accelerations, times = velocities[turn], accelerations[turn], times[turn]
-    time = np.repeat(times, 3)
-    angles = slice(instant.at["theta"], instant.at["q_f"])
-    rates = slice(instant.at["eps"], instant.at["v_f"])
-    start = y[angles].copy()
-
-    def rate(theta: np.ndarray, part: float) -> np.ndarray:
-        place = y.copy()
-        place[angles] = theta
-        omega = velocities + part * times[:, None] * accelerations
-        return np.linalg.solve(_axes(instant, place), omega[:, :, None])[:, :, 0].ravel()
-
-    k1 = rate(start, 0.0)
-    k2 = rate(start + 0.5 * time * k1, 0.5)
-    k3 = rate(start + 0.5 * time * k2, 0.5)
-    k4 = rate(start + time * k3, 1.0)
-    out = y.copy()
-    out[angles] = start + time / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    out[rates] = rate(out[angles], 1.0)
-    return out
+    return instant.pose()[:, POSE_W:]
 
 
 def spinning_modes(instant: Instant, velocities: np.ndarray) -> list[tuple[int, float, Generator | None]]:
@@ -311,23 +264,16 @@ def spinning_modes(instant: Instant, velocities: np.ndarray) -> list[tuple[int, 
     return out
 
 
-def _transform(
-    instant: Instant, y: np.ndarray, spins: list[tuple[int, float, Generator | None]], times: np.ndarray
-) -> np.ndarray:
-    """Return T for all coordinates after a time of each body."""
-    first = instant.at["R"]
-    n = instant.at["lambda"] - first
-    out = np.eye(n)
-    inverses = np.linalg.inv(_axes(instant, y))
-    for k, inverse in enumerate(inverses):
-        at = instant.at["theta"] - first + 3 * k
-        out[at : at + 3, at : at + 3] = inverse
-    starts = np.concatenate([[0], np.cumsum(instant.system.model.modes[1:])]) + instant.at["q_f"] - first
-    for k, speed, found in spins:
+def _modal_rates(instant: Instant, velocities: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return F' and F'', shape (n, n), of modal coordinates F r, F = exp(-Omega t G)."""
+    first, second = np.zeros((n, n)), np.zeros((n, n))
+    ends = n - sum(instant.system.model.modes[1:]) + np.cumsum([0, *instant.system.model.modes[1:]])
+    for k, speed, found in spinning_modes(instant, velocities):
         if found is not None:
-            own = slice(int(starts[k]), int(starts[k + 1]))
-            out[own, own] = expm(-speed * times[k] * found.matrix)
-    return out
+            own = slice(int(ends[k]), int(ends[k + 1]))
+            first[own, own] = -speed * found.matrix
+            second[own, own] = first[own, own] @ first[own, own]
+    return first, second
 
 
 def _momenta(instant: Instant, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

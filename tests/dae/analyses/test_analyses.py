@@ -476,7 +476,7 @@ def train(rng: np.random.Generator, slow: bool, spin: float) -> tuple[Mechanism,
     return m, inertia, stiffness, damping
 
 
-@pytest.mark.parametrize("number", range(60))
+@pytest.mark.parametrize("number", [*range(60), 168, 176, 342])
 def test_motions_that_nothing_but_dampers_resist_are_rigid_and_slow_decays_are_not(number):
     """At any speed, also while dampers brake the wheels: as many as K has null directions, and no others."""
     rng = np.random.default_rng([41, number])
@@ -559,3 +559,54 @@ def test_chains_in_space_have_the_modes_of_their_springs_and_no_others(first):
         assert values.size == wanted.size, seed
         for value in wanted:
             assert np.abs(values - value).min() <= 1e-6 * abs(value), seed
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_springs_far_slower_than_the_spin_are_found_about_any_axis(seed):
+    """s^2 + 2 D w s + w^2 = 0 about an axis in space, w = 1e-5 and 1e-4 of the spin."""
+    rng = np.random.default_rng(seed)
+    m, spin, wanted = Mechanism("soft"), 300.0, []
+    for k, share in enumerate((1e-5, 1e-4)):
+        axis, inertia, ratio = rng.normal(size=3), 10.0 ** rng.uniform(-2, 2), rng.uniform(0.1, 0.9)
+        axis /= np.linalg.norm(axis)
+        wheel = m.body(f"wheel{k}", 1.0, (inertia,) * 3, angular_velocity=tuple(spin * axis))
+        pin = m.revolute(f"pin{k}", wheel, m.ground, at=(0, 0, 0), axis=tuple(axis))
+        rate = share * spin
+        m.torsion_spring(f"spring{k}", pin.i, pin.j, stiffness=inertia * rate**2, damping=2.0 * ratio * inertia * rate)
+        wanted.append(rate * complex(-ratio, np.sqrt(1.0 - ratio**2)))
+    found = linear_modes(m)
+    assert found.kinds == ["oscillating"] * 2
+    np.testing.assert_allclose(found.eigenvalues, wanted, rtol=1e-3)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 11, 37, 48, 49, 65, 72, 98, 105, 111, 113, 125, 143])
+def test_what_is_at_rest_neither_swings_nor_decays_beside_what_spins(seed):
+    """Free, on a ball and on a pin, in any direction; what spins freely nutates with J_p / J_t = 1.5 of its speed."""
+    rng = np.random.default_rng([7, seed])
+    m, rigid, nutations, decays = Mechanism("apart", gravity=(0, 0, 0)), 0, [], []
+    for k in range(int(rng.integers(2, 5))):
+        frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        frame *= np.linalg.det(frame)
+        kind = rng.choice(["free", "ball", "pin", "damped"])
+        spin = 10.0 ** rng.uniform(-1, 4) if kind != "damped" and (k == 0 or rng.random() < 0.4) else 0.0
+        place, inertia = rng.normal(size=3), 10.0 ** rng.uniform(-4, 2)
+        turned = {"orientation": frame, "angular_velocity": tuple(spin * frame[:, 2])}
+        body = m.body(f"b{k}", 1.0, (inertia, inertia, 1.5 * inertia), position=place, **turned)
+        if kind == "ball":
+            m.spherical(f"j{k}", body, m.ground, at=tuple(place))
+        if kind in ("pin", "damped"):
+            pin = m.revolute(f"j{k}", body, m.ground, at=tuple(place), axis=tuple(frame[:, 2]))
+        if kind == "damped":
+            decay = 10.0 ** rng.uniform(-5, 1)
+            m.torsion_spring(f"d{k}", pin.i, pin.j, stiffness=0.0, damping=1.5 * inertia * decay)
+            decays.append(-decay)
+        if kind in ("free", "ball") and spin:
+            nutations.append(1.5 * spin)
+        rigid += {"free": 6, "ball": 3, "pin": 1, "damped": 1}[kind]
+    found = linear_modes(m)
+    kinds = np.array(found.kinds)
+    assert sorted(kinds) == sorted(
+        ["rigid"] * rigid + ["oscillating"] * len(nutations) + ["damped rigid"] * len(decays)
+    )
+    np.testing.assert_allclose(found.eigenvalues[found.oscillating].imag, np.sort(nutations), rtol=1e-6)
+    np.testing.assert_allclose(found.eigenvalues[kinds == "damped rigid"].real, np.sort(decays)[::-1], rtol=1e-4)
