@@ -7,12 +7,14 @@ pole the rates point at it, so that no solution leaves it, and a step that comes
 from __future__ import annotations
 
 import numpy as np
+from numba import boolean, int64
 
-from gearmbs.dae.integrators.corrector import HELD, ROUNDED_TERMS
+from gearmbs.dae.integrators.corrector import HELD, ROUNDED_TERMS, equations_hold
 from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
-from gearmbs.dae.integrators.run_state import copy, rows_from
+from gearmbs.dae.integrators.run_state import STATE_TYPE, copy, rows_from
 from gearmbs.dae.linalg.sparse_lu import solve
 from gearmbs.dae.problem import EPS
+from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
 from gearmbs.kernels.jit import njit
 
 UNFORESEEN = 100.0
@@ -23,7 +25,12 @@ SAME_BRANCH = 0.2
 """Least secant, in tangents, of a step that is not cut for it: that of a fifth power, or of exp over five units."""
 SAME_EQUATION = 1e-3
 """The same of steps that have been cut: a jump of the equation has 1/p, a fold the length of the step."""
-CUTS_TO_TELL = 4
+CUT_TO_TELL = 0.01
+"""Part of the step tried first from which on it counts as cut: four failures of the corrector take it to 1/256. They
+are not counted, for a step that drops pivots is tried at its first length again."""
+LOST = 1e4
+"""Violation of an equation, in the units of `equations_hold`, from which on a run is lost: its unknowns are off by some
+LOST HELD = 500 tolerances, where convergence leaves half a tolerance."""
 LARGER_GAMMA = 10.0
 """Ratio of the gamma at which the pencil is looked at to the largest leading coefficient of the run. Its first steps
 resolve the fastest modes, whose entries, wrong in differences by 1e-8, would drown the derivatives at a smaller one."""
@@ -41,6 +48,8 @@ RATES_HELD = 0.1
 """Part of a rate by which the rates next to a pole may be off."""
 FEWEST = 6
 """Divisions that tell, where rounding of the unknowns allows no more: the rates have grown by 64, or by 8."""
+PROLONGED = 10
+"""Times by which a way is doubled to find the pole it was going to."""
 GROWTH = 1.1
 """Least growth of a rate from one division to the next. Near a pole of order p it is 2^p, at a jump 1."""
 
@@ -88,7 +97,8 @@ def stays_on_branch(functions, st, plan, factors):
             d = (old[i] - y[i]) * size
             along += secant[i] * size * d
             square += d * d
-    least = SAME_BRANCH if st.newton_fails < CUTS_TO_TELL and st.n_past > 1 else SAME_EQUATION
+    cut = st.h < CUT_TO_TELL * st.h_first or st.n_past <= 1
+    least = SAME_EQUATION if cut else SAME_BRANCH
     if not along < least * square:
         return True
     st.jumped = seen
@@ -149,6 +159,22 @@ def _pencil_sign(functions, st):
                 for j in range(k + 1, n):
                     a[i, j] -= factor * a[k, j]
     return sign
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def is_lost(functions, st):
+    """Return whether an equation does not hold by far, judged by the derivatives at the iterate itself.
+
+    A matrix that has grown old says of any residual that it is small where its entries are too large: those of a place
+    next to a pole, or a difference quotient across one. So one that has to be made anew for its age, not for slow
+    convergence, is judged first; ``st.worst_row`` and ``st.violation`` are left as by `equations_hold`.
+    """
+    functions.jacobian(st.t_seen, st.y, st.yp, st.gamma, st.matrix, st.idata, st.rdata, st.work)
+    st.jacobians += 1
+    held = equations_hold(functions, st)
+    copy(st.jac, st.matrix)
+    carry_over(st)
+    return not held and not st.violation <= LOST
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -227,7 +253,7 @@ def passes_pole(functions, st):
         suspected |= _unforeseen(st, i, old)
     for m in range(st.n_carried):
         suspected |= _outruns_step(st, m)
-    return suspected and (_pole_between(functions, st, old) or (st.pole >= 0 and not _rates_hold(functions, st)))
+    return suspected and (_pole_between(functions, st, old) or not _rates_hold(functions, st))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -344,3 +370,24 @@ def _pole_between(functions, st, old):
 def _place(st, old, i, part):
     """Return the value of unknown i at a part of its way."""
     return old[i] + part * (st.y[i] - old[i])
+
+
+@njit(boolean(FUNCTIONS_TYPE, STATE_TYPE, int64), cache=True, nogil=True, error_model="numpy")
+def has_pole_ahead(bound, st, i):
+    """Return whether unknown i was on its way to a pole of the rates when the open step was given up; note where.
+
+    Next to it each step goes part of the way that is left, so that the way of the last one is prolonged until it has
+    got over.
+    """
+    functions, kept, known = unbound(bound), st.y.copy(), st.pole
+    old, way = rows_from(st, 1)[0], rows_from(st, 1)[0][i] - rows_from(st, 2)[0][i]
+    st.pole = i
+    for _ in range(PROLONGED):
+        way *= 2.0
+        copy(old, st.y)
+        st.y[i] = old[i] + way
+        if way != 0.0 and _pole_between(functions, st, old):
+            return True
+    copy(kept, st.y)
+    st.pole = known
+    return False

@@ -17,6 +17,7 @@ import numpy as np
 from gearmbs.dae.integrators import messages
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
+from gearmbs.dae.integrators.branches import has_pole_ahead
 from gearmbs.dae.integrators.corrector import rounding_level
 from gearmbs.dae.integrators.initial_state import begin, choose_steps, initial_state
 from gearmbs.dae.integrators.messages import WINDOW, Chatter
@@ -319,10 +320,11 @@ class Run:
             return status, messages.not_finite(problem, t, worst)
         if status is Status.STEP_TOO_SMALL:
             worst = st.worst_error
-            ends = self._end() if st.pole_met else ""
+            ends = self._end() if self._meets_pole() else ""
             told = messages.step_too_small(problem, t, h, worst, st.error, self._noise(), ends)
             return status, told
-        if status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS) and st.newton_fails > 0:
+        gave_up = status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS) and st.newton_fails > 0
+        if gave_up and not self._meets_pole():
             if st.index_changes:
                 return Status.SINGULAR_JACOBIAN, messages.index_changes(t, t)
             undetermined = self._undetermined()
@@ -344,11 +346,21 @@ class Run:
     def _end(self) -> str:
         """Say how the solution ends where the last attempts found none on its branch."""
         st = self.state
-        if st.pole_met:
+        if self._meets_pole():
             return messages.passes_pole(self.problem, st.pole, st.pole_at)
         if st.jumped >= 0:
             return messages.branch_ends(self.problem, st.jumped, st.jump_from, st.jump_to)
         return messages.solution_ends(self.problem, st.worst_row, st.violation)
+
+    def _meets_pole(self) -> bool:
+        """Whether the last attempts met a pole of the rates, or were on their way to one."""
+        st = self.state
+        if st.pole_met or st.nonlinear_rates or st.n_past < 2 or self.user_exception() is not None:
+            return st.pole_met
+        for unknown in dict.fromkeys((st.pole, st.worst, st.worst_error)):
+            if unknown >= 0 and st.differential[unknown] and has_pole_ahead(self.functions, st, unknown):
+                break
+        return st.pole_met
 
     def _undetermined(self) -> tuple[Status, str] | None:
         """Return the failure if the matrix of the last attempt, beyond the time reached, is singular."""

@@ -14,7 +14,7 @@ from numba import int64
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.algebraic import PART_TYPE
-from gearmbs.dae.integrators.branches import keeps_its_index, kept_its_index, passes_pole, stays_on_branch
+from gearmbs.dae.integrators.branches import is_lost, keeps_its_index, kept_its_index, passes_pole, stays_on_branch
 from gearmbs.dae.integrators.controller import after_error_failure, after_start, after_success
 from gearmbs.dae.integrators.corrector import (
     CONVERGED,
@@ -31,7 +31,7 @@ from gearmbs.dae.integrators.corrector import (
     weighted_argmax,
 )
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
-from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, renew_matrix
+from gearmbs.dae.integrators.newton_matrix import MATRIX_MAX_AGE, SLOPE_MAX_AGE, form_matrix, renew_matrix
 from gearmbs.dae.integrators.options import BESIDE, ROUNDED_STEP
 from gearmbs.dae.integrators.restart import shorten_first_step, start_afresh, take_block
 from gearmbs.dae.integrators.run_state import (
@@ -534,6 +534,8 @@ def advance(bound, st, part, plan, factors, max_accepted):
             code = refuse_by_newton(st, SLOW)
             if code != s.RUNNING:
                 return code
+        elif st.matrix_age >= MATRIX_MAX_AGE - 1 and is_lost(functions, st):
+            return s.FAIL_NEWTON
         else:
             accept(st)
             accepted += 1

@@ -175,6 +175,31 @@ def test_no_run_succeeds_beyond_the_end_and_its_twin_does(method, families):
         assert off.max() < most_off * tol, f"{ending.name}, {method}, tol = {tol:.2g}: off by {off / tol} tolerances"
 
 
+@pytest.mark.parametrize(
+    ("families", "number", "name", "method", "tol"),
+    [
+        # tried at its first length again without small pivots, a step passed for one that had been cut
+        (endings, 2, "fold beside another branch", "GSTIFF", 1.94e-6),
+        # no pole had been met when a stale matrix took the unknown off, at a rate that no equation gives
+        (poles, 8, "pole at zero", "WSTIFF", 1e-5),
+        # nothing was unforeseen, and the matrix was a difference quotient across the pole
+        (poles, 23, "pole beside a logarithm", "WSTIFF", 1.19e-7),
+    ],
+)
+def test_no_step_is_taken_from_an_end_to_somewhere_else(families, number, name, method, tol):
+    (ending,) = (one for one in families(np.random.default_rng(number)) if one.name == name)
+    beyond = solve(ending, tol, 1.7 * ending.end, method)
+    assert not beyond.success
+    assert abs(beyond.t[-1] / ending.end - 1.0) < 1e-2
+    assert solve(ending, tol, 0.98 * ending.end, method).success
+
+
+@pytest.mark.parametrize("family", range(7))
+def test_the_message_names_the_pole_ahead(family):
+    ending = poles(np.random.default_rng(seed()))[family]
+    assert "has a pole near" in solve(ending, 1e-6, 1.7 * ending.end, "WSTIFF").message
+
+
 def test_the_message_names_the_pole():
     ending = poles(np.random.default_rng(seed()))[0]
     unit = ending.exact(0.0)[0]
