@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from gearmbs.mechanism import Mechanism, harmonic, polynomial, ramp
+from gearmbs.mechanism import Mechanism, expression, harmonic, kinematic, polyline_integral, polynomial, ramp
 from tests.says import says
 
 INTEGRATORS = ("IDA", "WSTIFF")
@@ -322,3 +322,53 @@ def test_a_motion_whose_acceleration_jumps_between_breakpoints(integrator):
     solution = m.simulate(1.0, integrator=integrator, tol=1e-7, breakpoints=[0.4, 0.402])
     assert solution.success, solution.message
     assert solution.angular_velocity("crank")[-1, 2] == pytest.approx(40.0, abs=2e-5)
+
+
+def driven(way, velocity: float, push="0") -> Mechanism:
+    m = Mechanism("slide")
+    sled = m.body("sled", 2.0, (1, 1, 1), velocity=(velocity, 0, 0))
+    guide = m.translational("guide", sled, m.ground, at=(0, 0, 0), axis=(1, 0, 0))
+    m.axis_force("push", guide.i, guide.j, push)
+    m.translation("drive", guide, way)
+    return m
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
+def test_reactions_at_both_ends_of_a_run_are_those_of_the_inside(integrator, formulation):
+    """Also where a table, or an expression, begins or ends there, and where it goes on."""
+    options = {"integrator": integrator, "formulation": formulation}
+    ending = polyline_integral([0, 1], [1, 3], rounding=0)
+    for way, acceleration in (
+        (ending, 2.0),
+        (polyline_integral([-1, 2], [-1, 5], rounding=0), 2.0),
+        (expression("TIME + 1.5*MAX(0, TIME)**2 - 1.5*MAX(0, TIME - 1)**2"), 3.0),
+    ):
+        solution = driven(way, 1.0).simulate(1.0, rate=10.0, **options)
+        np.testing.assert_allclose(solution.com_acceleration("sled")[:, 0], acceleration, rtol=1e-9)
+        for part in (solution, next(driven(way, 1.0).simulate(1.0, rate=10.0, **options).parts())):
+            np.testing.assert_allclose(part.reaction("drive")[0][:, 0], 2.0 * acceleration, rtol=1e-9)
+    # within a run either side may be meant
+    longer = driven(ending, 1.0).simulate(2.0, rate=2.0, **options).com_acceleration("sled")[:, 0]
+    np.testing.assert_allclose(longer[[0, 1, 3, 4]], [2.0, 2.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_loads_and_kinematics_at_both_ends_are_those_of_the_inside():
+    """A push that is there in between, and motions without an integrator; parts that are handed on know the ends."""
+    way = polyline_integral([0, 1], [1, 3], rounding=0)
+    pushed = driven(way, 1.0, "IF(TIME: 0, 0, IF(TIME - 1: 7, 0, 0))")
+    solution = pushed.simulate(1.0, rate=4.0)
+    np.testing.assert_allclose(solution.load("push")[0][:, 0], 7.0)
+    np.testing.assert_allclose(solution.reaction("drive")[0][:, 0], 4.0 - 7.0, rtol=1e-9)
+    handed: list[np.ndarray] = []
+    pushed.simulate(1.0, every_step=True, consumer=lambda part: handed.append(part.load("push")[0][:, 0].copy()))
+    np.testing.assert_allclose(np.concatenate(handed), 7.0)
+    moved = kinematic(driven(way, 1.0), np.linspace(0.0, 1.0, 5))
+    np.testing.assert_allclose(moved.reaction("drive")[0][:, 0], 4.0, rtol=1e-9)
+    # where nothing jumps the ends are evaluated as they are, to the last digit
+    smooth = driven(harmonic(0.3, 5.0), 1.5).simulate(1.0, rate=4.0)
+    here = smooth.com_acceleration("sled").copy()
+    smooth.inside = {}
+    np.testing.assert_array_equal(
+        next(smooth.over(smooth.t, smooth.result.y, smooth.result.epochs).parts())._acc[:, 0, :3], here
+    )

@@ -42,6 +42,7 @@ from gearmbs.dae.integrators.algebraic_structure import (
     structure,
 )
 from gearmbs.dae.integrators.messages import list_names
+from gearmbs.dae.integrators.options import BESIDE
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import combine, lagrange_weights
 from gearmbs.kernels.jit import njit
@@ -104,6 +105,10 @@ class AlgebraicPart(Struct):
     f, guess, last, known, here : ndarray, shape (m,)
         What the equations are off by, or corrections; values to return to: of a guess, of slopes, along a branch; what
         they are off by at a breakpoint.
+    told : ndarray, shape (m,)
+        What an integrator says of them between its steps.
+    moved, moved_at, moved_step : ndarray, shape (m,)
+        By how many tolerances outputs are off that, at most; when; and the size of the step around.
     """
 
     count: int
@@ -136,6 +141,10 @@ class AlgebraicPart(Struct):
     last: Vector
     known: Vector
     here: Vector
+    told: Vector
+    moved: Vector
+    moved_at: Vector
+    moved_step: Vector
     res: Vector
     y_moved: Vector
     yp_kept: Vector
@@ -445,6 +454,7 @@ def settle_between(functions, part, t, t_old, y_old, h, nodes, rows, first, coun
     value, slope = part.value, part.slope
     lagrange_weights(t, nodes, count, value, slope)
     combine(value, slope, count, rows, first, y, yp)
+    _take(part, y, yp, part.told)
     if part.count == 0 or settle(functions, part, t, y, yp, h, idata, rdata, work):
         return
     at = t_old
@@ -475,6 +485,23 @@ def settle_between(functions, part, t, t_old, y_old, h, nodes, rows, first, coun
     lagrange_weights(t, nodes, count, value, slope)
     combine(value, slope, count, rows, first, y, yp)
     note_failure(part, t)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def note_moves(part, t, y, h):
+    """Keep by how far the output ``y`` is off what the step of size ``h`` around it says, where that is the most yet.
+
+    A step begins at the breakpoint before it, at the earliest; at one the equations are of either side.
+    """
+    h = min(h, t - part.t_first)
+    if h <= 0.0 or part.t_last - BESIDE * abs(t) <= t < part.t_end:
+        return
+    for k in range(part.count):
+        if part.rates[k] == 0:
+            now, told = y[part.cols[k]], part.told[k]
+            off = abs(now - told) / (part.atol[part.cols[k]] + part.rtol * max(abs(now), abs(told)))
+            if off > part.moved[k]:
+                part.moved[k], part.moved_at[k], part.moved_step[k] = off, t, h
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -509,6 +536,7 @@ def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, id
             functions, part, times[i], nodes[e - 1], rows[e - 1], h, nodes[e - k : e + 1], rows, e - k, k + 1,
             y[i], yp[i], idata, rdata, work,
         )  # fmt: skip
+        note_moves(part, times[i], y[i], h)
 
 
 @njit(
@@ -523,7 +551,9 @@ def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work
     Where the iteration does not converge, the branch is followed on the chord from the output before, ``y_old`` at
     ``t_old``. The other parameters are those of `settle`.
     """
+    _take(part, y, yp, part.told)
     if settle(functions, part, t, y, yp, h, idata, rdata, work):
+        note_moves(part, t, y, h)
         return
     n = y.shape[0]
     if t > t_old:
@@ -539,6 +569,7 @@ def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work
                 if part.rates[k] == 0:
                     y[part.cols[k]] = z[part.cols[k]]
             if settle(functions, part, t, y, yp, h, idata, rdata, work):
+                note_moves(part, t, y, h)
                 return
         part.failures = failures
     note_failure(part, t)
@@ -555,6 +586,7 @@ def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
         **{name: np.zeros(m, dtype=np.int64) for name in ("rows", "lifted", "cols", "rates", "pivots")},
         **{name: np.zeros(entries, dtype=np.int64) for name in ("entry_row", "entry_col", "entry_at", "entry_kind")},
         **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known", "here")},
+        **{name: np.zeros(m) for name in ("told", "moved", "moved_at", "moved_step")},
         **{name: np.zeros(n) for name in ("atol", "res", "y_moved", "yp_kept")},
         **{name: np.zeros(nnz) for name in ("vals", "vals_of_rates")},
         **{name: np.zeros(MAX_POINTS) for name in ("value", "slope")},
@@ -644,7 +676,7 @@ class AlgebraicOutputs:
         steps approach stays: a constraint has no smooth rate there, as t^1.5 at 0.
         """
         part = self.part
-        kept = part.failures, part.t_first, part.t_last
+        kept, moved = (part.failures, part.t_first, part.t_last), part.moved.copy()
         part.t_first, part.t_last = t, stops[0] if len(stops) else part.t_end
         given, closer = (y.copy(), yp.copy()), (y.copy(), yp.copy())
         self.settle_after(t, y, yp, h, t, y, idata)
@@ -655,6 +687,7 @@ class AlgebraicOutputs:
                 limit = np.abs(closer[0] - given[0]) < NEARER * np.abs(y - given[0])
                 y[limit], yp[limit] = given[0][limit], given[1][limit]
         part.failures, part.t_first, part.t_last = kept
+        part.moved[:] = moved
 
     def settle_after(
         self, t: float, y: np.ndarray, yp: np.ndarray, h: float, t_old: float, y_old: np.ndarray, idata: np.ndarray

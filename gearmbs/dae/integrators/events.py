@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.integrators.algebraic import settle, settle_between
+from gearmbs.dae.integrators.algebraic import note_moves, settle, settle_between
 from gearmbs.dae.integrators.run_state import copy, rows_from, times_from
 from gearmbs.kernels.jit import njit
 
@@ -52,6 +52,7 @@ def write_outputs(functions, st, part, t):
                 settle(functions, part, st.t_new, st.y_out[row], st.yp_out[row], st.step, st.idata, st.rdata, st.work)
         else:
             interpolate(functions, st, part, st.outputs[row], st.y_out[row], st.yp_out[row])
+            note_moves(part, st.outputs[row], st.y_out[row], st.step)
         st.next_output = row + 1
 
 

@@ -34,6 +34,7 @@ from gearmbs.dae.integrators.messages import (
     unknown_name,
 )
 from gearmbs.dae.integrators.options import BESIDE, ROUNDED_STEP, Options, beside
+from gearmbs.dae.integrators.records import remark_on_unresolved
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
@@ -299,7 +300,7 @@ class _Run:
             wall_time=time.perf_counter() - start,
         )
         rows, remark = self.rows, "" if self.every_step else self.algebraic.remark()
-        return DAEResult(
+        result = DAEResult(
             t=rows.t[: rows.done],
             y=rows.y[: rows.done],
             yp=rows.yp[: rows.done],
@@ -309,6 +310,9 @@ class _Run:
             epochs=self.epochs,
             t_last=self.t,
         )
+        if not self.every_step:
+            remark_on_unresolved(self.algebraic, result)
+        return result
 
     def _loop(self, messages: _Messages) -> tuple[Status, str]:
         """Take steps until the end or a failure; return how the run has ended."""

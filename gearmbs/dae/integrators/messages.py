@@ -249,6 +249,16 @@ def index_changes(after: float, before: float) -> str:
     )
 
 
+def unresolved(problem: DAEProblem, t: float, h: float, unknown: int, value: float, moved: int, off: float) -> str:
+    """Explain an output that shows what the steps have passed over."""
+    return (
+        f"What happens at t = {t:.9g} lies within a step of {h:.3g} that has not seen it: "
+        f"{unknown_name(problem, unknown)} is {value:.6g} there, and a step that ended there would move "
+        f"{unknown_name(problem, moved)} by {off:.2g} tolerances. The solution from there on leaves it out. Give its "
+        "time in breakpoints, or a max_step shorter than it lasts."
+    )
+
+
 def too_many_steps(problem: DAEProblem, t: float, steps: int) -> str:
     """Explain that the limit on steps was reached."""
     return (

@@ -3,17 +3,95 @@
 from __future__ import annotations
 
 import time
+import warnings
+from collections.abc import Callable
 
 import numpy as np
 
 from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
+from gearmbs.dae.integrators.messages import unresolved
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
+from gearmbs.dae.linalg.lu_plan import SingularMatrixError, analyse
+from gearmbs.dae.linalg.sparse_lu import factor, new_factors, solve
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
+from gearmbs.kernels.pointers import direct
 
 START_STEPS = 20
 """Steps, the longest of which is taken for the size of steps at the start: after some ten they have grown to it."""
+UNRESOLVED = 100.0
+"""Tolerances by which an output may be off what the steps say of it, and by which a step that ended there would have
+to move an unknown under error control, before the output counts as news to the steps: a step is refused at one."""
+LOOKED_AT = 10
+"""Outputs that are looked at, those the furthest off: one for each algebraic unknown."""
+
+
+def warn_of_unresolved(
+    algebraic: AlgebraicOutputs, t: np.ndarray, y: np.ndarray, yp: np.ndarray, table_of: Callable[[int], np.ndarray]
+) -> str:
+    """Warn of outputs that show what no step has seen, as a pulse between two of them; return what is said.
+
+    Algebraic unknowns solved for at an output may be far off the polynomial of the step and right: a read-out of a
+    differential unknown may do anything between two steps. The corrector of a step that ended at the output tells
+    whether it concerns the differential ones, by how far it would move them.
+
+    Parameters
+    ----------
+    algebraic : AlgebraicOutputs
+        Which remembers the outputs that are the furthest off, and forgets them.
+    t : ndarray, shape (m,)
+        Output times, increasing or not.
+    y, yp : ndarray, shape (m, n)
+        Outputs, with the rates of the polynomials.
+    table_of : callable
+        The integer table that is valid at output i.
+    """
+    part, problem = algebraic.part, algebraic.problem
+    order = np.argsort(part.moved)[::-1][:LOOKED_AT]
+    worst, told = UNRESOLVED, ""
+    for k in order[part.moved[order] > UNRESOLVED]:
+        i = int(np.flatnonzero(t == part.moved_at[k])[0])
+        off = _corrections(problem, float(t[i]), y[i], yp[i], float(part.moved_step[k]), table_of(i))
+        off *= problem.error_mask & problem.differential
+        off /= part.atol + part.rtol * np.abs(y[i])
+        j = int(np.argmax(off))
+        if off[j] > worst:
+            worst = off[j]
+            told = unresolved(problem, t[i], part.moved_step[k], int(part.cols[k]), y[i, part.cols[k]], j, worst)
+    part.moved[:] = 0.0
+    if told:
+        warnings.warn(told, stacklevel=2)
+    return told
+
+
+def remark_on_unresolved(algebraic: AlgebraicOutputs, result: DAEResult) -> None:
+    """Warn of outputs of a run that show what no step has seen, and add it to the message."""
+    told = warn_of_unresolved(algebraic, result.t, result.y, result.yp, result.epoch_of)
+    if told:
+        result.message = f"{result.message} {told}"
+
+
+def _corrections(
+    problem: DAEProblem, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray
+) -> np.ndarray:
+    """Return by how much a Newton iteration of a step of size ``h`` to ``t`` moves each unknown, zero if it cannot."""
+    res, vals = np.zeros(problem.n), np.zeros(len(problem.indices))
+    tables = idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    problem.residual(t, y, yp, res, *tables)
+    problem.jacobian(t, y, yp, 1.0 / h, vals, *tables)
+    none = np.zeros(problem.n)
+    if not (np.isfinite(res).all() and np.isfinite(vals).all()):
+        return none
+    indptr, indices = (np.asarray(a, dtype=np.int64) for a in (problem.indptr, problem.indices))
+    try:
+        plan = analyse(indptr, indices, vals, np.asarray(problem.scale, dtype=float))
+    except SingularMatrixError:
+        return none
+    factors, delta = new_factors(plan), np.zeros(problem.n)
+    direct(factor)(plan, factors, vals)
+    direct(solve)(plan, factors, res, delta)
+    return np.abs(delta) if np.isfinite(delta).all() else none
 
 
 class Records:
@@ -117,7 +195,7 @@ class Records:
         t_out, y_out, yp_out = outputs
         by_event = [[hit for hit in self.crossings if hit[1] == e] for e in range(st.n_events)]
         remark = "" if self.every_step and not self.options.dense_output else self.algebraic.remark()
-        return DAEResult(
+        result = DAEResult(
             t=t_out,
             y=y_out,
             yp=yp_out,
@@ -130,6 +208,8 @@ class Records:
             epochs=[(0 if consumed else first, table.copy()) for first, table in self.epochs[-1 if consumed else 0 :]],
             t_last=st.t,
         )
+        remark_on_unresolved(self.algebraic, result)
+        return result
 
     def _settle_start(self) -> None:
         """Settle the output at the start, whose algebraic unknowns the caller may have guessed."""
@@ -206,3 +286,4 @@ class Between:
         error = self.error_probe() if self.error_probe is not None else None
         if error is not None:
             raise error
+        warn_of_unresolved(self.algebraic, times, y, yp, lambda i: self.tables[max(int(valid[i]), 0)][1])

@@ -7,9 +7,10 @@ of the integrator's noise.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -58,6 +59,12 @@ def solution_html(solution: Solution) -> str:
 PART_SIZE = 2048
 """Output times whose records stay in the processor's cache, and outweigh what Python does for each part."""
 
+SAME = 1e-6
+"""Part of the largest acceleration, multiplier or load nearby within which those at an end of a run are those just
+inside: far above rounding, and what a table or an expression jumps by where it ends is more."""
+NEAR = 8
+"""Outputs that are nearby."""
+
 CONFLICT_SAMPLES = 50
 """Outputs at which constraints removed as redundant are looked at."""
 
@@ -96,7 +103,12 @@ class Solution(Shown):
         about the composites then, everything else about all bodies.
     remark : str
         What ``message`` says besides, for instance of an option without effect.
+    inside : mapping of float
+        Of the start and the end of a run, s, times next to them within it. A table or an expression may begin or end
+        there: accelerations, reactions and loads that jump at an end are those of the inside.
     """
+
+    inside: Mapping[float, float] = MappingProxyType({})
 
     def __init__(
         self,
@@ -169,8 +181,30 @@ class Solution(Shown):
             records = room.first(self.t.size) if self.t.size <= len(room.pose) else self._new_records(self.t.size)
         else:
             evaluator, records = self._evaluator(), self._new_records(self.t.size)
-        evaluator.fill(self.t, self.result.y, self.result.epochs, records)
+        self._fill(evaluator, records)
         return records
+
+    def _fill(self, evaluator: Fills, records: outputs.Records) -> None:
+        """Fill ``records`` for all output times, in their order."""
+        last = self.t.size - 1
+        rows = [row for row in (0, last) if row >= 0 and float(self.t[row]) in self.inside]
+        # the start comes before all others, for turns are counted
+        limits = {row: self._just_inside(evaluator, row) for row in rows if row == 0}
+        evaluator.fill(self.t, self.result.y, self.result.epochs, records)
+        limits |= {row: self._just_inside(evaluator, row) for row in rows if row > 0}
+        for row, limit in limits.items():
+            near = slice(max(row - NEAR, 0), row + NEAR + 1)
+            pairs = [(limit.solution[0], records.solution[near]), (limit.loads[0], records.loads[near])]
+            off = [np.abs(there - here[row - near.start]).max(initial=0.0) for there, here in pairs]
+            if not all(d <= SAME * np.abs(here).max(initial=0.0) for d, (_, here) in zip(off, pairs, strict=True)):
+                for column, value in zip(records, limit):
+                    column[row] = value[0]
+
+    def _just_inside(self, evaluator: Fills, row: int) -> outputs.Records:
+        """Return records of an output at an end of the run as they are next to it."""
+        record, t, y = self._new_records(1), self.inside[float(self.t[row])], self.result.y[row : row + 1]
+        evaluator.fill(np.array([t]), y, [(0, self.result.epoch_of(row))], record)
+        return record
 
     def over(self, t: np.ndarray, y: np.ndarray, epochs: list[tuple[int, np.ndarray]]) -> Solution:
         """Return a solution of the same equations over other times, with unknowns ``y`` and their ``epochs``."""
@@ -257,7 +291,7 @@ class Solution(Shown):
                 part.result.yp = self.result.yp[wanted]
             if evaluator is not None and room is not None:
                 part._records = room.first(wanted.size)
-                evaluator.fill(part.t, part.result.y, epochs, part._records)
+                part._fill(evaluator, part._records)
             elif known is not None:
                 part._records = outputs.Records(*(column[wanted] for column in known))
             yield part

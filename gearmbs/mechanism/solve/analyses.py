@@ -17,6 +17,7 @@ from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.solve.simulate import just_inside
 from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
@@ -188,4 +189,6 @@ def kinematic(mechanism: Mechanism, t_eval: np.ndarray) -> Solution:
     times = np.asarray(t_eval, dtype=float)
     if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
         raise ModelError("t_eval: give a sequence of finite times")
-    return _kinematic.kinematic(mechanism.compile(float(times[0])), times)
+    solution = _kinematic.kinematic(mechanism.compile(float(times[0])), times)
+    solution.inside = just_inside(times)
+    return solution

@@ -14,7 +14,7 @@ from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.kinematics.update import update_tables
 from gearmbs.dae.equations.loads.expressions import value
 from gearmbs.dae.integrators.events import STOP
-from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.options import Options, beside
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
@@ -236,6 +236,8 @@ def simulate(
     problem.advice = {**ADVICE, **(advice or {})}
     remark = " ".join(text for text in (locking_remark(mechanism, system), lumping if asked else "") if text)
     stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
+    if stream is not None:
+        stream.whole.inside = just_inside(t_eval)
     warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     bar = time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1]))
     result = None
@@ -248,6 +250,7 @@ def simulate(
             error.solution = Solution(system, problem, cut, members, remark)
         raise
     solution = Solution(system, problem, result, members, remark)
+    solution.inside = just_inside(t_eval)
     if stream is not None:
         return _closed(stream, solution, name)
     warn_of_spin(mechanism.bodies, solution)
@@ -260,6 +263,12 @@ def _without(mechanism: Mechanism, names: Collection[str]) -> Mechanism:
     part = copy.copy(mechanism)
     part.elements = {name: element for name, element in mechanism.elements.items() if name not in names}
     return part
+
+
+def just_inside(times: np.ndarray) -> dict[float, float]:
+    """Return times next to the ends of a run with outputs at ``times``, within it, by these ends."""
+    start, end = float(times[0]), float(times[-1])
+    return {start: start + beside(start, end - start), end: end - beside(end, end - start)} if start < end else {}
 
 
 def _closed(stream: Stream, solution: Solution, name: str) -> Solution:

@@ -1,6 +1,7 @@
 """Algebraic unknowns between the steps: at outputs, at crossings, anywhere in the dense output."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from gearmbs.dae import DAEResult, Status, solve_dae
 from gearmbs.mechanism import Mechanism
 from tests.dae.integrators.algebraic_families import FAMILIES, Case, case
 from tests.generators import cases, seed
+from tests.says import says
 
 METHODS = ("WSTIFF", "GSTIFF", "IDA")
 BDF = METHODS[:2]
@@ -43,6 +45,7 @@ def test_every_output_of_random_problems_is_within_a_hundred_tolerances():
         allowed = rtol * (problem.size + np.abs(exact) + problem.reach(times) * problem.algebraic)
         assert (np.abs(result.y - exact) < 100.0 * allowed).all(), where
         assert "could not be solved" not in result.message, where
+        assert "max_step" not in result.message, where
     assert len(messages) <= 0.05 * count, "\n".join(messages)
 
 
@@ -302,3 +305,62 @@ def test_a_multiplier_guessed_at_the_start_is_solved_for(rtol, method):
     found = solve_dae(swinging, (0.0, 0.2), [1000.0, 0.0], method=method, t_eval=[0.0, 0.2], rtol=rtol, atol=rtol)
     assert found.success, found.message
     np.testing.assert_allclose(found.y[:, 1], 30.0 * np.cos(30.0 * found.t), rtol=1e-5)
+
+
+def pulsed(t, y, yp, out):
+    """A pulse of index one, 0.09 long in all."""
+    out[0] = yp[0] - y[1]
+    out[1] = y[1] - 100.0 * np.exp(-(((t - 50.0) / 0.05) ** 2))
+
+
+def displaced(t, y, yp, out):
+    """One in a constraint, of index two."""
+    out[0] = yp[0] - y[1]
+    out[1] = y[0] - np.sin(0.1 * t) - np.exp(-(((t - 50.0) / 0.05) ** 2))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("problem", "rate", "when"), [(pulsed, 0.0, "50"), (displaced, 0.1, "50.1")])
+def test_an_output_that_shows_what_no_step_has_seen_is_told(problem, rate, when, method):
+    """A pulse shorter than the steps; where they are told of it they resolve it, and nothing is said."""
+    times = np.linspace(0.0, 100.0, 1001)
+    options = {"t_eval": times, "method": method}
+    with pytest.warns(UserWarning, match=says(f"t = {when}", "y[1]", "breakpoints", "max_step")):
+        passed = solve_dae(problem, (0.0, 100.0), [0.0, rate], **options)
+    assert "max_step" in passed.message
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        told = solve_dae(problem, (0.0, 100.0), [0.0, rate], breakpoints=[50.0], **options)
+        # without an output in it
+        unseen = solve_dae(problem, (0.0, 100.0), [0.0, rate], **{**options, "t_eval": times[::300]})
+    assert "max_step" not in told.message + unseen.message
+    if problem is pulsed:
+        np.testing.assert_allclose(told.y[-1, 0], np.sqrt(np.pi) * 5.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize("method", BDF)
+def test_dense_output_that_shows_what_no_step_has_seen_is_told(method):
+    passed = solve_dae(pulsed, (0.0, 100.0), [0.0, 0.0], dense_output=True, method=method)
+    with pytest.warns(UserWarning, match=says("t = 50", "y[1]", "breakpoints", "max_step")):
+        passed.sol(50.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        passed.sol(np.linspace(0.0, 49.0, 50))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8])
+def test_what_concerns_no_differential_unknown_is_not_told(method, rtol):
+    """Read-outs, contacts, and jumps, at breakpoints or found, at outputs next to them too."""
+
+    def stepped(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = y[1] - (3.0 if t >= 1.0 else 1.0)
+
+    times = np.sort(np.append(np.linspace(0.0, 3.0, 61), [1.0 - 1e-6, np.nextafter(1.0, 0.0), np.nextafter(1.0, 2.0)]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        solve_dae(read_out, (0.0, 3.0), [0.0, 0.0], rtol=rtol, t_eval=times, method=method)
+        solve_dae(pressed, (0.0, 3.0), [1.0, 0.0, 1e3 * 0.5**1.5], rtol=rtol, t_eval=times, method=method)
+        solve_dae(stepped, (0.0, 3.0), [0.0, 1.0], rtol=rtol, t_eval=times, method=method, breakpoints=[1.0])
+        solve_dae(stepped, (0.0, 3.0), [0.0, 1.0], rtol=rtol, t_eval=times, method=method)
