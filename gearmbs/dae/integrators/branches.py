@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import boolean, int64
 
-from gearmbs.dae.integrators.corrector import HELD, ROUNDED_TERMS, equations_hold
+from gearmbs.dae.integrators.corrector import CONVERGED, HELD, ROUNDED_TERMS, correct, equations_hold
 from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
 from gearmbs.dae.integrators.run_state import STATE_TYPE, copy, rows_from
 from gearmbs.dae.linalg.sparse_lu import solve
@@ -28,9 +28,11 @@ SAME_EQUATION = 1e-3
 CUT_TO_TELL = 0.01
 """Part of the step tried first from which on it counts as cut: four failures of the corrector take it to 1/256. They
 are not counted, for a step that drops pivots is tried at its first length again."""
-LOST = 1e4
-"""Violation of an equation, in the units of `equations_hold`, from which on a run is lost: its unknowns are off by some
-LOST HELD = 500 tolerances, where convergence leaves half a tolerance."""
+VIOLATED = 1e4
+"""Violation of an equation, in the units of `equations_hold`, from which on the corrector is asked again: its unknowns
+may be off by VIOLATED HELD = 500 tolerances, where convergence leaves half a tolerance."""
+LOST = 100.0
+"""Tolerances by which the corrector then has to move an unknown."""
 LARGER_GAMMA = 10.0
 """Ratio of the gamma at which the pencil is looked at to the largest leading coefficient of the run. Its first steps
 resolve the fastest modes, whose entries, wrong in differences by 1e-8, would drown the derivatives at a smaller one."""
@@ -162,19 +164,31 @@ def _pencil_sign(functions, st):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def is_lost(functions, st):
-    """Return whether an equation does not hold by far, judged by the derivatives at the iterate itself.
+def is_lost(functions, st, plan, factors):
+    """Return whether the step has left the solution, as the derivatives at the iterate itself tell.
 
-    A matrix that has grown old says of any residual that it is small where its entries are too large: those of a place
-    next to a pole, or a difference quotient across one. So one that has to be made anew for its age, not for slow
-    convergence, is judged first; ``st.worst_row`` and ``st.violation`` are left as by `equations_hold`.
+    A matrix that has grown old says of any correction that it is small where its entries are too large: those of a
+    place next to a pole, or a difference quotient across one. So one that has to be made anew for its age, not for
+    slow convergence, is judged first. Where an equation is violated by far, the corrector goes on from where it was
+    with a new matrix, and it is lost if that takes it far away. At a contact that opens or closes it does not.
+    ``st.worst_row`` and ``st.violation`` are left as by `equations_hold`.
     """
     functions.jacobian(st.t_seen, st.y, st.yp, st.gamma, st.matrix, st.idata, st.rdata, st.work)
     st.jacobians += 1
     held = equations_hold(functions, st)
     copy(st.jac, st.matrix)
     carry_over(st)
-    return not held and not st.violation <= LOST
+    if held or st.violation <= VIOLATED:
+        return False
+    y, yp = st.y.copy(), st.yp.copy()
+    lost = renew_matrix(functions, st, plan, factors) and correct(functions, st, plan, factors) == CONVERGED
+    away = 0.0
+    for i in range(y.shape[0]):
+        away = max(away, abs(st.y[i] - y[i]) * st.weight[i])
+    copy(y, st.y)
+    copy(yp, st.yp)
+    st.matrix_wanted = True
+    return lost and away > LOST
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -534,7 +534,7 @@ def advance(bound, st, part, plan, factors, max_accepted):
             code = refuse_by_newton(st, SLOW)
             if code != s.RUNNING:
                 return code
-        elif st.matrix_age >= MATRIX_MAX_AGE - 1 and is_lost(functions, st):
+        elif st.matrix_age >= MATRIX_MAX_AGE - 1 and not st.constrained and is_lost(functions, st, plan, factors):
             return s.FAIL_NEWTON
         else:
             accept(st)

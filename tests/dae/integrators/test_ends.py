@@ -194,6 +194,27 @@ def test_no_step_is_taken_from_an_end_to_somewhere_else(families, number, name, 
     assert solve(ending, tol, 0.98 * ending.end, method).success
 
 
+def stop(stiffness: float) -> Callable:
+    """Return a body that falls on a stop which damps it on its way in."""
+    damping = 0.1 * stiffness**0.5
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = yp[1] + 9.81 + (stiffness * y[0] + damping * min(0.0, y[1]) if y[0] < 0.0 else 0.0)
+
+    return residual
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+def test_a_stiff_stop_that_opens_and_closes_is_no_end(method):
+    """A matrix from the stop's other side is off by its stiffness, and the solution goes on: energy is not gained."""
+    rng = np.random.default_rng(seed())
+    for stiffness in 10.0 ** rng.uniform(4.0, 12.0, cases(4)):
+        run = solve_dae(stop(stiffness), (0.0, 1.0), [0.3, 0.0], rtol=1e-6, atol=1e-7, method=method)
+        assert run.success, f"{stiffness:.3g}: {run.message}"
+        assert run.y[:, 0].max() < 0.3 * (1.0 + 1e-4)
+
+
 @pytest.mark.parametrize("family", range(7))
 def test_the_message_names_the_pole_ahead(family):
     ending = poles(np.random.default_rng(seed()))[family]
