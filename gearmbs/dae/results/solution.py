@@ -319,8 +319,9 @@ class Solution(Shown):
 
     # --- access by name -----------------------------------------------------------------------------
 
-    def _body(self, name: str) -> int:
-        names = self.system.model.names.bodies
+    def _body(self, body) -> int:
+        """Return the number of a body, given as such or by its name."""
+        names, name = self.system.model.names.bodies, getattr(body, "name", body)
         try:
             return names.index(name)
         except ValueError:
@@ -371,7 +372,8 @@ class Solution(Shown):
         return _sum_of_rows(self._records.force, self._rows_of_joint(joint))
 
     def _rows_of_joint(self, joint: str) -> list[int]:
-        """Return the numbers of the constraint rows of a joint."""
+        """Return the numbers of the constraint rows of a joint, given as such or by its name."""
+        joint = getattr(joint, "name", joint)
         rows = self.system.model.rows_of_joint.get(joint)
         if rows is None:
             known = sorted(self.system.model.rows_of_joint)
