@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.signal import check_teeth, with_metadata
+from gearmbs.signals.signal.signal import SHAFT, check_teeth, with_metadata
 from gearmbs.units import to_si
 
 # A known speed in any shape: number, text, points, curve, function; and its values over a record.
@@ -264,10 +264,10 @@ def with_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
     """The signal with a known speed: a number or text as attribute, a curve as coordinate `speed` over time."""
     times = np.asarray(signal["time"].values, dtype=float)
     curve = speed_curve(speed, span=(float(times[0]), float(times[-1])))
-    # what the signal says of its own angle would contradict
-    signal = signal.drop_vars([name for name in ("speed", "angle") if name in signal.coords])
     if curve.constant is not None:
         return with_metadata(signal, speed=curve.constant)
-    result = signal.assign_coords(speed=("time", curve.at(times), {"units": "rad/s"}))
+    # the signal's own angle would contradict
+    result = signal.drop_vars([name for name in SHAFT if name in signal.coords])
+    result = result.assign_coords(speed=("time", curve.at(times), {"units": "rad/s"}))
     result.attrs = {k: v for k, v in signal.attrs.items() if k != "speed"}
     return result
