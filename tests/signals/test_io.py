@@ -570,3 +570,11 @@ def test_gaps_cut_the_speed_as_the_samples(tmp_path):
     back = read_signal(path, gaps="longest")
     assert back.sizes["time"] == 500
     np.testing.assert_array_equal(back["speed"], signal["speed"][100:])
+
+
+def test_uff_leaves_no_file_open(tmp_path):
+    pytest.importorskip("pyuff")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        write_signal(example(), tmp_path / "x.uff")
+    assert not said

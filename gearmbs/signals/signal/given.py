@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.signal import SHAFT, check_teeth, with_metadata
+from gearmbs.signals.signal.signal import SHAFT, STEADY, check_teeth, with_metadata
 from gearmbs.units import to_si
 
 # A known speed in any shape: number, text, points, curve, function; and its values over a record.
@@ -24,8 +24,6 @@ FORMS = (
     "give a number in rad/s, text such as '1500 rpm', points [(t, speed), ...], (times, speeds), "
     "a DataArray or Series over time, or a function of t"
 )
-STEADY = 1e-3
-"""A curve that strays less than this part from its mean is a constant speed."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +176,7 @@ def _of_points(speed: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def unit_factor(unit: str) -> float:
     """Factor from a unit of rotation to rad/s: rpm, Hz, rad/s, deg/s, 1/min ..."""
-    text = {"1/min": "rpm", "min^-1": "rpm", "min-1": "rpm", "1/s": "Hz", "rps": "Hz", "r/min": "rpm", "rev/min": "rpm"}
+    text = {"1/min": "rpm", "min^-1": "rpm", "min-1": "rpm", "1/s": "Hz", "rps": "Hz", "r/min": "rpm"}
     return _quantity(f"1 {text.get(unit.strip(), unit.strip())}", "angular speed", "speed")
 
 

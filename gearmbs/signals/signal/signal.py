@@ -30,6 +30,8 @@ UNKNOWN_UNITS = "unknown"
 MIXED_UNITS = "mixed"
 SHAFT = {"speed": "rad/s", "angle": "rad"}
 """Coordinates over time that tell how the shaft turns, with their units."""
+STEADY = 1e-3
+"""A speed over time that strays less than this part from its mean is a constant one."""
 CLOCK_TOLERANCE = 0.05
 """Part of a sample by which times may deviate from an even clock."""
 REMEDIES = {
@@ -291,14 +293,35 @@ def require(signal: xr.DataArray, name: str, value: Any = None, *, needed_for: s
     Raises
     ------
     MissingMetadataError
+    SignalError
+        If a speed is wanted and the signal's varies over time.
     """
-    if value is None:
+    if value is None and name == "speed":
+        value = _one_speed(signal, needed_for)
+    elif value is None:
         value = signal.attrs.get("sampling_rate" if name == "rate" else name)
     if value is None:
         raise MissingMetadataError(name, needed_for, REMEDIES[name])
     if name == "teeth":
         return check_teeth(value)
     return check_speed(value) if name == "speed" else check_rate(value)
+
+
+def _one_speed(signal: xr.DataArray, needed_for: str) -> float | None:
+    """Return the constant speed of a signal (rad/s), None without any; SignalError if it varies."""
+    turning = shaft_coords(signal)
+    if not turning or signal.sizes["time"] < 2:
+        return signal.attrs.get("speed")
+    own, times = next(iter(turning.values())).values, signal["time"].values
+    speeds = own if "speed" in turning else np.abs(np.diff(own) / np.diff(times))
+    mean = float(np.mean(speeds))
+    if np.abs(speeds - mean).max(initial=0.0) <= STEADY * mean:
+        return mean
+    low, high = (float(bound) * 30.0 / math.pi for bound in (speeds.min(), speeds.max()))
+    raise SignalError(
+        f"speed: {needed_for} needs a constant one, that of the signal varies from {low:.5g} to {high:.5g} rpm; pass "
+        "speed=... of the part that is meant, or use analyse or order_track, which follow it"
+    )
 
 
 def mesh_frequency(signal: xr.DataArray, speed: float | None = None, teeth: int | Sequence[int] | None = None) -> float:
