@@ -16,7 +16,8 @@ import numpy as np
 from gearmbs.adams.builders.constraints import JOINT_KINDS, JPRIM_KINDS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
-from gearmbs.adams.write.contacts import contact_statements, gear_solid_statements, gear_statements, is_gear_contact
+from gearmbs.adams.write.contacts import contact_statements, gear_solid_statements
+from gearmbs.adams.write.gear_expressions import gear_statements, is_gear_contact
 from gearmbs.adams.write.text import COMPONENTS, COMPONENTS_OF, WriterContext, listed, number, upper
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
