@@ -12,6 +12,7 @@ from gearmbs.adams import DeckError, parse_deck, read_deck, run_deck, write_deck
 from gearmbs.adams.write.contacts import MARK, pair_comments, pair_of
 from gearmbs.adams.write.gear_expressions import HELD, LEFT_OUT, REFUSED
 from gearmbs.dae.problem import ModelError
+from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Support, planetary, planetary_mechanism
 from gearmbs.gears.faults import BrokenTooth, Crowning, Fault, FlankMap, PitchError, TipRelief
 from gearmbs.mechanism import Mechanism, ramp, step
@@ -314,3 +315,37 @@ def test_faults_are_refused_by_their_names_and_other_places_too():
     m.elements["mesh"].pair = PAIRS["plain"].with_changes(centre_distance_error="0.2 mm")
     with pytest.raises(ModelError, match=says("mm apart", "centre_distance_error")):
         write_deck(m)
+
+
+# Drivetrains.
+
+
+def train(bearings=("40 mm",), loads=()):
+    wheels = {name: GearSpec(z, "3 mm", face_width="20 mm") for name, z in (("w1", 21), ("w2", 53))}
+    return Drivetrain(
+        "t",
+        shafts=[Shaft(name=name, length="80 mm", radius="10 mm", mass="1 kg") for name in ("in", "out")],
+        wheels=[Wheel(name=n, shaft=s, station="40 mm", gear=wheels[n]) for n, s in (("w1", "in"), ("w2", "out"))],
+        meshes=[GearMesh(name="m", driver="w1", driven="w2", direction="130 deg", settings={"backlash": "0.1 mm"})],
+        bearings=[IdealBearing(name=f"{s} {k}", shaft=s, station=z) for s in ("in", "out")
+                  for k, z in enumerate(bearings)],
+        drives=[SpeedDrive(name="dr", shaft="in", speed="-500 rpm")], loads=loads, running=True,
+    )  # fmt: skip
+
+
+def test_the_speed_drive_of_a_shaft_in_one_ideal_bearing_comes_back():
+    m = train().build()
+    m.torque("load", m.bodies["out"], -20.0)
+    back = written(m)
+    a, b = (x.simulate(0.002, rate=2000, tol=1e-7, rate_scale=1000.0) for x in (m, back))
+    speed = a.angular_velocity("in")[:, 2]
+    np.testing.assert_allclose(speed, -500.0 * np.pi / 30.0, rtol=1e-6)
+    np.testing.assert_allclose(b.angular_velocity("in")[:, 2], speed, rtol=1e-6)
+    np.testing.assert_allclose(b.joint_angle("in 0"), a.joint_angle("in 0"), atol=1e-9)
+
+
+def test_what_a_deck_has_not_of_a_drivetrain_is_named():
+    with pytest.raises(ModelError, match=says("dr.I", "'in'", "IdealBearing")):
+        write_deck(train(("10 mm", "70 mm")).build())
+    with pytest.raises(ModelError, match=says("load 'ld'", "Mechanism.load")):
+        write_deck(train(loads=[TorqueLoad(name="ld", shaft="out", torque="20 N m")]).build())
