@@ -8,6 +8,7 @@ from gearmbs.gears import GearSpec, PlanetarySet, planetary_mechanism
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.parts import functions
 from gearmbs.studies.run.simulation import case_mechanism
+from tests.says import says
 
 PAIR = {"tol": 1e-7, "rate_scale": 3000.0}
 
@@ -160,37 +161,37 @@ def test_what_does_not_fit_is_refused(tmp_path):
     sim = gm.Simulator(slider_crank(), 1.0)
     sim.advance("0.2 s")
     state = sim.state()
-    with pytest.raises(ModelError, match=r"its unknown 0 is 'u_x\(crank\)', that of the model 'u_x\(top\)'; take"):
+    with pytest.raises(ModelError, match=says("unknown", "'u_x(crank)'", "'u_x(top)'", "take")):
         top().simulate(1.0, initial=state)
     other = slider_crank()
     other.body("more", mass=1.0, inertia=(0.1, 0.1, 0.1))
-    with pytest.raises(ModelError, match=r"state: its unknown \d+ is"):
+    with pytest.raises(ModelError, match=says("state", "unknown", "take")):
         other.simulate(1.0, initial=state)
-    with pytest.raises(ModelError, match=r"state: it has 87 unknowns, the model 70, of which 'mu\(main: .*first that"):
+    with pytest.raises(ModelError, match=says("87", "70", "'mu(main:")):
         slider_crank().simulate(1.0, initial=state, formulation="I3")
-    with pytest.raises(ModelError, match=r"it is a state at t = 0\.2 s, t_start is 0\.5 s; leave t_start away"):
+    with pytest.raises(ModelError, match=says("0.2", "t_start", "0.5", "leave")):
         slider_crank().simulate(1.0, initial=state, t_start=0.5)
     for t_end in (0.1, 0.2):
-        with pytest.raises(ModelError, match=r"it must be later than the start 0\.2 s"):
+        with pytest.raises(ModelError, match=says("t_end", "0.2")):
             slider_crank().simulate(t_end, initial=state)
-    with pytest.raises(ModelError, match=r"the simulator goes from 0 to 0\.1 s; make it with a later t_end"):
+    with pytest.raises(ModelError, match=says("0.1", "later", "t_end")):
         gm.Simulator(slider_crank(), 0.1).restore(state)
     late, early = gm.Simulator(slider_crank(), 1.0, initial=state), gm.Simulator(slider_crank(), 1.0).state()
-    with pytest.raises(ModelError, match="pass it as initial="):
+    with pytest.raises(ModelError, match=says("pass", "initial=")):
         late.restore(early)
     # a wheel of other size has a state of the same kind, and another integrator starts afresh from it
     assert slider_crank(0.3).simulate(0.3, initial=state, integrator="IDA").success
     assert slider_crank(0.3).simulate(0.3, initial=state, t_start=0.2).success
     path = tmp_path / "cut.npz"
     path.write_bytes(state.save(tmp_path / "s.npz").read_bytes()[:5000])
-    with pytest.raises(ModelError, match=r"cut\.npz: not a whole file of a state"):
+    with pytest.raises(ModelError, match=says("cut.npz", "whole")):
         gm.State.load(path)
-    with pytest.raises(ModelError, match=r"a state is saved as \.npz"):
+    with pytest.raises(ModelError, match=says("state", ".npz")):
         state.save(tmp_path / "s.txt")
     solution = slider_crank().simulate(1.0, rate=10)
-    with pytest.raises(ModelError, match=r"t = 0\.55 s is none of the output times"):
+    with pytest.raises(ModelError, match=says("0.55", "output", "times")):
         solution.state_at(0.55)
-    with pytest.raises(ModelError, match="take the state of a Simulator"):
+    with pytest.raises(ModelError, match=says("take", "Simulator")):
         slider_crank().simulate(3.0, t_eval=[0.0, 2.9, 3.0]).state_at(3.0)
 
 
@@ -203,13 +204,13 @@ def test_wrong_calls_say_what_to_do():
         assert "\n" not in str(error.value)
     assert sim.t == 0.2
     sim.advance(0.2)
-    with pytest.raises(ModelError, match=r"get: there is no 'com_positon'.*com_position"):
+    with pytest.raises(ModelError, match=says("'com_positon'", "com_position")):
         sim.get("com_positon", "top")
-    with pytest.raises(KeyError, match="the bodies are top"):
+    with pytest.raises(KeyError, match=says("'wheel'", "top")):
         sim.get("com_position", "wheel")
     with pytest.raises(ModelError, match="records=True"):
         sim.solution()
-    with pytest.raises(ModelError, match=r"IDA cannot be held between calls; take 'WSTIFF' or 'GSTIFF'|WSTIFF"):
+    with pytest.raises(ModelError, match=says("IDA", "WSTIFF")):
         gm.Simulator(top(), 1.0, integrator="IDA")
     with pytest.raises(ModelError, match="dense_output"):
         gm.Simulator(top(), 1.0, dense_output=True)
@@ -225,9 +226,9 @@ def test_a_failure_can_be_gone_back_from():
     state = sim.state()
     with pytest.raises(ModelError, match="finite"):
         sim.advance(0.7)
-    with pytest.raises(ModelError, match=r"has failed.*restore"):
+    with pytest.raises(ModelError, match=says("failed", "restore")):
         sim.advance(0.4)
-    with pytest.raises(ModelError, match=r"has failed"):
+    with pytest.raises(ModelError, match=says("failed")):
         sim.state()
     sim.restore(state)
     sim.advance(0.4)
