@@ -30,17 +30,19 @@ def _event_rules(events: Sequence[Callable]) -> dict[str, Any]:
     """
     direction, action, count = [], [], []
     for g in events:
-        attributes = getattr(g, "py_func", g)
-        direction.append(int(np.sign(getattr(attributes, "direction", 0))))
-        terminal = getattr(attributes, "terminal", False)
+        # of a compiled function they stand on it, or on the Python function that it was made from
+        inner = getattr(g, "py_func", g)
+        given = {name: getattr(g, name, getattr(inner, name, 0)) for name in ("direction", "terminal", "restart")}
+        direction.append(int(np.sign(given["direction"])))
+        terminal = given["terminal"]
         if isinstance(terminal, bool | np.bool_):
             terminal = int(terminal)
         if terminal is not None and (terminal != int(terminal) or terminal < 0):
             raise ValueError(
-                f"terminal of {getattr(attributes, '__name__', 'an event function')} is {terminal!r}; set True, False, "
+                f"terminal of {getattr(inner, '__name__', 'an event function')} is {terminal!r}; set True, False, "
                 "or the number of the occurrence that ends the run"
             )
-        action.append(1 if terminal else 2 if getattr(attributes, "restart", False) else 0)
+        action.append(1 if terminal else 2 if given["restart"] else 0)
         count.append(max(1, int(terminal or 0)))
     return {"event_direction": direction, "event_action": action, "event_count": count}
 

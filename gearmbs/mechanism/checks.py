@@ -71,7 +71,8 @@ def locking_remark(mechanism: Mechanism, system: System) -> str:
     one = len(bodies) == 1
     return (
         f"{'Body' if one else 'Bodies'} {_listed(bodies)} cannot move: {_listed(joints)} together leave "
-        f"{'it' if one else 'them'} no motion; fix {'it' if one else 'them'} to the ground if that is meant."
+        f"{'it' if one else 'them'} no motion; fix {'it' if one else 'them'} to the ground if that is meant. "
+        "It is judged where they start: at a dead centre they seem to be held and go on."
     )
 
 

@@ -121,6 +121,21 @@ def test_terminal_event(compiled):
     np.testing.assert_allclose(result.y_events[0][0], result.y[-1], atol=1e-12)
 
 
+@pytest.mark.parametrize("inner", [True, False])
+def test_attributes_of_a_compiled_event_stand_on_it_or_on_what_it_was_made_from(inner):
+    def ground(t, y, yp):
+        return y[0] - 4.0
+
+    event = njit(ground)
+    (ground if inner else event).terminal = True
+    (ground if inner else event).direction = -1
+    result = solve_dae(falling, (0.0, 1.3), [10.0, 0.0], rtol=1e-8, atol=1e-8, events=event)
+    assert result.status == 1
+    assert result.t_last == pytest.approx(np.sqrt(12.0 / 9.81), abs=1e-6)
+    (ground if inner else event).direction = 1
+    assert solve_dae(falling, (0.0, 1.3), [10.0, 0.0], rtol=1e-8, atol=1e-8, events=event).success
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
