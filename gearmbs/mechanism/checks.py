@@ -18,6 +18,7 @@ from gearmbs.mechanism.parts.point_mass import PointMass
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
+    from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
     from gearmbs.mechanism.parts.joints import Joint, Row
 
@@ -27,6 +28,9 @@ MOST_ROWS = 200
 MOTIONS = ("rotation", "translation")
 STILL = 1e-8
 """Motion of a body, as a part of the largest, that is none."""
+
+MOVED = 1e-7
+"""Way (m) or turn (rad) by which a body has moved: locked ones stray within the tolerance of constraints, 1e-10."""
 
 NAMED = 3
 """Bodies and joints named in the remark at most."""
@@ -71,8 +75,16 @@ def locking_remark(mechanism: Mechanism, system: System) -> str:
     one = len(bodies) == 1
     return (
         f"{'Body' if one else 'Bodies'} {_listed(bodies)} cannot move: {_listed(joints)} together leave "
-        f"{'it' if one else 'them'} no motion; fix {'it' if one else 'them'} to the ground if that is meant. "
-        "It is judged where they start: at a dead centre they seem to be held and go on."
+        f"{'it' if one else 'them'} no motion; fix {'it' if one else 'them'} to the ground if that is meant."
+    )
+
+
+def moves_after_all(mechanism: Mechanism, solution: Solution) -> bool:
+    """Whether a body that joints lock at the start has moved: at a dead centre it has no velocity."""
+    return any(
+        np.ptp(values.reshape(len(values), -1), axis=0).max(initial=0.0) > MOVED
+        for name in locked_bodies(mechanism, solution.system)
+        for values in (solution.com_position(name), solution.orientation(name))
     )
 
 

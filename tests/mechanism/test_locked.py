@@ -51,6 +51,19 @@ def test_what_is_fixed_or_driven_on_purpose_is_not():
     assert "cannot move" not in m.simulate(0.01).message
 
 
+def test_a_slider_at_its_dead_centre_is_not():
+    m = Mechanism("crank")
+    crank = m.body("crank", 1.0, (0.01, 0.01, 0.01), position=(0.05, 0, 0))
+    rod = m.body("rod", 1.0, (0.01, 0.01, 0.01), position=(0.25, 0, 0))
+    block = m.body("block", 1.0, (0.01, 0.01, 0.01), position=(0.4, 0, 0))
+    m.revolute("main", crank, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.revolute("pin", rod, crank, at=(0.1, 0, 0), axis=(0, 0, 1))
+    m.spherical("wrist", rod, block, at=(0.4, 0, 0))
+    m.translational("guide", block, m.ground, at=(0.4, 0, 0), axis=(1, 0, 0))
+    m.torque("drive", crank, 5.0, axis=(0, 0, 1))
+    assert "cannot move" not in m.simulate(0.05).message
+
+
 def test_many_are_summed_up():
     m = Mechanism("frame")
     bodies = [m.body(name, 1.0, (1, 1, 1), position=(k, 0, 0)) for k, name in enumerate("abcd")]

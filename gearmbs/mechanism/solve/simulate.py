@@ -24,6 +24,7 @@ from gearmbs.dae.state import State
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
     locking_remark,
+    moves_after_all,
     refuse_overlaps,
     warn_of_lost_torques,
     warn_of_spin,
@@ -243,7 +244,8 @@ def simulate(
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
         options.update(stop_options(stops))
     problem.advice = {**ADVICE, **(advice or {})}
-    remark = " ".join(text for text in (locking_remark(mechanism, system), lumping if asked else "") if text)
+    held, lumping = locking_remark(mechanism, system), lumping if asked else ""
+    remark = " ".join(text for text in (held, lumping) if text)
     stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
     if stream is not None:
         stream.whole.inside = just_inside(t_eval)
@@ -263,6 +265,8 @@ def simulate(
     solution.initial = initial
     if stream is not None:
         return _closed(stream, solution, name)
+    if held and moves_after_all(mechanism, solution):
+        solution.remark = lumping
     warn_of_spin(mechanism.bodies, solution)
     warn_of_lost_torques(mechanism.elements, solution)
     return solution
