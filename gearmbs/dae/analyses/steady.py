@@ -150,6 +150,7 @@ def turning_basis(
         return replace(none, varying=[list(instant.system.body_names)])
     generators, weight = _generators(instant), weights(instant)
     turn, back, varying = np.zeros((len(basis),) * 2), np.zeros((basis.shape[1],) * 2), []
+    seen_turn = np.zeros_like(turn)
     for k, own in enumerate(rates):
         rows = np.flatnonzero(label[owner] == k)
         columns = np.flatnonzero(label[owner[anchors]] == k)
@@ -164,13 +165,19 @@ def turning_basis(
             for z in chain.choices(whole):
                 change = chain.change(whole, seen, z, forces=bool(w.any()))
                 if change < least:
-                    least, kept = change, (w, whole, z)
+                    least, kept = change, (w, whole, seen, z)
             if least <= 1.0:
                 break
         if least > 1.0:
             varying.append([instant.system.body_names[b] for b in np.flatnonzero(label == k)])
         if kept is not None:
-            axes[label == k], turn[np.ix_(rows, rows)], back[np.ix_(columns, columns)] = kept
+            within = np.ix_(rows, rows)
+            axes[label == k], turn[within], seen_turn[within], back[np.ix_(columns, columns)] = kept
+    if axes.any() and not varying and len(chains) > 1:
+        # loads between chains that turn differently
+        every = _Chain(basis, anchors, here, near, largest, weight)
+        if not every.change(turn, seen_turn, back, forces=True) <= 1.0:
+            varying.append([instant.system.body_names[b] for b in np.flatnonzero(axes.any(axis=1))])
     first = turn @ basis - basis @ back
     return Basis(basis, first, turn @ first - first @ back, axes, varying)
 

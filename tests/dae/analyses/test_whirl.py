@@ -279,3 +279,19 @@ def test_a_rotor_that_is_not_alike_has_modes_on_supports_that_are():
         assert np.abs(found - value).min() < 1e-5 * value
     with pytest.warns(UserWarning, match=says("rotor", "vary")):
         unlike(spin, (k, 3.0 * k)).linear_modes()
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_springs_between_what_turns_and_what_rests_are_looked_at(coupled):
+    m = frame(20.0)
+    block = carried(m, 20.0, np.array([0.2, 0, 0]), 2.0, (1e-3,) * 3, "block")
+    m.translational("guide", block, m.bodies["frame"], axis=(1, 0, 0))
+    m.spring_damper("own", block.marker(), m.bodies["frame"].marker(), stiffness=2000.0, length=0.12)
+    other = m.point_mass("other", 1.0, at=(0, 0, 0.5))
+    m.bushing("support", other.marker(), m.ground.marker((0, 0, 0.5)), stiffness=(1e4,) * 3)
+    if coupled:
+        m.spring_damper("between", block.marker(), other.marker(), stiffness=500.0, length=np.hypot(0.2, 0.5))
+        with pytest.warns(UserWarning, match=says("block", "vary")):
+            m.linear_modes()
+    else:
+        assert oscillating(m) == pytest.approx([np.sqrt(600.0), *[100.0] * 3], rel=1e-8)
