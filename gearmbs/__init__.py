@@ -20,8 +20,8 @@ Flexible bodies
 Rolling bearings
     `Bearing`, `RollingBearing`
 Mechanisms
-    `Mechanism`, `JointFriction`, `simulate`, `static_equilibrium`, `quasi_static`, `linear_modes`,
-    `Solution`
+    `Mechanism`, `JointFriction`, `simulate`, `Simulator`, `State`, `static_equilibrium`, `quasi_static`,
+    `linear_modes`, `Solution`
 Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals

@@ -19,6 +19,7 @@ from .bearings import Bearing as Bearing
 from .bearings import RollingBearing as RollingBearing
 from .dae import DAEProblem as DAEProblem
 from .dae import DAEResult as DAEResult
+from .dae import State as State
 from .dae import Status as Status
 from .dae import solve_dae as solve_dae
 from .dae.results.solution import Solution as Solution
@@ -39,6 +40,7 @@ from .gears import planetary as planetary
 from .gears import planetary_mechanism as planetary_mechanism
 from .mechanism import JointFriction as JointFriction
 from .mechanism import Mechanism as Mechanism
+from .mechanism import Simulator as Simulator
 from .mechanism import linear_modes as linear_modes
 from .mechanism import quasi_static as quasi_static
 from .mechanism import simulate as simulate

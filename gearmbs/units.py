@@ -48,6 +48,7 @@ SPELLINGS = (
     (r"\bNmm\b", "N*mm"),
     (r"\b(?:RPM|[Uu]/min)\b", "rpm"),
     (r"(?<![A-Za-z_])mils?\b", "thou"),
+    (r"(?<![A-Za-z_])revs?\b", "turn"),
 )
 """Usual ways of writing that the parser of units does not know; a mil, 0.001 inch, it takes for an angle."""
 

@@ -5,3 +5,4 @@ from .result import DAEResult as DAEResult
 from .result import SolverStats as SolverStats
 from .result import Status as Status
 from .solve import solve_dae as solve_dae
+from .state import State as State

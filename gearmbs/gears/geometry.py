@@ -448,8 +448,16 @@ class PairGeometry(Written):
 
     @cached_property
     def normal_backlash(self) -> float:
-        """Backlash j_bn along the line of action at the working centre distance, parallel axes, m."""
+        """Play along the transverse line of action at the working centre distance, parallel axes, m.
+
+        Of spur wheels it is j_bn of ISO 21771; between the flanks of helical ones there is `flank_backlash`.
+        """
         return self.normal_backlash_of(self.centre_distance)
+
+    @cached_property
+    def flank_backlash(self) -> float:
+        """Backlash j_bn between the flanks, along their common normal, m: that in the transverse plane cos(beta_b)."""
+        return self.normal_backlash * math.cos(self.driver.base_helix_angle)
 
     def normal_backlash_of(self, centre_distance: float) -> float:
         """Backlash along the line of action at another centre distance, m."""

@@ -62,7 +62,9 @@ class GearPair(PairGeometry, Shown):
     axial_shift : float or str
         Shift of the driven wheel along global z, m.
     backlash : float or str
-        Normal backlash made by thinning both wheels' teeth equally, m; at the nominal centre distance.
+        Backlash made by thinning both wheels' teeth equally, m, at the nominal centre distance: play along the
+        transverse line of action. Of spur wheels that is the normal backlash; between the flanks of helical ones it
+        is ``backlash cos(beta_b)``, `PairGeometry.flank_backlash`, so divide a drawing's j_bn by cos(beta_b).
     contact : ContactLaw
     friction : FlankFriction
     rotation : {1, -1}

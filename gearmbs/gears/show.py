@@ -66,7 +66,7 @@ def pair_table(pair: Mesh) -> Table:
         ("contact ratio", f"{geometry.contact_ratio:.4f}"),
         *_overlap(geometry),
         ("path of contact", shown(geometry.path_of_contact, "mm", ".3f")),
-        ("normal backlash", shown(geometry.normal_backlash, "mm", ".4f")),
+        ("normal backlash", shown(geometry.flank_backlash, "mm", ".4f")),
         *((f"{name.replace('_', ' ')}", shown(getattr(geometry, name), unit)) for name, unit in _given(geometry)),
         ("misalignment", f"{shown(geometry.misalignment, 'deg', '.3f')} {tilt}".strip()),
         ("load torque, driven wheel", shown(point.torque, "N m", ".1f")),

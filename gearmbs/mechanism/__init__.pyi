@@ -34,3 +34,4 @@ from .solve.analyses import linear_modes as linear_modes
 from .solve.analyses import quasi_static as quasi_static
 from .solve.analyses import static_equilibrium as static_equilibrium
 from .solve.simulate import simulate as simulate
+from .solve.simulator import Simulator as Simulator

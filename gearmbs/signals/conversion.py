@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.signal import DIMENSIONS, common_unit, like, make_signal, rate_of, unit_dimension, units_of
+from gearmbs.signals.signal.signal import DIMENSIONS, common_unit, like, rate_of, unit_dimension, units_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -193,17 +193,7 @@ def force_components(
     e_a = sense * math.cos(pressure_angle) * e_t + math.sin(pressure_angle) * e_c
     vector = force.values[:, [names.index(c) for c in channels]]
     result = np.stack((vector @ e_c, vector @ e_t, vector @ e_a, np.linalg.norm(vector, axis=1)), axis=1)
-    attrs = {k: v for k, v in force.attrs.items() if k not in ("sampling_rate", "units", "speed", "teeth")}
-    return make_signal(
-        result,
-        rate_of(force),
-        units=common_unit(force),
-        channels=COMPONENTS,
-        t0=float(force["time"].values[0]),
-        speed=force.attrs.get("speed"),
-        teeth=force.attrs.get("teeth"),
-        attrs={**attrs, "pressure_angle": pressure_angle},
-    )
+    return like(force, result, channels=COMPONENTS, units=common_unit(force), pressure_angle=pressure_angle)
 
 
 def force_to_acceleration(force: xr.DataArray, mass: float) -> xr.DataArray:

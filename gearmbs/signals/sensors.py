@@ -17,7 +17,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import decimate, resample
-from gearmbs.signals.signal.signal import check_rate, common_unit, like, make_signal, rate_of
+from gearmbs.signals.signal.signal import check_rate, common_unit, like, rate_of
 
 XYZ = ("x", "y", "z")
 DECAY_TIMES = 10.0
@@ -318,14 +318,5 @@ def _direction(direction: Sequence[float]) -> np.ndarray:
     return d / length
 
 
-def _one(like_signal: xr.DataArray, column: np.ndarray, name: str, unit: str) -> xr.DataArray:
-    attrs = {k: v for k, v in like_signal.attrs.items() if k not in ("sampling_rate", "units", "speed", "teeth")}
-    return make_signal(
-        {name: column},
-        rate_of(like_signal),
-        units=unit,
-        t0=float(like_signal["time"].values[0]),
-        speed=like_signal.attrs.get("speed"),
-        teeth=like_signal.attrs.get("teeth"),
-        attrs=attrs,
-    )
+def _one(source: xr.DataArray, column: np.ndarray, name: str, unit: str) -> xr.DataArray:
+    return like(source, column[:, None], channels=[name], units=unit)

@@ -23,7 +23,7 @@ from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.analysis.bands import MIN_PERIODS, harmonic_amplitudes
-from gearmbs.signals.files.simulated import holds_speed, placed_lines
+from gearmbs.signals.files.simulated import holds_speed, placed_lines, with_speed_of
 from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
@@ -416,7 +416,8 @@ def _as_table(value: Any) -> Any:
 def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> xr.DataArray:
     """Return one channel of a drivetrain's record as a signal with speed and teeth, for `analyse` and its like.
 
-    Where the speed of the record is not steady the signal has neither a speed nor known lines.
+    Where the speed of the record is not steady, as in a run-up, the signal has that over time, as the coordinate
+    ``speed`` (rad/s), and no known lines.
 
     Parameters
     ----------
@@ -453,11 +454,10 @@ def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> x
         raise DrivetrainError(f"record: there is no mesh '{mesh}'; known are {', '.join(meshes)}")
     parts = json.loads(record.attrs["train_json"])
     wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
-    steady = holds_speed(record)
-    speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean())) if steady else None
-    lines = {"known_lines": placed_lines(record)} if steady else {}
-    return make_signal(
+    lines = {"known_lines": placed_lines(record)} if holds_speed(record) else {}
+    signal = make_signal(
         values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],
-        t0=float(record.time.values[0]), speed=speed, teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
+        t0=float(record.time.values[0]), teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
         attrs={"source": record.attrs["title"], **lines},
     )  # fmt: skip
+    return with_speed_of(signal, record, wheels[0]["shaft"])

@@ -7,10 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from gearmbs import gear_rig
 from gearmbs.adams import DeckError, parse_deck, read_deck, run_deck, write_deck
 from gearmbs.adams.write.contacts import MARK, pair_comments, pair_of
+from gearmbs.adams.write.gear_expressions import HELD, LEFT_OUT, REFUSED
 from gearmbs.dae.problem import ModelError
-from gearmbs.gears import ContactLaw, FlankFriction, GearPair
+from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Support, planetary, planetary_mechanism
 from gearmbs.gears.faults import BrokenTooth, Crowning, Fault, FlankMap, PitchError, TipRelief
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.mechanism.contacts import (
@@ -208,3 +211,141 @@ def test_comments_hold_a_whole_pair(pair):
     texts = pair_comments(pair)
     assert max(map(len, texts)) <= 120
     assert pair_of("".join(t.removeprefix(MARK) for t in texts)) == pair
+
+
+# Gears as expressions.
+
+
+STIFF = {"contact": ContactLaw.linear("2e8 N/m", "3000 N*s/m", "10 um"), "friction": FlankFriction.none()}
+
+
+def internal():
+    wheels = GearSpec(21, "3 mm", profile_shift=0.2), GearSpec.ring(64, "3 mm", face_width="20 mm")
+    return GearPair(*wheels, backlash="0.1 mm", **STIFF)
+
+
+def written(m):
+    return parse_deck(write_deck(m)).to_mechanism()
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_ring_as_expressions_turns_and_bears_as_it_does(sense):
+    m = gear_rig(internal(), speed=100.0 * sense, run_up=0.01)
+    a, b = (x.simulate(0.003, rate=2000, tol=1e-8, rate_scale=2000.0) for x in (m, written(m)))
+    turned = a.joint_angle("bearing 2")
+    assert sense * turned[-1] > 0.005
+    np.testing.assert_allclose(b.joint_angle("bearing 2"), turned, atol=1e-4 * abs(turned[-1]))
+    for bearing in ("bearing 1", "bearing 2"):
+        force = a.reaction(bearing)[0]
+        assert np.abs(force).max() > 100.0
+        np.testing.assert_allclose(b.reaction(bearing)[0], force, atol=0.02 * np.abs(force).max())
+
+
+def planets(driving="sun", loaded="carrier", **changes):
+    gears = planetary((20, 22, 64), "1.5 mm", 3, backlash_sun="0.05 mm", backlash_ring="0.05 mm", **STIFF)
+    return planetary_mechanism(gears, speeds={driving: 50.0}, torques={loaded: -85.0}, run_up=0.002, **changes)
+
+
+def test_planets_as_expressions_are_seen_from_their_carrier():
+    m = planets()
+    a, b = (x.simulate(0.003, rate=2000, tol=1e-7, rate_scale=2000.0) for x in (m, written(m)))
+    assert a.joint_angle("carrier seat")[-1] > 0.02
+    for joint in ("carrier seat", "planet 1 pin"):
+        np.testing.assert_allclose(b.joint_angle(joint), a.joint_angle(joint), atol=1e-4)
+    # before the first corner meets
+    force = a.reaction("planet 2 pin")[0][:3]
+    np.testing.assert_allclose(b.reaction("planet 2 pin")[0][:3], force, atol=0.02 * np.abs(force).max())
+
+
+def test_axes_that_are_carried_about_without_a_common_carrier_are_refused():
+    with pytest.raises(ModelError, match=says("'sun-planet 1'", "'carrier seat'", 'gears="solids"')):
+        write_deck(planets("carrier", "sun", supports={"sun": Support(1e8)}))
+
+
+@pytest.mark.parametrize("pair", [GearPair.paper(backlash="0.1 mm", **STIFF), internal()], ids=["external", "internal"])
+def test_axes_in_elastic_bearings_move_in_the_expressions_too(pair):
+    m = rig(pair)
+    del m.joints["axle 2"]
+    wheel = m.bodies["wheel 2"]
+    m.bushing("seat", wheel.marker(), m.ground.marker_at(wheel.position, wheel.orientation), stiffness=(2e4, 2e4, 1e8),
+              damping=(50, 50, 500), torsional_stiffness=(1e5, 1e5, 0), torsional_damping=(10, 10, 0))  # fmt: skip
+    a, b = (x.simulate(0.006, rate=2000, tol=1e-8, rate_scale=1000.0) for x in (m, written(m)))
+    moved = a.com_position("wheel 2") - wheel.position
+    assert np.abs(moved).max() > 2e-5
+    np.testing.assert_allclose(b.com_position("wheel 2") - wheel.position, moved, atol=0.02 * np.abs(moved).max())
+
+
+def test_each_field_of_a_pair_is_held_left_out_or_refused():
+    pair = GearPair.paper()
+    own = {f"{owner}.{f.name}" for owner, thing in (
+        ("GearPair", pair), ("GearSpec", pair.driver), ("ContactLaw", pair.contact),
+    ) for f in dataclasses.fields(thing)}  # fmt: skip
+    assert own == {*HELD, *LEFT_OUT, *REFUSED}
+    assert len(own) == len(HELD) + len(LEFT_OUT) + len(REFUSED)
+
+
+def helical(hand):
+    return GearSpec(29, "3 mm", helix_angle="12 deg", hand=hand)
+
+
+UNWRITTEN = {
+    "GearPair.axial_shift": lambda: GearPair.paper(backlash="0.1 mm", axial_shift="5 mm"),
+    "GearPair.root_contact": lambda: GearPair.paper(
+        centre_distance_error="-0.8 mm", backlash="0.8 mm", root_contact=True
+    ),
+    "GearPair.stiffness_curve": lambda: GearPair.paper().with_potential_energy_stiffness(),
+    "GearPair.faults": lambda: GearPair.paper(backlash="0.1 mm", faults=(BrokenTooth(), TipRelief())),
+    "GearSpec.helix_angle": lambda: GearPair(helical("right"), helical("left"), backlash="0.1 mm"),
+    "ContactLaw.kind": lambda: GearPair.paper(contact=ContactLaw.hunt_crossley()),
+}
+
+
+@pytest.mark.parametrize("field", REFUSED)
+@pytest.mark.filterwarnings("ignore:GearPair")
+def test_what_expressions_cannot_hold_is_refused_by_name(field):
+    solids = field not in ("GearPair.stiffness_curve", "ContactLaw.kind")
+    with pytest.raises(ModelError, match=says("'mesh'", field, *['gears="solids"'] * solids)):
+        write_deck(rig(UNWRITTEN[field]()))
+
+
+def test_faults_are_refused_by_their_names_and_other_places_too():
+    with pytest.raises(ModelError, match=says("BrokenTooth, TipRelief")):
+        write_deck(rig(UNWRITTEN["GearPair.faults"]()))
+    m = rig(PAIRS["plain"])
+    m.elements["mesh"].pair = PAIRS["plain"].with_changes(centre_distance_error="0.2 mm")
+    with pytest.raises(ModelError, match=says("mm apart", "centre_distance_error")):
+        write_deck(m)
+
+
+# Drivetrains.
+
+
+def train(bearings=("40 mm",), loads=()):
+    wheels = {name: GearSpec(z, "3 mm", face_width="20 mm") for name, z in (("w1", 21), ("w2", 53))}
+    return Drivetrain(
+        "t",
+        shafts=[Shaft(name=name, length="80 mm", radius="10 mm", mass="1 kg") for name in ("in", "out")],
+        wheels=[Wheel(name=n, shaft=s, station="40 mm", gear=wheels[n]) for n, s in (("w1", "in"), ("w2", "out"))],
+        meshes=[GearMesh(name="m", driver="w1", driven="w2", direction="130 deg", settings={"backlash": "0.1 mm"})],
+        bearings=[IdealBearing(name=f"{s} {k}", shaft=s, station=z) for s in ("in", "out")
+                  for k, z in enumerate(bearings)],
+        drives=[SpeedDrive(name="dr", shaft="in", speed="-500 rpm")], loads=loads, running=True,
+    )  # fmt: skip
+
+
+def test_the_speed_drive_of_a_shaft_in_one_ideal_bearing_comes_back():
+    m = train().build()
+    m.torque("load", m.bodies["out"], -20.0)
+    back = written(m)
+    a, b = (x.simulate(0.002, rate=2000, tol=1e-7, rate_scale=1000.0) for x in (m, back))
+    speed = a.angular_velocity("in")[:, 2]
+    np.testing.assert_allclose(speed, -500.0 * np.pi / 30.0, rtol=1e-6)
+    np.testing.assert_allclose(b.angular_velocity("in")[:, 2], speed, rtol=1e-6)
+    np.testing.assert_allclose(b.joint_angle("in 0"), a.joint_angle("in 0"), atol=1e-9)
+
+
+def test_what_a_deck_has_not_of_a_drivetrain_is_named():
+    with pytest.raises(ModelError, match=says("dr.I", "'in'", "IdealBearing")):
+        write_deck(train(("10 mm", "70 mm")).build())
+    with pytest.raises(ModelError, match=says("load 'ld'", "Mechanism.load")):
+        write_deck(train(loads=[TorqueLoad(name="ld", shaft="out", torque="20 N m")]).build())

@@ -80,6 +80,16 @@ def test_backlash_by_thinning_adds_up():
     assert pair.normal_backlash / MM == pytest.approx(0.8120, abs=6e-5)
 
 
+@pytest.mark.parametrize("helix", [0.0, 0.2, math.radians(25.0)])
+def test_backlash_between_flanks_is_that_of_tooth_thicknesses(helix):
+    """At nominal centre distance j_bn = j_t cos(alpha_n) cos(beta), with j_t on the pitch circles."""
+    one, two = (GearSpec(z, "2 mm", helix_angle=helix, hand=h) for z, h in ((25, "left"), (40, "right")))
+    geometry = GearPair(one, two, backlash="0.4 mm").geometry
+    expected = geometry.circumferential_backlash * math.cos(math.radians(20.0)) * math.cos(helix)
+    assert geometry.flank_backlash == pytest.approx(expected, rel=1e-12)
+    assert (geometry.flank_backlash < 0.3999 * MM) == (helix > 0.0)
+
+
 def test_contact_ratio_of_62_62():
     # the potential-energy code of ROSS gives 1.78978 for m = 2 mm
     assert GearPair(GearSpec(62, "2 mm"), GearSpec(62, "2 mm")).contact_ratio == pytest.approx(1.78978, abs=6e-6)

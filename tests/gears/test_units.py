@@ -259,6 +259,9 @@ def test_commas_in_numbers_are_refused(text):
         ("3 mils", "length", 7.62e-5),
         ("0.5mil", "length", 1.27e-5),
         ("2 mil/s", "speed", 5.08e-5),
+        ("25 rev/s", "angular speed", 50.0 * math.pi),
+        ("1500 rev/min", "angular speed", 50.0 * math.pi),
+        ("2 revs", "angle", 4.0 * math.pi),
         ("2 milliradian", "angle", 2e-3),
     ],
 )

@@ -20,6 +20,7 @@ from gearmbs.signals import (
     remove_average,
     spectrum,
     with_metadata,
+    with_speed,
 )
 from gearmbs.signals.diagnosis.bearing_judgement import EnvelopeSpectrum, find_lines, judge, log_tail, power_of
 from gearmbs.signals.diagnosis.bearing_report import PartFinding
@@ -187,6 +188,9 @@ def test_speed_that_varies_is_followed_in_angle():
     assert diagnose_bearing(data, "6205", f"{SHAFT} Hz").fault != "inner race"
     points = [(t, 2.0 * np.pi * s) for t, s in zip(TIME[::200], speed[::200])]
     assert diagnose_bearing(data, "6205", points).fault == "outer race"
+    own = diagnose_bearing(with_speed(data, points), "6205")
+    assert own.fault == "outer race"
+    assert own.shaft == pytest.approx(float(speed.mean()), rel=1e-3)
 
 
 def test_own_band_and_its_limits():

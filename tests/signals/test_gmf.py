@@ -23,6 +23,7 @@ from gearmbs.signals import (
     scale_states,
     spectrum,
 )
+from tests.says import says
 
 
 def periodic(rate, gmf, amplitudes, seconds=1.0, mean=0.0, phase=0.3):
@@ -94,6 +95,22 @@ def test_harmonic_amplitude_and_phase(order, phase, amplitude, periods):
     x = 5.0 + amplitude * np.cos(2 * np.pi * order * f * t + phase)
     c = harmonic_amplitudes(x[:, None], rate, f, np.array([order]))[0, 0]
     assert abs(c - amplitude * np.exp(1j * phase)) < 2e-4 * (amplitude + 5.0 / periods)
+
+
+@pytest.mark.parametrize("name", ["speed", "angle"])
+def test_gmf_of_a_speed_that_varies_asks_for_a_constant_one(name):
+    """A part of the record at one speed is the twin, and so is a speed that is given."""
+    t = np.arange(25600) / 12800.0
+    speed = np.where(t < 1.0, 50.0 + 50.0 * t, 100.0)
+    angle = np.cumsum(speed) / 12800.0
+    signal = make_signal(np.cos(30.0 * angle), 12800.0, teeth=30)
+    signal = signal.assign_coords({name: ("time", speed if name == "speed" else angle)})
+    with pytest.raises(SignalError, match=says("speed", "477.", "954.", "constant", "pass")):
+        gmf_rms(signal)
+    late = signal.isel(time=slice(12801, None))
+    levels = gmf_rms(late, harmonics=1)
+    assert float(levels["orders"][0, 0]) == pytest.approx(np.sqrt(0.5), rel=1e-3)
+    assert gmf_rms(signal, speed=100.0).attrs["gmf"] == pytest.approx(levels.attrs["gmf"])
 
 
 def test_gmf_asks_for_missing_metadata_by_name():

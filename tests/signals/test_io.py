@@ -505,3 +505,76 @@ def test_parquet_keeps_speed_and_teeth(tmp_path):
     assert tuple(found.attrs["teeth"]) == tuple(signal.attrs["teeth"])
     write_signal(make_signal(np.arange(20.0), 1000.0), tmp_path / "y.parquet")
     assert not {"speed", "teeth"} & set(read_signal(tmp_path / "y.parquet").attrs)
+
+
+# How the shaft turns over time, beside the channels.
+
+
+def turning(n=600):
+    t = 0.25 + np.arange(n) / 12800.0
+    signal = example(n, 12800.0)
+    signal.attrs.pop("speed")
+    angle = 2.0 * np.pi * (30.0 * t + 5.0 * t**2)
+    return signal.assign_coords(
+        speed=("time", 2.0 * np.pi * (30.0 + 10.0 * t), {"units": "rad/s"}), angle=("time", angle, {"units": "rad"})
+    )
+
+
+@pytest.mark.parametrize("format", [*NAMES, "npy", "parquet"])
+def test_speed_and_angle_over_time_read_back(tmp_path, format):
+    if format == "parquet":
+        pytest.importorskip("pyarrow")
+    signal = turning()
+    path = write_signal(
+        signal, tmp_path / {"npy": "x.npz", "parquet": "x.pq"}.get(format, NAMES.get(format)), format=format
+    )
+    for back in (read_signal(path, format=format), read_signal(path, format=format, channels=["force, y"], teeth=29)):
+        for name in ("speed", "angle"):
+            np.testing.assert_array_equal(back[name], signal[name])
+            assert back[name].attrs == signal[name].attrs
+        assert "speed" not in back.attrs
+    assert_same(read_signal(path, format=format), signal, attrs=format in KEEPS_ATTRS)
+    assert back["channel"].values.tolist() == ["force, y"]
+    np.testing.assert_array_equal(back.values[:, 0], signal.values[:, 1])
+    # section by section, of one channel as of all
+    parts = list(sections(path, 0.02, format=format, channels=["aux"]))
+    assert len(parts) == 2
+    np.testing.assert_array_equal(np.concatenate([part["speed"] for part in parts]), signal["speed"][: 2 * 256])
+    # the twin: a constant speed that is given wins, as over one that is written
+    steady = read_signal(path, format=format, speed="1500 rpm")
+    assert steady.attrs["speed"] == pytest.approx(50.0 * np.pi)
+    assert set(steady.coords) == {"time", "channel", "units"}
+
+
+def test_channels_of_speed_stay_channels(tmp_path):
+    """All but one that would be read as the shaft's own, which is refused with its name."""
+    data = {"x": [1.0, 2.0], "speed": [3.0, 4.0], "speed over time": [5.0, 6.0]}
+    signal = make_signal(data, 100.0, units=["N", "rad/s", "rpm"])
+    back = read_signal(write_signal(signal, tmp_path / "x.csv"))
+    assert_same(back, signal)
+    assert set(back.coords) == {"time", "channel", "units"}
+    with pytest.raises(SignalError, match=says("channels", "'speed over time'", "another", "read back")):
+        write_signal(make_signal(data, 100.0, units="rad/s"), tmp_path / "y.csv")
+    assert not (tmp_path / "y.csv").exists()
+    alone = make_signal({"speed over time": [5.0, 6.0]}, 100.0, units="rad/s")
+    assert_same(read_signal(write_signal(alone, tmp_path / "z.csv")), alone)
+
+
+def test_gaps_cut_the_speed_as_the_samples(tmp_path):
+    signal = turning()
+    path = write_signal(signal, tmp_path / "x.csv")
+    lines = path.read_text().splitlines()
+    head = len(lines) - 600
+    lines[head + 99] = "," + lines[head + 99].partition(",")[2]
+    path.write_text("\n".join(lines) + "\n")
+    back = read_signal(path, gaps="longest")
+    assert back.sizes["time"] == 500
+    np.testing.assert_array_equal(back["speed"], signal["speed"][100:])
+
+
+def test_uff_leaves_no_file_open(tmp_path):
+    pytest.importorskip("pyuff")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        write_signal(example(), tmp_path / "x.uff")
+    assert not said

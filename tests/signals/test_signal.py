@@ -1,20 +1,52 @@
 """The signal type: shapes, metadata, errors that name what is wrong."""
 
+import inspect
+
 import numpy as np
 import pytest
 import xarray as xr
 
+from gearmbs import signals
 from gearmbs.signals import (
     MissingMetadataError,
+    ModalPath,
+    Mode,
     SignalError,
+    accelerometer,
+    add_noise,
+    analyse,
     as_signal,
+    bandpass,
     common_unit,
+    convert,
+    decimate,
+    discrete_random,
+    edit_cepstrum,
+    envelope,
+    force_components,
+    force_to_acceleration,
+    joint_force,
+    laser_vibrometer,
+    level_lines,
     make_signal,
+    measure,
     mesh_frequency,
+    prewhiten,
+    quantise,
     rate_of,
+    remove_average,
+    remove_mean,
+    resample,
+    sample,
+    scale,
+    scale_states,
+    sections,
+    shaft_phase,
+    to_signal,
     trim,
     units_of,
     with_metadata,
+    with_speed,
 )
 from tests.says import says
 
@@ -102,3 +134,95 @@ def test_trim_and_metadata_changes():
     assert common_unit(s) == "unknown"
     with pytest.raises(SignalError, match="sampling_rate"):
         with_metadata(s, rate=5.0)
+
+
+# What a signal that is made of another one keeps: all but the samples, and the speed over time at its own times.
+
+
+def turning_signal(seconds=1.0, rate=12800.0):
+    """Forces of a shaft that runs up from 30 Hz at t = 5 s by 10 Hz a second, with its angle."""
+    t = 5.0 + np.arange(round(seconds * rate)) / rate
+    angle = 2.0 * np.pi * revolutions(t)
+    x = np.stack([np.cos(29.0 * angle), np.sin(angle), np.cos(3.0 * angle)], axis=1)
+    x += 0.1 * np.random.default_rng(0).standard_normal(x.shape)
+    signal = make_signal(x, rate, units="N", channels=["x", "y", "z"], t0=5.0, teeth=(29, 31), attrs={"source": "rig"})
+    turning = with_speed(signal, [(5.0, 2.0 * np.pi * 30.0), (9.0, 2.0 * np.pi * 70.0)])
+    return turning.assign_coords(angle=("time", angle, {"units": "rad"}))
+
+
+def revolutions(t):
+    return 30.0 * (t - 5.0) + 5.0 * (t - 5.0) ** 2
+
+
+PATH = ModalPath((Mode(2000.0, 0.05, 1.0),))
+PARTS = {
+    "accelerometer": lambda s: accelerometer(s, PATH),
+    "add_noise": lambda s: add_noise(s, seed=1, rms=0.1),
+    "as_signal": as_signal,
+    "bandpass": lambda s: bandpass(s, 300.0, 2000.0, transition=100.0),
+    "convert": lambda s: convert(with_metadata(s, units="m/s^2"), "velocity", band=(100.0, 3000.0)),
+    "decimate": lambda s: decimate(s, 6400.0),
+    "discrete_random": lambda s: discrete_random(s)[1],
+    "edit_cepstrum": lambda s: edit_cepstrum(s, 30.0),
+    "envelope": lambda s: envelope(s, (300.0, 2000.0)),
+    "force_components": lambda s: force_components(s, pressure_angle=0.35),
+    "force_to_acceleration": lambda s: force_to_acceleration(s, 2.0),
+    "joint_force": lambda s: joint_force(s, (1.0, 0.0, 0.0)),
+    "laser_vibrometer": lambda s: laser_vibrometer(s, (1.0, 0.0, 0.0)),
+    "level_lines": lambda s: level_lines(s, 200.0),
+    "measure": lambda s: measure(s, rate=10000.0, noise_rms=0.1, bits=16, full_scale=10.0),
+    "prewhiten": prewhiten,
+    "quantise": lambda s: quantise(s, bits=16, full_scale=10.0),
+    "remove_average": lambda s: remove_average(s, shaft_phase(s))[1],
+    "remove_mean": remove_mean,
+    "resample": lambda s: resample(s, 10000.0),
+    "sample": lambda s: sample(s, 4266.0 + 2.0 / 3.0),
+    "scale": lambda s: scale(s, 2.0),
+    "scale_states": lambda s: scale_states({"healthy": s, "cracked": s}, 2.0, channel="x")["cracked"],
+    "sections": lambda s: list(sections(s, 0.4))[1],
+    "to_signal": lambda s: to_signal(s, channels=["x"]),
+    "trim": lambda s: trim(s, 5.2),
+    "with_metadata": lambda s: with_metadata(s, units="kN"),
+}
+NO_PARTS = {
+    "made of samples or files": "even_signal make_signal read_signal",
+    "given another speed": "with_speed",
+    "over angle": "angular_resample difference_signal regular_signal remove_orders residual_signal planetary_average "
+    "time_synchronous_average",
+    "angles and speeds": "instantaneous_speed phase_from_line phase_from_speed phase_from_tacho shaft_phase",
+    "over frequency, order or channel": "band_rms dynamic_rms envelope_spectrum mesh_bands order_map order_rms "
+    "order_spectrum order_track power_cepstrum spectral_kurtosis spectrogram spectrum waterfall",
+}
+
+
+def test_every_function_that_returns_a_signal_is_tried():
+    """A new one that returns arrays belongs into one of the two tables."""
+    functions = {name: getattr(signals, name) for name in dir(signals) if inspect.isfunction(getattr(signals, name))}
+    arrays = {name for name, f in functions.items() if "DataArray" in str(inspect.signature(f).return_annotation)}
+    assert arrays == {*PARTS, *" ".join(NO_PARTS.values()).split()}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_what_is_made_of_a_signal_keeps_how_the_shaft_turns(name):
+    made = PARTS[name](turning_signal())
+    t = made["time"].values
+    assert t.size > 1000
+    np.testing.assert_allclose(made["speed"], 2.0 * np.pi * (30.0 + 10.0 * (t - 5.0)), rtol=1e-9)
+    # between samples an angle is a straight line
+    np.testing.assert_allclose(made["angle"], 2.0 * np.pi * revolutions(t), atol=1e-5)
+    assert (made["speed"].attrs["units"], made["angle"].attrs["units"]) == ("rad/s", "rad")
+    assert made.attrs["teeth"] == (29, 31)
+    assert made.attrs["source"] == "rig"
+    assert "speed" not in made.attrs
+    # the twin of constant speed keeps that, and has none over time
+    plain = turning_signal().drop_vars(["speed", "angle"])
+    steady = PARTS[name](with_metadata(plain, speed=200.0))
+    assert steady.attrs["speed"] == 200.0
+    assert set(steady.coords) == {"time", "channel", "units"}
+
+
+def test_a_constant_speed_that_is_given_replaces_the_one_over_time():
+    for steady in (with_metadata(turning_signal(), speed=200.0), to_signal(turning_signal(), speed="200 rad/s")):
+        assert set(steady.coords) == {"time", "channel", "units"}
+        assert analyse(steady, channels=["x"]).speed == pytest.approx(200.0)
+    assert "speed" in with_metadata(turning_signal(), teeth=29).coords

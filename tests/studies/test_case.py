@@ -301,6 +301,20 @@ def test_speed_and_torque_as_curves(tmp_path):
     assert case.changed(operation={"speed": [[0, 0], [3, "3000 rpm"]]}).operation.duration == 3.0
 
 
+def test_a_duration_that_a_new_curve_replaces_is_named():
+    """One that is given beside the curve, one that was never given, and one beside a new constant speed are not."""
+    curve, case = [[0, "500 rpm"], ["0.3 s", "1500 rpm"]], Case(operation={"duration": "0.2 s"})
+    with pytest.warns(CaseWarning, match=says("operation.duration", "'0.2 s'", "give", "curve")):
+        assert case.changed(operation={"torque": [[0, 10.0], [0.4, 50.0]]}).operation.duration == 0.4
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert case.changed(operation={"speed": curve, "duration": "0.2 s"}).operation.duration == 0.2
+        assert case.changed(operation={"speed": "1500 rpm"}).operation.duration == 0.2
+        up = Case().changed(operation={"speed": curve})
+        assert up.operation.duration == 0.3
+        assert up.changed(operation={"speed": [[0, "500 rpm"], [0.5, "900 rpm"]]}).operation.duration == 0.5
+
+
 @pytest.mark.parametrize(
     ("data", "words"),
     [

@@ -20,12 +20,14 @@ from gearmbs.drivetrain import (
     Laser,
     Mount,
     RunSettings,
+    SpeedDrive,
     SpeedSensor,
     TorqueDrive,
     TorqueLoad,
     TorqueSensor,
 )
-from gearmbs.signals import analyse
+from gearmbs.saving import save
+from gearmbs.signals import analyse, order_track, to_signal
 from gearmbs.signals.analysis.bands import harmonic_amplitudes
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.studies import run_train, run_trains, train_report, train_scene, train_signal, train_spectrum
@@ -280,6 +282,45 @@ def test_a_motor_with_slip_has_its_lines_at_its_own_speed():
     assert json.loads(train_signal(record, "force of mesh").attrs["known_lines"])["1 x GMF of mesh"] == pytest.approx(
         float(levels.mesh_frequency), rel=1e-3
     )
+
+
+def test_signals_of_a_run_up_have_its_speed_over_time(tmp_path, train, record):
+    """Their orders are those of the record's own tracks; from a file it is the same. A steady record has one speed."""
+    drive = SpeedDrive(name="motor", shaft="in", speed="1500 rpm", curve=[["20 ms", "500 rpm"], ["0.3 s", "1500 rpm"]])
+    up = stage(drives=[drive], sensors=[SpeedSensor(name="speed", shaft="out")], running=True)
+    found = run_train(up, RunSettings(settling=0.02, duration=0.28, tolerance=5e-6))
+    signal = train_signal(found, "force of mesh")
+    assert "speed" not in signal.attrs
+    assert "known_lines" not in signal.attrs
+    np.testing.assert_array_equal(signal["speed"], found.speed.sel(shaft="in"))
+    report = analyse(signal)
+    assert np.array(report.speed_range) * 30 / np.pi == pytest.approx([500.0, 1500.0], rel=1e-3)
+    track = found.mesh_track.sel(signal="force of mesh", mesh="mesh", harmonic=1).values
+    # windows of a revolution, of the track of some mesh cycles
+    level = np.sqrt(np.mean(order_track(signal, orders=[20], scaling="rms", revolutions=1.0).values ** 2))
+    assert level == pytest.approx(np.sqrt(np.nanmean(track**2)), rel=0.15)
+    sensed = to_signal(save(found, tmp_path / "up.nc"))
+    assert "speed" not in sensed.attrs
+    np.testing.assert_array_equal(sensed["speed"], signal["speed"])
+    assert to_signal(tmp_path / "up.nc", speed="900 rpm").attrs["speed"] == pytest.approx(30.0 * np.pi)
+    for steady in (train_signal(record, "seat"), to_signal(save(record, tmp_path / "steady.nc"), channels=["seat"])):
+        assert steady.attrs["speed"] == pytest.approx(train.speeds["in"], rel=1e-4)
+        assert "speed" not in steady.coords
+        assert "known_lines" in steady.attrs
+
+
+def test_a_shaft_that_turns_back_has_no_speed_for_its_lines(train, record):
+    """One that only swings at rest has, with zero there."""
+    turning = record["speed"].copy()
+    swings, back = turning.copy(), turning.copy()
+    swings.loc[{"shaft": "in"}] = -np.linspace(-0.1, 100.0, turning.sizes["time"])
+    back.loc[{"shaft": "in"}] = np.linspace(-50.0, 100.0, turning.sizes["time"])
+    moving = record.assign_attrs(speed_is_steady=0)
+    speed = train_signal(moving.assign(speed=swings), "seat")["speed"]
+    assert (float(speed[0]), float(speed[-1])) == (0.0, 100.0)
+    signal = train_signal(moving.assign(speed=back), "seat")
+    assert "speed" not in signal.coords
+    assert "speed" not in signal.attrs
 
 
 def test_levels_follow_the_angle_where_the_speed_drifts():

@@ -11,7 +11,6 @@ from typing import Any, Literal
 import numpy as np
 
 from gearmbs.adams.parse.deck import TABLES
-from gearmbs.adams.write.contacts import is_gear_contact
 from gearmbs.adams.write.elements import (
     as_expressions,
     constraint_statements,
@@ -25,6 +24,7 @@ from gearmbs.adams.write.elements import (
     nearest_node,
     states_of,
 )
+from gearmbs.adams.write.gear_expressions import is_gear_contact
 from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
 from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
 from gearmbs.dae.methods import FORMULATIONS, INTEGRATORS
@@ -232,10 +232,11 @@ def write_deck(
 ) -> str:
     """Write a mechanism as an .adm file, in the mechanism's units.
 
-    Contacts of solids become GRAPHICS and CONTACTs, meshes .obj files beside the deck. Contacts of gears with parallel
-    axes become GFORCEs of IMPACT expressions along both lines of action; their friction and the contact of tooth
-    corners beyond the path of contact are left out, as comments say. Or they become CONTACTs of solids. Bodies that
-    deform by modes become FLEX_BODYs with modal neutral files beside the deck.
+    Contacts of solids become GRAPHICS and CONTACTs, meshes .obj files beside the deck. Contacts of spur gears with
+    parallel axes become GFORCEs of IMPACT expressions along both lines of action; their friction and the contact of
+    tooth corners beyond the path of contact are left out, as comments say. Or they become CONTACTs of solids, which
+    hold helices, faults and axial shifts, too. Bodies that deform by modes become FLEX_BODYs with modal neutral files
+    beside the deck.
 
     Parameters
     ----------

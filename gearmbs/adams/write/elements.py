@@ -16,7 +16,8 @@ import numpy as np
 from gearmbs.adams.builders.constraints import JOINT_KINDS, JPRIM_KINDS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
-from gearmbs.adams.write.contacts import contact_statements, gear_solid_statements, gear_statements, is_gear_contact
+from gearmbs.adams.write.contacts import contact_statements, gear_solid_statements
+from gearmbs.adams.write.gear_expressions import gear_statements, is_gear_contact
 from gearmbs.adams.write.text import COMPONENTS, COMPONENTS_OF, WriterContext, listed, number, upper
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 INVARIANTS = {"full": "TTTTTTTTT", "partial": "TTTTFTTTF", "constant": "TTTTFTTFF"}
 """Inertia invariants that a level of coupling keeps; the reader knows the same."""
+SAME = 1e-9
+"""Difference of axes, and distance of places, m, up to which they are the same: rounding of a model's places."""
 RIGID = 6
 """Rigid motions, which come first in the neutral files written here."""
 
@@ -283,10 +286,32 @@ def _joint_type(w: WriterContext, joint: Joint) -> list[str]:
 
 
 def _joint_id(w: WriterContext, i: Marker, j: Marker) -> int:
+    """Return the id of the JOINT between two markers, or of one about their axis that measures the same angle.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
     for name, joint in w.mechanism.joints.items():
         if joint.i is i and joint.j is j and joint_statement(joint) == "JOINT":
             return w.elements["joint", name]
-    raise ModelError(f"no joint connects {i.name} and {j.name}; a motion or coupler of it cannot be written")
+    for name, joint in w.mechanism.joints.items():
+        between = joint.i.body is i.body and joint.j.body is j.body
+        if joint.kind == "revolute" and between and _along(joint.i, i) and _along(joint.j, j):
+            return w.elements["joint", name]
+    raise ModelError(
+        f"no joint connects {i.name} and {j.name}; a motion or coupler of it cannot be written: it needs a revolute "
+        f"joint about that axis between '{i.body.name}' and '{j.body.name}', in a drivetrain a shaft with one "
+        "IdealBearing"
+    )
+
+
+def _along(one: Marker, two: Marker) -> bool:
+    """Whether two markers of a body have the same axes but for rounding, and one z axis."""
+    axes = two.global_orientation()
+    apart = axes.T @ (one.global_position() - two.global_position())
+    return bool(np.abs(axes - one.global_orientation()).max() <= SAME and np.abs(apart[:2]).max() <= SAME)
 
 
 def _coupler(w: WriterContext, joint: Joint) -> list[str]:

@@ -24,6 +24,7 @@ from gearmbs.dae.integrators.messages import WINDOW, Chatter
 from gearmbs.dae.integrators.options import Options, output_times
 from gearmbs.dae.integrators.records import Records
 from gearmbs.dae.integrators.step import advance
+from gearmbs.dae.integrators.stepping.memory import Pivots, continue_run
 from gearmbs.dae.linalg.entry_lists import (
     FEWEST_ENTRIES,
     LEAVING_PLANS,
@@ -98,6 +99,9 @@ class Run:
         )
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None
+        self.pivots: Pivots | None = None
+        if options.history is not None:
+            continue_run(self, options.history)
 
     def repivot(self, exactly: bool = False) -> tuple[Status, str] | None:
         """Choose new pivots for the current Newton matrix; return a failure or None.
@@ -118,9 +122,10 @@ class Run:
                 problem, t, int(self.indices[bad[0]]), "the Jacobian of equation"
             )
         try:
-            drop = DROP_TOLERANCES[st.drop_level]
+            drop, counted = DROP_TOLERANCES[st.drop_level], self._entries_to_leave()
+            self.pivots = Pivots(st.matrix.copy(), drop, negligible, None if counted is None else counted.copy())
             self.plan = analyse(
-                self.indptr, self.indices, st.matrix, self.scale, drop, self._entries_to_leave(), negligible,
+                self.indptr, self.indices, st.matrix, self.scale, drop, counted, negligible,
                 with_tail=problem.small_entries,
             )  # fmt: skip
             st.gamma_planned = st.gamma
@@ -241,6 +246,8 @@ class Run:
                 return ending
             if code == s.RUNNING:
                 self._report()
+                if self.state.t >= self.state.t_pause:
+                    return Status.SUCCESS, Status.SUCCESS.sentence
                 if few < chunk:
                     continue
                 elapsed = time.perf_counter() - tic

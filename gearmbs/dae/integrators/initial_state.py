@@ -131,6 +131,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     _set_tolerances(st, problem, options, t_end - t0)
     _set_event_rules(st, n_events, options)
     st.t_end = t_end
+    st.t_pause = np.inf
     st.h_max = np.inf if options.max_step is None else options.max_step
     st.rtol = options.rtol
     st.rate_allowed = RATE_ALLOWED_IF_DEAR if problem.jacobian_residuals >= DEAR else RATE_ALLOWED

@@ -12,6 +12,7 @@ import numpy as np
 
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, Integrator
 from gearmbs.dae.problem import EPS
+from gearmbs.dae.state import History
 
 CORRECTORS = ("original", "modified")
 
@@ -85,6 +86,9 @@ class Options:
         holds nothing but the last step.
     error_probe : callable, optional
         Returns the exception that a Python callback has stored, or None.
+    history : History, optional
+        Of the `gearmbs.dae.State` that the problem starts in: the run goes on with it, by the same method, instead of
+        starting afresh.
 
     Raises
     ------
@@ -113,6 +117,7 @@ class Options:
     progress: Callable[[float], None] | None = None
     consumer: Consumer | None = None
     error_probe: Callable[[], BaseException | None] | None = None
+    history: History | None = None
 
     def __post_init__(self) -> None:
         _check_choice("method", self.method, INTEGRATORS)

@@ -489,7 +489,7 @@ def close_step(functions, st):
     error_model="numpy",
 )
 def advance(bound, st, part, plan, factors, max_accepted):
-    """Take at most ``max_accepted`` accepted steps.
+    """Take at most ``max_accepted`` accepted steps, none after one that ends at ``st.t_pause`` or later.
 
     Parameters
     ----------
@@ -510,7 +510,7 @@ def advance(bound, st, part, plan, factors, max_accepted):
     """
     functions = unbound(bound)
     accepted = 0
-    while accepted < max_accepted:
+    while accepted < max_accepted and st.t < st.t_pause:
         code = open_step(st)
         if code == s.RUNNING:
             code = take_block(functions, st, plan, factors)

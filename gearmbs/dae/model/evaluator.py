@@ -118,7 +118,20 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def write_row(k, at, multipliers, forces, moments, pose, idata, tab):
-    """Write reactions and pose of row k from its unknowns ``at`` and up-to-date tables; the pose is a row already."""
+    """Write reactions and pose of one row of the records.
+
+    Parameters
+    ----------
+    k : int
+        Row.
+    at, multipliers : ndarray
+        Its unknowns, with which the tables are up to date, and its multipliers.
+    forces, moments : ndarray
+        All rows of reactions one after the other, written.
+    pose : ndarray
+        Its poses, written.
+    idata, tab : ndarray of int, Tables
+    """
     rows = idata[T.H_ROWS]
     force, moment = matrix_at(forces, 3 * rows * k, rows, 3), matrix_at(moments, 3 * rows * k, rows, 3)
     loads_of_rows(multipliers, idata, tab, force, moment)

@@ -24,6 +24,7 @@ from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.frames import Evaluated
+from gearmbs.dae.state import State
 from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
@@ -106,6 +107,8 @@ class Solution(Shown):
     inside : mapping of float
         Of the start and the end of a run, s, times next to them within it. A table or an expression may begin or end
         there: accelerations, reactions and loads that jump at an end are those of the inside.
+    initial : State or None
+        The state that the run started in, if it was given one.
     """
 
     inside: Mapping[float, float] = MappingProxyType({})
@@ -123,6 +126,7 @@ class Solution(Shown):
         self.result = result
         self.members = members
         self.remark = remark
+        self.initial: State | None = None
         self.t = result.t
         self._shared: tuple[Fills, outputs.Records] | None = None
         samples = np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES))
@@ -319,8 +323,9 @@ class Solution(Shown):
 
     # --- access by name -----------------------------------------------------------------------------
 
-    def _body(self, name: str) -> int:
-        names = self.system.model.names.bodies
+    def _body(self, body) -> int:
+        """Return the number of a body, given as such or by its name."""
+        names, name = self.system.model.names.bodies, getattr(body, "name", body)
         try:
             return names.index(name)
         except ValueError:
@@ -371,7 +376,8 @@ class Solution(Shown):
         return _sum_of_rows(self._records.force, self._rows_of_joint(joint))
 
     def _rows_of_joint(self, joint: str) -> list[int]:
-        """Return the numbers of the constraint rows of a joint."""
+        """Return the numbers of the constraint rows of a joint, given as such or by its name."""
+        joint = getattr(joint, "name", joint)
         rows = self.system.model.rows_of_joint.get(joint)
         if rows is None:
             known = sorted(self.system.model.rows_of_joint)
@@ -475,6 +481,23 @@ class Solution(Shown):
         may have been added to the bodies after the run.
         """
         return self._measures().expression(expression)
+
+    def state_at(self, t: float) -> State:
+        """Return the state at a time, s, to start another run from; it has no history of the integrator.
+
+        Parameters
+        ----------
+        t : float
+            An output time, or with ``dense_output`` any time of the run.
+
+        Raises
+        ------
+        ModelError
+            For other times, for a solution without rates, and where turns cannot be told from the outputs.
+        """
+        from gearmbs.dae.results.states import state_at
+
+        return state_at(self, t)
 
     @property
     def multipliers(self) -> np.ndarray:

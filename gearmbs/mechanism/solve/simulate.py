@@ -20,6 +20,7 @@ from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
+from gearmbs.dae.state import State
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
     locking_remark,
@@ -152,6 +153,7 @@ def simulate(
     lump: bool | None = None,
     stops: Sequence[StopAt] = (),
     continued: bool = False,
+    initial: State | None = None,
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -200,6 +202,9 @@ def simulate(
     continued : bool
         Whether the start is a state in which an earlier run ended: teeth may then be deep in an impact, which else is
         refused.
+    initial : State, optional
+        Start from a state of this mechanism, at its time; see `Solution.state_at` and `gearmbs.Simulator`. With the
+        history of the same integrator the run goes on as if it had never stopped, otherwise it starts afresh.
     **options
         Handed to the integrator.
 
@@ -217,16 +222,20 @@ def simulate(
     """
     if consumer is not None and not every_step:
         raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
-    t_start = quantity(t_start, "time", "t_start")
+    t_start = start_time(quantity(t_start, "time", "t_start"), initial)
     t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
-    name = _checked(integrator, tol, options)
+    name = checked(integrator, tol, options)
     # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
     INTEGRATORS[name].load()
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
-    with uncollected(), raised_errors(mechanism.functions.values()):
-        if not continued:
-            refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_start))
-        system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
+    system, problem, members, lumping = prepared(
+        mechanism, t_start if initial is None else initial.t_model, lump, formulation, rate_scale,
+        continued or initial is not None,
+    )  # fmt: skip
+    if initial is not None:
+        problem = initial.problem(problem)
+        if initial.history is not None and initial.history.method == name:
+            options["history"] = initial.history
     if stops:
         if lump or not INTEGRATORS[name].can("event_action"):
             able = any_of(those_that("event_action"))
@@ -251,11 +260,31 @@ def simulate(
         raise
     solution = Solution(system, problem, result, members, remark)
     solution.inside = just_inside(t_eval)
+    solution.initial = initial
     if stream is not None:
         return _closed(stream, solution, name)
     warn_of_spin(mechanism.bodies, solution)
     warn_of_lost_torques(mechanism.elements, solution)
     return solution
+
+
+def start_time(t_start: float, initial: State | None) -> float:
+    """Return the time at which a run starts, that of its initial state if it has one."""
+    if initial is None:
+        return t_start
+    if t_start not in (0.0, initial.t):
+        raise ModelError(f"initial: it is a state at t = {initial.t:g} s, t_start is {t_start:g} s; leave t_start away")
+    return initial.t
+
+
+def prepared(
+    mechanism: Mechanism, t_model: float, lump: bool, formulation: str, rate_scale: float, continued: bool
+) -> tuple[System, DAEProblem, Members | None, str]:
+    """Return what `_prepared` does; refuse teeth that start deep in each other unless the run is ``continued``."""
+    with uncollected(), raised_errors(mechanism.functions.values()):
+        if not continued:
+            refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_model))
+        return _prepared(mechanism, t_model, lump, formulation, rate_scale)
 
 
 def _without(mechanism: Mechanism, names: Collection[str]) -> Mechanism:
@@ -279,7 +308,7 @@ def _closed(stream: Stream, solution: Solution, name: str) -> Solution:
     return stream.close(solution)
 
 
-def _checked(integrator: str, tol: float, options: Mapping[str, Any]) -> str:
+def checked(integrator: str, tol: float, options: Mapping[str, Any]) -> str:
     """Return the integrator's name in capitals; raise a ModelError for a setting or an option that it cannot have."""
     if not np.isfinite(tol) or tol <= 0.0:
         raise ModelError(f"tol = {tol}; it must be a positive number")
@@ -376,4 +405,5 @@ SETTINGS = (
     "lump",
     "stops",
     "continued",
+    "initial",
 )

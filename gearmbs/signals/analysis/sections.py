@@ -26,7 +26,7 @@ from gearmbs.signals.files.formats import checked_format, read_signal
 from gearmbs.signals.files.table import Asked, format_of
 from gearmbs.signals.signal.given import given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.inputs import to_signal
-from gearmbs.signals.signal.record import Record, checked_gaps, signal_from
+from gearmbs.signals.signal.record import Record, checked_gaps, columns_asked, record_of, signal_from
 from gearmbs.signals.signal.signal import check_units, rate_of
 from gearmbs.units import to_si
 
@@ -266,22 +266,13 @@ def _pieces(path: Path, format: str | None, settings: Mapping[str, Any]) -> Piec
     """Records in the order of the file, each with the fraction of the file that is read then."""
     kind, content = checked_format(path, format)
     known = format_of(kind)
-    asked = Asked(content=content, channels=settings["channels"], rate=settings["rate"], gaps=settings["gaps"])
+    columns = columns_asked(settings["channels"])
+    asked = Asked(content=content, channels=columns, rate=settings["rate"], gaps=settings["gaps"])
     streamed = None if known.pieces is None else known.pieces(path, asked)
     if streamed is not None:
         yield from streamed
         return
-    whole = read_signal(path, format=format, **settings)
-    record = Record(
-        whole.values,
-        [str(c) for c in whole["channel"].values],
-        [str(u) for u in whole["units"].values],
-        float(whole.attrs["sampling_rate"]),
-        float(whole["time"].values[0]),
-        whole.attrs.get("speed"),
-        whole.attrs.get("teeth"),
-    )
-    yield record, 1.0
+    yield record_of(read_signal(path, format=format, **settings)), 1.0
 
 
 def _signal(

@@ -29,8 +29,9 @@ from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.separation import level_lines, prewhiten
+from gearmbs.signals.rotation.shaft import shaft_phase
 from gearmbs.signals.signal.any_data import takes_data
-from gearmbs.signals.signal.signal import like, rate_of, require, units_of
+from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, units_of
 from gearmbs.signals.spectra import kurtogram
 from gearmbs.units import to_si
 
@@ -185,8 +186,8 @@ def diagnose_bearing(
         See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds. Those
         that are alike and turn alike have the same lines and are reported as one, "a or b".
     speed : float, str or curve, optional
-        Of the inner ring's shaft, rad/s or text; default the signal's. Of a curve, as for `speed_curve`, the angle is
-        taken, see ``phase``.
+        Of the inner ring's shaft, rad/s or text; default the signal's, constant or over time. Of a curve, as for
+        `speed_curve`, the angle is taken, see ``phase``.
     band : pair of float or str, optional
         Hz or texts; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's
         edge.
@@ -218,6 +219,8 @@ def diagnose_bearing(
     _check_search(slip, harmonics)
     if phase is None and speed is not None and not isinstance(speed, (int, float, str)):
         phase = phase_from_speed(signal, speed)
+    elif phase is None and speed is None and shaft_coords(signal):
+        phase = shaft_phase(signal)
     shaft, notes = _shaft(signal, speed, phase)
     rate = rate_of(signal)
     highest = max(order for lines in known for order in lines.orders.values()) * shaft

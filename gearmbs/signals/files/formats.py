@@ -17,7 +17,7 @@ from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.csv import CUT
 from gearmbs.signals.files.table import TABLE, Asked, Content, format_of, known_endings
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
-from gearmbs.signals.signal.record import Progress, checked_gaps, record_of, signal_from
+from gearmbs.signals.signal.record import Progress, checked_gaps, columns_asked, record_of, signal_from
 from gearmbs.signals.signal.signal import as_signal, check_units
 
 FORMATS = tuple(TABLE)
@@ -81,7 +81,7 @@ def read_signal(
     format, content = checked_format(path, format)
     with damage_named(path, format):
         record = format_of(format).read(
-            path, Asked(content=content, channels=channels, rate=hertz, gaps=gaps, progress=progress)
+            path, Asked(content=content, channels=columns_asked(channels), rate=hertz, gaps=gaps, progress=progress)
         )
     for words in record.notes:
         if words.startswith(CUT):
@@ -117,6 +117,9 @@ def write_signal(
     signal: xr.DataArray | xr.Dataset, path: str | Path, *, format: str | None = None, progress: Progress | None = None
 ) -> Path:
     """Write a signal so that samples, rate, units, speed and tooth counts read back the same.
+
+    A speed or angle over time (`with_speed`) stands beside the channels as a column "speed over time" (rad/s) or "angle
+    over time" (rad), of which `read_signal` makes the coordinate again.
 
     The file appears under its name only when it is complete.
 

@@ -16,7 +16,10 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.files.formats import read_signal
-from gearmbs.signals.signal.signal import make_signal
+from gearmbs.signals.signal.signal import make_signal, with_metadata
+
+AT_REST = 0.01
+"""Part of its highest speed by which a shaft that starts or comes to rest may swing back: no line is told there."""
 
 
 def parse_states(items: Sequence[str], what: str = "experiment") -> dict[str, dict[str, Path]]:
@@ -93,16 +96,35 @@ def _numbering(record: xr.Dataset) -> dict[str, tuple[float, ...]]:
     return {} if found is None else {"teeth_in_mesh": tuple(float(x) for x in np.ravel(found))}
 
 
+def first_driver(record: xr.Dataset) -> str:
+    """Return the shaft that drives the first mesh of a drivetrain's record."""
+    parts = json.loads(record.attrs["train_json"])
+    return parts[parts[str(record.mesh.values[0])]["driver"]]["shaft"]
+
+
 def held_speed(record: xr.Dataset) -> float:
     """Return the mean speed of a record over the nominal one: lines of a spectrum are where that puts them."""
-    parts = json.loads(record.attrs["train_json"])
-    first = parts[parts[str(record.mesh.values[0])]["driver"]]["shaft"]
-    return float(np.abs(record["speed"].sel(shaft=first).mean())) / float(record.attrs["mesh_speed"])
+    return float(np.abs(record["speed"].sel(shaft=first_driver(record)).mean())) / float(record.attrs["mesh_speed"])
 
 
 def holds_speed(record: xr.Dataset) -> bool:
     """Return whether the meshes of a drivetrain's record turn at steady speeds; older records do not say so."""
-    return bool(record.attrs.get("speed_is_steady", 1))
+    return "mesh_track" not in record and bool(record.attrs.get("speed_is_steady", 1))
+
+
+def with_speed_of(signal: xr.DataArray, record: xr.Dataset, shaft: str) -> xr.DataArray:
+    """Return a signal with the speed of a shaft that a drivetrain's record holds.
+
+    Where it is steady that is its mean, else the coordinate ``speed`` (rad/s) over time; a shaft that turns back, or
+    rests throughout, has none.
+    """
+    values = record["speed"].sel(shaft=shaft).values
+    if holds_speed(record):
+        return with_metadata(signal, speed=float(np.abs(values).mean()))
+    turning = values if values.mean() > 0.0 else -values
+    if not turning.any() or turning.min() < -AT_REST * turning.max():
+        return signal
+    return signal.assign_coords(speed=("time", np.maximum(turning, 0.0), {"units": "rad/s"}))
 
 
 def placed_lines(record: xr.Dataset) -> str:
@@ -114,7 +136,7 @@ def placed_lines(record: xr.Dataset) -> str:
 def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: Any) -> xr.DataArray:
     """Return what the sensors of a drivetrain's record measured as a signal, with speed and teeth of its first mesh.
 
-    Where the speed of the record is not steady the signal has none.
+    Where the speed of the record is not steady the signal has that over time, as the coordinate ``speed`` (rad/s).
 
     Parameters
     ----------
@@ -137,24 +159,19 @@ def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: An
             raise SignalError(f"channel: there is no {name!r}; choose one of {', '.join(names) or 'none'}")
     attributes = record.attrs
     attrs: dict[str, Any] = {"source": str(attributes.get("title", "simulation"))}
-    nominal = float(attributes["mesh_speed"])
-    speed: float | None = nominal
-    # in a run-up lines move
-    if not holds_speed(record):
-        speed = None
-    elif "known_lines" in attributes and "mesh_track" not in record:
+    if holds_speed(record) and "known_lines" in attributes:
         attrs["known_lines"] = placed_lines(record)
-        speed = nominal * held_speed(record)
-    return make_signal(
+    signal = make_signal(
         record["measured"].sel(sensor=kept).values,
         float(attributes["run_rate"]),
         units=[str(u) for u in record.sensor_units.sel(sensor=kept).values],
         channels=kept,
         t0=float(record.time.values[0]),
-        speed=settings.get("speed") or speed,
+        speed=settings.get("speed"),
         teeth=settings.get("teeth") or tuple(int(z) for z in np.ravel(attributes["mesh_teeth"])),
         attrs=attrs,
     )
+    return signal if settings.get("speed") else with_speed_of(signal, record, first_driver(record))
 
 
 def ring_signal(record: xr.Dataset) -> xr.DataArray:

@@ -11,6 +11,7 @@ import json
 import os
 import re
 import tempfile
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -132,7 +133,10 @@ def write_uff(record: Record, path: Path) -> None:
         )
     # pyuff's own "overwrite" loses the header of binary sets; an empty file to add to does not.
     path.write_bytes(b"")
-    pyuff.UFF(str(path)).write_sets(sets, mode="add")
+    with warnings.catch_warnings():
+        # behind binary data pyuff leaves its file to the interpreter to close
+        warnings.simplefilter("ignore", ResourceWarning)
+        pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
 
 @contextmanager

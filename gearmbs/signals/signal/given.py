@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.signal import check_teeth, with_metadata
+from gearmbs.signals.signal.signal import SHAFT, STEADY, check_teeth, with_metadata
 from gearmbs.units import to_si
 
 # A known speed in any shape: number, text, points, curve, function; and its values over a record.
@@ -24,8 +24,6 @@ FORMS = (
     "give a number in rad/s, text such as '1500 rpm', points [(t, speed), ...], (times, speeds), "
     "a DataArray or Series over time, or a function of t"
 )
-STEADY = 1e-3
-"""A curve that strays less than this part from its mean is a constant speed."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +176,7 @@ def _of_points(speed: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def unit_factor(unit: str) -> float:
     """Factor from a unit of rotation to rad/s: rpm, Hz, rad/s, deg/s, 1/min ..."""
-    text = {"1/min": "rpm", "min^-1": "rpm", "min-1": "rpm", "1/s": "Hz", "rps": "Hz", "r/min": "rpm", "rev/min": "rpm"}
+    text = {"1/min": "rpm", "min^-1": "rpm", "min-1": "rpm", "1/s": "Hz", "rps": "Hz", "r/min": "rpm"}
     return _quantity(f"1 {text.get(unit.strip(), unit.strip())}", "angular speed", "speed")
 
 
@@ -264,10 +262,10 @@ def with_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
     """The signal with a known speed: a number or text as attribute, a curve as coordinate `speed` over time."""
     times = np.asarray(signal["time"].values, dtype=float)
     curve = speed_curve(speed, span=(float(times[0]), float(times[-1])))
-    # what the signal says of its own angle would contradict
-    signal = signal.drop_vars([name for name in ("speed", "angle") if name in signal.coords])
     if curve.constant is not None:
         return with_metadata(signal, speed=curve.constant)
-    result = signal.assign_coords(speed=("time", curve.at(times), {"units": "rad/s"}))
+    # the signal's own angle would contradict
+    result = signal.drop_vars([name for name in SHAFT if name in signal.coords])
+    result = result.assign_coords(speed=("time", curve.at(times), {"units": "rad/s"}))
     result.attrs = {k: v for k, v in signal.attrs.items() if k != "speed"}
     return result

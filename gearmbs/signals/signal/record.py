@@ -15,7 +15,16 @@ import xarray as xr
 
 from gearmbs.files import plain
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
-from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth, make_signal, rate_of, uniform_rate, units_of
+from gearmbs.signals.signal.signal import (
+    SHAFT,
+    UNKNOWN_UNITS,
+    check_teeth,
+    make_signal,
+    rate_of,
+    shaft_coords,
+    uniform_rate,
+    units_of,
+)
 
 # What headers say, by the names that real files use: sampling rates and speeds, and which to believe.
 
@@ -321,6 +330,8 @@ def without_gaps(values: np.ndarray, gaps: str | None, rate: float | None = None
 
 Progress = Callable[[float, str], None]
 RESERVED_ATTRS = ("sampling_rate", "speed", "teeth", "units")
+SHAFT_COLUMNS = {f"{name} over time": name for name in SHAFT}
+"""Names under which files hold the coordinates of a signal that tell how the shaft turns, beside its channels."""
 
 
 @dataclass
@@ -358,18 +369,49 @@ class Record:
 
 
 def record_of(signal: xr.DataArray) -> Record:
-    """The record that a writer puts into a file."""
-    teeth = signal.attrs.get("teeth")
+    """The record that a writer puts into a file; `speed` and `angle` over time become columns, see `SHAFT_COLUMNS`.
+
+    Raises
+    ------
+    SignalError
+        If a channel would be read back as one of these.
+    """
+    teeth, turning = signal.attrs.get("teeth"), shaft_coords(signal)
+    columns = {column: turning[name] for column, name in SHAFT_COLUMNS.items() if name in turning}
+    names, units = [str(c) for c in signal["channel"].values], units_of(signal)
+    wrong = [name for name in _shaft_columns(names, units) if columns or len(names) > 1]
+    if wrong:
+        raise SignalError(
+            f"channels: {wrong[0]!r} would be read back as the {SHAFT_COLUMNS[wrong[0]]} of the shaft, which files "
+            "hold under this name; give the channel another one"
+        )
+    values = np.asarray(signal.values, dtype=float)
     return Record(
-        values=np.asarray(signal.values, dtype=float),
-        names=[str(c) for c in signal["channel"].values],
-        units=units_of(signal),
+        values=np.column_stack([values, *(own.values for own in columns.values())]) if columns else values,
+        names=[*names, *columns],
+        units=[*units, *(SHAFT[SHAFT_COLUMNS[column]] for column in columns)],
         rate=rate_of(signal),
         t0=float(signal["time"].values[0]),
         speed=None if signal.attrs.get("speed") is None else float(signal.attrs["speed"]),
         teeth=None if teeth is None else check_teeth(teeth),
         attrs={k: v for k, v in signal.attrs.items() if k not in RESERVED_ATTRS},
     )
+
+
+def _shaft_columns(names: Sequence[str], units: Sequence[str]) -> dict[str, int]:
+    """Return the places of those columns that hold a coordinate over time."""
+    return {n: i for i, n in enumerate(names) if n in SHAFT_COLUMNS and units[i] == SHAFT[SHAFT_COLUMNS[n]]}
+
+
+def columns_asked(channels: Sequence[str] | None) -> list[str] | None:
+    """Return the columns of a file that hold the channels asked for, and what belongs to any of them."""
+    return None if channels is None else [*channels, *SHAFT_COLUMNS]
+
+
+def _picked(record: Record, kept: Sequence[int]) -> None:
+    record.values = record.values[:, kept]
+    record.names = [record.names[i] for i in kept]
+    record.units = [record.units[i] for i in kept]
 
 
 def signal_from(
@@ -384,14 +426,15 @@ def signal_from(
     gaps: str | None = None,
 ) -> xr.DataArray:
     """Join what the file and the caller say into a signal; errors name the file."""
+    turning, found_at = {}, _shaft_columns(record.names, record.units)
+    if len(found_at) < len(record.names):
+        turning = {SHAFT_COLUMNS[column]: record.values[:, at] for column, at in found_at.items()}
+        _picked(record, [i for i in range(len(record.names)) if i not in found_at.values()])
     if channels is not None:
         missing = [c for c in channels if c not in record.names]
         if missing:
             raise SignalFileError(path, f"has no channel {missing}; it holds {record.names}")
-        pick = [record.names.index(c) for c in channels]
-        record.values = record.values[:, pick]
-        record.names = [record.names[i] for i in pick]
-        record.units = [record.units[i] for i in pick]
+        _picked(record, [record.names.index(c) for c in channels])
     if rate is not None and record.rate is not None and abs(rate - record.rate) > 1e-3 * record.rate:
         raise SignalFileError(
             path,
@@ -406,7 +449,7 @@ def signal_from(
     try:
         values, first, said = without_gaps(record.values, gaps, found)
         notes = [*record.notes, *said]
-        return make_signal(
+        signal = make_signal(
             values,
             found,
             units=_units_said(units, record),
@@ -416,6 +459,10 @@ def signal_from(
             teeth=record.teeth if teeth is None else teeth,
             attrs={**record.attrs, "source": path.name, **({"notes": notes} if notes else {})},
         )
+        # a constant speed that the caller gives wins
+        kept = {} if speed is not None else turning
+        rows = slice(first, first + len(values))
+        return signal.assign_coords({name: ("time", own[rows], {"units": SHAFT[name]}) for name, own in kept.items()})
     except MissingMetadataError:
         raise
     except SignalError as exc:

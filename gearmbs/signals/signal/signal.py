@@ -1,8 +1,12 @@
 """The signal type: an `xarray.DataArray` with dimensions (time, channel) and agreed metadata.
 
-Coordinates: `time` in s (uniform), `channel` (names) and `units` (one text per channel).
+Coordinates: `time` in s (uniform), `channel` (names) and `units` (one text per channel); where the speed varies,
+`speed` (rad/s) or `angle` (rad) over time.
 Attributes: `sampling_rate` in Hz, and where known `speed` in rad/s (of the wheel whose tooth count comes
 first), `teeth` (tuple of int), `units` (the common unit of all channels, or "mixed") and anything else.
+
+A signal that is made of another one, by `like`, keeps all of this but the samples; `speed` and `angle` are those at
+its own times.
 """
 
 from __future__ import annotations
@@ -24,6 +28,10 @@ if TYPE_CHECKING:
 
 UNKNOWN_UNITS = "unknown"
 MIXED_UNITS = "mixed"
+SHAFT = {"speed": "rad/s", "angle": "rad"}
+"""Coordinates over time that tell how the shaft turns, with their units."""
+STEADY = 1e-3
+"""A speed over time that strays less than this part from its mean is a constant one."""
 CLOCK_TOLERANCE = 0.05
 """Part of a sample by which times may deviate from an even clock."""
 REMEDIES = {
@@ -203,7 +211,7 @@ def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> x
         if found is None and times.size > 1:
             found = uniform_rate(times)
     attrs = {k: v for k, v in array.attrs.items() if k not in ("sampling_rate", "speed", "teeth", "units")}
-    return make_signal(
+    result = make_signal(
         data,
         found,
         units=unit_list,
@@ -214,6 +222,12 @@ def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> x
         name=None if array.name is None else str(array.name),
         attrs=attrs,
     )
+    return result.assign_coords({name: ("time", own.values, own.attrs) for name, own in shaft_coords(signal).items()})
+
+
+def shaft_coords(signal: xr.DataArray | xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return the coordinates of `SHAFT` that a signal has over time."""
+    return {name: signal.coords[name] for name in SHAFT if name in signal.coords and signal[name].dims == ("time",)}
 
 
 def uniform_rate(times: np.ndarray) -> float:
@@ -279,14 +293,35 @@ def require(signal: xr.DataArray, name: str, value: Any = None, *, needed_for: s
     Raises
     ------
     MissingMetadataError
+    SignalError
+        If a speed is wanted and the signal's varies over time.
     """
-    if value is None:
+    if value is None and name == "speed":
+        value = _one_speed(signal, needed_for)
+    elif value is None:
         value = signal.attrs.get("sampling_rate" if name == "rate" else name)
     if value is None:
         raise MissingMetadataError(name, needed_for, REMEDIES[name])
     if name == "teeth":
         return check_teeth(value)
     return check_speed(value) if name == "speed" else check_rate(value)
+
+
+def _one_speed(signal: xr.DataArray, needed_for: str) -> float | None:
+    """Return the constant speed of a signal (rad/s), None without any; SignalError if it varies."""
+    turning = shaft_coords(signal)
+    if not turning or signal.sizes["time"] < 2:
+        return signal.attrs.get("speed")
+    own, times = next(iter(turning.values())).values, signal["time"].values
+    speeds = own if "speed" in turning else np.abs(np.diff(own) / np.diff(times))
+    mean = float(np.mean(speeds))
+    if np.abs(speeds - mean).max(initial=0.0) <= STEADY * mean:
+        return mean
+    low, high = (float(bound) * 30.0 / math.pi for bound in (speeds.min(), speeds.max()))
+    raise SignalError(
+        f"speed: {needed_for} needs a constant one, that of the signal varies from {low:.5g} to {high:.5g} rpm; pass "
+        "speed=... of the part that is meant, or use analyse or order_track, which follow it"
+    )
 
 
 def mesh_frequency(signal: xr.DataArray, speed: float | None = None, teeth: int | Sequence[int] | None = None) -> float:
@@ -305,6 +340,8 @@ def with_metadata(signal: xr.DataArray, **changes: Any) -> xr.DataArray:
             result = result.assign_coords(units=("channel", np.asarray(unit_list, dtype=str)))
             result.attrs["units"] = _common(unit_list)
         elif key == "speed":
+            # what the signal says of its own turning would contradict
+            result = result.drop_vars([name for name in SHAFT if name in result.coords])
             result.attrs["speed"] = check_speed(value)
         elif key == "teeth":
             result.attrs["teeth"] = check_teeth(value)
@@ -316,32 +353,53 @@ def with_metadata(signal: xr.DataArray, **changes: Any) -> xr.DataArray:
 
 
 def like(
-    signal: xr.DataArray, values: np.ndarray, *, t0: float | None = None, rate: float | None = None, **changes: Any
+    signal: xr.DataArray,
+    values: np.ndarray,
+    *,
+    t0: float | None = None,
+    rate: float | None = None,
+    channels: Sequence[str] | None = None,
+    **changes: Any,
 ) -> xr.DataArray:
-    """A signal with new samples and the metadata of `signal`, with `changes` as for `with_metadata`.
+    """A signal with new samples and all else of `signal`, with `changes` as for `with_metadata`.
 
     Parameters
     ----------
     values : ndarray of shape (n, channels)
     t0, rate : float, optional
-        Start in s and rate in Hz where they differ from those of `signal`.
+        Start in s and rate in Hz where they differ from those of `signal`: its `speed` and `angle` over time are then
+        those at the new times.
+    channels : sequence of str, optional
+        Names of the channels where they are others; their `units` are to be among the changes.
     """
     import xarray as xr
 
     rate = rate_of(signal) if rate is None else check_rate(rate)
-    t0 = float(signal["time"].values[0]) if t0 is None else t0
+    old = np.asarray(signal["time"].values, dtype=float)
+    times = (float(old[0]) if t0 is None else t0) + np.arange(values.shape[0]) / rate
+    units = units_of(signal) if channels is None else _unit_list(None, channels)
     result = xr.DataArray(
         values,
         dims=("time", "channel"),
         coords={
-            "time": ("time", t0 + np.arange(values.shape[0]) / rate, {"units": "s"}),
-            "channel": signal["channel"].values,
-            "units": ("channel", np.asarray(units_of(signal), dtype=str)),
+            "time": ("time", times, {"units": "s"}),
+            "channel": signal["channel"].values if channels is None else np.asarray(channels, dtype=str),
+            "units": ("channel", np.asarray(units, dtype=str)),
+            **{name: ("time", _at(times, old, own.values), own.attrs) for name, own in shaft_coords(signal).items()},
         },
         name=signal.name,
         attrs={**signal.attrs, "sampling_rate": rate},
     )
     return with_metadata(result, **changes) if changes else result
+
+
+def _at(times: np.ndarray, old: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values over the times `old` at others, of which few lie beyond the last: there they go straight on."""
+    found = np.interp(times, old, values)
+    beyond = times > old[-1]
+    if old.size > 1 and beyond.any():
+        found[beyond] = values[-1] + (times[beyond] - old[-1]) * (values[-1] - values[-2]) / (old[-1] - old[-2])
+    return found
 
 
 def trim(signal: xr.DataArray, start: float | None = None, stop: float | None = None) -> xr.DataArray:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -205,11 +206,24 @@ class Operation(Section):
         return data
 
     def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """Return all settings with some changed; the length of the old record says nothing of a new curve's."""
+        """Return all settings with some changed; the length of the old record says nothing of a new curve's.
+
+        Warns
+        -----
+        CaseWarning
+            If a duration that was given goes.
+        """
         data = super().with_settings(changes)
         curves = [changes[key] for key in ("speed", "torque") if key in changes]
         if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
-            data = {key: value for key, value in data.items() if key != "duration" or key in changes}
+            if "duration" in data and "duration" not in changes:
+                given = data.pop("duration")
+                warnings.warn(
+                    f"operation.duration = {given!r}, given before, goes: the record lasts as long as the new curve; "
+                    f"give 'duration': {given!r} beside the curve to keep it",
+                    CaseWarning,
+                    stacklevel=3,
+                )
         return data
 
     @cached_property
@@ -514,7 +528,8 @@ class Case(Section, Shown):
     def changed(self, **sections: Any) -> Case:
         """Return a copy with fields of its sections changed.
 
-        With a new curve of speed or torque the record lasts as long as the curve unless ``duration`` is given, too.
+        With a new curve of speed or torque the record lasts as long as the curve unless ``duration`` is given, too; of
+        a duration that the case was given before a `CaseWarning` says so.
 
         Examples
         --------

@@ -6,6 +6,7 @@ import pytest
 from gearmbs.dae.linalg.sparse_lu import factor
 from gearmbs.dae.model.evaluator import assemble
 from gearmbs.mechanism import Mechanism
+from tests.says import says
 
 LENGTH, MASS, G = 0.7, 1.3, 9.81
 
@@ -29,6 +30,17 @@ def test_pin_force_of_a_pendulum(integrator):
     tension = -3.0 * MASS * G * along[:, 1]
     force, _ = solution.reaction("pin")
     np.testing.assert_allclose(force, -tension[:, None] * along, atol=2e-6 * MASS * G)
+
+
+def test_a_body_and_a_joint_are_taken_as_such_or_by_name():
+    m = pendulum("revolute")
+    solution = m.simulate(0.1, rate=100)
+    bob, pin = m.bodies["bob"], m.joints["pin"]
+    for what in ("com_position", "orientation", "angular_velocity", "com_acceleration"):
+        assert (getattr(solution, what)(bob) == getattr(solution, what)("bob")).all()
+    assert (solution.reaction_force(pin) == solution.reaction_force("pin")).all()
+    with pytest.raises(KeyError, match=says("'arm'", "bob")):
+        solution.com_position("arm")
 
 
 def test_outputs_satisfy_the_constraints_better_than_the_integrator():

@@ -1,0 +1,1 @@
+"""Runs that are held between calls, taken out as a state and put back."""

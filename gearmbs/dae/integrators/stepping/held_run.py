@@ -1,0 +1,134 @@
+"""A run of WSTIFF or GSTIFF that is held between calls: it goes to one time after the other.
+
+Steps go beyond the times asked for, and values there lie on the polynomial of the last step, as the outputs of a run
+that was told all times ahead: what is asked does not change the steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.driver import InterruptFlag, Run, StallWatch
+from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.run_state import RunState
+from gearmbs.dae.integrators.stepping.memory import LastStep, put_memory, record_window, take_memory, value_in
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import Status
+from gearmbs.dae.state import History
+
+ROWS = 16 * HISTORY
+"""Records between two calls of the compiled loop: enough for it to be called seldom, few enough for the cache."""
+
+
+class LastRecords:
+    """The records of the last few steps, and the integer table that was valid in the last one.
+
+    It stands in for `gearmbs.dae.integrators.records.Records`, which keeps all.
+    """
+
+    consumed_time = 0.0
+
+    def __init__(self, st: RunState) -> None:
+        self.state = st
+        for name in ("record_t", "record_h", "record_order", "record_y"):
+            setattr(st, name, getattr(st, name)[:ROWS])
+        self.table = self.before = st.idata.copy()
+        self.changed_at = -1
+
+    def drain(self) -> None:
+        """Make room for further records but keep the points of a polynomial."""
+        st = self.state
+        m = int(st.n_records)
+        kept = min(m, HISTORY)
+        for array in (st.record_t, st.record_h, st.record_order, st.record_y):
+            array[:kept] = array[m - kept : m].copy()
+        st.n_records = kept
+
+    def change_table(self) -> None:
+        """Note that coordinates have changed at the end of the last step."""
+        st = self.state
+        self.before, self.table, self.changed_at = self.table, st.idata.copy(), int(st.steps)
+
+    def last_step(self) -> LastStep:
+        """Return the last step: its points from the window, or from the records where coordinates have changed."""
+        st, n = self.state, len(self.state.y)
+        if self.changed_at != st.steps:
+            first, count = int(st.newest), int(st.record_order[st.n_records - 1]) + 1
+            rows = st.window_y[first * n : (first + count) * n].reshape(count, n).copy()
+            return LastStep(st.window_t[first : first + count].copy(), rows, st.y.copy(), st.yp.copy(), self.table)
+        p = int(np.flatnonzero(st.record_order[: st.n_records])[-1])
+        points = slice(p - int(st.record_order[p]), p + 1)
+        nodes, rows = st.record_t[points][::-1].copy(), st.record_y[points][::-1].copy()
+        return LastStep(nodes, rows, rows[0].copy(), st.yp.copy(), self.before)
+
+
+class HeldRun(Run):
+    """A run that goes to one time after the other.
+
+    Parameters
+    ----------
+    problem : DAEProblem
+    t_end : float
+        Latest time that can be asked for.
+    options : Options
+        A ``history`` among them is that of the state in which the problem starts.
+    """
+
+    def __init__(self, problem: DAEProblem, t_end: float, options: Options) -> None:
+        super().__init__(problem, None, t_end, replace(options, history=None))
+        self.options = options
+        st = self.state
+        st.outputs, st.y_out, st.yp_out = np.empty(1), np.empty((1, problem.n)), np.empty((1, problem.n))
+        st.next_output = 1
+        self.last_records = LastRecords(st)
+        self.records = self.last_records  # type: ignore[assignment]
+        self._given: tuple[int, LastStep] | None = None
+        if options.history is not None:
+            self.put_back(options.history)
+
+    def go_to(self, t: float) -> tuple[Status, str]:
+        """Take steps until one ends at ``t`` or later; return a success, or how the run has failed."""
+        st = self.state
+        if self.started and t <= st.t:
+            return Status.SUCCESS, Status.SUCCESS.sentence
+        st.outputs[0] = st.t_pause = t
+        st.next_output = 0
+        with InterruptFlag() as interrupt:
+            return self._loop(interrupt)
+
+    def values_at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return y, y' and the integer table valid for them at a time within the last step."""
+        st, records = self.state, self.last_records
+        if st.next_output == 1 and st.outputs[0] == t:
+            table = records.before if records.changed_at == st.steps else records.table
+            return st.y_out[0].copy(), st.yp_out[0].copy(), table
+        last = self._last_step()
+        return *value_in(self, last, t), last.idata
+
+    def history(self) -> History:
+        """Return what the next steps depend on; a run that has not been started remembers nothing yet."""
+        assert self.pivots is not None
+        return take_memory(self, self.pivots, self._last_step())
+
+    def put_back(self, history: History) -> None:
+        """Go on with a history; the tables are those of its state."""
+        st = self.state
+        self.pivots, last = put_memory(self, history)
+        st.n_records, st.next_output = 0, 1
+        record_window(st)
+        st.outputs[0] = np.nan
+        self.stall = StallWatch(st.steps, st.t)
+        records = self.last_records = LastRecords(st)
+        self.records = records  # type: ignore[assignment]
+        self._given = int(st.steps), last
+
+    def _last_step(self) -> LastStep:
+        st = self.state
+        if self._given is not None and self._given[0] == st.steps:
+            return self._given[1]
+        if not st.steps:
+            return LastStep(np.array([st.t]), st.y[None, :].copy(), st.y.copy(), st.yp.copy(), st.idata.copy())
+        return self.last_records.last_step()

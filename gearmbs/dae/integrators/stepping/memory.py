@@ -1,0 +1,270 @@
+"""What a run of WSTIFF or GSTIFF remembers, taken out of it and put into another one.
+
+A step depends on the points behind it, the order and the size chosen for it, the Newton matrix and its factors, the
+pivots they were found with, and what the controller has noted of earlier steps. All of it is copied, so that the other
+run takes the very steps that this one would have taken. What was asked of a run (tolerances, limits, stops, outputs) is
+its own.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numba import float64, int64, types
+
+from gearmbs.dae.integrators.algebraic import PART_TYPE, AlgebraicOutputs, settle_between, settle_output
+from gearmbs.dae.integrators.bdf import HISTORY, MAX_ORDER
+from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.records import Records
+from gearmbs.dae.integrators.run_state import WINDOW, RunState
+from gearmbs.dae.linalg.lu_plan import LUPlan, analyse
+from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
+from gearmbs.dae.problem import DAEProblem, ModelError
+from gearmbs.dae.state import History
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE, direct
+
+ASKED = {
+    "t_end", "h_max", "rtol", "max_order", "max_iterations", "max_steps", "n_events", "most_crossings", "fixed_leading",
+    "interpolate", "has_hook", "has_index_one", "nonlinear_rates", "watches_pencil", "constrained", "keep_rows",
+    "step_in_weights", "t_pause", "next_output", "next_stop", "n_records", "n_crossings",
+}  # fmt: skip
+"""Scalars of a run that are its own."""
+SCALARS = tuple(name for name in RunState.scalar_members if name not in ASKED)
+OWN = {
+    "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one", "entry_row", "entry_col", "idata",
+    "rdata", "stops", "outputs", "y_out", "yp_out", "record_t", "record_h", "record_order", "record_y", "g_new",
+    "g_between", "event_direction", "event_action", "crossing_t", "crossing_event", "crossing_y",
+}  # fmt: skip
+"""Arrays of a run that are its own, or scratch, or follow from the state."""
+ARRAYS = tuple(name for name in RunState.array_members if name not in OWN)
+PART_SCALARS = ("factored", "t_start", "t_first", "t_last", "failures", "first_failure")
+PART_ARRAYS = ("lu", "scale", "pivots", "guess", "last", "known")
+FACTORS = tuple(LUFactors.array_members)
+
+_VEC = float64[::1]
+_MAT = float64[:, ::1]
+
+
+class Pivots(NamedTuple):
+    """What pivots were chosen from, of which they follow: the matrix, how small pivots may be, what may be left out."""
+
+    matrix: np.ndarray
+    drop: float
+    negligible: float
+    counted: np.ndarray | None
+
+
+class LastStep(NamedTuple):
+    """The last step as its outputs see it: nodes newest first, their values, its end, the integer table valid in it."""
+
+    nodes: np.ndarray
+    rows: np.ndarray
+    y: np.ndarray
+    yp: np.ndarray
+    idata: np.ndarray
+
+
+class Remembers(Protocol):
+    """A run as far as its memory goes, see `gearmbs.dae.integrators.driver.Run`."""
+
+    problem: DAEProblem
+    options: Options
+    state: RunState
+    algebraic: AlgebraicOutputs
+    plan: LUPlan | None
+    factors: LUFactors | None
+    functions: Any
+    counted: np.ndarray
+    indptr: np.ndarray
+    indices: np.ndarray
+    scale: np.ndarray
+    repivots: int
+    first_pivots: int
+    started: bool
+
+
+class Continued(Remembers, Protocol):
+    """The same, and what it has to tell of its outputs."""
+
+    pivots: Pivots | None
+    records: Records
+    stall: Any
+
+
+def take_memory(run: Remembers, pivots: Pivots, last: LastStep) -> History:
+    """Return copies of all that the next steps of a run depend on; no step is open.
+
+    Parameters
+    ----------
+    run : Run
+    pivots : Pivots
+        Of its plan.
+    last : LastStep
+    """
+    st, part, factors = run.state, run.algebraic.part, run.factors
+    numbers: dict[str, np.ndarray] = {
+        "run": np.array([getattr(st, name) for name in SCALARS], dtype=float),
+        "part": np.array([getattr(part, name) for name in PART_SCALARS], dtype=float),
+        "counts": np.array([run.repivots, run.first_pivots]),
+        "counted": run.counted.copy(),
+        "pivots": np.array([pivots.drop, pivots.negligible]),
+        "pivots matrix": pivots.matrix,
+        "pivots counted": np.zeros(0, dtype=bool) if pivots.counted is None else pivots.counted,
+    }
+    numbers |= {f"run {name}": getattr(st, name).copy() for name in ARRAYS}
+    numbers |= {f"part {name}": getattr(part, name).copy() for name in PART_ARRAYS}
+    numbers |= {f"factors {name}": getattr(factors, name).copy() for name in FACTORS}
+    numbers |= {"last nodes": last.nodes, "last rows": last.rows, "last y": last.y, "last yp": last.yp}
+    changed = np.flatnonzero(last.idata != st.idata)
+    numbers |= {"table at": changed, "table": st.idata[changed]}
+    return History(run.options.method, numbers, run.plan)
+
+
+def put_memory(run: Remembers, history: History) -> tuple[Pivots, LastStep]:
+    """Let a run go on with what another one remembers; its tables are those of the state already.
+
+    The state may lie within the last step, after which coordinates may have changed.
+
+    Returns
+    -------
+    pivots : Pivots
+    last : LastStep
+
+    Raises
+    ------
+    ModelError
+        If the history is one of another version or of other equations.
+    """
+    st, part, numbers = run.state, run.algebraic.part, history.numbers
+    counted = numbers["pivots counted"] if len(numbers["pivots counted"]) else None
+    drop, negligible = map(float, numbers["pivots"])
+    pivots = Pivots(numbers["pivots matrix"], drop, negligible, counted)
+    plan = history.plan
+    if plan is None:
+        plan = _analysed(run, pivots)
+    factors = new_factors(plan)
+    wanted: dict[str, tuple[int, ...]] = {"run": (len(SCALARS),), "part": (len(PART_SCALARS),)}
+    targets = {f"run {name}": getattr(st, name) for name in ARRAYS}
+    targets |= {f"part {name}": getattr(part, name) for name in PART_ARRAYS}
+    targets |= {f"factors {name}": getattr(factors, name) for name in FACTORS}
+    targets["counted"] = run.counted
+    wanted |= {name: array.shape for name, array in targets.items()}
+    for name, shape in wanted.items():
+        if name not in numbers or numbers[name].shape != shape:
+            raise _unfit(f"{name!r} has not the size it has here")
+    scalars = dict(zip(SCALARS, numbers["run"].tolist(), strict=True))
+    _check(scalars, numbers, part.count)
+    for name, array in targets.items():
+        array[...] = numbers[name]
+    for name, value in scalars.items():
+        setattr(st, name, int(value) if RunState.scalar_members[name] != "f8" else value)
+    for name, value in zip(PART_SCALARS, numbers["part"].tolist(), strict=True):
+        setattr(part, name, int(value) if type(part).scalar_members[name] != "f8" else value)
+    st.next_stop = int(np.searchsorted(st.stops, st.t, side="right"))
+    run.repivots, run.first_pivots = map(int, numbers["counts"])
+    run.plan, run.factors, run.started = plan, factors, True
+    idata = st.idata.copy()
+    changed = numbers["table at"]
+    if len(changed) and not 0 <= changed.min() <= changed.max() < len(idata):
+        raise _unfit("its tables are others")
+    st.idata[changed] = numbers["table"]
+    nodes, rows, y, yp = (numbers[f"last {name}"] for name in ("nodes", "rows", "y", "yp"))
+    return pivots, LastStep(nodes, rows, y, yp, idata)
+
+
+def _analysed(run: Remembers, pivots: Pivots) -> LUPlan:
+    """Choose pivots once more from what they were chosen from."""
+    if len(pivots.matrix) != len(run.indices) or len(run.counted) != len(run.indices):
+        raise _unfit("its matrix has another pattern")
+    counted = None if pivots.counted is None else pivots.counted.copy()
+    return analyse(
+        run.indptr, run.indices, pivots.matrix, run.scale, pivots.drop, counted, pivots.negligible,
+        with_tail=run.problem.small_entries,
+    )  # fmt: skip
+
+
+def _check(scalars: dict[str, float], numbers: Any, count: int) -> None:
+    """Refuse what compiled code would read beside its arrays for."""
+    first, past = scalars["newest"], scalars["n_past"]
+    carried, pivots = numbers["run carried"], numbers["part pivots"]
+    sound = 1 <= past <= HISTORY and 0 <= first <= WINDOW - HISTORY + 1 and 1 <= scalars["order"] <= MAX_ORDER
+    sound &= 0 <= scalars["n_carried"] <= len(carried) and carried.max(initial=0) < max(1, len(carried))
+    sound &= bool((pivots >= 0).all()) and pivots.max(initial=0) < max(1, count)
+    sound &= len(numbers["last nodes"]) == len(numbers["last rows"]) <= MAX_ORDER + 1
+    if not sound or scalars["open"]:
+        raise _unfit("its numbers do not belong together")
+
+
+def _unfit(why: str) -> ModelError:
+    return ModelError(
+        f"state: its history does not fit: {why}; state.without_history() goes on from it at order one, in any version"
+    )
+
+
+def continue_run(run: Continued, history: History) -> None:
+    """Let a run that has just been made go on with a history, and write its outputs within the last step."""
+    pivots, last = put_memory(run, history)
+    run.pivots, st, records = pivots, run.state, run.records
+    run.stall.steps, run.stall.t = st.steps, st.t
+    while st.next_output < len(st.outputs) and st.outputs[st.next_output] <= st.t:
+        row = st.next_output
+        st.y_out[row], st.yp_out[row] = value_in(run, last, float(st.outputs[row]))
+        st.next_output = row + 1
+    if not np.array_equal(last.idata, st.idata):
+        records.change_table()
+    if st.keep_rows:
+        record_window(st)
+
+
+def record_window(st: RunState) -> None:
+    """Append the points of the history, oldest first, as records of order 0."""
+    n, first = len(st.y), int(st.newest)
+    for row in range(first + min(st.n_past, HISTORY - 1) - 1, first - 1, -1):
+        p = st.n_records
+        st.record_t[p], st.record_h[p], st.record_order[p] = st.window_t[row], 0.0, 0
+        st.record_y[p] = st.window_y[row * n : (row + 1) * n]
+        st.n_records = p + 1
+
+
+# --- values inside the last step --------------------------------------------------------------------------
+
+
+@njit(
+    types.void(
+        FUNCTIONS_TYPE, PART_TYPE, float64, float64, _VEC, float64, _VEC,
+        _MAT, int64, _VEC, _VEC, int64[::1], _VEC, _VEC,
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)  # fmt: skip
+def value_between(functions, part, t, t_old, y_old, h, nodes, rows, count, y, yp, idata, rdata, work):
+    """Write y and y' at ``t`` from the polynomial of the last step, through all its points.
+
+    Parameters
+    ----------
+    functions, part, t, t_old, y_old, h, nodes, rows, count, y, yp, idata, rdata, work
+        As of `settle_between`.
+    """
+    settle_between(functions, part, t, t_old, y_old, h, nodes, rows, 0, count, y, yp, idata, rdata, work)
+
+
+def value_in(run: Remembers, last: LastStep, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return y and y' at a time within the last step, as an output there; the run itself is left alone."""
+    st, part = run.state, run.algebraic.part
+    tables = last.idata, st.rdata.copy(), st.work.copy()
+    nodes, rows = last.nodes, last.rows
+    if len(nodes) < 2 or t == nodes[0]:
+        y, yp = last.y.copy(), last.yp.copy()
+        if part.count > 0 and len(nodes) > 1:
+            h = float(nodes[0] - nodes[1])
+            direct(settle_output)(run.functions, part, t, y, yp, h, t, y, *tables)
+        return y, yp
+    y, yp = np.empty_like(last.y), np.empty_like(last.yp)
+    t_old = float(nodes[1])
+    direct(value_between)(
+        run.functions, part, t, t_old, rows[1], float(nodes[0] - nodes[1]), nodes, rows, len(nodes), y, yp, *tables
+    )
+    return y, yp

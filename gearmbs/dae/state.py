@@ -1,0 +1,227 @@
+"""The state of a DAE at an instant: all that its continuation depends on, as one object that can be kept in a file.
+
+See "States and stepping" in the theory for what a state holds and why a continuation with history is exact.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.dae.problem import DAEProblem, ModelError
+from gearmbs.files import whole_file
+
+FORMAT = 1
+"""Number of the format of files; others are refused."""
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What an integrator remembers of the steps behind it.
+
+    Attributes
+    ----------
+    method : str
+        The integrator: another one cannot go on with it.
+    numbers : mapping of str to ndarray
+        Arrays and scalars of the run by name, copies of its own; see `gearmbs.dae.integrators.stepping.memory`.
+    plan : object or None
+        Pivots in use, where the process that chose them is still there; they follow from ``numbers``.
+    """
+
+    method: str
+    numbers: Mapping[str, np.ndarray]
+    plan: Any = None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class State:
+    """A DAE at an instant.
+
+    Attributes
+    ----------
+    t : float
+        Instant, s.
+    y, yp : ndarray, shape (n,)
+        Unknowns and their rates: of a mechanism positions, velocities, multipliers, loads and states of elements.
+    names : tuple of str
+        Of the unknowns.
+    t_model : float
+        Time for which the model was assembled, s.
+    sizes : tuple of int
+        Lengths of the model's tables of integers and numbers.
+    integers, reals : tuple of ndarray
+        Places and values of what differs from these tables: Euler references, counted turns.
+    history : History or None
+        Of the integrator; without it a run starts afresh, at order one.
+    """
+
+    t: float
+    y: np.ndarray
+    yp: np.ndarray
+    names: tuple[str, ...]
+    t_model: float
+    sizes: tuple[int, int]
+    integers: tuple[np.ndarray, np.ndarray]
+    reals: tuple[np.ndarray, np.ndarray]
+    history: History | None = field(default=None)
+
+    @classmethod
+    def of(
+        cls,
+        problem: DAEProblem,
+        t: float,
+        y: np.ndarray,
+        yp: np.ndarray,
+        tables: tuple[np.ndarray, np.ndarray],
+        history: History | None = None,
+        origin: State | None = None,
+    ) -> State:
+        """Return the state of a problem.
+
+        Parameters
+        ----------
+        problem : DAEProblem
+        t : float
+        y, yp : ndarray, shape (n,)
+        tables : (ndarray, ndarray)
+            Tables of integers and numbers as they are at ``t``.
+        history : History, optional
+        origin : State, optional
+            The state that the problem starts in, as :meth:`problem` has made it.
+        """
+        pairs = []
+        for k, (now, own) in enumerate(zip(tables, (problem.idata, problem.rdata), strict=True)):
+            places = np.flatnonzero(now != own)
+            if origin is not None:
+                places = np.union1d(places, (origin.integers, origin.reals)[k][0])
+            pairs.append((places, now[places]))
+        integers, reals = pairs
+        sizes = len(problem.idata), len(problem.rdata)
+        t_model = float(problem.t0) if origin is None else origin.t_model
+        names = tuple(problem.names)
+        return cls(float(t), y.copy(), yp.copy(), names, t_model, sizes, integers, reals, history)
+
+    def tables(self, problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tables of a problem, as assembled at ``t_model``, as they are in this state."""
+        found = problem.idata.copy(), problem.rdata.copy()
+        for table, (places, values) in zip(found, (self.integers, self.reals), strict=True):
+            table[places] = values
+        return found
+
+    def problem(self, problem: DAEProblem) -> DAEProblem:
+        """Return a problem, as assembled at ``t_model``, that starts in this state.
+
+        Raises
+        ------
+        ModelError
+            If the state is one of another model; the message names what differs.
+        """
+        self.check(problem)
+        idata, rdata = self.tables(problem)
+        return replace(problem, t0=self.t, y0=self.y.copy(), yp0=self.yp.copy(), idata=idata, rdata=rdata)
+
+    def check(self, problem: DAEProblem) -> None:
+        """Raise a ModelError that names what differs if this is no state of a problem."""
+        same = "take the model, formulation= and lump= of the run that it is from"
+        for k, (own, other) in enumerate(zip(self.names, problem.names, strict=False)):
+            if own != other:
+                raise ModelError(f"state: its unknown {k} is {own!r}, that of the model {other!r}; {same}")
+        if len(self.y) != problem.n:
+            longer = self.names if len(self.y) > problem.n else tuple(problem.names)
+            first = min(len(self.y), problem.n)
+            extra = f", of which {longer[first]!r} is the first that the other lacks" if len(longer) > first else ""
+            raise ModelError(f"state: it has {len(self.y)} unknowns, the model {problem.n}{extra}; {same}")
+        sizes = len(problem.idata), len(problem.rdata)
+        if self.sizes != sizes:
+            raise ModelError(
+                f"state: the tables of its model have {self.sizes[0]} integers and {self.sizes[1]} numbers, those of "
+                f"this one {sizes[0]} and {sizes[1]}: markers, functions or elements were added or removed; {same}"
+            )
+
+    def without_history(self) -> State:
+        """Return the state alone, from which a run starts afresh."""
+        return replace(self, history=None)
+
+    def __getitem__(self, name: str) -> float:
+        """Return an unknown by its name in ``names``."""
+        if name not in self.names:
+            raise KeyError(f"state has no unknown {name!r}; see its names")
+        return float(self.y[self.names.index(name)])
+
+    def __repr__(self) -> str:
+        told = f"with the history of {self.history.method}" if self.history is not None else "without history"
+        return f"State(t = {self.t:.9g} s, {len(self.y)} unknowns, {told})"
+
+    # --- files --------------------------------------------------------------------------------------
+
+    def save(self, path: str | Path) -> Path:
+        """Write the state as an ``.npz`` file that appears under its name only when it is whole; return its path.
+
+        Raises
+        ------
+        ModelError
+            If the name does not end in ``.npz``.
+        """
+        path = Path(path)
+        if path.suffix != ".npz":
+            raise ModelError(f"path is {str(path)!r}; a state is saved as .npz")
+        arrays: dict[str, Any] = {
+            "format": np.int64(FORMAT),
+            "times": np.array([self.t, self.t_model]),
+            "y": self.y,
+            "yp": self.yp,
+            "names": np.array(self.names, dtype=np.str_),
+            "sizes": np.array(self.sizes, dtype=np.int64),
+        }
+        for name, (places, values) in (("integers", self.integers), ("reals", self.reals)):
+            arrays |= {f"{name} at": places.astype(np.int64), name: values}
+        if self.history is not None:
+            arrays["method"] = np.array(self.history.method)
+            arrays |= {f"history {name}": values for name, values in self.history.numbers.items()}
+        with whole_file(path) as part, open(part, "wb") as file:
+            np.savez(file, **arrays)
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path) -> State:
+        """Return the state in a file.
+
+        Raises
+        ------
+        ModelError
+            If the file holds no state, or one of another format.
+        FileNotFoundError
+            If there is none.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+            form = int(arrays["format"])
+            if form != FORMAT:
+                raise ModelError(f"{path}: a state of format {form}, this version reads {FORMAT}; save it anew")
+            t, t_model = map(float, arrays["times"])
+            integers, reals = ((arrays[f"{name} at"], arrays[name]) for name in ("integers", "reals"))
+            sizes = int(arrays["sizes"][0]), int(arrays["sizes"][1])
+            for (places, values), size in zip((integers, reals), sizes, strict=True):
+                if len(places) != len(values) or (len(places) and not 0 <= places.min() <= places.max() < size):
+                    raise ValueError("places lie outside the tables")
+            history = None
+            if "method" in arrays:
+                head = "history "
+                numbers = {name.removeprefix(head): a for name, a in arrays.items() if name.startswith(head)}
+                history = History(str(arrays["method"]), numbers)
+            names = tuple(map(str, arrays["names"]))
+            return cls(t, arrays["y"], arrays["yp"], names, t_model, sizes, integers, reals, history)
+        except ModelError:
+            raise
+        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise ModelError(f"{path}: not a whole file of a state, as State.save writes it ({error})") from None
+
+
+__all__ = ["History", "State"]

@@ -1,0 +1,254 @@
+"""States and steps of one's own: what goes on from a state is what one run would have given, bit for bit."""
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.gears import GearSpec, PlanetarySet, planetary_mechanism
+from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism.parts import functions
+from gearmbs.studies.run.simulation import case_mechanism
+
+PAIR = {"tol": 1e-7, "rate_scale": 3000.0}
+
+
+def slider_crank(length=0.3):
+    """A slider crank with a spring that counts turns, a state of its own and one that equations determine."""
+    m = Mechanism("slider crank", gravity=(0.0, -9.81, 0.0))
+    crank = m.body("crank", mass=1.0, inertia=(0.01, 0.01, 0.01), position=(0.05, 0, 0))
+    rod = m.body("rod", mass=0.5, inertia=(0.01, 0.01, 0.01), position=(0.1 + 0.5 * length, 0, 0))
+    block = m.body("block", mass=2.0, inertia=(0.01, 0.01, 0.01), position=(0.1 + length, 0, 0))
+    m.revolute("main", crank, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.revolute("pin", rod, crank, at=(0.1, 0, 0), axis=(0, 0, 1))
+    m.spherical("wrist", rod, block, at=(0.1 + length, 0, 0))
+    m.translational("guide", block, m.ground, at=(0.1 + length, 0, 0), axis=(1, 0, 0))
+    m.differential_state("lag", "20*(DX(guide.I, guide.J) - DIF(lag))")
+    m.algebraic_state("squeeze", "50*TANH(10*VX(guide.I, guide.J)) + DIF(lag)")
+    i, j = m.joints["main"].i, m.joints["main"].j
+    m.torsion_spring("coil", i, j, stiffness=0.4, damping=0.001)
+    m.torque("drive", crank, 6.0, axis=(0, 0, 1))
+    return m
+
+
+def top():
+    """A heavy body that tumbles, so that its Euler angles change their reference on the way."""
+    m = Mechanism("top", gravity=(0.0, 0.0, -9.81))
+    body = m.body("top", mass=1.0, inertia=(0.02, 0.03, 0.045), position=(0, 0, 0.2), angular_velocity=(3.0, 9.0, 4.0))
+    m.spherical("foot", body, m.ground, at=(0, 0, 0))
+    return m
+
+
+def advanced(m, times, **options):
+    """Return a simulator that has gone through some times."""
+    sim = gm.Simulator(m, float(times[-1]), **options)
+    for t in times[1:]:
+        sim.advance(t)
+    return sim
+
+
+@pytest.mark.parametrize(
+    ("model", "options"),
+    [
+        (slider_crank, {}),
+        (slider_crank, {"integrator": "GSTIFF"}),
+        (slider_crank, {"breakpoints": [0.3, 0.61]}),
+        (slider_crank, {"formulation": "SI1"}),
+        (top, {}),
+        (top, {"interpolate": False}),
+    ],
+)
+def test_points_are_outputs_of_one_run(model, options):
+    """Many points in a step and many steps between two points, on the way through changes of coordinates."""
+    times = np.concatenate((np.linspace(0.0, 0.6, 13), np.linspace(0.602, 0.7, 50), [1.0]))
+    one = model().simulate(1.0, t_eval=times, **options)
+    solution = advanced(model(), times, **options).solution()
+    assert one.success
+    np.testing.assert_array_equal(solution.result.y, one.result.y)
+    np.testing.assert_array_equal(solution.result.yp, one.result.yp)
+    for body in one.system.body_names:
+        np.testing.assert_array_equal(solution.com_acceleration(body), one.com_acceleration(body))
+    if model is top:
+        assert len(one.result.epochs) > 1
+
+
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF"])
+@pytest.mark.parametrize("model", [slider_crank, top])
+def test_continuations_are_exact(model, integrator, tmp_path):
+    """In the same simulator, in another one, from a file, and in a run: the same states, bit for bit."""
+    times = np.linspace(0.0, 1.0, 47)
+    for at in (3, 33):
+        sim = gm.Simulator(model(), 1.0, integrator=integrator)
+        for t in times[1 : at + 1]:
+            sim.advance(t)
+        state = sim.state()
+        for t in times[at + 1 :]:
+            sim.advance(t)
+        wanted = sim.solution().result.y
+        sim.restore(state)
+        for t in times[at + 1 :]:
+            sim.advance(t)
+        np.testing.assert_array_equal(sim.solution().result.y, wanted)
+        read = gm.State.load(state.save(tmp_path / "s.npz"))
+        for name in ("y", "yp"):
+            np.testing.assert_array_equal(getattr(read, name), getattr(state, name))
+        for other in (state, read):
+            sim = gm.Simulator(model(), 1.0, integrator=integrator, initial=other)
+            for t in times[at + 1 :]:
+                sim.advance(t)
+            np.testing.assert_array_equal(sim.solution().result.y, wanted[at:])
+            run = model().simulate(1.0, t_eval=times[at:], integrator=integrator, initial=other)
+            np.testing.assert_array_equal(run.result.y, wanted[at:])
+
+
+def test_pair_of_the_paper():
+    """With its bodies as one and with all of them."""
+    m = case_mechanism(gm.Case())
+    for lump in (True, False):
+        times = np.linspace(0.0, 0.02 if lump else 0.005, 101)
+        sim = gm.Simulator(m, float(times[-1]), lump=lump, **PAIR)
+        for t in times[1:51]:
+            sim.advance(t)
+        state = sim.state()
+        for t in times[51:]:
+            sim.advance(t)
+        one = m.simulate(float(times[-1]), t_eval=times, lump=lump, **PAIR)
+        np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
+        sim.restore(state)
+        for t in times[51:]:
+            sim.advance(t)
+        np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
+
+
+def test_values_are_those_of_the_solution():
+    times = np.linspace(0.0, 1.0, 31)
+    one = slider_crank().simulate(1.0, t_eval=times)
+    sim = gm.Simulator(slider_crank(), 1.0)
+    for k, t in enumerate(times[1:], start=1):
+        sim.advance(t)
+        force, moment = sim.get("reaction", "pin")
+        np.testing.assert_allclose(force, one.reaction("pin")[0][k], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(sim.get("load", "coil")[1], one.load("coil")[1][k], rtol=1e-9, atol=1e-12)
+        assert sim.get("joint_angle", "main") == pytest.approx(one.joint_angle("main")[k], rel=1e-12)
+        assert sim.get("state", "lag") == one.state("lag")[k]
+        text = "AZ(main.I, main.J) + DX(guide.I, guide.J)"
+        assert sim.get("evaluate", text) == pytest.approx(one.evaluate(text)[k], rel=1e-12)
+        assert moment.shape == (3,)
+    assert abs(one.joint_angle("main")[-1]) > 2 * np.pi
+    assert sim.real_time_factor > 0.0
+
+
+def test_states_of_a_solution(tmp_path):
+    """They start a run afresh, with the turns counted until then."""
+    times = np.linspace(0.0, 1.0, 1001)
+    one = slider_crank().simulate(1.0, t_eval=times, dense_output=True)
+    for state in (one.state_at(times[800]), gm.State.load(one.state_at(0.8034).save(tmp_path / "a.npz"))):
+        assert state.history is None
+        later = slider_crank().simulate(1.0, t_eval=[state.t, *times[804:]], initial=state)
+        assert later.success
+        for get in (lambda s: s.com_position("block"), lambda s: s.load("coil")[1]):
+            np.testing.assert_allclose(get(later)[1:], get(one)[804:], rtol=1e-4, atol=2e-5)
+        again = slider_crank().simulate(1.0, t_eval=[state.t, *times[804:]], initial=later.state_at(times[900]).of(
+            later.problem, state.t, state.y, state.yp, state.tables(slider_crank().compile().problem()), origin=state
+        ))  # fmt: skip
+        np.testing.assert_array_equal(again.result.y, later.result.y)
+    turned = later.state_at(times[950])
+    last = slider_crank().simulate(1.0, initial=turned)
+    np.testing.assert_allclose(last.load("coil")[1][-1], one.load("coil")[1][-1], rtol=1e-3)
+
+
+def test_what_does_not_fit_is_refused(tmp_path):
+    sim = gm.Simulator(slider_crank(), 1.0)
+    sim.advance("0.2 s")
+    state = sim.state()
+    with pytest.raises(ModelError, match=r"its unknown 0 is 'u_x\(crank\)', that of the model 'u_x\(top\)'; take"):
+        top().simulate(1.0, initial=state)
+    other = slider_crank()
+    other.body("more", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    with pytest.raises(ModelError, match=r"state: its unknown \d+ is"):
+        other.simulate(1.0, initial=state)
+    with pytest.raises(ModelError, match=r"state: it has 87 unknowns, the model 70, of which 'mu\(main: .*first that"):
+        slider_crank().simulate(1.0, initial=state, formulation="I3")
+    with pytest.raises(ModelError, match=r"it is a state at t = 0\.2 s, t_start is 0\.5 s; leave t_start away"):
+        slider_crank().simulate(1.0, initial=state, t_start=0.5)
+    for t_end in (0.1, 0.2):
+        with pytest.raises(ModelError, match=r"it must be later than the start 0\.2 s"):
+            slider_crank().simulate(t_end, initial=state)
+    with pytest.raises(ModelError, match=r"the simulator goes from 0 to 0\.1 s; make it with a later t_end"):
+        gm.Simulator(slider_crank(), 0.1).restore(state)
+    late, early = gm.Simulator(slider_crank(), 1.0, initial=state), gm.Simulator(slider_crank(), 1.0).state()
+    with pytest.raises(ModelError, match="pass it as initial="):
+        late.restore(early)
+    # a wheel of other size has a state of the same kind, and another integrator starts afresh from it
+    assert slider_crank(0.3).simulate(0.3, initial=state, integrator="IDA").success
+    assert slider_crank(0.3).simulate(0.3, initial=state, t_start=0.2).success
+    path = tmp_path / "cut.npz"
+    path.write_bytes(state.save(tmp_path / "s.npz").read_bytes()[:5000])
+    with pytest.raises(ModelError, match=r"cut\.npz: not a whole file of a state"):
+        gm.State.load(path)
+    with pytest.raises(ModelError, match=r"a state is saved as \.npz"):
+        state.save(tmp_path / "s.txt")
+    solution = slider_crank().simulate(1.0, rate=10)
+    with pytest.raises(ModelError, match=r"t = 0\.55 s is none of the output times"):
+        solution.state_at(0.55)
+    with pytest.raises(ModelError, match="take the state of a Simulator"):
+        slider_crank().simulate(3.0, t_eval=[0.0, 2.9, 3.0]).state_at(3.0)
+
+
+def test_wrong_calls_say_what_to_do():
+    sim = gm.Simulator(top(), 1.0, records=False)
+    sim.advance(0.2)
+    for t, told in ((0.1, "restore"), (float("nan"), "finite"), (2.0, "later t_end"), ("5 mm", "t")):
+        with pytest.raises(ModelError, match=told) as error:
+            sim.advance(t)
+        assert "\n" not in str(error.value)
+    assert sim.t == 0.2
+    sim.advance(0.2)
+    with pytest.raises(ModelError, match=r"get: there is no 'com_positon'.*com_position"):
+        sim.get("com_positon", "top")
+    with pytest.raises(KeyError, match="the bodies are top"):
+        sim.get("com_position", "wheel")
+    with pytest.raises(ModelError, match="records=True"):
+        sim.solution()
+    with pytest.raises(ModelError, match=r"IDA cannot be held between calls; take 'WSTIFF' or 'GSTIFF'|WSTIFF"):
+        gm.Simulator(top(), 1.0, integrator="IDA")
+    with pytest.raises(ModelError, match="dense_output"):
+        gm.Simulator(top(), 1.0, dense_output=True)
+
+
+def test_a_failure_can_be_gone_back_from():
+    m = Mechanism("burst")
+    body = m.body("body", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    m.revolute("pin", body, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.torque("load", body, functions.expression("SQRT(0.5 - TIME)"))
+    sim = gm.Simulator(m, 1.0)
+    sim.advance(0.3)
+    state = sim.state()
+    with pytest.raises(ModelError, match="finite"):
+        sim.advance(0.7)
+    with pytest.raises(ModelError, match=r"has failed.*restore"):
+        sim.advance(0.4)
+    with pytest.raises(ModelError, match=r"has failed"):
+        sim.state()
+    sim.restore(state)
+    sim.advance(0.4)
+    assert sim.solution().success
+    one = m.simulate(0.4, t_eval=[0.0, 0.3, 0.4])
+    np.testing.assert_allclose(sim.solution().com_velocity("body"), one.com_velocity("body"), atol=1e-9)
+
+
+def test_planetary_set():
+    """Its meshes are forces given by equations, unknowns of their own."""
+    wheels = GearSpec(28, "2 mm"), GearSpec(36, "2 mm"), GearSpec.ring(100, "2 mm")
+    gears = PlanetarySet(*wheels, planets=4, ideal=(1e8, 1e8))
+    m = planetary_mechanism(gears, speeds={"sun": 50.0}, torques={"carrier": -20.0}, run_up=0.01)
+    times = np.linspace(0.0, 0.02, 41)
+    sim = gm.Simulator(m, 0.02, tol=1e-5)
+    for t in times[1:21]:
+        sim.advance(t)
+    state = sim.state()
+    for t in times[21:]:
+        sim.advance(t)
+    one = m.simulate(0.02, t_eval=times, tol=1e-5)
+    np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
+    run = m.simulate(0.02, t_eval=times[20:], tol=1e-5, initial=state)
+    np.testing.assert_array_equal(run.result.y, one.result.y[20:])
