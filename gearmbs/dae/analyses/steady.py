@@ -42,6 +42,9 @@ STILL = 2e-6
 """Change of J T, of masses, stiffness and damping that counts as none, of their terms: what turns the wrong way has
 1e-2, and weight at the bottom of a swing 9e-6."""
 
+FREE_BODIES = 20
+"""Bodies, the first of all, whose axes are tried at rest: carriers come before what they carry."""
+
 RUNGE_KUTTA = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
 
 SLOWEST = 1e-6
@@ -158,7 +161,9 @@ def turning_basis(
             continue
         places = np.searchsorted(rows, anchors[columns])
         parts = [(h, there.within(rows)) for h, there in near]
-        chain = _Chain(basis[np.ix_(rows, columns)], places, here.within(rows), parts, largest, weight[rows])
+        chain = _Chain(
+            basis[np.ix_(rows, columns)], places, here.within(rows), parts, largest, weight[rows], owner[rows]
+        )
         least, kept = np.inf, None
         for w in (np.zeros(3), *(w for w in own if np.linalg.norm(w) > SLOW * largest)):
             whole, seen = _turned(instant, w, rows, owner, generators)
@@ -175,7 +180,7 @@ def turning_basis(
             axes[label == k], turn[within], seen_turn[within], back[np.ix_(columns, columns)] = kept
     if axes.any() and not varying and len(chains) > 1:
         # loads between chains that turn differently
-        every = _Chain(basis, anchors, here, near, largest, weight)
+        every = _Chain(basis, anchors, here, near, largest, weight, owner)
         if not every.change(turn, seen_turn, back, forces=True) <= 1.0:
             varying.append([instant.system.body_names[b] for b in np.flatnonzero(axes.any(axis=1))])
     first = turn @ basis - basis @ back
@@ -192,12 +197,19 @@ class _Chain:
     near: list[tuple[float, Linearised]]
     rate: float
     weight: np.ndarray
+    bodies: np.ndarray
 
     def choices(self, turn: np.ndarray) -> Iterator[np.ndarray]:
         """Yield Z: components of the same vectors in axes at rest, then all that turns with the chain."""
         own = self.basis[self.anchors].diagonal()
         yield turn[np.ix_(self.anchors, self.anchors)] * own / own[:, None]
         if turn.any():
+            # a body that joints to others leave free, as a carrier on springs
+            for first in range(0, min(FREE_BODIES, self.bodies.max(initial=-1) + 1)):
+                rows = np.flatnonzero(self.bodies == first)[:6]
+                part = self.basis[rows] * self.weight[rows, None]
+                if rows.size == 6 and np.linalg.matrix_rank(part) == 6:
+                    yield np.linalg.pinv(part) @ turn[np.ix_(rows, rows)] @ part
             yield np.zeros((own.size, own.size))
 
     def change(self, turn: np.ndarray, seen: np.ndarray, back: np.ndarray, forces: bool) -> float:
