@@ -14,40 +14,41 @@ it can be inverted.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cholesky, eig, qr, solve_triangular
 
 from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
+from gearmbs.dae.analyses.steady import Linearised, turning_basis, weights
 from gearmbs.dae.analyses.turning import turning
 from gearmbs.dae.problem import ModelError, SingularModelError
-
-if TYPE_CHECKING:
-    pass
-
 
 DEPENDENT = 1e-10
 """Pivot, of the largest, below which constraints count as dependent."""
 
 
-def allowed_motions(constraint: np.ndarray) -> np.ndarray:
+def allowed_motions(constraint: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a basis of the null space of the constraints: some coordinates move by one each, the others follow.
 
-    Unlike an orthonormal one it keeps parts that have nothing to do with each other apart, exactly.
+    The second array has the former, one for each column, shape (dof,). Unlike an orthonormal basis it keeps parts that
+    have nothing to do with each other apart, exactly.
     """
     rows, n = constraint.shape
     if rows == 0:
-        return np.eye(n)
+        return np.eye(n), np.arange(n)
     upper, order = qr(constraint, mode="r", pivoting=True)
     pivots = np.abs(np.diag(upper))
     rank = int(np.sum(pivots > DEPENDENT * pivots[0]))
     basis = np.zeros((n, n - rank))
     basis[order[rank:]] = np.eye(n - rank)
     basis[order[:rank]] = -solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
-    return basis
+    return basis, order[rank:]
 
+
+NAMED = 6
+"""Bodies of a chain that a remark names; more would hide what it says."""
 
 NEIGHBOURS = 3
 """Points at which rounding is tried: with one, changes of some coefficients would vanish by chance."""
@@ -66,6 +67,9 @@ class Reduced:
 
     ``basis`` has a column of changes of (R, theta, q_f) for each entry of x; ``stiffness_terms`` and ``damping_terms``
     are the sums of the absolute values of the terms each coefficient is made of, against which rounding is to be held.
+    ``axes`` is how fast the axes turn in which each body's motions are described, rad/s, shape (bodies, 3), and
+    ``varying`` names the bodies of each chain whose coefficients are constant in no axes; see
+    `gearmbs.dae.analyses.steady`.
     """
 
     basis: np.ndarray
@@ -78,6 +82,8 @@ class Reduced:
     state_position: np.ndarray
     state_velocity: np.ndarray
     state_state: np.ndarray
+    axes: np.ndarray
+    varying: list[list[str]]
 
 
 def reduce(instant: Instant) -> Reduced:
@@ -87,6 +93,69 @@ def reduce(instant: Instant) -> Reduced:
     ------
     ModelError
         If the applied loads depend on each other in a singular way, or have no derivatives here.
+    """
+    lin = linearised(instant)
+    found = turning_basis(instant, *_free(instant, lin.constraint), lin, linearised)
+    basis, first, second = found.now, found.first, found.second
+    absolute = np.abs(basis)
+    forces = (lin.stiffness, lin.damping, lin.state_force, lin.mass)
+    projected = [basis.T @ force for force in forces]
+    rates = [lin.state_position, lin.state_velocity, lin.state_state, np.zeros_like(lin.state_position)]
+    # what constraints exert themselves does no work along the basis; loads that follow the reactions do
+    following = lin.force_reaction - lin.own_reaction
+    felt = basis.T @ following
+    felt[np.abs(felt) <= DEPENDENT * (absolute.T @ np.abs(following))] = 0.0
+    if felt.any() or lin.state_reaction.any():
+        # M q'' of the motions themselves is in the reactions' own equations
+        changes = _reactions(lin.mass, lin.constraint, lin.force_reaction, forces)
+        projected = [force + felt @ change for force, change in zip(projected, changes)]
+        rates = [rate + lin.state_reaction @ change for rate, change in zip(rates, changes)]
+    stiffness, damping, state_force, mass = projected
+    reduced = Reduced(
+        basis if lin.transform is None else lin.transform @ basis,
+        absolute.T @ lin.stiffness_terms @ absolute,
+        absolute.T @ lin.damping_terms @ absolute,
+        basis.T @ lin.mass @ basis,
+        damping @ basis,
+        stiffness @ basis,
+        state_force,
+        rates[0] @ basis,
+        rates[1] @ basis,
+        rates[2],
+        found.axes,
+        found.varying,
+    )
+    if found.axes.any():
+        # x' = T z' + T' z and x'' = T z'' + 2 T' z' + T'' z
+        sizes = absolute.T @ np.abs(lin.mass), absolute.T @ lin.damping_terms
+        reduced.stiffness += damping @ first + mass @ second
+        reduced.damping += 2.0 * mass @ first
+        reduced.stiffness_terms += sizes[1] @ np.abs(first) + sizes[0] @ np.abs(second)
+        reduced.damping_terms += 2.0 * sizes[0] @ np.abs(first)
+        reduced.state_position = reduced.state_position + rates[1] @ first + rates[3] @ second
+        reduced.state_velocity = reduced.state_velocity + 2.0 * rates[3] @ first
+    return reduced
+
+
+def warn_of_varying(reduced: Reduced, stacklevel: int) -> None:
+    """Warn of each chain of bodies whose linearised equations have coefficients that vary with time."""
+    for names in reduced.varying:
+        shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+        warnings.warn(
+            f"{shown}: in this motion the coefficients of the linearised equations vary with time, also in axes that "
+            "turn with a body; the eigenvalues are those of this instant and no modes of the motion. Take a position "
+            "of rest, or speeds and positions at which it turns steadily, and supports alike all round; or simulate",
+            stacklevel=stacklevel,
+        )
+
+
+def linearised(instant: Instant) -> Linearised:
+    """Linearise an I3 problem about an instant, in all coordinates.
+
+    Raises
+    ------
+    ModelError
+        As `reduce`.
     """
     y = instant.y
     matrix = instant.matrix(y)
@@ -144,29 +213,21 @@ def reduce(instant: Instant) -> Reduced:
         state_q, state_v = state_q @ to + state_v @ rate, state_v @ to
         constraint = constraint @ to
         force_reaction, own_reaction = to.T @ force_reaction, to.T @ own_reaction
-    basis = _free(instant, constraint)
-    absolute = np.abs(basis)
-    projected = [basis.T @ force for force in (stiffness, damping, state_force)]
-    # what constraints exert themselves does no work along the basis; loads that follow the reactions do
-    following = force_reaction - own_reaction
-    felt = basis.T @ following
-    felt[np.abs(felt) <= DEPENDENT * (absolute.T @ np.abs(following))] = 0.0
-    if felt.any() or state_reaction.any():
-        changes = _reactions(mass, constraint, force_reaction, (stiffness, damping, state_force))
-        projected = [force + felt @ change for force, change in zip(projected, changes)]
-        rates = zip((state_q, state_v, state_z), changes)
-        state_q, state_v, state_z = (rate + state_reaction @ change for rate, change in rates)
-    return Reduced(
-        basis if turn is None else turn.transform @ basis,
-        absolute.T @ stiffness_terms @ absolute,
-        absolute.T @ damping_terms @ absolute,
-        basis.T @ mass @ basis,
-        projected[1] @ basis,
-        projected[0] @ basis,
-        projected[2],
-        state_q @ basis,
-        state_v @ basis,
+    return Linearised(
+        mass,
+        damping,
+        stiffness,
+        damping_terms,
+        stiffness_terms,
+        constraint,
+        state_force,
+        state_q,
+        state_v,
         state_z,
+        force_reaction,
+        own_reaction,
+        state_reaction,
+        None if turn is None else turn.transform,
     )
 
 
@@ -193,14 +254,11 @@ def _uncertain(stiffness: np.ndarray, terms: np.ndarray, nearby: list[np.ndarray
     return change / ROUNDING
 
 
-def _free(instant: Instant, constraint: np.ndarray) -> np.ndarray:
+def _free(instant: Instant, constraint: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a basis of the motions that constraints allow, lengths and angles weighed against each other."""
-    arm = max(min(instant.system.length, 1.0), 1e-3)
-    sizes = instant.system.model.modal_sizes[:, 0]
-    moves = instant.at["theta"] - instant.at["R"]
-    turns = constraint.shape[1] - sizes.size - moves
-    weight = np.concatenate([np.ones(moves), np.full(turns, arm), arm / sizes])
-    return allowed_motions(constraint / weight) / weight[:, None]
+    weight = weights(instant)
+    basis, anchors = allowed_motions(constraint / weight)
+    return basis / weight[:, None], anchors
 
 
 def _reactions(

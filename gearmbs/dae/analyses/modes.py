@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
 
 
-from gearmbs.dae.analyses.eigenvalues import Reduced, reduce, spectrum
+from gearmbs.dae.analyses.eigenvalues import Reduced, reduce, spectrum, warn_of_varying
 
 RIGID, OSCILLATING, REAL, SLIDING = "rigid", "oscillating", "real", "damped rigid"
 
@@ -34,6 +34,8 @@ for a damping ratio of 1 - 5e-13.
 """
 UNRESISTED = 1e-6
 """Elastic by kinetic energy of a decaying motion below which it is rigid."""
+WITH_THE_BODY = 1e-6
+"""Part of its angular velocity by which axes may differ from it that turn with a body."""
 GROWTH_TOLERANCE = 1e-8
 """Rounding of a real part, of the eigenvalue's own magnitude, that does not count as growth."""
 
@@ -123,7 +125,8 @@ def linear_modes(place: System | Instant) -> Modes:
     At a position of equilibrium they are the small vibrations. Elsewhere they are the instantaneous eigenvalues
     with the loads' own changes. What spins is described in axes that do not turn with it (see
     `gearmbs.dae.analyses.turning`): of rotors alike about their axis the modes are those of the whirl, with gyroscopic
-    couples; of other moving points the coefficients are frozen. Without degrees of freedom and states there are none.
+    couples. Where joints turn with bodies, as hinges of a pendulum on a turning frame, so do the axes (see
+    `gearmbs.dae.analyses.steady`). Without degrees of freedom and states there are none.
 
     Raises
     ------
@@ -135,13 +138,15 @@ def linear_modes(place: System | Instant) -> Modes:
     Warns
     -----
     UserWarning
-        If a body with modal coordinates spins that is not alike about this axis: they turn with it, so that its own
-        modes are not those of its whirl.
+        If bodies move so that the coefficients vary with time in all axes: they are those of this instant. If a body
+        with modal coordinates spins that is not alike about this axis, while other axes serve the rest: they turn
+        with it, so that its own modes are not those of its whirl.
     """
     instant = place if isinstance(place, Instant) else Instant(place, "I3")
     instant.y = instant.settle(instant.y)
-    _warn_of_turning_modes(instant)
     reduced = reduce(instant)
+    warn_of_varying(reduced, stacklevel=4)
+    _warn_of_turning_modes(instant, reduced)
     found = spectrum(reduced)
     values, vectors = found.values, found.vectors
     real = np.abs(values.imag) <= CRITICAL * np.abs(values)
@@ -184,9 +189,12 @@ def _unresisted(reduced: Reduced, values: np.ndarray, vectors: np.ndarray) -> np
     return out
 
 
-def _warn_of_turning_modes(instant: Instant) -> None:
-    names = instant.system.body_names
-    for k, _, found in spinning_modes(instant, angular_velocities(instant)):
+def _warn_of_turning_modes(instant: Instant, reduced: Reduced) -> None:
+    names, velocities = instant.system.body_names, angular_velocities(instant)
+    varying = {name for chain in reduced.varying for name in chain}
+    for k, speed, found in spinning_modes(instant, velocities):
+        if names[k] not in varying and np.linalg.norm(reduced.axes[k] - velocities[k]) <= WITH_THE_BODY * speed:
+            continue
         if found is None:
             reason = "is not alike about the axis it spins about"
         elif not found.gyroscopic:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, expm
 
-from gearmbs.dae.analyses.eigenvalues import Reduced, reduce
+from gearmbs.dae.analyses.eigenvalues import Reduced, reduce, warn_of_varying
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.problem import ModelError, SingularModelError
 
@@ -163,6 +163,7 @@ def linear_plant(
     instant = Instant(system, "I3")
     instant.y = instant.settle(instant.y)
     reduced = reduce(instant)
+    warn_of_varying(reduced, stacklevel=3)
     own = np.array([k for k in range(len(names)) if k not in (*inputs, *outputs)], dtype=int)
     u, y = np.array(inputs, dtype=int), np.array(outputs, dtype=int)
     accelerated = _accelerations(reduced)

@@ -148,7 +148,7 @@ def _changed(values: np.ndarray, k: int, m: int, modes: int) -> np.ndarray:
 
 
 def _commuted(axis: np.ndarray, values: np.ndarray) -> np.ndarray:
-    turn = _skew(axis)
+    turn = skew(axis)
     return turn @ values - values @ turn
 
 
@@ -204,8 +204,8 @@ def turning(instant: Instant) -> Turning | None:
         driven = inverse.T @ mass[three, three] @ inverse @ acceleration
         momentum_rate = np.cross(velocities[body], momentum) + driven
         to[three, three], turned[three, three] = inverse, (rates.T @ inverse).T
-        spin[three, three] = _skew(velocities[body])
-        couple[three, three], couple_rate[three, three] = -_skew(momentum), -_skew(driven)
+        spin[three, three] = skew(velocities[body])
+        couple[three, three], couple_rate[three, three] = -skew(momentum), -skew(driven)
         # each axis is turned by the angles before it
         across = np.cross(axes[:, None], axes)
         across_rate = np.cross(rates[:, None], axes) + np.cross(axes[:, None], rates)
@@ -242,7 +242,7 @@ def _added(*products: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:
     return np.sum(values, axis=0), np.sum(sizes, axis=0)
 
 
-def _skew(vector: np.ndarray) -> np.ndarray:
+def skew(vector: np.ndarray) -> np.ndarray:
     """Return the matrix a~ with a~ b = a x b."""
     return np.cross(vector, np.eye(3)).T
 
