@@ -36,6 +36,13 @@ def test_mesh_orders_meet_the_mode_of_a_mechanism():
     np.testing.assert_allclose(torsional().linear_modes().frequencies.max(), natural(), rtol=1e-9)
 
 
+def test_a_range_below_the_lowest_mode_is_named():
+    speeds = ["0 rpm", "3000 rpm"]
+    with pytest.raises(SignalError, match=says("maximum", f"{0.9 * natural():.6g}", f"{natural():.6g}", "higher")):
+        campbell(torsional(), speeds, (29,), maximum=0.9 * natural())
+    assert campbell(torsional(), speeds, (29,), maximum=1.1 * natural()).sizes["mode"] == 1
+
+
 def test_a_function_of_the_speed_may_return_mechanisms():
     diagram = campbell(lambda speed: torsional(2000.0 + 10.0 * speed), [0.0, 100.0, 200.0], (29,))
     np.testing.assert_allclose(

@@ -73,10 +73,15 @@ def campbell(
         raise SignalError(f"speeds: need two or more, increasing and not negative, got {list(speeds)[:6]}")
     names, multiples = _orders(orders)
     frequency, damping = _frequencies(modes, omega)
-    kept = np.flatnonzero(np.nanmax(frequency, axis=0, initial=0.0) > LOWEST)
+    kept = oscillating = np.flatnonzero(np.nanmax(frequency, axis=0, initial=0.0) > LOWEST)
     if maximum is not None:
         kept = kept[np.nanmin(frequency[:, kept], axis=0) <= maximum]
     kept = kept if count is None else kept[:count]
+    if not kept.size and oscillating.size:
+        lowest = np.nanmin(frequency[:, oscillating])
+        raise SignalError(
+            f"maximum: no mode lies below {maximum:.6g} Hz, the lowest has {lowest:.6g} Hz; give a higher one"
+        )
     if not kept.size:
         raise SignalError(
             "modes: no mode oscillates within the range; rigid motions, and what is damped beyond the critical, "
