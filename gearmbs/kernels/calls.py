@@ -22,7 +22,7 @@ from gearmbs.kernels import PLAIN
 from gearmbs.kernels.jit import Kernel
 
 MAKES_KERNELS = re.compile(
-    r"^(?:from (?:[\w.]*jit|gearmbs\.kernels\.records) import|import numba|from numba import .*\bnjit\b)", re.M
+    r"^(?:from (?:[\w.]*jit|gearmbs\.contact\.records) import|import numba|from numba import .*\bnjit\b)", re.M
 )
 MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "late")}
 """Modules that make kernels and hold none."""

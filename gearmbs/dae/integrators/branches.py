@@ -267,7 +267,20 @@ def passes_pole(functions, st):
         suspected |= _unforeseen(st, i, old)
     for m in range(st.n_carried):
         suspected |= _outruns_step(st, m)
-    return suspected and (_pole_between(functions, st, old) or not _rates_hold(functions, st))
+    if not suspected:
+        return False
+    if _pole_between(functions, st, old):
+        return True
+    if _rates_hold(functions, st):
+        return False
+    if st.pole >= 0:
+        return True
+    # rates that do not hold tell of a pole if one lies behind; where they jump they need not hold
+    for k in range(2, st.n_past + 1):
+        copy(st.y, st.y_pred)
+        if _pole_between(functions, st, rows_from(st, k)[0]):
+            return True
+    return False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
