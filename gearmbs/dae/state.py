@@ -5,6 +5,7 @@ See "States and stepping" in the theory for what a state holds and why a continu
 
 from __future__ import annotations
 
+import hashlib
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,8 +16,9 @@ import numpy as np
 
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.files import whole_file
+from gearmbs.kernels.bound import NAMES
 
-FORMAT = 1
+FORMAT = 2
 """Number of the format of files; others are refused."""
 
 
@@ -32,11 +34,24 @@ class History:
         Arrays and scalars of the run by name, copies of its own; see `gearmbs.dae.integrators.stepping.memory`.
     plan : object or None
         Pivots in use, where the process that chose them is still there; they follow from ``numbers``.
+    equations : str
+        Of the model that the steps were made with, see `equations_of`.
     """
 
     method: str
     numbers: Mapping[str, np.ndarray]
     plan: Any = None
+    equations: str = ""
+
+
+def equations_of(problem: DAEProblem) -> str:
+    """Return a digest of all that the equations of a problem, as assembled, depend on: tables and functions."""
+    addressed = np.isin(problem.idata, np.fromiter(NAMES, dtype=np.int64))
+    names = [problem.residual.__name__, *(NAMES[k] for k in problem.idata[addressed].tolist())]
+    found = hashlib.blake2b("\n".join(names).encode(), digest_size=32)
+    found.update(np.where(addressed, -1, problem.idata).tobytes())
+    found.update(problem.rdata.tobytes())
+    return found.hexdigest()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,6 +141,16 @@ class State:
         idata, rdata = self.tables(problem)
         return replace(problem, t0=self.t, y0=self.y.copy(), yp0=self.yp.copy(), idata=idata, rdata=rdata)
 
+    def history_for(self, problem: DAEProblem, method: str) -> History | None:
+        """Return the history if a run of a problem, as assembled at ``t_model``, may go on with it, else None.
+
+        Its last step may end after ``t``. So it is of no use to another integrator, nor to other equations.
+        """
+        history = self.history
+        if history is None or history.method != method or history.equations != equations_of(problem):
+            return None
+        return history
+
     def check(self, problem: DAEProblem) -> None:
         """Raise a ModelError that names what differs if this is no state of a problem."""
         same = "take the model, formulation= and lump= of the run that it is from"
@@ -182,7 +207,7 @@ class State:
         for name, (places, values) in (("integers", self.integers), ("reals", self.reals)):
             arrays |= {f"{name} at": places.astype(np.int64), name: values}
         if self.history is not None:
-            arrays["method"] = np.array(self.history.method)
+            arrays |= {"method": np.array(self.history.method), "equations": np.array(self.history.equations)}
             arrays |= {f"history {name}": values for name, values in self.history.numbers.items()}
         with whole_file(path) as part, open(part, "wb") as file:
             np.savez(file, **arrays)
@@ -215,7 +240,7 @@ class State:
             if "method" in arrays:
                 head = "history "
                 numbers = {name.removeprefix(head): a for name, a in arrays.items() if name.startswith(head)}
-                history = History(str(arrays["method"]), numbers)
+                history = History(str(arrays["method"]), numbers, equations=str(arrays["equations"]))
             names = tuple(map(str, arrays["names"]))
             return cls(t, arrays["y"], arrays["yp"], names, t_model, sizes, integers, reals, history)
         except ModelError:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Callable
 from functools import lru_cache
+from itertools import count
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 import numpy as np
 from numba import types
@@ -24,6 +27,24 @@ I8 = types.int64
 _C_CALLBACK = ctypes.CFUNCTYPE(
     None, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p
 )
+
+NAMES: dict[int, str] = {}
+"""What stands behind each address in the tables of this process: the same name elsewhere is the same function."""
+_PROCESS = uuid4().hex
+_numbers = count()
+
+
+def named(address: int, function: Any = None) -> int:
+    """Return an address, noted with a name of its function in `NAMES`.
+
+    The kernels of this package go by the places of their definitions, in all processes; other functions, which may be
+    others under one name, and those of Python by numbers that are given once.
+    """
+    function = getattr(function, "py_func", function)
+    name = f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', '')}"
+    of_package = name.startswith("gearmbs.") and "<" not in name
+    NAMES[address] = name if of_package else f"{_PROCESS} {os.getpid()} {next(_numbers)}"
+    return address
 
 
 class PythonCallback:
@@ -61,7 +82,7 @@ class PythonCallback:
                 target[:] = np.nan
 
         self._callback = _C_CALLBACK(call)
-        self.address = ctypes.cast(self._callback, ctypes.c_void_p).value
+        self.address = named(ctypes.cast(self._callback, ctypes.c_void_p).value or 0)
 
 
 # The four functions of a DAE bound together, so that handing them to compiled code costs next to nothing.

@@ -17,7 +17,20 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from gearmbs.kernels.bound import F8, FUNCTIONS_TYPE, I8, IMAT, IVEC, MAT, VEC, PythonCallback, bind, no_events, no_hook
+from gearmbs.kernels.bound import (
+    F8,
+    FUNCTIONS_TYPE,
+    I8,
+    IMAT,
+    IVEC,
+    MAT,
+    VEC,
+    PythonCallback,
+    bind,
+    named,
+    no_events,
+    no_hook,
+)  # fmt: skip
 
 __all__ = [
     "F8",
@@ -67,7 +80,7 @@ def address(dispatcher: Any, signature: Any) -> int:
         If it was not compiled for ``signature``.
     """
     compiled = dispatcher.overloads[signature.args]
-    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+    return named(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name), dispatcher)
 
 
 # Calls of kernels from Python without a look at the types of their arguments.

@@ -1,5 +1,9 @@
 """States and steps of one's own: what goes on from a state is what one run would have given, bit for bit."""
 
+import gc
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -99,6 +103,69 @@ def test_continuations_are_exact(model, integrator, tmp_path):
             np.testing.assert_array_equal(sim.solution().result.y, wanted[at:])
             run = model().simulate(1.0, t_eval=times[at:], integrator=integrator, initial=other)
             np.testing.assert_array_equal(run.result.y, wanted[at:])
+
+
+def disc(torque):
+    """A disc of 2 kg m^2 with a torque (N m)."""
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    m.torque("drive", body, torque)
+    return m
+
+
+def test_a_history_goes_with_its_equations_only(tmp_path):
+    """The step that passed the state was made with the torque of before: with another one a run starts afresh."""
+    sim = gm.Simulator(disc(1.0), 10.0)
+    sim.advance(1.0)
+    state = sim.state()
+    for initial in (state, gm.State.load(state.save(tmp_path / "s.npz"))):
+        for torque, angle in ((-5.0, -0.5), (3.0, 1.5), (1.0, 1.0)):
+            branch = gm.Simulator(disc(torque), 10.0, initial=initial)
+            branch.advance(2.0)
+            assert branch.get("joint_angle", "pin") == pytest.approx(angle, abs=1e-5)
+            run = disc(torque).simulate(10.0, t_eval=[1.0, 2.0, 10.0], initial=initial)
+            assert run.joint_angle("pin")[1] == pytest.approx(angle, abs=1e-5)
+            other = gm.Simulator(disc(torque), 10.0)
+            other.restore(initial)
+            other.advance(2.0)
+            assert other.get("angular_velocity", "disc")[2] == pytest.approx(0.5 + 0.5 * torque, abs=1e-5)
+
+
+def test_functions_of_python_are_the_same_only_if_they_are_one(tmp_path):
+    """The same text with another function is another model, also where the first one is gone."""
+
+    def driven(scale):
+        m = disc("FAST(TIME)")
+        m.function("fast", lambda t: scale * (1.0 + 0.0 * t))
+        return m
+
+    m = driven(1.0)
+    sim = gm.Simulator(m, 10.0)
+    sim.advance(1.0)
+    state = sim.state()
+    read = gm.State.load(state.save(tmp_path / "s.npz"))
+    sim.advance(2.0)
+    wanted = sim.solution().result.y[-1]
+    for initial in (state, read):
+        same = gm.Simulator(m, 10.0, initial=initial)
+        same.advance(2.0)
+        np.testing.assert_array_equal(same.solution().result.y[-1], wanted)
+    del sim, same, m
+    gc.collect()
+    for initial in (state, read):
+        other = gm.Simulator(driven(-5.0), 10.0, initial=initial)
+        other.advance(2.0)
+        assert other.get("joint_angle", "pin") == pytest.approx(-0.5, abs=1e-5)
+
+
+def test_the_page_on_steps_says_what_comes_out(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "stepping.md").read_text()
+    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), {})
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("lowest at")
+    assert told[1:] == ["True", "True"]
 
 
 def test_pair_of_the_paper():

@@ -12,7 +12,20 @@ from typing import Any
 
 from numba import types
 
-from gearmbs.kernels.bound import F8, FUNCTIONS_TYPE, I8, IMAT, IVEC, MAT, VEC, PythonCallback, bind, no_events, no_hook
+from gearmbs.kernels.bound import (
+    F8,
+    FUNCTIONS_TYPE,
+    I8,
+    IMAT,
+    IVEC,
+    MAT,
+    VEC,
+    PythonCallback,
+    bind,
+    named,
+    no_events,
+    no_hook,
+)  # fmt: skip
 from gearmbs.kernels.plain.jit import Kernel, c_function, caller, checked, njit
 
 __all__ = [
@@ -37,7 +50,7 @@ __all__ = [
 @cache
 def address(function: Any, signature: Any) -> int:
     """Return the address of a kernel, or of what `numba.njit` made, as a C function; it is kept alive."""
-    return c_function(function, signature).address
+    return named(c_function(function, signature).address, function)
 
 
 @cache

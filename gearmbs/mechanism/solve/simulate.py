@@ -234,9 +234,8 @@ def simulate(
         continued or initial is not None,
     )  # fmt: skip
     if initial is not None:
+        options |= {"history": history} if (history := initial.history_for(problem, name)) else {}
         problem = initial.problem(problem)
-        if initial.history is not None and initial.history.method == name:
-            options["history"] = initial.history
     if stops:
         if lump or not INTEGRATORS[name].can("event_action"):
             able = any_of(those_that("event_action"))

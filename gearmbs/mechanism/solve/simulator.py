@@ -16,7 +16,7 @@ from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
-from gearmbs.dae.state import State
+from gearmbs.dae.state import State, equations_of
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
@@ -129,9 +129,7 @@ class Simulator:
         """Make a run that starts in a state, by default in that which the model was assembled in."""
         problem, history = self._base, None
         if state is not None:
-            problem = state.problem(problem)
-            if state.history is not None and state.history.method == self._options.method:
-                history = state.history
+            problem, history = state.problem(problem), state.history_for(problem, self._options.method)
         self._problem, self._origin = problem, state
         with uncollected():
             self._run = HeldRun(problem, self.t_end, replace(self._options, history=history))
@@ -298,7 +296,7 @@ class Simulator:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
         t, y, yp, idata = self._point
         run = self._run
-        history = run.history() if run.started else None
+        history = replace(run.history(), equations=equations_of(self._base)) if run.started else None
         return State.of(self._base, t, y, yp, (idata, run.state.rdata), history)
 
     def restore(self, state: State) -> None:
