@@ -255,6 +255,11 @@ def test_what_does_not_fit_is_refused(tmp_path):
         gm.State.load(path)
     with pytest.raises(ModelError, match=says("state", ".npz")):
         state.save(tmp_path / "s.txt")
+    for start in (gm.Simulator, Mechanism.simulate):
+        with pytest.raises(ModelError, match=says("initial", "'s.npz'", "State.load")):
+            start(slider_crank(), 1.0, initial="s.npz")
+    with pytest.raises(ModelError, match=says("satisfy", "constraints")):
+        gm.Simulator(slider_crank(0.4), 1.0, initial=state).advance(0.3)
     solution = slider_crank().simulate(1.0, rate=10)
     with pytest.raises(ModelError, match=says("0.55", "output", "times")):
         solution.state_at(0.55)

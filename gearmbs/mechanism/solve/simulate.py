@@ -275,6 +275,8 @@ def start_time(t_start: float, initial: State | None) -> float:
     """Return the time at which a run starts, that of its initial state if it has one."""
     if initial is None:
         return t_start
+    if not hasattr(initial, "yp"):
+        raise ModelError(f"initial: {initial!r} is no State; read a file with gearmbs.State.load")
     if t_start not in (0.0, initial.t):
         raise ModelError(f"initial: it is a state at t = {initial.t:g} s, t_start is {t_start:g} s; leave t_start away")
     return initial.t
