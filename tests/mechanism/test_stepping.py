@@ -255,6 +255,9 @@ def test_what_does_not_fit_is_refused(tmp_path):
         gm.State.load(path)
     with pytest.raises(ModelError, match=says("state", ".npz")):
         state.save(tmp_path / "s.txt")
+    afresh = slider_crank().simulate(0.3, initial=state.without_history())
+    gone_on = slider_crank().simulate(0.3, t_eval=[0.2, 0.3], initial=state)
+    np.testing.assert_allclose(afresh.com_position("block")[-1], gone_on.com_position("block")[-1], atol=1e-5)
     for start in (gm.Simulator, Mechanism.simulate):
         with pytest.raises(ModelError, match=says("initial", "'s.npz'", "State.load")):
             start(slider_crank(), 1.0, initial="s.npz")
