@@ -6,7 +6,7 @@ integrator serves all of them through typed function pointers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -109,6 +109,8 @@ class DAEProblem:
         default all, as far as they are not under error control. See `gearmbs.dae.integrators.algebraic`.
     advice : mapping of Status to str
         What to try after a failure, in the words of whoever states the problem; default: in those of `solve_dae`.
+    callbacks : sequence
+        What has to live as long as the addresses in ``idata``.
     """
 
     n: int
@@ -139,3 +141,4 @@ class DAEProblem:
     small_entries: bool = False
     solved_at_outputs: np.ndarray | None = None
     advice: Mapping[Any, str] = field(default_factory=dict)
+    callbacks: Sequence[Any] = ()

@@ -171,13 +171,13 @@ def _posed(
     if y0 is None:
         raise ValueError("y0 is missing")
     functions = [events] if callable(events) else list(events or ())
-    problem, probe = as_problem(
+    problem, errors = as_problem(
         fun, t_span[0], y0, yp0, t_span[1] - t_span[0], atol=atol, events=functions, **of_equations
     )
     if rtol is None:
         rtol = DEFAULT_RTOL if base is None else base.rtol
     rules: dict[str, Any] = _event_rules(functions) if functions else {}
-    return problem, replace(chosen, tol=1.0, rtol=float(rtol), error_probe=probe, **rules)
+    return problem, replace(chosen, tol=1.0, rtol=float(rtol), errors=errors, **rules)
 
 
 def _run_at_outputs(
@@ -193,8 +193,8 @@ def _run_at_outputs(
     result = options.integrator.load()(problem, padded, options)
     if padded is not times:
         result.t, result.y, result.yp = result.t[1:], result.y[1:], result.yp[1:]
-    error = options.error_probe() if options.error_probe is not None else None
-    if error is not None:
+    if options.errors:
+        error = options.errors[0]
         result.status = Status.USER_ERROR
         result.message = f"{Status.USER_ERROR.sentence} {type(error).__name__}: {error}"
     return result

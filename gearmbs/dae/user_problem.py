@@ -133,10 +133,6 @@ class _UserFunctions:
         self._register(differences.EVENTS_ADDRESS, call, len(functions))
         return differences.python_events
 
-    def probe(self) -> BaseException | None:
-        """Return the first exception a callback has raised."""
-        return self.errors[0] if self.errors else None
-
 
 def _vector(value: Any, n: int, name: str) -> np.ndarray:
     array = np.asarray(value, dtype=float)
@@ -435,7 +431,7 @@ def as_problem(
     jac_sparsity: Any = None,
     events: Sequence[Callable] = (),
     names: Sequence[str] = (),
-) -> tuple[DAEProblem, Callable[[], BaseException | None]]:
+) -> tuple[DAEProblem, list[BaseException]]:
     """Turn a user's functions into a `DAEProblem`.
 
     Parameters
@@ -469,8 +465,8 @@ def as_problem(
     -------
     problem : DAEProblem
         With ``atol_scale`` set to ``atol``: integrate with ``tol=1``.
-    error_probe : callable
-        Returns the first exception raised by a Python callback, or None.
+    errors : list of BaseException
+        Where Python callbacks leave what they raise; while it is not empty they are not called.
     """
     y0, atols, scales = _start(y0, atol, scale)
     n = len(y0)
@@ -499,6 +495,7 @@ def as_problem(
         differential=mask,
         t0=float(t0),
         names=list(names),
+        callbacks=functions.callbacks,
         jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,
     )
     if differential is None:
@@ -518,4 +515,4 @@ def as_problem(
     elif yp0 is None:
         _find_rates(problem, span)
     problem.index_one = _index_one(problem)
-    return problem, functions.probe
+    return problem, functions.errors

@@ -7,7 +7,7 @@ pole the rates point at it, so that no solution leaves it, and a step that comes
 from __future__ import annotations
 
 import numpy as np
-from numba import boolean, int64
+from numba import boolean, float64, int64
 
 from gearmbs.dae.integrators.corrector import CONVERGED, HELD, ROUNDED_TERMS, correct, equations_hold
 from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
@@ -54,6 +54,12 @@ PROLONGED = 10
 """Times by which a way is doubled to find the pole it was going to."""
 GROWTH = 1.1
 """Least growth of a rate from one division to the next. Near a pole of order p it is 2^p, at a jump 1."""
+STEPS_BACK = 64.0
+"""Steps, of the length of the last one, within which a jump is looked for: a matrix that crossed it has served
+`MATRIX_MAX_AGE` steps, each at most twice as long as the one before."""
+JUMPS = 0.5
+"""Part of the change over a way that is left between neighbouring numbers where the equations jump: all but what they
+change by on the rest of the way."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -184,7 +190,10 @@ def is_lost(functions, st, plan, factors):
     lost = renew_matrix(functions, st, plan, factors) and correct(functions, st, plan, factors) == CONVERGED
     away = 0.0
     for i in range(y.shape[0]):
-        away = max(away, abs(st.y[i] - y[i]) * st.weight[i])
+        moved = abs(st.y[i] - y[i]) * st.weight[i]
+        if moved > away:
+            away = moved
+            st.worst = i
     copy(y, st.y)
     copy(yp, st.yp)
     st.matrix_wanted = True
@@ -418,3 +427,49 @@ def has_pole_ahead(bound, st, i):
     copy(kept, st.y)
     st.pole = known
     return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rate(functions, st, i, value, row, slope):
+    """Return what equation ``row`` makes of the rate of unknown i at a value of it."""
+    st.y[i] = value
+    _terms(functions, st, st.y, st.delta, 1.0, st.res)
+    return -st.res[row] / slope
+
+
+@njit(boolean(FUNCTIONS_TYPE, STATE_TYPE, int64, float64[::1]), cache=True, nogil=True, error_model="numpy")
+def stays_on_jump(bound, st, i, found):
+    """Return whether the rate of unknown i jumps near the last steps, and points at the jump from both sides.
+
+    ``found`` becomes the value of the unknown at the jump, and the rates below and above. As with poles the rate is
+    what the terms without rates make of it, with all other unknowns as they are.
+    """
+    functions, kept = unbound(bound), st.y.copy()
+    old = rows_from(st, 1)[0]
+    way = STEPS_BACK * abs(old[i] - rows_from(st, 2)[0][i])
+    slope, row = 0.0, -1
+    for k in range(st.n_carried):
+        p = st.carried[k]
+        if st.entry_col[p] == i and abs(st.jac_slope[p]) > abs(slope):
+            slope, row = st.jac_slope[p], st.entry_row[p]
+    if row < 0 or not way > 0.0:
+        return False
+    below, above = old[i] - way, old[i] + way
+    copy(old, st.y)
+    low, high = _rate(functions, st, i, below, row, slope), _rate(functions, st, i, above, row, slope)
+    whole = low - high
+    place = below + 0.5 * (above - below)
+    nearest = ROUNDED_TERMS * EPS * max(abs(below), abs(above))
+    while above - below > nearest and below < place < above and low > 0.0 > high:
+        rate = _rate(functions, st, i, place, row, slope)
+        if rate > 0.0:
+            below, low = place, rate
+        else:
+            above, high = place, rate
+        place = below + 0.5 * (above - below)
+    # at the jump itself, as sign(0) is, a rate may be another one
+    low = _rate(functions, st, i, below - nearest, row, slope)
+    high = _rate(functions, st, i, above + nearest, row, slope)
+    copy(kept, st.y)
+    found[0], found[1], found[2] = place, high, low
+    return low > 0.0 > high and low - high > JUMPS * whole

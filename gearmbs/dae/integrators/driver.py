@@ -17,7 +17,7 @@ import numpy as np
 from gearmbs.dae.integrators import messages
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
-from gearmbs.dae.integrators.branches import has_pole_ahead
+from gearmbs.dae.integrators.branches import has_pole_ahead, stays_on_jump
 from gearmbs.dae.integrators.corrector import rounding_level
 from gearmbs.dae.integrators.initial_state import begin, choose_steps, initial_state
 from gearmbs.dae.integrators.messages import WINDOW, Chatter
@@ -37,6 +37,7 @@ from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
+from gearmbs.kernels.bound import trying
 from gearmbs.kernels.pointers import bind, direct, no_events, no_hook
 
 FIRST_CHUNK = 16
@@ -197,10 +198,13 @@ class Run:
         self.state.h *= 0.6
 
     def user_exception(self) -> BaseException | None:
-        return self.options.error_probe() if self.options.error_probe is not None else None
+        return self.options.errors[0] if self.options.errors else None
 
     def user_failure(self) -> tuple[Status, str]:
+        """Return how the run has ended, and let the user's functions be called again, for what it has reached."""
         error = self.user_exception() or RuntimeError("unknown")
+        if self.options.errors:
+            self.options.errors.clear()
         if isinstance(error, KeyboardInterrupt):
             return Status.INTERRUPTED, self._interrupted_message()
         return Status.USER_ERROR, messages.user_error(self.state.t, error)
@@ -330,13 +334,17 @@ class Run:
             ends = self._end() if self._meets_pole() else ""
             told = messages.step_too_small(problem, t, h, worst, st.error, self._noise(), ends)
             return status, told
-        gave_up = status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS) and st.newton_fails > 0
+        gave_up = status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS)
         if gave_up and not self._meets_pole():
-            if st.index_changes:
-                return Status.SINGULAR_JACOBIAN, messages.index_changes(t, t)
-            undetermined = self._undetermined()
-            if undetermined is not None:
-                return undetermined
+            if st.newton_fails > 0:
+                if st.index_changes:
+                    return Status.SINGULAR_JACOBIAN, messages.index_changes(t, t)
+                undetermined = self._undetermined()
+                if undetermined is not None:
+                    return undetermined
+            chatter = self._jump()
+            if chatter is not None:
+                return Status.STALLED, messages.chatters(problem, t, chatter)
         if status is Status.NEWTON_FAILURE:
             return status, messages.newton(problem, t, h, worst, self._noise(), self._end())
         if status is Status.TOO_MANY_STEPS:
@@ -362,12 +370,27 @@ class Run:
     def _meets_pole(self) -> bool:
         """Whether the last attempts met a pole of the rates, or were on their way to one."""
         st = self.state
-        if st.pole_met or st.nonlinear_rates or st.n_past < 2 or self.user_exception() is not None:
-            return st.pole_met
-        for unknown in dict.fromkeys((st.pole, st.worst, st.worst_error)):
-            if unknown >= 0 and st.differential[unknown] and has_pole_ahead(self.functions, st, unknown):
-                break
+        if not st.pole_met:
+            with trying():
+                any(has_pole_ahead(self.functions, st, unknown) for unknown in self._suspects())
         return st.pole_met
+
+    def _jump(self) -> Chatter | None:
+        """Return where the solution stays on a jump of a rate, None if it does not."""
+        found = np.empty(3)
+        with trying():
+            for unknown in self._suspects():
+                if stays_on_jump(self.functions, self.state, unknown, found):
+                    return Chatter(unknown, *found.tolist())
+        return None
+
+    def _suspects(self) -> list[int]:
+        """Return the unknowns with a rate that the last attempts failed for, if their equations may be looked at."""
+        st = self.state
+        if st.nonlinear_rates or st.n_past < 2 or self.user_exception() is not None:
+            return []
+        suspects = dict.fromkeys((st.pole, st.worst, st.worst_error))
+        return [unknown for unknown in suspects if unknown >= 0 and st.differential[unknown]]
 
     def _undetermined(self) -> tuple[Status, str] | None:
         """Return the failure if the matrix of the last attempt, beyond the time reached, is singular."""

@@ -381,7 +381,7 @@ def _check(run: Run, h: float) -> Failure | None:
             st.h_min = min(st.h_min, SMALLEST_OF_FIRST * h)
         if not first_given:
             st.h = max(min(st.h, h * min(1.0, FIRST_MOVE / move)), st.h_min)
-    if run.options.error_probe is not None and h < st.h:
+    if run.options.errors is not None and h < st.h:
         run.start_note += _algebraic_note(run)
     return None
 

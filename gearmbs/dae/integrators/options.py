@@ -84,8 +84,8 @@ class Options:
         With outputs at every step: called as ``consumer(t, y, idata)`` with some accepted steps at a time and the
         integer table valid there, instead of keeping them; the arrays are valid during the call only. The result then
         holds nothing but the last step.
-    error_probe : callable, optional
-        Returns the exception that a Python callback has stored, or None.
+    errors : list of BaseException, optional
+        Where callbacks in Python leave the exceptions they raise.
     history : History, optional
         Of the `gearmbs.dae.State` that the problem starts in: the run goes on with it, by the same method, instead of
         starting afresh.
@@ -116,7 +116,7 @@ class Options:
     check_start: bool = True
     progress: Callable[[float], None] | None = None
     consumer: Consumer | None = None
-    error_probe: Callable[[], BaseException | None] | None = None
+    errors: list[BaseException] | None = None
     history: History | None = None
 
     def __post_init__(self) -> None:

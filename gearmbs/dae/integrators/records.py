@@ -16,6 +16,7 @@ from gearmbs.dae.linalg.lu_plan import SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import factor, new_factors, solve
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
+from gearmbs.kernels.bound import trying
 from gearmbs.kernels.pointers import direct
 
 START_STEPS = 20
@@ -51,7 +52,11 @@ def warn_of_unresolved(
     order = np.argsort(part.moved)[::-1][:LOOKED_AT]
     worst, told = UNRESOLVED, ""
     for k in order[part.moved[order] > UNRESOLVED]:
-        i = int(np.flatnonzero(t == part.moved_at[k])[0])
+        at = np.flatnonzero(t == part.moved_at[k])
+        if not at.size:
+            # an event has cut the step before this output
+            continue
+        i = int(at[0])
         off = _corrections(problem, float(t[i]), y[i], yp[i], float(part.moved_step[k]), table_of(i))
         off *= problem.error_mask & problem.differential
         off /= part.atol + part.rtol * np.abs(y[i])
@@ -229,7 +234,9 @@ class Records:
         y_out = rows if ends.size == len(rows) else rows[ends]
         if not self.options.slopes:
             return t_out, y_out, np.empty((0, self.problem.n))
-        yp_out = sol.derivative(t_out)
+        # where a run has failed the user's functions may not be defined beside its last step
+        with trying():
+            yp_out = sol.derivative(t_out)
         yp_out[0] = self.problem.yp0
         return t_out, y_out, yp_out
 
@@ -258,7 +265,7 @@ class Between:
         self.algebraic = algebraic
         self.stops = stops.copy()
         self.tables = list(tables)
-        self.error_probe = options.error_probe
+        self.errors = options.errors
         part = algebraic.part
         self.unknowns = np.unique(part.cols[part.rates == 0])
         self.atol, self.rtol = part.atol[self.unknowns], part.rtol
@@ -283,7 +290,6 @@ class Between:
                 part, slopes = y[mine], yp[mine]
                 self.algebraic.settle_on_steps(times[mine], ends[mine], orders, nodes, rows, part, slopes, idata)
                 y[mine], yp[mine] = part, slopes
-        error = self.error_probe() if self.error_probe is not None else None
-        if error is not None:
-            raise error
+        if self.errors:
+            raise self.errors.pop()
         warn_of_unresolved(self.algebraic, times, y, yp, lambda i: self.tables[max(int(valid[i]), 0)][1])

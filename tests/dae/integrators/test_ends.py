@@ -258,3 +258,19 @@ def test_rates_that_are_steep_but_finite_run_on(method):
             assert result.success, f"{told}: {result.message}"
             off = abs(result.y[-1, 0] - exact)
             assert off < 1e4 * tol, f"{told}: off by {off / tol:.3g} tolerances"
+
+
+def test_what_lies_beyond_the_end_is_asked_without_its_errors():
+    """y = sqrt(1 - 2t) ends at 1/2; beyond, where steps and messages look, the function of the user is not defined."""
+
+    def residual(t, y, yp, out):
+        if y[0] < 0.0:
+            raise ValueError("no root of a negative number")
+        out[0] = yp[0] + 1.0 / y[0]
+        out[1] = y[1] - 2.0 * y[0]
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0, 2.0], rtol=1e-6, method="GSTIFF", dense_output=True)
+    assert not result.success
+    assert result.t[-1] == pytest.approx(0.5, abs=1e-4)
+    assert result.sol is not None
+    assert result.sol(0.25)[1] == pytest.approx(2.0 * np.sqrt(0.5), rel=1e-5)

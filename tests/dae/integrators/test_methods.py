@@ -51,7 +51,7 @@ def another(monkeypatch):
     row = Integrator(
         words="another",
         solver=f"{__name__}:solve",
-        takes=("tol", "rtol", "max_step", "progress", "error_probe"),
+        takes=("tol", "rtol", "max_step", "progress", "errors"),
         highest_order=3,
         tolerance=1e-6,
         largest_tolerance=1e-5,
