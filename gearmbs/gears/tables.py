@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -66,22 +67,24 @@ class _Latest:
     """The tables packed last: setting a simulation up asks for them several times, a series changes the load alone."""
 
     def __init__(self) -> None:
-        self._kept: tuple[tuple, tuple[Fault, ...], tuple[np.ndarray, np.ndarray, int]] | None = None
+        self._kept: deque[tuple[tuple, tuple[Fault, ...], tuple[np.ndarray, np.ndarray, int]]] = deque(maxlen=MESHES)
 
     def find(self, key: tuple, faults: tuple[Fault, ...]) -> tuple[np.ndarray, np.ndarray, int] | None:
         """Return copies of the tables of what the key holds and of these very faults, or None."""
-        kept = self._kept
-        if kept is None or len(faults) != len(kept[1]) or not all(map(operator.is_, faults, kept[1])) or kept[0] != key:
-            return None
-        gi, gr, size = kept[2]
-        return gi.copy(), gr.copy(), size
+        for known, known_faults, (gi, gr, size) in self._kept:
+            same_faults = len(faults) == len(known_faults) and all(map(operator.is_, faults, known_faults))
+            if same_faults and known == key:
+                return gi.copy(), gr.copy(), size
+        return None
 
     def keep(self, key: tuple, faults: tuple[Fault, ...], tables: tuple[np.ndarray, np.ndarray, int]) -> None:
         """Keep copies of tables."""
         gi, gr, size = tables
-        self._kept = key, faults, (gi.copy(), gr.copy(), size)
+        self._kept.appendleft((key, faults, (gi.copy(), gr.copy(), size)))
 
 
+MESHES = 12
+"""Meshes whose tables are kept, some 10 kB each: those of a planetary set with six planets."""
 _latest = _Latest()
 
 
