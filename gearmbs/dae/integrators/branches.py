@@ -472,4 +472,5 @@ def stays_on_jump(bound, st, i, found):
     high = _rate(functions, st, i, above + nearest, row, slope)
     copy(kept, st.y)
     found[0], found[1], found[2] = place, high, low
-    return low > 0.0 > high and low - high > JUMPS * whole
+    # at a pole it would have grown
+    return low > 0.0 > high and JUMPS * whole < low - high < whole / JUMPS
