@@ -535,8 +535,8 @@ def _least_rate(balanced: Balanced, slowest: np.ndarray) -> float:
     if motion.size and np.abs(motion).max() > 1e-3:
         stiff = float(np.linalg.norm(balanced.static @ slowest))
         return float(np.sqrt(stiff / (motion @ balanced.mass @ motion)))
-    inertia = np.diag(balanced.mass) if n else np.ones(1)
-    damped = np.abs(np.diag(balanced.damping)) / inertia if n else np.ones(1)
+    # rates of M s x + C x = 0. Couples of a spin stand beside the diagonal, on which they leave rounding
+    damped = np.abs(np.linalg.eigvals(np.linalg.solve(balanced.mass, balanced.damping))) if n else np.ones(1)
     # beside the others the damping of what is free may be rounding, 1e-126
     damped = damped[damped > ROUNDING * damped.max()]
     return float(damped.min()) if damped.size else 1.0
