@@ -13,7 +13,7 @@ from typing import NoReturn
 import typer
 
 from gearmbs.progress import alone
-from gearmbs.schema.files import read_toml
+from gearmbs.schema.described import read_toml
 
 UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 """What is wrong with the place and not with the file."""

@@ -155,9 +155,8 @@ MORE = {
     },
     "gearmbs.units": {
         "gearmbs.units": ["to_si"],
-        "gearmbs.schema.described": ["Described", "make", "measures_of"],
+        "gearmbs.schema.described": ["Described", "make", "measures_of", "read_toml"],
         "gearmbs.schema.quantities": ["Measure", "OneOf", "OverTime"],
-        "gearmbs.schema.files": ["read_toml"],
         "gearmbs.kernels.ahead": ["compile_all"],
         "gearmbs.files": ["whole_file", "write_whole"],
         "gearmbs.saving": ["save"],

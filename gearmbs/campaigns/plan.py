@@ -26,8 +26,7 @@ from gearmbs.campaigns.factors import (
 from gearmbs.campaigns.settings import CampaignError, check_settings, satisfied, texts, whole
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
 from gearmbs.files import python_scalar
-from gearmbs.schema.described import chosen
-from gearmbs.schema.files import read_toml
+from gearmbs.schema.described import chosen, read_toml
 
 FORMAT = 1
 ALL_CORNERS = 6

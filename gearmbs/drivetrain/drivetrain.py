@@ -62,8 +62,7 @@ from gearmbs.drivetrain.part import DrivetrainError, Part, parts_html, require, 
 from gearmbs.drivetrain.parts import SENSORS, GearMesh, Housing, HousingMode, Mount, Sensor, Shaft, Wheel
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
-from gearmbs.schema.described import Described, check_keys, chosen, line, make
-from gearmbs.schema.files import read_toml
+from gearmbs.schema.described import Described, check_keys, chosen, line, make, read_toml
 from gearmbs.schema.quantities import Measure, OneOf
 from gearmbs.units import Quantity
 from gearmbs.wording import did_you_mean

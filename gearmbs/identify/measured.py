@@ -12,8 +12,7 @@ import numpy as np
 
 from gearmbs.identify.cases import COLUMNS, CaseProblem
 from gearmbs.identify.parameters import Free, IdentifyError
-from gearmbs.schema.described import check_keys, make
-from gearmbs.schema.files import read_toml
+from gearmbs.schema.described import check_keys, make, read_toml
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,7 +4,7 @@ from gearmbs.dae.problem import ModelError as ModelError
 from gearmbs.dae.problem import SingularModelError as SingularModelError
 
 from .forces.friction import JointFriction as JointFriction
-from .forces.modal_force import add_modal_force as add_modal_force
+from .load_methods import add_modal_force as add_modal_force
 from .mechanism import Mechanism as Mechanism
 from .parts.bodies import Body as Body
 from .parts.bodies import Marker as Marker

@@ -15,8 +15,7 @@ from gearmbs.dae.equations.kinematics.update import AXES as COUNTED
 from gearmbs.dae.equations.loads import time_functions
 from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.model.builder import TableBuilder
-from gearmbs.dae.model.configuration import Configuration
-from gearmbs.dae.model.model import STATE_IMPLICIT, Names
+from gearmbs.dae.model.model import STATE_IMPLICIT, Configuration, Names
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import row_order

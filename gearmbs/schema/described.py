@@ -1,11 +1,17 @@
-"""Dataclasses whose annotations say what their fields may hold, and what is said of mistakes: place, value, remedy."""
+"""Dataclasses whose annotations say what their fields may hold, and what is said of mistakes: place, value, remedy.
+
+Descriptions come from TOML files, or tables in Python, and are written as TOML.
+"""
 
 from __future__ import annotations
 
+import json
 import re
+import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
+from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -15,7 +21,6 @@ from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
-
 
 WORDS = {
     **dict.fromkeys(("int_type", "int_from_float", "int_parsing"), "give a whole number"),
@@ -241,3 +246,47 @@ def make(
         if field.default is MISSING and field.default_factory is MISSING and field.name not in table:
             raise error(f"{where}: {field.name!r} is missing")
     return kind(**others, **table)
+
+
+def read_toml(path: str | Path, error: type[ValueError] = ValueError) -> dict[str, Any]:
+    """Return the tables of a TOML file, with or without a byte order mark.
+
+    Parameters
+    ----------
+    path : path-like
+    error : type
+        What is raised if it cannot be read, is no text or no TOML, with the path in front.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except OSError as caught:
+        raise error(f"{path}: cannot be read ({caught.strerror or caught})") from None
+    except UnicodeDecodeError:
+        raise error(
+            f"{path}: not a text file, so no description in TOML; records are read by `gearmbs analyse`"
+        ) from None
+    except tomllib.TOMLDecodeError as caught:
+        raise error(f"{path}: not a valid TOML file ({caught})") from None
+
+
+def toml_value(value: Any) -> str:
+    """Return a value as TOML writes it.
+
+    Examples
+    --------
+    >>> toml_value(["20 mm", 0.5, True])
+    '["20 mm", 0.5, true]'
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
+    return repr(value)
+
+
+def toml_table(header: str, values: Mapping[str, Any]) -> list[str]:
+    """Return the lines of a table with its header, as ``[run]``, an empty line before; what is None is left out."""
+    rows = [f"{name} = {toml_value(value)}" for name, value in values.items() if value is not None]
+    return ["", header, *rows] if rows else []

@@ -18,8 +18,7 @@ from gearmbs.drivetrain.parts import contact_law
 from gearmbs.gears import ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
 from gearmbs.gears.planetary_mechanism import PinBearing
 from gearmbs.mechanism import Mechanism
-from gearmbs.schema.described import Described, check_keys
-from gearmbs.schema.files import read_toml
+from gearmbs.schema.described import Described, check_keys, read_toml
 from gearmbs.schema.quantities import Measure
 from gearmbs.signals import fixed_sensor
 from gearmbs.studies.case.section import CaseError

@@ -5,7 +5,7 @@ import pytest
 
 from gearmbs.flexible import Shaft, ShaftSection
 from gearmbs.mechanism import Mechanism, ModelError, add_modal_force
-from gearmbs.mechanism.forces.modal_force import frame_marker
+from gearmbs.mechanism.load_methods import frame_marker
 from tests.says import says
 
 

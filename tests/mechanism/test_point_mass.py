@@ -14,7 +14,7 @@ from gearmbs.adams.write.deck_writer import write_deck
 from gearmbs.dae.equations import jacobian as exact
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.residual import residual
-from gearmbs.dae.model.configuration import Configuration
+from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.model.system import FORMULATIONS
 from gearmbs.mechanism import Mechanism, ModelError, PointMass, kinematic, quasi_static, static_equilibrium
 from gearmbs.mechanism.checks import singular_passage

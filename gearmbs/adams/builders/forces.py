@@ -14,9 +14,8 @@ from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.mechanism.forces.friction import INPUTS, KINDS
-from gearmbs.mechanism.forces.modal_force import add_modal_force
 from gearmbs.mechanism.forces.springs import Beam, Bushing, Field, MatrixForce
-from gearmbs.mechanism.load_methods import beam_stiffness
+from gearmbs.mechanism.load_methods import add_modal_force, beam_stiffness
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.modal import ModalBody
 

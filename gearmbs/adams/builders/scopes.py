@@ -3,6 +3,12 @@
 Checks need no mechanism for it (``deck_scope``); `AdamsModel` is the mechanism with the way back from its names to the
 deck's ids. Functions that mechanisms do not have become others: SENVAL, CURVE, ARYVAL of variables, MODE, and
 accelerations.
+
+An acceleration is an unknown of the equations by a probe: from a body a ball with the mass m and the moments of inertia
+j about its middle, the origin of a marker, is split off and fixed to the rest, whose mass, centre and inertia are what
+is left, so that nothing moves differently. With the force F and the torque N of the joint on the ball,
+
+    a = F / m + g,    alpha = N / j.
 """
 
 from __future__ import annotations
@@ -11,7 +17,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,12 +26,15 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import curve_points, spline_data
 from gearmbs.adams.parse.deck import Deck, measured_markers
 from gearmbs.dae.equations.expressions import SplineData
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.language.syntax import Call, Chain, Name, Node, Number, Power, Scope, parse, unparse
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.curves import AXES
 from gearmbs.mechanism.parts.joints import Joint
-from gearmbs.mechanism.parts.probes import split_off
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.mechanism import Mechanism
 
 MODES = {
     "KINEMATICS": 1, "INITIAL_CONDITIONS": 3, "DYNAMICS": 4, "TRANSIENT": 4, "STATICS": 5, "QUASI_STATICS": 6,
@@ -394,7 +403,7 @@ def translated(deck: Deck, present: Present, text: str, rename: Callable[[Call],
     return unparse(parse(text), both)
 
 
-# ACCX, WDTX and their kin in the equations: the reactions of probes, see `gearmbs.mechanism.parts.probes`.
+# ACCX, WDTX and their kin in the equations: the reactions of probes, see `gearmbs.adams.builders.scopes`.
 
 
 LINEAR = ("ACCX", "ACCY", "ACCZ", "ACCM")
@@ -463,3 +472,45 @@ class Accelerations:
             self.gravity = tip.name, origin.name
         tip_name, origin_name = self.gravity
         return f'D{"XYZ"[axis]}("{tip_name}", "{origin_name}", {along})'
+
+
+SHARE = 0.01
+"""Of a body's mass and its least moment of inertia that a probe takes at most."""
+
+
+def split_off(mechanism: Mechanism, name: str, marker: Marker) -> tuple[Joint, float, float]:
+    """Split a probe off the body of a marker; return the joint that holds it, its mass and moment of inertia.
+
+    Raises
+    ------
+    ModelError
+        If the body has no mass or no inertia.
+    """
+    body = marker.body
+    least = float(np.linalg.eigvalsh(body.inertia)[0])
+    if not (body.mass > 0.0 and least > 0.0):
+        raise ModelError(
+            f"the acceleration of marker '{marker.name}' is no unknown: body '{body.name}' has no mass or no inertia; "
+            "give it both, or measure at a marker of another body"
+        )
+    arm = marker.position - body.com
+    mass = min(SHARE * body.mass, SHARE * least / max(float(arm @ arm), 1e-300))
+    inertia = SHARE * least
+    rest = body.mass - mass
+    shift = -mass / rest * arm
+    body.inertia = body.inertia - inertia * np.eye(3) - steiner(mass, arm) - steiner(rest, shift)
+    body.mass = rest
+    body.com = body.com + shift
+    origin = marker.global_position()
+    velocity = body.velocity + np.cross(body.angular_velocity, origin - body.position)
+    probe = mechanism.body(
+        name, mass, inertia * np.eye(3), position=origin, orientation=marker.global_orientation(), velocity=velocity,
+        angular_velocity=body.angular_velocity,
+    )  # fmt: skip
+    joint = mechanism.joint("fixed", f"{name}.hold", probe.marker(name=f"{name}.I"), marker)
+    return joint, mass, inertia
+
+
+def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
+    """Return the inertia of a point mass about another point."""
+    return mass * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))

@@ -21,8 +21,7 @@ from gearmbs.campaigns.subjects.base import (
     kept_by_functions,
     tooth_fault_unit,
 )
-from gearmbs.schema.described import check_keys, chosen, measures_of
-from gearmbs.schema.files import read_toml
+from gearmbs.schema.described import check_keys, chosen, measures_of, read_toml
 from gearmbs.units import si_unit, to_si
 
 

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.kinematics.rotation import KIN_AXES, POSE_COLUMNS
 from gearmbs.dae.equations.outputs import accelerations
-from gearmbs.dae.model.configuration import Configuration
+from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.problem import AssemblyError, ModelError
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 from gearmbs.dae.results.solution import Solution

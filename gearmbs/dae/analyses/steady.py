@@ -31,7 +31,7 @@ from scipy.sparse.csgraph import connected_components
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.turning import skew, spinning_modes
 from gearmbs.dae.equations.kinematics.rotation import POSE_V, POSE_W
-from gearmbs.dae.model import start
+from gearmbs.dae.model.system import accelerations
 from gearmbs.dae.problem import ModelError
 
 LOOK = 1e-2
@@ -288,7 +288,7 @@ def _later(instant: Instant, h: float) -> Instant:
     for share in (0.0, 0.5, 0.5, 1.0):
         there = now.displaced(share * h * speeds[-1]).pushed(share * h * changes[-1]) if speeds else now
         speeds.append(there.velocities)
-        changes.append(start.accelerations(system, there, instant.t + share * h)[0])
+        changes.append(accelerations(system, there, instant.t + share * h)[0])
     moved, pushed = (h * np.tensordot(RUNGE_KUTTA, rates, axes=1) for rates in (speeds, changes))
     system.configuration = now.displaced(moved).pushed(pushed)
     system.t0 = instant.t + h

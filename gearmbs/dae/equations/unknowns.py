@@ -5,7 +5,7 @@
 Every body has u and R, three entries each; one that turns has p, eps and theta, three each. A body with modal
 coordinates q_f also has their velocities v_f and momenta p_f = dT/dv_f; without such bodies these blocks are empty and
 y is that of eq. (9), extended by the user-defined states z and the multipliers mu of the stabilisation. How many
-coordinates a body has is a matter of its kind, see `gearmbs.dae.equations.bodies.kinds`.
+coordinates a body has is a matter of its kind, see `gearmbs.dae.equations.bodies`.
 
 Nothing else in the package computes an offset: Python asks `offsets` and `places`, kernels read the header of the
 tables and their table ``at``, which are filled from these two.

@@ -9,9 +9,8 @@ import numpy as np
 import scipy
 
 from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_COLUMNS, POSE_R
-from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.model.evaluator import Assembler
-from gearmbs.dae.model.model import Model
+from gearmbs.dae.model.model import Configuration, Model
 
 STIFFENED = 1e4
 """Weight of modal coordinates over that of displacements."""

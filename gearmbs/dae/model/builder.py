@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies import RIGID, BodyKind
 from gearmbs.dae.equations.bodies.frames import shape_table
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
-from gearmbs.dae.equations.bodies.kinds import RIGID, BodyKind
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.loads.forces import FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.equations.unknowns import Counts

@@ -14,8 +14,7 @@ from gearmbs.dae.problem import AssemblyError, ModelError
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.base_system import BaseSystem
-    from gearmbs.dae.model.configuration import Configuration
-    from gearmbs.dae.model.model import Model
+    from gearmbs.dae.model.model import Configuration, Model
 
 LARGEST_LOCK = 600
 """Constraint rows up to which the cause of a failure is sought in a locking position."""

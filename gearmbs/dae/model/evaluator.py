@@ -41,8 +41,7 @@ from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.configuration import Configuration
-    from gearmbs.dae.model.model import Model
+    from gearmbs.dae.model.model import Configuration, Model
     from gearmbs.dae.problem import DAEProblem
 
 _VEC = float64[::1]

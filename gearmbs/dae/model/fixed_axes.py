@@ -43,7 +43,7 @@ from gearmbs.dae.model.members import (
     move_member,
 )
 from gearmbs.dae.model.records import RECORDS_TYPE, Records
-from gearmbs.dae.model.start import turns_of_one
+from gearmbs.dae.model.system import turns_of_one
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at

@@ -23,7 +23,7 @@ from gearmbs.dae.problem import AssemblyError, SingularModelError
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.base_system import BaseSystem
-    from gearmbs.dae.model.configuration import Configuration
+    from gearmbs.dae.model.model import Configuration
 
 POSITION_TOLERANCE = 1e-12
 """Part of the mechanism's length, or of 1 m, within which constraints hold: some thousand times the rounding of their

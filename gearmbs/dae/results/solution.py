@@ -19,7 +19,7 @@ from gearmbs._lazy import former_name
 from gearmbs._shown import Shown, html_table
 from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model import evaluator as outputs
-from gearmbs.dae.model.configuration import Configuration
+from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, Status
@@ -495,7 +495,7 @@ class Solution(Shown):
         ModelError
             For other times, for a solution without rates, and where turns cannot be told from the outputs.
         """
-        from gearmbs.dae.results.states import state_at
+        from gearmbs.dae.results.frames import state_at
 
         return state_at(self, t)
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from gearmbs.dae.equations.expressions.evaluate import angle_rates, eval_request, update_angles
 from gearmbs.dae.equations.expressions.tape import Tape
+from gearmbs.dae.results.frames import warn_of_doubtful_turns
 from gearmbs.kernels.jit import njit
-from gearmbs.mechanism.language.turns import warn_of_doubtful_turns
 
 
 @njit(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError
-from gearmbs.dae.equations.expressions.spline_data import SplineData
+from gearmbs.dae.equations.expressions.splines import SplineData
 
 MAX_DEPTH = 100
 """Deepest nesting of brackets, functions and signs."""

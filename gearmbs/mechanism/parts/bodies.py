@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae.equations.bodies.kinds import RIGID, BodyKind
+from gearmbs.dae.equations.bodies import RIGID, BodyKind
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.quantities import (
     Vector,

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gearmbs.dae.equations.bodies import MODAL
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
-from gearmbs.dae.equations.bodies.kinds import MODAL
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.quantities import Vector

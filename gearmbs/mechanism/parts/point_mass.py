@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae.equations.bodies.kinds import POINT_MASS
+from gearmbs.dae.equations.bodies import POINT_MASS
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker

@@ -12,8 +12,7 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
-from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion
-from gearmbs.mechanism.language.turns import warn_of_doubtful_turns
+from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, warn_of_doubtful_turns
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle, kinds_with_displacement

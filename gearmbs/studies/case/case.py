@@ -29,7 +29,7 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from gearmbs._shown import Shown
 from gearmbs.dae.methods import DEFAULT, FORMULATIONS, INTEGRATORS
-from gearmbs.schema.files import read_toml, toml_table
+from gearmbs.schema.described import read_toml, toml_table
 from gearmbs.schema.quantities import SHOWN, Measure, flag, two
 from gearmbs.studies.case import section as q
 from gearmbs.studies.case.section import CaseError, CaseWarning, Section, measures_of

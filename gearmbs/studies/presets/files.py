@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from gearmbs.drivetrain import Drivetrain, Housing
 from gearmbs.drivetrain.drivetrain import read_description
 from gearmbs.drivetrain.part import Part
-from gearmbs.schema.files import read_toml
+from gearmbs.schema.described import read_toml
 
 FOLDER = Path(__file__).parent
 """Where the files are."""

@@ -163,7 +163,7 @@ def test_jacobian_equals_central_differences(kind, formulation, code):
 
 def test_quadratic_part_is_the_second_derivative_along_a_motion():
     """d2(phi)/dt2 along R + v t, exp(w t) A (no accelerations), by differences of phi on the moving frames."""
-    from gearmbs.dae.model.configuration import Configuration
+    from gearmbs.dae.model.model import Configuration
 
     rng = np.random.default_rng(3)
     for kind in KINDS:

@@ -8,7 +8,7 @@ from gearmbs.dae.equations import jacobian as exact
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.residual import residual
 from gearmbs.dae.equations.unknowns import FORMULATIONS
-from gearmbs.dae.model.configuration import Configuration
+from gearmbs.dae.model.model import Configuration
 from gearmbs.mechanism import Mechanism, Mode, ModelError, ShapeIntegrals, linear_modes, static_equilibrium
 from tests.says import says
 

@@ -6,6 +6,6 @@ from .evaluate import update_angles as update_angles
 from .opcodes import ExpressionError as ExpressionError
 from .second import eval_second as eval_second
 from .second import eval_time as eval_time
-from .spline_data import SplineData as SplineData
+from .splines import SplineData as SplineData
 from .tape import Tape as Tape
 from .tape import TapeBuilder as TapeBuilder

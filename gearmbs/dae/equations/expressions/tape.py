@@ -14,7 +14,7 @@ from gearmbs.dae.equations.expressions.measures import LEAF_WORK
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError
 from gearmbs.dae.equations.expressions.scalar import binary_python, unary_python
 from gearmbs.dae.equations.expressions.second import JACOBIAN_AT
-from gearmbs.dae.equations.expressions.spline_data import SplineData, spline_table
+from gearmbs.dae.equations.expressions.splines import SplineData, spline_table
 
 _LEAF_LEVEL = {
     op.CONST: op.LEVEL_CONSTANT,
