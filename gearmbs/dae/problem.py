@@ -107,6 +107,8 @@ class DAEProblem:
     solved_at_outputs : ndarray of bool, optional
         Algebraic unknowns that are solved for at outputs, where the rest of the algebraic ones is evaluated elsewhere;
         default all, as far as they are not under error control. See `gearmbs.dae.integrators.algebraic`.
+    solved_if_needed : ndarray of bool, optional
+        Algebraic unknowns that are solved for together with these where their equations hold them.
     advice : mapping of Status to str
         What to try after a failure, in the words of whoever states the problem; default: in those of `solve_dae`.
     callbacks : sequence
@@ -140,5 +142,6 @@ class DAEProblem:
     jacobian_residuals: int = 0
     small_entries: bool = False
     solved_at_outputs: np.ndarray | None = None
+    solved_if_needed: np.ndarray | None = None
     advice: Mapping[Any, str] = field(default_factory=dict)
     callbacks: Sequence[Any] = ()

@@ -251,6 +251,13 @@ def plain_states(at: dict[str, int], controlled: np.ndarray) -> np.ndarray:
     return mask
 
 
+def loads(at: dict[str, int]) -> np.ndarray:
+    """Return which unknowns are applied forces and torques."""
+    mask = np.zeros(at["n"], dtype=bool)
+    mask[at["F"] : at["z"]] = True
+    return mask
+
+
 def velocities(at: dict[str, int]) -> np.ndarray:
     """Return the indices of u, eps and v_f, in the order of the coordinates R, theta and q_f."""
     return np.concatenate([np.arange(at["u"], at["p"]), np.arange(at["eps"], at["R"])])

@@ -79,6 +79,11 @@ CLOSER, NEARER = 0.25, 0.75
 there that is left where it is the limit: 1/2 of t^1.5, while smooth constraints lead to one value over both."""
 RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
+UNRESOLVED = 100.0
+"""Tolerances by which an output may be off what the steps say of it, and by which a step that ended there would have
+to move an unknown under error control, before the output counts as news to the steps: a step is refused at one."""
+LOOKED_AT = 10
+"""Outputs that are looked at, those the furthest off: one for each algebraic unknown."""
 MAX_POINTS = 8
 """Points of a polynomial of the highest order, and one to spare."""
 
@@ -107,13 +112,19 @@ class AlgebraicPart(Struct):
         they are off by at a breakpoint.
     told : ndarray, shape (m,)
         What an integrator says of them between its steps.
-    moved, moved_at, moved_step : ndarray, shape (m,)
-        By how many tolerances outputs are off that, at most; when; and the size of the step around.
+    moved, moved_at, moved_step : ndarray, shape (s,)
+        By how many tolerances outputs are off that, the furthest of each of at most `LOOKED_AT` unknowns; when; and the
+        size of the step around. Zero for a place that is free.
+    moved_of : ndarray of int64, shape (s,)
+        Which of the unknowns.
+    moved_rdata : ndarray, shape (s, p)
+        The table of numbers that was valid then: angles count their turns in it.
     """
 
     count: int
     any_lifted: bool
     any_rates: bool
+    noting: bool  # whether outputs far off are to be kept
     factored: bool
     rtol: float
     t_start: float  # ends of the run: a table may end with it
@@ -145,6 +156,8 @@ class AlgebraicPart(Struct):
     moved: Vector
     moved_at: Vector
     moved_step: Vector
+    moved_of: IntVector
+    moved_rdata: Matrix
     res: Vector
     y_moved: Vector
     yp_kept: Vector
@@ -488,20 +501,36 @@ def settle_between(functions, part, t, t_old, y_old, h, nodes, rows, first, coun
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def note_moves(part, t, y, h):
+def note_moves(part, t, y, h, rdata):
     """Keep by how far the output ``y`` is off what the step of size ``h`` around it says, where that is the most yet.
 
     A step begins at the breakpoint before it, at the earliest; at one the equations are of either side.
     """
     h = min(h, t - part.t_first)
-    if h <= 0.0 or part.t_last - BESIDE * abs(t) <= t < part.t_end:
+    if not part.noting or h <= 0.0 or part.t_last - BESIDE * abs(t) <= t < part.t_end:
         return
     for k in range(part.count):
         if part.rates[k] == 0:
             now, told = y[part.cols[k]], part.told[k]
             off = abs(now - told) / (part.atol[part.cols[k]] + part.rtol * max(abs(now), abs(told)))
-            if off > part.moved[k]:
-                part.moved[k], part.moved_at[k], part.moved_step[k] = off, t, h
+            if off > UNRESOLVED:
+                _keep_move(part, k, off, t, h, rdata)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _keep_move(part, k, off, t, h, rdata):
+    """Keep an output in the place of its unknown, or in that of the unknown the least off, if it is further off."""
+    place = 0
+    for q in range(part.moved.shape[0]):
+        if part.moved[q] > 0.0 and part.moved_of[q] == k:
+            place = q
+            break
+        if part.moved[q] < part.moved[place]:
+            place = q
+    if off > part.moved[place]:
+        part.moved[place], part.moved_at[place], part.moved_step[place], part.moved_of[place] = off, t, h, k
+        for i in range(rdata.shape[0]):
+            part.moved_rdata[place, i] = rdata[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -512,11 +541,35 @@ def note_failure(part, t):
     part.failures += 1
 
 
-_SETTLE_ROWS = types.void(FUNCTIONS_TYPE, PART_TYPE, _VEC, _IVEC, _IVEC, _VEC, _MAT, _MAT, _MAT, _IVEC, _VEC, _VEC)
+@njit(
+    int64(FUNCTIONS_TYPE, _IVEC, _VEC, _MAT, int64, int64, _IVEC, _VEC, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def follow(functions, orders, nodes, rows, seen, last, idata, rdata, work):
+    """Let the hook look at the ends of steps among the rows behind ``seen`` up to ``last``; return which was the last.
+
+    What it keeps in ``rdata``, as turns that are counted, is then as it was in the run. The other parameters are those
+    of `settle_on_steps`, the integer table that of these steps.
+    """
+    point, table = np.empty((1, rows.shape[1])), np.empty_like(idata)
+    for r in range(seen + 1, last + 1):
+        if orders[r] > 0:
+            # where it changes the coordinates rows that are stored behind are in those already
+            point[0, :] = rows[r]
+            table[:] = idata
+            functions.hook(nodes[r], point, 1, table, rdata, work)
+    return max(seen, last)
 
 
-@njit(_SETTLE_ROWS, cache=True, nogil=True, error_model="numpy")
-def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, idata, rdata, work):
+@njit(
+    int64(FUNCTIONS_TYPE, PART_TYPE, _VEC, _IVEC, _IVEC, _VEC, _MAT, _MAT, _MAT, int64, _IVEC, _VEC, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, seen, idata, rdata, work):
     """Write y and y' at ``times``, each on the polynomial of the step that ends in row ``ends[i]``, and settle them.
 
     Parameters
@@ -524,19 +577,27 @@ def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, id
     functions, part
         As of `settle`.
     times, ends, orders, nodes, rows, y, yp
-        As of `gearmbs.dae.result.evaluate_many`.
+        As of `gearmbs.dae.result.evaluate_many`, the times increasing.
+    seen : int
+        Row up to which the hook has looked at the steps for ``rdata``; the number of rows if it need not.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
+
+    Returns
+    -------
+    seen : int
     """
     for i in range(times.shape[0]):
         e = ends[i]
+        seen = follow(functions, orders, nodes, rows, seen, e - 1, idata, rdata, work)
         k = orders[e]
         h = nodes[e] - nodes[e - 1]
         settle_between(
             functions, part, times[i], nodes[e - 1], rows[e - 1], h, nodes[e - k : e + 1], rows, e - k, k + 1,
             y[i], yp[i], idata, rdata, work,
         )  # fmt: skip
-        note_moves(part, times[i], y[i], h)
+        note_moves(part, times[i], y[i], h, rdata)
+    return seen
 
 
 @njit(
@@ -553,7 +614,7 @@ def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work
     """
     _take(part, y, yp, part.told)
     if settle(functions, part, t, y, yp, h, idata, rdata, work):
-        note_moves(part, t, y, h)
+        note_moves(part, t, y, h, rdata)
         return
     n = y.shape[0]
     if t > t_old:
@@ -569,14 +630,15 @@ def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work
                 if part.rates[k] == 0:
                     y[part.cols[k]] = z[part.cols[k]]
             if settle(functions, part, t, y, yp, h, idata, rdata, work):
-                note_moves(part, t, y, h)
+                note_moves(part, t, y, h, rdata)
                 return
         part.failures = failures
     note_failure(part, t)
 
 
-def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
+def _new_part(m: int, n: int, nnz: int, entries: int, numbers: int) -> AlgebraicPart:
     """Return room for m equations among those of n unknowns, with ``nnz`` entries, ``entries`` of them in these."""
+    places = min(m, LOOKED_AT)
     return AlgebraicPart(
         count=m,
         t_start=-np.inf,
@@ -586,7 +648,11 @@ def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
         **{name: np.zeros(m, dtype=np.int64) for name in ("rows", "lifted", "cols", "rates", "pivots")},
         **{name: np.zeros(entries, dtype=np.int64) for name in ("entry_row", "entry_col", "entry_at", "entry_kind")},
         **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known", "here")},
-        **{name: np.zeros(m) for name in ("told", "moved", "moved_at", "moved_step")},
+        told=np.zeros(m),
+        noting=True,
+        **{name: np.zeros(places) for name in ("moved", "moved_at", "moved_step")},
+        moved_of=np.zeros(places, dtype=np.int64),
+        moved_rdata=np.empty((places, numbers)),
         **{name: np.zeros(n) for name in ("atol", "res", "y_moved", "yp_kept")},
         **{name: np.zeros(nnz) for name in ("vals", "vals_of_rates")},
         **{name: np.zeros(MAX_POINTS) for name in ("value", "slope")},
@@ -597,7 +663,7 @@ def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
 @cache
 def _nothing() -> AlgebraicPart:
     """Return the part of problems without anything to solve for: compiled code but looks at its count."""
-    return _new_part(0, 0, 0, 0)
+    return _new_part(0, 0, 0, 0, 0)
 
 
 class AlgebraicOutputs:
@@ -614,7 +680,7 @@ class AlgebraicOutputs:
 
     def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float, ends: tuple[float, float]) -> None:
         self.problem = problem
-        wanted, solved = chosen(problem)
+        wanted, solved, taken = chosen(problem)
         self.left = np.empty(0, dtype=np.int64)
         self.coupled = self.left
         # scratch of polynomials is not shared between threads
@@ -623,9 +689,8 @@ class AlgebraicOutputs:
             return
         by_y, by_rate = dependences(problem)
         differential = np.asarray(problem.differential, dtype=bool)
-        found = structure(
-            Graph(by_y, by_rate, wanted, solved, differential, np.asarray(problem.indptr), np.asarray(problem.indices))
-        )
+        pattern = np.asarray(problem.indptr), np.asarray(problem.indices)
+        found = structure(Graph(by_y, by_rate, wanted, solved, differential, taken, *pattern))
         self.left, self.coupled = found.left, found.coupled
         if len(found.rows):
             self.part = self._made(found, atol, rtol)
@@ -633,7 +698,9 @@ class AlgebraicOutputs:
 
     def _made(self, found: Structure, atol: np.ndarray, rtol: float) -> AlgebraicPart:
         """Return the compiled loop's part of it."""
-        part = _new_part(len(found.rows), self.problem.n, len(self.problem.indices), len(found.entries))
+        problem = self.problem
+        sizes = len(found.rows), problem.n, len(problem.indices), len(found.entries), len(problem.rdata)
+        part = _new_part(*sizes)
         part.rtol = rtol
         part.any_lifted, part.any_rates = bool(found.lifted.any()), bool(found.rates.any())
         part.rows[:], part.cols[:], part.lifted[:], part.rates[:] = found.rows, found.cols, found.lifted, found.rates
@@ -659,7 +726,8 @@ class AlgebraicOutputs:
     @property
     def functions(self) -> Any:
         """The functions of the problem, bound together for compiled code."""
-        return bind(self.problem.residual, self.problem.jacobian, no_hook, no_events)
+        problem = self.problem
+        return bind(problem.residual, problem.jacobian, problem.hook or no_hook, no_events)
 
     def settle_start(
         self,
@@ -676,36 +744,34 @@ class AlgebraicOutputs:
         steps approach stays: a constraint has no smooth rate there, as t^1.5 at 0.
         """
         part = self.part
-        kept, moved = (part.failures, part.t_first, part.t_last), part.moved.copy()
+        kept, part.noting = (part.failures, part.t_first, part.t_last), False
+        rdata = self.problem.rdata
         part.t_first, part.t_last = t, stops[0] if len(stops) else part.t_end
         given, closer = (y.copy(), yp.copy()), (y.copy(), yp.copy())
-        self.settle_after(t, y, yp, h, t, y, idata)
+        self.settle_after(t, y, yp, h, t, y, idata, rdata)
         if part.any_lifted:
             failures = part.failures
-            self.settle_after(t, *closer, CLOSER * h, t, closer[0], idata)
+            self.settle_after(t, *closer, CLOSER * h, t, closer[0], idata, rdata)
             if part.failures == failures:
                 limit = np.abs(closer[0] - given[0]) < NEARER * np.abs(y - given[0])
                 y[limit], yp[limit] = given[0][limit], given[1][limit]
         part.failures, part.t_first, part.t_last = kept
-        part.moved[:] = moved
+        part.noting = True
 
     def settle_after(
-        self, t: float, y: np.ndarray, yp: np.ndarray, h: float, t_old: float, y_old: np.ndarray, idata: np.ndarray
+        self,
+        t: float,
+        y: np.ndarray,
+        yp: np.ndarray,
+        h: float,
+        t_old: float,
+        y_old: np.ndarray,
+        idata: np.ndarray,
+        rdata: np.ndarray,
     ) -> None:
-        """Settle one output in place; see `settle_output`."""
-        problem = self.problem
-        direct(settle_output)(
-            self.functions, self.part, t, y, yp, h, t_old, y_old, idata, problem.rdata.copy(),
-            np.zeros(problem.work_size),
-        )  # fmt: skip
-
-    def settle_on_steps(self, times, ends, orders, nodes, rows, y, yp, idata: np.ndarray) -> None:
-        """Write y and y' at times between steps, settled; see the function of this name."""
-        problem = self.problem
-        direct(settle_on_steps)(
-            self.functions, self.part, times, ends, orders, nodes, rows, y, yp, idata, problem.rdata.copy(),
-            np.zeros(problem.work_size),
-        )  # fmt: skip
+        """Settle one output in place, with the tables valid there; see `settle_output`."""
+        tables = idata, rdata.copy(), np.zeros(self.problem.work_size)
+        direct(settle_output)(self.functions, self.part, t, y, yp, h, t_old, y_old, *tables)
 
     def remark(self) -> str:
         """Say which unknowns are known at the steps alone, and where they could not be solved for."""

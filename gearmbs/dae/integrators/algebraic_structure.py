@@ -160,7 +160,8 @@ class Graph:
     Parameters
     ----------
     *lists : ndarray
-        Dependences on unknowns and on rates; wanted, solved for and differential unknowns; pattern of the matrix.
+        Dependences on unknowns and on rates; wanted, solved for and differential unknowns, and those that are taken as
+        they are, without being exact; pattern of the matrix.
     """
 
     def __init__(self, *lists: np.ndarray) -> None:
@@ -188,15 +189,24 @@ class Structure(NamedTuple):
 
 @lru_cache(maxsize=KNOWN)
 def structure(graph: Graph) -> Structure:
-    """Return what is solved for and by which equations; runs of alike problems find it once."""
-    by_y, by_rate, wanted, solved, differential, indptr, indices = graph.lists
+    """Return what is solved for and by which equations; runs of alike problems find it once.
+
+    Equations with unknowns that are taken as they are, such as multipliers, serve only for what the others leave open.
+    """
+    by_y, by_rate, wanted, solved, differential, taken, indptr, indices = graph.lists
     n = len(wanted)
     unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & differential))
     edges = np.concatenate((by_y, by_rate), axis=1) & unknown
     constraints = ~edges.any(axis=1) & ~by_y[:, ~differential].any(axis=1)
     edges[constraints, n:] = by_y[constraints] & unknown[n:]
-    match, determined = _determined(edges)
+    exact = np.asarray(~by_y[:, taken].any(axis=1))
+    match, determined = _determined(edges & exact[:, None])
     determined &= unknown
+    if not determined[wanted.nonzero()].all():
+        rest = edges & ~determined
+        rest[match[determined]] = False
+        others, more = _determined(rest)
+        match, determined = np.where(determined, match, others), determined | (more & unknown)
     asked = np.flatnonzero(wanted)
     found, coupled = _needed(edges, match, asked[determined[asked]])
     rows, cols, rates = match[found].astype(np.int64), found % n, found >= n
@@ -212,14 +222,15 @@ def structure(graph: Graph) -> Structure:
     return Structure(asked[~determined[asked]], coupled, rows, cols, lifted, rates, table)
 
 
-def chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Return which unknowns are wanted at outputs, and which are solved for if an equation needs them."""
+def chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which unknowns are wanted at outputs, solved for if an equation needs them, and taken as they are."""
     algebraic = ~np.asarray(problem.differential, dtype=bool)
-    if problem.solved_at_outputs is not None:
-        wanted = algebraic & problem.solved_at_outputs
-        return wanted, wanted
-    wanted = algebraic & ~np.asarray(problem.error_mask, dtype=bool)
-    return wanted, algebraic
+    free = algebraic & ~np.asarray(problem.error_mask, dtype=bool)
+    if problem.solved_at_outputs is None:
+        return free, algebraic, np.zeros_like(free)
+    wanted = algebraic & problem.solved_at_outputs
+    solved = wanted if problem.solved_if_needed is None else wanted | problem.solved_if_needed
+    return wanted, solved, free & ~solved
 
 
 def has_hidden_constraints(problem: DAEProblem) -> bool:

@@ -52,7 +52,7 @@ def write_outputs(functions, st, part, t):
                 settle(functions, part, st.t_new, st.y_out[row], st.yp_out[row], st.step, st.idata, st.rdata, st.work)
         else:
             interpolate(functions, st, part, st.outputs[row], st.y_out[row], st.yp_out[row])
-            note_moves(part, st.outputs[row], st.y_out[row], st.step)
+            note_moves(part, st.outputs[row], st.y_out[row], st.step, st.rdata)
         st.next_output = row + 1
 
 

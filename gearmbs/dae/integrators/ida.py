@@ -376,7 +376,7 @@ class _Run:
             if k == 0:
                 settler.settle_start(*output, self.idata, self.stops)
             else:
-                settler.settle_after(*output, float(rows.t[k - 1]), rows.y[k - 1], self.idata)
+                settler.settle_after(*output, float(rows.t[k - 1]), rows.y[k - 1], self.idata, self.rdata)
 
     def _advance(self, solver: IDA, target: float, messages: _Messages) -> tuple[Any, str]:
         """Go to ``target``, in portions of steps; return IDA's answer and what it has to say of a failure."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
+from gearmbs.dae.integrators.algebraic import UNRESOLVED, AlgebraicOutputs, follow, settle_on_steps
 from gearmbs.dae.integrators.messages import unresolved
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
@@ -21,11 +21,6 @@ from gearmbs.kernels.pointers import direct
 
 START_STEPS = 20
 """Steps, the longest of which is taken for the size of steps at the start: after some ten they have grown to it."""
-UNRESOLVED = 100.0
-"""Tolerances by which an output may be off what the steps say of it, and by which a step that ended there would have
-to move an unknown under error control, before the output counts as news to the steps: a step is refused at one."""
-LOOKED_AT = 10
-"""Outputs that are looked at, those the furthest off: one for each algebraic unknown."""
 
 
 def warn_of_unresolved(
@@ -49,21 +44,21 @@ def warn_of_unresolved(
         The integer table that is valid at output i.
     """
     part, problem = algebraic.part, algebraic.problem
-    order = np.argsort(part.moved)[::-1][:LOOKED_AT]
     worst, told = UNRESOLVED, ""
-    for k in order[part.moved[order] > UNRESOLVED]:
+    for k in np.flatnonzero(part.moved):
         at = np.flatnonzero(t == part.moved_at[k])
         if not at.size:
             # an event has cut the step before this output
             continue
         i = int(at[0])
-        off = _corrections(problem, float(t[i]), y[i], yp[i], float(part.moved_step[k]), table_of(i))
+        h, unknown = float(part.moved_step[k]), int(part.cols[part.moved_of[k]])
+        off = _corrections(problem, float(t[i]), y[i], yp[i], h, (table_of(i), part.moved_rdata[k]))
         off *= problem.error_mask & problem.differential
         off /= part.atol + part.rtol * np.abs(y[i])
         j = int(np.argmax(off))
         if off[j] > worst:
             worst = off[j]
-            told = unresolved(problem, t[i], part.moved_step[k], int(part.cols[k]), y[i, part.cols[k]], j, worst)
+            told = unresolved(problem, t[i], h, unknown, y[i, unknown], j, worst)
     part.moved[:] = 0.0
     if told:
         warnings.warn(told, stacklevel=2)
@@ -78,11 +73,11 @@ def remark_on_unresolved(algebraic: AlgebraicOutputs, result: DAEResult) -> None
 
 
 def _corrections(
-    problem: DAEProblem, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray
+    problem: DAEProblem, t: float, y: np.ndarray, yp: np.ndarray, h: float, valid: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
     """Return by how much a Newton iteration of a step of size ``h`` to ``t`` moves each unknown, zero if it cannot."""
     res, vals = np.zeros(problem.n), np.zeros(len(problem.indices))
-    tables = idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    tables = *(table.copy() for table in valid), np.zeros(problem.work_size)
     problem.residual(t, y, yp, res, *tables)
     problem.jacobian(t, y, yp, 1.0 / h, vals, *tables)
     none = np.zeros(problem.n)
@@ -181,7 +176,7 @@ class Records:
         consumed = self.options.consumer is not None
         sol = None
         if rows is not None and not consumed:
-            between = Between(self.algebraic, self.tables, st.stops, self.options) if self.algebraic.is_needed else None
+            between = Between(self.algebraic, self.tables, st, self.options) if self.algebraic.is_needed else None
             sol = DenseOutput(t, rows, order, between)
         outputs: tuple[np.ndarray, np.ndarray, np.ndarray]
         if consumed and rows is not None:
@@ -249,8 +244,8 @@ class Between:
     algebraic : AlgebraicOutputs
     tables : list of (float, ndarray)
         Times, and the integer tables that are valid from there on.
-    stops : ndarray
-        Breakpoints.
+    st : RunState
+        At the end of the run, with its breakpoints.
     options : Options
         With tolerances, and what tells that a function of the user has failed.
     """
@@ -259,12 +254,18 @@ class Between:
         self,
         algebraic: AlgebraicOutputs,
         tables: list[tuple[float, np.ndarray]],
-        stops: np.ndarray,
+        st: RunState,
         options: Options,
     ) -> None:
         self.algebraic = algebraic
-        self.stops = stops.copy()
+        self.stops = st.stops.copy()
         self.tables = list(tables)
+        self.starts = np.array([t for t, _ in tables])
+        problem = algebraic.problem
+        self.keeps = problem.hook is not None and not np.array_equal(problem.rdata, st.rdata)
+        """Whether the hook keeps something in the table of numbers, which has to be followed from step to step."""
+        self.rdata = problem.rdata.copy()
+        self.seen = 0
         self.errors = options.errors
         part = algebraic.part
         self.unknowns = np.unique(part.cols[part.rates == 0])
@@ -278,18 +279,39 @@ class Between:
         Exception
             What a function of the user has raised.
         """
-        valid = np.searchsorted([t for t, _ in self.tables], times, side="left") - 1
+        order = np.argsort(times, kind="stable")
+        valid = np.maximum(np.searchsorted(self.starts, times, side="left") - 1, 0)
         pieces = np.searchsorted(self.stops, times, side="left")
-        for k, piece in sorted({*zip(np.maximum(valid, 0).tolist(), pieces.tolist())}):
-            mine = np.flatnonzero((np.maximum(valid, 0) == k) & (pieces == piece))
-            idata = self.tables[k][1]
-            among = self.algebraic.part
+        among, problem = self.algebraic.part, self.algebraic.problem
+        functions, work = self.algebraic.functions, np.zeros(problem.work_size)
+        for k, piece in sorted({*zip(valid.tolist(), pieces.tolist())}):
+            mine = order[(valid[order] == k) & (pieces[order] == piece)]
             among.t_first = self.stops[piece - 1] if piece > 0 else among.t_start
             among.t_last = self.stops[piece] if piece < len(self.stops) else among.t_end
-            if mine.size:
-                part, slopes = y[mine], yp[mine]
-                self.algebraic.settle_on_steps(times[mine], ends[mine], orders, nodes, rows, part, slopes, idata)
-                y[mine], yp[mine] = part, slopes
+            self._follow(functions, int(ends[mine[0]]) - 1, orders, nodes, rows)
+            part, slopes = y[mine], yp[mine]
+            seen = direct(settle_on_steps)(
+                functions, among, times[mine], ends[mine], orders, nodes, rows, part, slopes,
+                self.seen if self.keeps else len(rows), self.tables[k][1], self.rdata, work,
+            )  # fmt: skip
+            self.seen = seen if self.keeps else 0
+            y[mine], yp[mine] = part, slopes
         if self.errors:
             raise self.errors.pop()
-        warn_of_unresolved(self.algebraic, times, y, yp, lambda i: self.tables[max(int(valid[i]), 0)][1])
+        warn_of_unresolved(self.algebraic, times, y, yp, lambda i: self.tables[valid[i]][1])
+
+    def _follow(self, functions, last: int, orders: np.ndarray, nodes: np.ndarray, rows: np.ndarray) -> None:
+        """Bring the table of numbers to where it was behind row ``last``."""
+        if not self.keeps:
+            return
+        problem = self.algebraic.problem
+        if last < self.seen:
+            self.rdata[:] = problem.rdata
+            self.seen = 0
+        work = np.zeros(problem.work_size)
+        steps = self.seen + 1 + np.flatnonzero(orders[self.seen + 1 : last + 1] > 0)
+        valid = np.maximum(np.searchsorted(self.starts, nodes[steps], side="left") - 1, 0)
+        for k in np.unique(valid):
+            until = int(steps[valid == k][-1])
+            idata = self.tables[k][1]
+            self.seen = direct(follow)(functions, orders, nodes, rows, self.seen, until, idata, self.rdata, work)
