@@ -141,6 +141,20 @@ def _common(unit: str) -> tuple[float, tuple] | None:
     return (factor, tuple(round(p, 9) for p in powers.values())) if place else None
 
 
+def powers_of(unit: str) -> tuple[float, tuple] | None:
+    """Return the SI value of a unit or dimension and its powers of m, kg, s and rad; None for anything else.
+
+    Examples
+    --------
+    >>> powers_of("Nm") == powers_of("torque"), powers_of("rpm")[1], powers_of("pump")
+    (True, (0.0, 0.0, -1.0, 1.0), None)
+    """
+    clean = DIMENSIONS.get(unit, unit)
+    for pattern, written in SPELLINGS:
+        clean = re.sub(pattern, written, clean)
+    return _common(clean)
+
+
 def _quick(text: str, target: str) -> float | None:
     """Return the value of a number with common units in a target of the very same powers; else None."""
     number = NUMBER.match(text)

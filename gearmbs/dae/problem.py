@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from gearmbs.dae.numbers import Number
+
 EPS = 2.220446049250313e-16
 """Distance from one to the next larger double, 2^-52."""
 
@@ -113,6 +115,8 @@ class DAEProblem:
         What to try after a failure, in the words of whoever states the problem; default: in those of `solve_dae`.
     callbacks : sequence
         What has to live as long as the addresses in ``idata``.
+    numbers : mapping of str to Number
+        Inputs and other numbers that can be changed by their names, with their places in ``rdata``.
     """
 
     n: int
@@ -145,3 +149,4 @@ class DAEProblem:
     solved_if_needed: np.ndarray | None = None
     advice: Mapping[Any, str] = field(default_factory=dict)
     callbacks: Sequence[Any] = ()
+    numbers: Mapping[str, Number] = field(default_factory=dict)

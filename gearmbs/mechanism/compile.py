@@ -17,14 +17,16 @@ from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.model.builder import TableBuilder
 from gearmbs.dae.model.model import STATE_IMPLICIT, Configuration, Names
 from gearmbs.dae.model.system import System
+from gearmbs.dae.numbers import INPUT, PARAMETER, Place
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import row_order
-from gearmbs.mechanism.language.syntax import Scope
+from gearmbs.mechanism.language.syntax import NamedNumber, Scope
 from gearmbs.mechanism.parts import elements as el
 from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State
 from gearmbs.mechanism.parts.functions import TimeFunction
+from gearmbs.mechanism.parts.inputs import COEFFICIENTS, Input, Parameter, unit_factor
 from gearmbs.mechanism.parts.modal import ModalBody
 
 if TYPE_CHECKING:
@@ -87,6 +89,7 @@ class _Compiler:
         q_f = np.concatenate([np.zeros(0), *(body.start for body in bent)])
         v_f = np.concatenate([np.zeros(0), *(body.rate for body in bent)])
         self.index_all_markers()
+        self.add_numbers()
         labels = [f"{joint.name}: {row.label}" for joint in m.joints.values() for row in joint.rows]
         rows = [row for joint in m.joints.values() for row in joint.rows]
         self.builder.add_rows([self.packed_row(row, label) for row, label in zip(rows, labels)])
@@ -98,7 +101,7 @@ class _Compiler:
                     f"general constraint '{name}': {text!r} must depend on positions and TIME only; "
                     "velocities and forces cannot enter a constraint"
                 )
-            self.builder.add_tape_row(self.add_tape(tape))
+            self.builder.add_tape_row(self.add_tape(tape, f"{name}: expression"))
             self.row_names.append(f"{name}: expression")
         # the states given by expressions come first among the unknowns; their tapes are added with all else known
         self.builder.states = [(_state_kind(state), -1) for state in m.states.values()]
@@ -144,12 +147,28 @@ class _Compiler:
         """Return the name of a marker of the table, "" for the global frame."""
         return self.marker_names[index] if index >= 0 else ""
 
+    # --- inputs and parameters ----------------------------------------------------------------------
+
+    def add_numbers(self) -> None:
+        for made in self.mechanism.inputs.values():
+            self.know(made)
+        for given in self.mechanism.parameters.values():
+            self.builder.add_number(given.name, given.unit, PARAMETER, given.start)
+
+    def know(self, made: Input) -> None:
+        """Add an input, which may be one that was not made by the mechanism, to the named numbers."""
+        known = self.builder.numbers.get(made.name)
+        if known is None:
+            self.builder.add_number(made.name, made.unit, INPUT, made.start)
+        elif known.kind != INPUT or known.unit != made.unit:
+            raise ModelError(f"input {made.name!r}: another {known.kind} in {known.unit} has this name; choose another")
+
     # --- constraints --------------------------------------------------------------------------------
 
     def packed_row(self, row: jt.Row, label: str) -> tuple[list[tuple], int]:
         """Return the terms and the function of a constraint row as `TableBuilder.add_rows` takes them."""
-        function = -1 if row.function is None else self.function(row.function, label)
-        rotation = -1 if row.rotation is None else self.function(row.rotation, label)
+        function = -1 if row.function is None else self.function(row.function, label, label)
+        rotation = -1 if row.rotation is None else self.function(row.rotation, label, label)
         index = self.marker_index
         packed = []
         for t in row.terms:
@@ -157,21 +176,31 @@ class _Compiler:
             packed.append((t.kind, index[id(t.i)], index[id(t.j)], t.axes, rotation, t.coefficient, start))
         return packed, function
 
-    def function(self, function: TimeFunction, label: str) -> int:
+    def function(self, function: TimeFunction, label: str, row: str | None = None) -> int:
+        """Add a function of time; ``row`` is the constraint that it is prescribed for, if it is one."""
         if not function.is_expression:
-            return self.builder.add_function(function.kind, list(function.parameters))
+            number = self.builder.add_function(function.kind, list(function.parameters))
+            if isinstance(function, Input):
+                self.know(function)
+                # behind the number of its pieces
+                at = self.builder.functions[number][1] + 1
+                self.builder.add_place(function.name, Place(at, COEFFICIENTS, function.order, T.H_R_FUNCTION), row)
+            return number
         tape = self.tape(function.text, label, "number")
         if tape.level > LEVEL_TIME:
             raise ModelError(f"{label}: {function.text!r} must be a function of TIME alone")
-        number = self.add_tape(tape)
+        number = self.add_tape(tape, row)
         self.builder.functions.append((time_functions.TAPE, number))
         return len(self.builder.functions) - 1
 
     # --- expressions --------------------------------------------------------------------------------
 
-    def add_tape(self, tape: Tape) -> int:
-        """Add a tape; its counted angles start where the mechanism says."""
+    def add_tape(self, tape: Tape, row: str | None = None) -> int:
+        """Add a tape; its counted angles start where the mechanism says. ``row`` is the constraint it is part of."""
         number = self.builder.add_tape(tape)
+        for name, place, size in tape.numbers:
+            at = self.builder.tape_rows[-1][T.TAPE_R] + place
+            self.builder.add_place(name, Place(at, size, 0, T.H_R_EXTRA), row)
         at, n = self.builder.tape_rows[-1][T.TAPE_REFERENCE], tape.n_angles
         for k, start in enumerate(starting_angles(tape, self.mechanism.turns, self.marker_named)):
             # the reference, and the value of the last point that was tracked
@@ -213,6 +242,7 @@ class _Compiler:
                 modes={_upper(name): b.modal.modes for name, b in m.bodies.items() if isinstance(b, ModalBody)},
                 splines={_upper(k): v for k, v in m.splines.items()},
                 arrays={_upper(k): v for k, v in m.arrays.items()},
+                numbers=named_numbers(m),
                 functions=m.functions,
                 plants={(kind, _upper(k)): v for (kind, k), v in m.plants.items()},
                 forces=forces,
@@ -377,6 +407,16 @@ class _Compiler:
             bodies=sorted(set(bodies) - {0}),
             unknowns=sorted(set(unknowns)),
         )
+
+
+def named_numbers(mechanism: Mechanism, known: bool = False) -> dict[str, NamedNumber]:
+    """Return the inputs and parameters of a mechanism as expressions take them, by upper-case name."""
+    found = {}
+    every: list[Input | Parameter] = [*mechanism.inputs.values(), *mechanism.parameters.values()]
+    for made in every:
+        factor = unit_factor(mechanism.units, made.unit)
+        found[made.name.upper()] = NamedNumber(made.name, made.start, factor, isinstance(made, Input), known)
+    return found
 
 
 def starting_angles(

@@ -12,7 +12,7 @@ from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Body, Marker
-from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, integrated
+from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
 
 if TYPE_CHECKING:
@@ -295,4 +295,4 @@ def _displacement(
     """Return the displacement of a motion, whatever its function gives."""
     if given is None:
         return as_function(function, unit, f"motion '{name}'")
-    return integrated(given.function, given.start, None if given.level == "velocity" else given.rate)
+    return given.function.integral(given.start, None if given.level == "velocity" else given.rate)

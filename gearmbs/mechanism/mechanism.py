@@ -22,6 +22,7 @@ from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
+from gearmbs.mechanism.parts.inputs import Input, Parameter, make_input, make_parameter
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
@@ -82,6 +83,8 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         self.splines: dict[Any, SplineData] = {}
         self.arrays: dict[Any, tuple[float, ...]] = {}
         self.functions: dict[str, UserFunction] = {}
+        self.inputs: dict[str, Input] = {}
+        self.parameters: dict[str, Parameter] = {}
         self.plants: dict[tuple[str, Any], tuple[Any, ...]] = {}
         self.units = Units()
         self.reads_units = True
@@ -388,6 +391,47 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         self._check_name(name)
         self.constraints[name] = str(expression)
 
+    def input(self, name: str, unit: str, value: float = 0.0) -> Input:
+        """Add an input: a number with a name that is set from outside while a simulation goes on.
+
+        What is returned is a function of time for torques and motions; expressions use the name, in quotes if it holds
+        other characters than letters, digits, dot and underscore. `gearmbs.Simulator.set` gives it another value.
+
+        Parameters
+        ----------
+        name : str
+            In expressions capitals do not matter.
+        unit : str
+            Of SI, "N m", or a dimension, "torque".
+        value : float or str
+            Until it is set, SI or text with a unit.
+
+        Raises
+        ------
+        ModelError
+            For a name that is in use or a unit that is none of SI.
+
+        Examples
+        --------
+        >>> from gearmbs.mechanism import Mechanism
+        >>> m = Mechanism("disc")
+        >>> disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+        >>> pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+        >>> m.torque("drive", disc, m.input("load", "N m", 4.0))
+        Torque('drive', load N m on 'disc' about z of 'drive.J')
+        """
+        made = make_input(name, unit, value)
+        self._check_number(name, "input")
+        self.inputs[name] = made
+        return made
+
+    def parameter(self, name: str, unit: str, value: float) -> Parameter:
+        """Add a number with a name that expressions use and `gearmbs.Simulator.set` changes; as :meth:`input`."""
+        made = make_parameter(name, unit, value)
+        self._check_number(name, "parameter")
+        self.parameters[name] = made
+        return made
+
     def variable(self, name: str, expression: Expression) -> None:
         """Name an expression; others use it as VARVAL(name)."""
         self.variables[name] = str(expression)
@@ -493,6 +537,11 @@ class Mechanism(JointMethods, LoadMethods, Shown):
     def _check_body_name(self, name: str) -> None:
         if name in self.bodies or name == "ground":
             raise ModelError(f"body '{name}': the name is in use; choose another")
+
+    def _check_number(self, name: str, what: str) -> None:
+        for title, table in (("input", self.inputs), ("parameter", self.parameters)):
+            if name.upper() in map(str.upper, table):
+                raise ModelError(f"{what} {name!r}: one of its {title}s has the name; choose another")
 
     def _add_load(self, load: Load) -> Load:
         self._check_name(load.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +17,7 @@ from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.loads.forces import FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.equations.unknowns import Counts
 from gearmbs.dae.model.model import Model, Names
+from gearmbs.dae.numbers import INPUT, Number, Place
 
 
 class TableBuilder:
@@ -57,6 +59,8 @@ class TableBuilder:
         self.diagnostics: list[tuple[Diagnostic, ...]] = []
         """Of each force element."""
         self.largest_jac = 0
+        self.numbers: dict[str, Number] = {}
+        """Of each name, with places among the tables `H_R_EXTRA` and `H_R_FUNCTION`; see `Model.numbers`."""
         self._ground_marker: int | None = None
         self.add_body(0.0, np.zeros((3, 3)))
 
@@ -109,6 +113,18 @@ class TableBuilder:
         self.functions.append((kind, len(self.function_r)))
         self.function_r.extend(float(p) for p in parameters)
         return len(self.functions) - 1
+
+    def add_number(self, name: str, unit: str, kind: str, value: float) -> None:
+        """Add a number with a name; its first place is one of its own, whatever uses it."""
+        at = len(self.extra_r)
+        self.extra_r.extend([0.0, value, 0.0] if kind == INPUT else [value])
+        self.numbers[name] = Number(name, unit, kind, (Place(at, 2 if kind == INPUT else 0, table=T.H_R_EXTRA),))
+
+    def add_place(self, name: str, place: Place, row: str | None = None) -> None:
+        """Note a further place of a number, and the constraint row whose function it is if it is one."""
+        number = self.numbers[name]
+        prescribes = number.prescribes if row is None else (*number.prescribes, (row, place.order))
+        self.numbers[name] = replace(number, places=(*number.places, place), prescribes=prescribes)
 
     def add_rows(self, rows: Iterable[tuple[list[tuple], int]]) -> None:
         """Add constraint rows: terms of (type, I, J, axes, function, coefficient, start of an angle), a function."""
@@ -314,6 +330,7 @@ class TableBuilder:
             frame_body=tuple(self.frame_body),
             shape_at=tuple(self.shape_at),
             names=names,
+            numbers=MappingProxyType(dict(self.numbers)),
         )
 
 

@@ -177,6 +177,7 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
         solved_at_outputs=~mask & ~differential,
         hook=fx.axes_hook if counted else None,
         hook_interval=_hook_interval(omega, model, axes, (idata, rdata, size)) if counted else None,
+        numbers=model.numbers_in(idata),
     )
 
 

@@ -22,6 +22,7 @@ from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.kinematics.rotation import KIN_COLUMNS, POSE_A, POSE_COLUMNS, POSE_R, POSE_V
 from gearmbs.dae.equations.loads.forces import FORCE_SIG, Diagnostic
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
+from gearmbs.dae.numbers import Number
 from gearmbs.kernels.pointers import address
 
 
@@ -158,6 +159,8 @@ class Model:
         For each body the offset of its own numbers there, -1 of a rigid one, and the integrals; None without modes.
     frame_body, shape_at : tuple of int
         Of each elastic frame its body and the offset of its shapes; frames are numbered on from the bodies.
+    numbers : mapping of str to Number
+        What can be changed by its name; the tables of its places are ``H_R_EXTRA`` and ``H_R_FUNCTION``.
     """
 
     gravity: np.ndarray
@@ -190,6 +193,7 @@ class Model:
     frame_body: tuple[int, ...] = ()
     shape_at: tuple[int, ...] = ()
     names: Names = field(default_factory=Names)
+    numbers: Mapping[str, Number] = field(default_factory=dict)
 
     @cached_property
     def rows_of_joint(self) -> dict[str, list[int]]:
@@ -344,6 +348,10 @@ class Model:
         integers = integers | {T.H_I_CODE: codes, T.H_I_SLOT: slots}
         _place(head, integers, T.H_SIZE)
         return np.concatenate([head, *integers.values()]), rdata.copy(), int(head[T.H_WORK])
+
+    def numbers_in(self, idata: np.ndarray) -> dict[str, Number]:
+        """Return what can be changed by its name, with its places among the numbers packed with ``idata``."""
+        return {name: number.placed(lambda table: int(idata[table])) for name, number in self.numbers.items()}
 
     @cached_property
     def _packed(self) -> dict[int, tuple[np.ndarray, dict[int, np.ndarray], np.ndarray]]:

@@ -10,7 +10,20 @@ from typing import NoReturn
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
-from gearmbs.mechanism.language.syntax import Call, Chain, Name, Negative, Node, Number, Power, Ref, Scope, parse, shown
+from gearmbs.mechanism.language.syntax import (
+    Call,
+    Chain,
+    Name,
+    NamedNumber,
+    Negative,
+    Node,
+    Number,
+    Power,
+    Ref,
+    Scope,
+    parse,
+    shown,
+)
 from gearmbs.wording import did_you_mean
 
 CONSTANTS = {"PI": math.pi, "DTOR": math.pi / 180.0, "RTOD": 180.0 / math.pi}
@@ -107,7 +120,21 @@ class Lowering:
             return self.scaled(self.builder.time(), "time")
         if node.text in CONSTANTS:
             return self.builder.constant(CONSTANTS[node.text])
-        self.fail(f"{node.text} is not TIME, PI, DTOR or RTOD and stands where a value is expected", node.at)
+        number = self.scope.numbers.get(node.text)
+        if number is not None:
+            return self._number(number)
+        named = ", ".join(n.name for n in self.scope.numbers.values())
+        others = f", nor one of the inputs and parameters {named}," if named else ""
+        self.fail(f"{node.text} is not TIME, PI, DTOR or RTOD{others} and stands where a value is expected", node.at)
+
+    def _number(self, number: NamedNumber) -> int:
+        """Return the register of an input or a parameter, in the expression's own units."""
+        b = self.builder
+        if number.known:
+            register = b.algebraic(("number", number.name))
+        else:
+            register = (b.input if number.is_input else b.parameter)(number.name, number.value)
+        return b.binary(op.MUL, b.constant(1.0 / number.factor), register)
 
     def _call(self, node: Call) -> int:
         name = node.name

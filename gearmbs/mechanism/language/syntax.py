@@ -117,6 +117,29 @@ class Units:
 
 
 @dataclass(frozen=True)
+class NamedNumber:
+    """An input or a parameter, as expressions take it.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+        SI.
+    factor : float
+        SI value of its unit in the expression's own units.
+    is_input : bool
+    known : bool
+        Whether its values are given as those of an unknown, ``("number", name)``, as over a solution.
+    """
+
+    name: str
+    value: float
+    factor: float
+    is_input: bool
+    known: bool = False
+
+
+@dataclass(frozen=True)
 class Scope:
     """What the names and ids in an expression stand for.
 
@@ -136,6 +159,8 @@ class Scope:
         Number of modes of each body that has some, by upper-case name.  MODAL becomes ``("mode", name, place)``.
     splines : mapping to SplineData
     arrays : mapping to sequences of float
+    numbers : mapping of str
+        Inputs and parameters by upper-case name.
     functions : mapping
         Functions of the user by name, see `gearmbs.mechanism.language.user_functions.UserFunction`.
     plants : mapping of ("pinput" | "poutput", ref) to VARIABLE refs
@@ -159,6 +184,7 @@ class Scope:
     modes: Mapping[Ref, int] = field(default_factory=dict)
     splines: Mapping[Ref, SplineData] = field(default_factory=dict)
     arrays: Mapping[Ref, Sequence[float]] = field(default_factory=dict)
+    numbers: Mapping[str, NamedNumber] = field(default_factory=dict)
     functions: Mapping[str, Any] = field(default_factory=dict)
     plants: Mapping[tuple[str, Ref], Sequence[Ref]] = field(default_factory=dict)
     forces: Mapping[tuple[str, Ref], tuple[Ref, Ref | None]] = field(default_factory=dict)

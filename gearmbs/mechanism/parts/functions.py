@@ -35,6 +35,22 @@ class TimeFunction:
         if not np.all(np.isfinite(self.parameters)):
             raise ModelError(f"function {self.text}: its parameters must be finite")
 
+    def check_unit(self, unit: str, field: str) -> None:
+        """Raise a ModelError if what it gives has another unit; most functions are of numbers, without one."""
+
+    def integral(self, start: float, rate: float | None = None) -> TimeFunction:
+        """Return start + int f, or with a rate start + rate t + int int f, from time 0.
+
+        Expressions are tabulated over the first ten seconds; later times take longer to evaluate.
+        """
+        f = function_text(self, 1.0, 1.0)
+        once = f"INTEGRAL({f}, 0, {SPAN!r})"
+        if rate is None:
+            return expression(f"({start!r}) + {once}")
+        # the second integral of f is t int f - int t f
+        twice = f"TIME*{once} - INTEGRAL(TIME*({f}), 0, {SPAN!r})"
+        return expression(f"({start!r}) + ({rate!r})*TIME + {twice}")
+
     @property
     def is_expression(self) -> bool:
         """Whether the function is given by a text that is compiled with the mechanism."""
@@ -299,6 +315,7 @@ def as_function(
         If it is none of these.
     """
     if isinstance(value, TimeFunction):
+        value.check_unit(unit, field)
         return value
     if isinstance(value, str):
         return expression(expression_text(value, unit, field))
@@ -392,17 +409,3 @@ def _step_integral(function: TimeFunction, time: float, value: float) -> str:
         f"{start / value!r} + ({slope!r})*(TIME - ({t0 / time!r})) + "
         f"({rise!r})*({inside} + MAX(0, {x} - 1))"
     )  # fmt: skip
-
-
-def integrated(function: TimeFunction, start: float, rate: float | None = None) -> TimeFunction:
-    """Return start + int f, or with a rate start + rate t + int int f, from time 0.
-
-    Expressions are tabulated over the first ten seconds; later times take longer to evaluate.
-    """
-    f = function_text(function, 1.0, 1.0)
-    once = f"INTEGRAL({f}, 0, {SPAN!r})"
-    if rate is None:
-        return expression(f"({start!r}) + {once}")
-    # the second integral of f is t int f - int t f
-    twice = f"TIME*{once} - INTEGRAL(TIME*({f}), 0, {SPAN!r})"
-    return expression(f"({start!r}) + ({rate!r})*TIME + {twice}")

@@ -37,6 +37,9 @@ AlgebraicKey = tuple[Hashable, ...]
 AngleKey = tuple[str, int, int]
 """Name of a counted angle: function and indices of the markers I and J."""
 
+NumberKey = tuple[str, int, int]
+"""A named number: its name, its place among the floats, the coefficients behind it."""
+
 
 @dataclass(frozen=True)
 class Tape:
@@ -62,6 +65,8 @@ class Tape:
         Whether the value holds an integral over time.
     angles : tuple
         Names of the counted angles, in the order of the array of reference angles.
+    numbers : tuple
+        Named numbers that it depends on: name, place among ``floats``, how many coefficients stand behind it.
     """
 
     ints: np.ndarray
@@ -74,6 +79,7 @@ class Tape:
     text: str = ""
     integrates: bool = False
     angles: tuple[AngleKey, ...] = ()
+    numbers: tuple[NumberKey, ...] = ()
 
     @property
     def length(self) -> int:
@@ -104,7 +110,7 @@ class Tape:
     @property
     def constant(self) -> float | None:
         """The value when the expression is a constant, else None."""
-        if self.level != op.LEVEL_CONSTANT:
+        if self.level != op.LEVEL_CONSTANT or self.numbers:
             return None
         at = self.ints[op.HEAD_CODE] + op.WIDTH * self.ints[op.HEAD_RESULT]
         return float(self.floats[self.ints[at + 1]])
@@ -139,6 +145,7 @@ class TapeBuilder:
         self._spline_at: dict[tuple[SplineData, str], int] = {}
         self._algebraic: dict[AlgebraicKey, int] = {}
         self._angles: list[AngleKey] = []
+        self._numbers: dict[str, tuple[int, int, int]] = {}
 
     def _emit(self, *instruction: int) -> int:
         key = tuple(instruction)
@@ -157,9 +164,32 @@ class TapeBuilder:
         return self._emit(op.CONST, self._constants[key])
 
     def value_of(self, register: int) -> float | None:
-        """Return the value of a constant register, else None."""
+        """Return the value of a constant register, else None: named numbers are constant until they are set."""
         code = self._code[register]
-        return self._floats[code[1]] if code[0] == op.CONST else None
+        if code[0] != op.CONST or any(at <= code[1] <= at + size for _, at, size in self._numbers.values()):
+            return None
+        return self._floats[code[1]]
+
+    def parameter(self, name: str, value: float) -> int:
+        """Return the register of a number that is changed by its name."""
+        if name not in self._numbers:
+            at = len(self._floats)
+            self._floats.append(float(value))
+            self._numbers[name] = (-1, at, 0)
+            self._numbers[name] = (self._emit(op.CONST, at), at, 0)
+        return self._numbers[name][0]
+
+    def input(self, name: str, value: float) -> int:
+        """Return the register of an input, u_0 + u_1 (t - t_0); see `gearmbs.dae.numbers`."""
+        if name not in self._numbers:
+            at = len(self._floats)
+            self._floats.extend([0.0, float(value), 0.0])
+            self._numbers[name] = (-1, at, 2)
+            origin, level, slope = (self._emit(op.CONST, at + k) for k in range(3))
+            passed = self.binary(op.SUB, self.time(), origin)
+            register = self.binary(op.ADD, level, self.binary(op.MUL, slope, passed))
+            self._numbers[name] = (register, at, 2)
+        return self._numbers[name][0]
 
     def time(self) -> int:
         """Return the register of t."""
@@ -291,6 +321,11 @@ class TapeBuilder:
         tape = self.finish(a)
         if tape.level > op.LEVEL_TIME or tape.integrates:
             raise ExpressionError("only a function of TIME, itself without an integral, can be integrated")
+        if tape.numbers:
+            raise ExpressionError(
+                f"the integral of {tape.numbers[0][0]!r}, which may change, is not known beforehand; add a state with "
+                "that rate, or let the input itself be the velocity of a motion"
+            )
         if not end > start:
             raise ExpressionError(f"the end {end} of the span must be later than its start {start}")
         if self._outline:
@@ -345,6 +380,7 @@ class TapeBuilder:
         if any(c[0] == op.INTEGRAL for c in used):
             levels.append(op.LEVEL_TIME)
         smooth = {op.CONST, op.TIME, op.DISPLACEMENT, op.COSINE}
+        constants = {c[1] for c in used if c[0] == op.CONST}
         body_at = op.HEAD_SIZE
         algebraic_at = body_at + len(bodies)
         header = [
@@ -365,6 +401,7 @@ class TapeBuilder:
             text=text,
             integrates=any(c[0] == op.INTEGRAL for c in used),
             angles=tuple(self._angles[a] for a in angle_slot),
+            numbers=tuple((name, at, size) for name, (_, at, size) in self._numbers.items() if at in constants),
         )
 
     def _needed(self, result: int) -> list[int]:

@@ -1,0 +1,135 @@
+"""Inputs and parameters of a mechanism: numbers with a name that are set from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gearmbs.dae.equations.loads import time_functions as tf
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.language.syntax import DIMENSIONS as LANGUAGE
+from gearmbs.mechanism.language.syntax import Units
+from gearmbs.mechanism.parts.functions import TimeFunction
+from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.units import DIMENSIONS, powers_of
+
+COEFFICIENTS = tf.PIECE_SIZE - 1
+"""Of the polynomial that an input is as a function of time."""
+RESERVED = ("TIME", "PI", "DTOR", "RTOD")
+"""Names that mean something else in expressions."""
+
+
+@dataclass(frozen=True)
+class Input(TimeFunction):
+    """A function of time whose value is set from outside, see `gearmbs.mechanism.Mechanism.input`.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        Of SI.
+    order : int
+        How often it is integrated: 1 as the speed of a motion, 2 as its acceleration.
+    """
+
+    name: str = ""
+    unit: str = ""
+    order: int = 0
+
+    @property
+    def start(self) -> float:
+        """Value until it is set."""
+        return float(self.parameters[2 + self.order])
+
+    def integral(self, start: float, rate: float | None = None) -> Input:
+        """Return start + int u, or with a rate start + rate t + int int u, from time 0."""
+        known = (start,) if rate is None else (start, rate)
+        value = self.start / (2.0 if rate is not None else 1.0)
+        return replace(self, parameters=_piece((*known, value)), order=len(known))
+
+    def check_unit(self, unit: str, field: str) -> None:
+        """Raise a ModelError if it is no function of a unit or dimension."""
+        own, wanted = powers_of(self.unit), powers_of(unit)
+        if (own and own[1]) != (wanted and wanted[1]):
+            raise ModelError(f"{field}: input {self.name!r} is in {self.unit}, not in {DIMENSIONS.get(unit, unit)}")
+
+    def __repr__(self) -> str:
+        return f"Input({self.name!r}, {self.start:g} {self.unit})"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number with a name that expressions use, see `gearmbs.mechanism.Mechanism.parameter`."""
+
+    name: str
+    unit: str
+    start: float
+    """Value until it is set."""
+
+
+def make_input(name: str, unit: str, value: Any) -> Input:
+    """Return an input.
+
+    Raises
+    ------
+    ModelError
+        For a name that means something else, or a unit that is none of SI.
+    """
+    field = f"input '{name}'"
+    checked_name(name, "input")
+    unit = checked_unit(unit, field)
+    start = quantity(value, unit, field)
+    return Input(tf.PIECEWISE, _piece((start,)), name, name, unit)
+
+
+def make_parameter(name: str, unit: str, value: Any) -> Parameter:
+    """Return a parameter; refused as an input is."""
+    field = f"parameter '{name}'"
+    checked_name(name, "parameter")
+    unit = checked_unit(unit, field)
+    return Parameter(name, unit, quantity(value, unit, field))
+
+
+def checked_name(name: Any, what: str) -> None:
+    """Raise a ModelError for a name that cannot be given to an input, a parameter or an output."""
+    if not isinstance(name, str) or not name.strip() or any(mark in name for mark in "\"'"):
+        raise ModelError(f"{what} {name!r}: give a name, a text without quotation marks")
+    if name.upper() in RESERVED:
+        raise ModelError(f"{what} {name!r}: the name means something else in expressions; choose another")
+
+
+def checked_unit(unit: Any, field: str) -> str:
+    """Return a unit, or that of a dimension; raise a ModelError if it is none of SI."""
+    if unit in ("", "1", "dimensionless"):
+        return "dimensionless"
+    found = powers_of(unit) if isinstance(unit, str) else None
+    if found is None or found[0] != 1.0:
+        raise ModelError(f"{field}: unit {unit!r} is none of SI; give one such as 'N m', 'rad/s', 'm' or '1'")
+    return DIMENSIONS.get(unit, unit)
+
+
+def unit_factor(units: Units, unit: str) -> float:
+    """Return the SI value of the unit that a quantity of an SI unit has in a mechanism's own units.
+
+    Raises
+    ------
+    ModelError
+        If these are not SI, and have none for it.
+    """
+    if units == Units() or unit in ("dimensionless", "rad"):
+        return 1.0
+    wanted = powers_of(unit)
+    for dimension, (mass, length, time, force) in LANGUAGE.items():
+        powers = (length + force, mass + force, time - 2 * force)
+        if wanted is not None and wanted[1][:3] == powers:
+            return units.factor(dimension)
+    raise ModelError(f"unit {unit!r} has no counterpart in the mechanism's units; give one of a force, length or time")
+
+
+def _piece(coefficients: Sequence[float]) -> tuple[float, ...]:
+    """Return the parameters of a single polynomial about time 0."""
+    return (1.0, 0.0, *coefficients, *([0.0] * (COEFFICIENTS - len(coefficients))))
+
+
+__all__ = ["Input", "Parameter", "make_input", "make_parameter"]

@@ -1,0 +1,96 @@
+"""Inputs and parameters by name: where they stand in the tables, in functions of time and in expressions."""
+
+import numpy as np
+import pytest
+
+from gearmbs.mechanism import Mechanism, ModelError
+from tests.says import says
+
+
+def disc():
+    """A disc of 2 kg m^2 on a pin."""
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    return m, body, m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+
+
+def test_an_input_is_a_torque_and_a_name_in_expressions():
+    """2 w' = 1.5 u - c w with u = 4, c = 1."""
+    m, body, pin = disc()
+    m.torque("drive", body, m.input("load", "N m", 4.0))
+    m.parameter("drag", "N m s/rad", 1.0)
+    m.axis_torque("brake", pin.i, pin.j, "0.5*load - DRAG*WZ(pin.I, pin.J)")
+    speed = m.simulate(1.0, tol=1e-9).angular_velocity("disc")[-1, 2]
+    assert speed == pytest.approx(6.0 * (1.0 - np.exp(-0.5)), rel=1e-8)
+
+
+@pytest.mark.parametrize(("level", "order", "angle"), [("velocity", 1, 3.0), ("acceleration", 2, 1.5)])
+def test_an_input_is_the_rate_of_a_motion(level, order, angle):
+    m, _, pin = disc()
+    unit = "rad/s" if order == 1 else "rad/s^2"
+    m.rotation("motion", pin, m.input("rate", unit, 3.0), level=level)
+    assert m.simulate(1.0).joint_angle("pin")[-1] == pytest.approx(angle, abs=1e-9)
+    assert m.compile().problem().numbers["rate"].prescribes == (("motion: angle", order),)
+
+
+def test_a_number_is_written_to_all_its_places():
+    """The torque from a straight line, its integral and the expressions agree with the table they stand in."""
+    m, body, pin = disc()
+    m.torque("drive", body, m.input("load", "torque", 4.0))
+    m.axis_torque("brake", pin.i, pin.j, "0.5*load")
+    problem = m.compile().problem()
+    load, table = problem.numbers["load"], problem.rdata.copy()
+    assert (load.unit, load.value(table, 7.0), load.slope(table)) == ("N*m", 4.0, 0.0)
+    load.write(table, 2.0, 1.0, 0.5)
+    assert [p.polynomial(table, 4.0)[:2] for p in load.places] == [(2.0, 0.5)] * 3
+    out = np.zeros((2, problem.n))
+    for row, numbers in zip(out, (problem.rdata, table), strict=True):
+        problem.residual(4.0, problem.y0, problem.yp0, row, problem.idata, numbers, np.zeros(problem.work_size))
+    assert np.sort(np.abs(out[1] - out[0]))[-2:] == pytest.approx([1.0, 2.0])
+
+
+def test_integrals_of_an_input_go_on_from_where_they_are():
+    m, _, pin = disc()
+    m.rotation("motion", pin, m.input("rate", "rad/s^2", 2.0), level="acceleration", start=0.5, rate=1.0)
+    problem = m.compile().problem()
+    number, table = problem.numbers["rate"], problem.rdata.copy()
+    place = number.places[1]
+    before = place.polynomial(table, 3.0)
+    assert before[:3] == pytest.approx((0.5 + 3.0 + 9.0, 1.0 + 6.0, 2.0))
+    number.write(table, 3.0, -1.0, 6.0)
+    assert place.polynomial(table, 3.0)[:4] == pytest.approx((*before[:2], -1.0, 6.0))
+    assert place.polynomial(table, 4.0)[0] == pytest.approx(12.5 + 7.0 - 0.5 + 1.0)
+
+
+def test_expressions_in_units_of_their_own():
+    """A deck in mm and kN: the input is in N m, the expression in kN mm."""
+    from gearmbs.mechanism.language.syntax import Units
+
+    m, _, pin = disc()
+    m.units = Units(length=1e-3, force=1e3)
+    m.reads_units = False
+    m.input("load", "N m", 4.0)
+    m.axis_torque("drive", pin.i, pin.j, "2*load")
+    assert m.simulate(1.0).angular_velocity("disc")[-1, 2] == pytest.approx(4.0, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda m, pin: m.input("load", "N m"), ("load", "choose")),
+        (lambda m, pin: m.parameter("LOAD", "N m", 1.0), ("LOAD", "choose")),
+        (lambda m, pin: m.input("pi", "N m"), ("pi", "choose")),
+        (lambda m, pin: m.input("speed", "rpm"), ("speed", "rpm", "give")),
+        (lambda m, pin: m.input("speed", "rad/s", "3 N"), ("speed", "3 N", "rad/s")),
+        (lambda m, pin: m.input("a'b", "N"), ("a'b", "give")),
+        (lambda m, pin: m.torque("t", pin.i, m.input("speed", "rad/s")), ("speed", "rad/s", "N*m")),
+        (lambda m, pin: m.rotation("m", pin, "2*load", level="velocity") and m.compile(), ("load", "state")),
+        (lambda m, pin: m.axis_torque("t", pin.i, pin.j, "2*lod") and m.compile(), ("LOD", "load")),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(call, words):
+    m, _, pin = disc()
+    m.input("load", "N m", 4.0)
+    with pytest.raises(ModelError, match=says(*words)) as error:
+        call(m, pin)
+    assert "\n" not in str(error.value)
