@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.forces.springs import AxisSpring, Beam, Bushing, Field, LineSpring, MatrixForce, in_si
+from gearmbs.mechanism.forces.springs import SI_UNITS, AxisSpring, Beam, Bushing, Field, LineSpring, MatrixForce, in_si
 from gearmbs.mechanism.parts import elements as el
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import Load
@@ -30,12 +30,6 @@ if TYPE_CHECKING:
 Expression = str | float | None
 
 M = TypeVar("M", bound=MatrixForce)
-
-SI_UNITS = {
-    "force": "N", "torque": "N*m", "length": "m", "angle": "rad", "time": "s", "stiffness": "N/m", "damping": "N*s/m",
-    "rotational_stiffness": "N*m/rad", "rotational_damping": "N*m*s/rad",
-}  # fmt: skip
-"""SI unit of each dimension of the function language that loads have."""
 
 FIELDS = {"damping_ratio": "time"}
 """Dimensions of fields that are not called like them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.language.user_functions import UserFunction
 from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.parts import joints as jt
+from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
@@ -26,6 +27,7 @@ from gearmbs.mechanism.parts.inputs import Input, Parameter, make_input, make_pa
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
+from gearmbs.units import truth
 
 E = TypeVar("E", bound=ForceElement)
 
@@ -38,7 +40,7 @@ class ContactPair(Protocol):
         ...
 
 
-class Mechanism(JointMethods, LoadMethods, Shown):
+class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
     """A system of bodies, rigid or with modes of deformation, joints, motions and forces.
 
     Every part has a name. Joints take two bodies with a point and an axis in global components at the
@@ -69,6 +71,11 @@ class Mechanism(JointMethods, LoadMethods, Shown):
     given : dict of str to dict
         Settings that were written with units, by the names of bodies, joints and forces.
     """
+
+    reads: ClassVar = {
+        "gravity": lambda value, field: vector(value, field, "acceleration"),
+        "lump": truth,
+    }
 
     def __init__(self, name: str = "mechanism", gravity: Vector = (0.0, 0.0, 0.0)) -> None:
         self.name = name

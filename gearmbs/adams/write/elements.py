@@ -34,6 +34,7 @@ from gearmbs.mechanism.parts.modal import ModalBody, ShapedMarker
 
 if TYPE_CHECKING:
     from gearmbs.flexible import ModalModel
+    from gearmbs.mechanism.language.syntax import Units
 
 INVARIANTS = {"full": "TTTTTTTTT", "partial": "TTTTFTTTF", "constant": "TTTTFTTFF"}
 """Inertia invariants that a level of coupling keeps; the reader knows the same."""
@@ -114,7 +115,8 @@ def element_arguments(writer: WriterContext, load: Any) -> list[str]:
         return _friction(writer, p["joint"], p["friction"])
     ends = [f"I = {writer.markers[id(load.i)]}", f"J = {writer.markers[id(load.j)]}"]
     if load.kind == "springdamper":
-        return [*_spring(load, p)[:1], *ends, *_spring(load, p)[1:]]
+        kind, *numbers = _spring(load, p, writer.units)
+        return [kind, *ends, *numbers]
     return [*ends, *{"bushing": _bushing, "field": _field, "beam": _beam}[load.kind](p)]
 
 
@@ -151,12 +153,14 @@ def _used_elsewhere(mechanism: Mechanism, name: str, load: Load) -> bool:
     return any(key in used for key in keys)
 
 
-def _spring(load: Any, p: Mapping[str, Any]) -> list[str]:
-    if isinstance(load, LineSpring):
-        words = {"K": "stiffness", "C": "damping", "LENGTH": "length", "FORCE": "preload"}
-        return ["TRANSLATIONAL", *(f"{w} = {number(p[key])}" for w, key in words.items())]
-    words = {"KT": "stiffness", "CT": "damping", "ANGLE": "angle", "TORQUE": "preload"}
-    return ["ROTATIONAL", *(f"{w} = {number(p[key])}" for w, key in words.items())]
+def _spring(load: Any, p: Mapping[str, Any], units: Units) -> list[str]:
+    line = isinstance(load, LineSpring)
+    out = ["TRANSLATIONAL" if line else "ROTATIONAL"]
+    for word, key in zip(("K", "C", "LENGTH", "FORCE") if line else ("KT", "CT", "ANGLE", "TORQUE"), load.dimensions):
+        # a number that has been changed since it was given is written as it is now
+        given, now, factor = p[key], getattr(load, key), units.factor(load.dimensions[key])
+        out.append(f"{word} = {number(given if given * factor == now else now / factor)}")
+    return out
 
 
 def _bushing(p: Mapping[str, Any]) -> list[str]:

@@ -409,6 +409,7 @@ class FrictionForce(ForceElement):
     own_states: tuple[State, ...]
     text: FrictionText
 
+    settled = (*ForceElement.settled, "joint", "friction", "units", "own_states", "text")
     kind = "friction"
 
     @property

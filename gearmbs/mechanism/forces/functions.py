@@ -80,6 +80,9 @@ class FunctionForce(ForceElement):
     own_states: tuple[State, ...] = ()
     told: tuple[Diagnostic, ...] = field(default=())
 
+    settled = (
+        *ForceElement.settled, "all_markers", "function", "derivatives", "parameters", "steps", "own_states", "told",
+    )  # fmt: skip
     kind = "force"
 
     @property

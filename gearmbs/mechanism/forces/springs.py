@@ -4,12 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from gearmbs.mechanism.parts.attributes import Reader
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement
+from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.units import shown
+
+SI_UNITS = {
+    "force": "N", "torque": "N*m", "length": "m", "angle": "rad", "time": "s", "stiffness": "N/m", "damping": "N*s/m",
+    "rotational_stiffness": "N*m/rad", "rotational_damping": "N*m*s/rad",
+}  # fmt: skip
+"""SI unit of each dimension of the function language that loads have."""
+
+
+def readers(dimensions: Mapping[str, str]) -> dict[str, Reader]:
+    """Return what reads the numbers of attributes, SI or texts with a unit, from their dimensions."""
+
+    def reader(unit: str) -> Reader:
+        return lambda value, field: quantity(value, unit, field)
+
+    return {name: reader(SI_UNITS[dimension]) for name, dimension in dimensions.items()}
 
 
 @dataclass(eq=False, repr=False)
@@ -21,7 +38,7 @@ class LineSpring(ForceElement):
     stiffness, damping, length, preload : float
         N/m, N s/m, m, N; the force is ``preload`` at the length.
     parameters : mapping
-        The same in the mechanism's units, for writing decks.
+        The same as it was given, in the mechanism's units, for writing decks.
     """
 
     stiffness: float
@@ -30,6 +47,9 @@ class LineSpring(ForceElement):
     preload: float
     parameters: Mapping[str, Any]
 
+    dimensions: ClassVar = {"stiffness": "stiffness", "damping": "damping", "length": "length", "preload": "force"}
+    reads = readers(dimensions)
+    settled = (*ForceElement.settled, "parameters")
     kind = "springdamper"
     has_torque = False
 
@@ -54,7 +74,7 @@ class AxisSpring(ForceElement):
     stiffness, damping, angle, preload : float
         N m/rad, N m s/rad, rad, N m; the torque is ``preload`` at the angle, which is counted through full turns.
     parameters : mapping
-        The same in the mechanism's units, for writing decks.
+        The same as it was given, in the mechanism's units, for writing decks.
     """
 
     stiffness: float
@@ -63,6 +83,11 @@ class AxisSpring(ForceElement):
     preload: float
     parameters: Mapping[str, Any]
 
+    dimensions: ClassVar = {
+        "stiffness": "rotational_stiffness", "damping": "rotational_damping", "angle": "angle", "preload": "torque",
+    }  # fmt: skip
+    reads = readers(dimensions)
+    settled = (*ForceElement.settled, "parameters")
     kind = "springdamper"
     has_force = False
 
@@ -100,6 +125,7 @@ class MatrixForce(ForceElement):
     preload: np.ndarray
     parameters: Mapping[str, Any]
 
+    settled = (*ForceElement.settled, "stiffness", "damping", "free", "preload", "parameters")
     kind = "field"
 
     @property

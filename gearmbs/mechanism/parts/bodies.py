@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from gearmbs.dae.equations.bodies import RIGID, BodyKind
 from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.quantities import (
     Vector,
     cross,
@@ -23,7 +24,7 @@ from gearmbs.units import shown
 
 
 @dataclass(eq=False)
-class Marker:
+class Marker(OwnAttributes):
     """A frame fixed in a body.
 
     Attributes
@@ -44,6 +45,12 @@ class Marker:
     orientation: np.ndarray
     number: int | None = None
 
+    reads: ClassVar = {
+        "position": lambda value, field: vector(value, field, "length"),
+        "orientation": rotation_matrix,
+    }
+    settled = ("name", "body")
+
     def global_position(self) -> np.ndarray:
         """Return the origin at the initial position, global components, m."""
         return self.body.position + self.body.orientation @ self.position
@@ -61,8 +68,16 @@ class Marker:
         return f"Marker({self.name!r} on {self.body.name!r} at {np.array2string(self.position, precision=6)})"
 
 
+def mass_of(value: Any, field: str) -> float:
+    """Return a mass that is not negative, kg."""
+    mass = quantity(value, "mass", field)
+    if not np.isfinite(mass) or mass < 0.0:
+        raise ModelError(f"{field} = {mass} kg; it must be a positive number")
+    return mass
+
+
 @dataclass(eq=False)
-class Body:
+class Body(OwnAttributes):
     """A rigid body. Made by :meth:`gearmbs.mechanism.Mechanism.body`.
 
     Attributes
@@ -92,6 +107,16 @@ class Body:
     markers: list[Marker] = field(default_factory=list)
 
     kind: ClassVar[BodyKind] = RIGID
+    reads: ClassVar = {
+        "mass": mass_of,
+        "inertia": inertia_matrix,
+        "com": lambda value, field: vector(value, field, "length"),
+        "position": lambda value, field: vector(value, field, "length"),
+        "orientation": rotation_matrix,
+        "velocity": lambda value, field: vector(value, field, "speed"),
+        "angular_velocity": lambda value, field: vector(value, field, "angular speed"),
+    }
+    settled = ("name", "is_ground", "markers")
 
     @property
     def coordinates(self) -> int:
@@ -191,17 +216,8 @@ def make_body(
     ModelError
         If mass or inertia is negative or not finite, or a vector is malformed.
     """
-    label = f"body '{name}'"
-    mass = quantity(mass, "mass", f"{label}: mass")
-    if not np.isfinite(mass) or mass < 0.0:
-        raise ModelError(f"{label}: mass = {mass} kg; it must be a positive number")
-    return Body(
-        name=name,
-        mass=mass,
-        inertia=inertia_matrix(inertia, f"{label}: inertia"),
-        com=vector(com, f"{label}: com", "length"),
-        position=vector(position, f"{label}: position", "length"),
-        orientation=rotation_matrix(matrix, f"{label}: orientation"),
-        velocity=vector(velocity, f"{label}: velocity", "speed"),
-        angular_velocity=vector(angular_velocity, f"{label}: angular_velocity", "angular speed"),
-    )
+    given = {
+        "mass": mass, "inertia": inertia, "com": com, "position": position, "orientation": matrix,
+        "velocity": velocity, "angular_velocity": angular_velocity,
+    }  # fmt: skip
+    return Body(name, **{key: Body.reads[key](value, f"body '{name}': {key}") for key, value in given.items()})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -11,8 +11,9 @@ import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, Diagnostic
 from gearmbs.kernels.jit import njit
+from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.bodies import Marker
-from gearmbs.mechanism.parts.functions import TimeFunction
+from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class StartOverlap:
 
 
 @dataclass(eq=False)
-class ForceElement(ABC):
+class ForceElement(OwnAttributes):
     """A force element with a kernel of its own. A subclass says how it is compiled.
 
     Attributes
@@ -84,6 +85,7 @@ class ForceElement(ABC):
     i: Marker
     j: Marker
 
+    settled: ClassVar[tuple[str, ...]] = ("name", "i", "j")
     kind: ClassVar[str] = "force"
     """The element's name in messages and in the function language."""
     diagnostics: ClassVar[tuple[Diagnostic, ...]] = ()
@@ -123,6 +125,8 @@ class Torque(ForceElement):
     axis: Marker
     function: TimeFunction
 
+    reads: ClassVar = {"function": lambda value, field: as_function(value, "torque", field)}
+    settled = (*ForceElement.settled, "axis")
     kind = "torque"
     has_force = False
 
@@ -138,7 +142,7 @@ LINE, AXIS_FORCE, AXIS_TORQUE, COMPONENTS = 0, 1, 2, 3
 
 
 @dataclass(eq=False)
-class Load:
+class Load(OwnAttributes):
     """Force and torque given by expressions in the ADAMS function language.
 
     Attributes
@@ -166,6 +170,7 @@ class Load:
     expressions: tuple[str | None, ...]
     parameters: Mapping[str, Any] | None = None
 
+    settled = ("name", "kind", "i", "j", "rm", "mode", "expressions", "parameters")
     wrenches: ClassVar[int] = 1
 
     @property
@@ -189,7 +194,7 @@ class Load:
 
 
 @dataclass(eq=False)
-class State:
+class State(OwnAttributes):
     """A state: z' = expression from ``start``, or z = expression when it is algebraic.
 
     That of a force element has no expression: its kernel knows it. An ``implicit`` algebraic one stands in its own
@@ -201,6 +206,8 @@ class State:
     start: float = 0.0
     algebraic: bool = False
     implicit: bool = False
+
+    settled = ("name",)
 
 
 # Kernel of a single torque: a function of time about an axis.

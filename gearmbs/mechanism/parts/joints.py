@@ -13,6 +13,7 @@ import numpy as np
 
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.functions import TimeFunction
 
@@ -60,7 +61,7 @@ class Prescribed:
 
 
 @dataclass(eq=False)
-class Joint:
+class Joint(OwnAttributes):
     """A joint, primitive, coupler or motion: a name and its constraint rows."""
 
     name: str
@@ -69,6 +70,8 @@ class Joint:
     j: Marker
     rows: list[Row] = field(default_factory=list)
     prescribed: Prescribed | None = None
+
+    settled = ("name", "kind", "i", "j")
 
     def __repr__(self) -> str:
         return f"Joint({self.name!r}, {self.kind}, I={self.i.name!r}, J={self.j.name!r}, {len(self.rows)} rows)"

@@ -19,6 +19,7 @@ from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State, equations_of
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.simulate import ADVICE, checked, just_inside, prepared, start_time
 from gearmbs.wording import any_of, did_you_mean
@@ -38,7 +39,7 @@ REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_actio
 """Options of integrators that are about outputs and events of a run that is told its end."""
 
 
-class Simulator:
+class Simulator(OwnAttributes):
     """A simulation that goes from one communication point to the next.
 
     The run behind it is that of `gearmbs.mechanism.simulate` with the same arguments: its steps pass the points, where
