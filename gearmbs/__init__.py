@@ -21,7 +21,7 @@ Rolling bearings
     `Bearing`, `RollingBearing`
 Mechanisms
     `Mechanism`, `JointFriction`, `simulate`, `Simulator`, `State`, `static_equilibrium`, `quasi_static`,
-    `linear_modes`, `Solution`
+    `linear_modes`, `linearize`, `Solution`
 Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals

@@ -42,6 +42,7 @@ from .mechanism import JointFriction as JointFriction
 from .mechanism import Mechanism as Mechanism
 from .mechanism import Simulator as Simulator
 from .mechanism import linear_modes as linear_modes
+from .mechanism import linearize as linearize
 from .mechanism import quasi_static as quasi_static
 from .mechanism import simulate as simulate
 from .mechanism import static_equilibrium as static_equilibrium

@@ -90,7 +90,8 @@ CIRCLES = {
      "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
     ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",
-     "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.simulate"):
+     "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.plant_names",
+     "mechanism.solve.plants", "mechanism.solve.points", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",
     ("campaigns.campaign", "campaigns.report", "campaigns.results", "campaigns.sensitivity",
      "campaigns.surrogates"):

@@ -33,5 +33,6 @@ from .solve.analyses import kinematic as kinematic
 from .solve.analyses import linear_modes as linear_modes
 from .solve.analyses import quasi_static as quasi_static
 from .solve.analyses import static_equilibrium as static_equilibrium
+from .solve.plants import linearize as linearize
 from .solve.simulate import simulate as simulate
 from .solve.simulator import Simulator as Simulator

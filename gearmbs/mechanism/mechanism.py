@@ -533,6 +533,12 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
 
         return linear_modes(self, **options)
 
+    def linearize(self, inputs, outputs, **options):
+        """Return the linear plant between inputs and outputs; see :func:`gearmbs.mechanism.linearize`."""
+        from gearmbs.mechanism.solve.plants import linearize
+
+        return linearize(self, inputs, outputs, **options)
+
     def measures(self, solution):
         """Return what can be measured on a solution of this mechanism; its methods offer it by name."""
         from gearmbs.mechanism.solve.measures import Measures

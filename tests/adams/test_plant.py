@@ -137,7 +137,7 @@ def test_a_script_writes_the_plant(tmp_path):
 
     found = loadmat(tmp_path / "arm.mat")
     (plant,) = result.plants
-    assert np.array_equal(found["A"], plant.a)
+    assert np.array_equal(found["A"], plant.A)
     assert "S T A T E" in (tmp_path / "run.msg").read_text()
     with np.load(plant.save(tmp_path / "arm.npz")) as again:
         assert again["outputs"].tolist() == ["VARIABLE/2", "VARIABLE/3", "VARIABLE/4"]
@@ -208,6 +208,6 @@ def test_the_force_between_two_markers_is_that_of_their_joint_once():
     plant = linear_plant(parse_deck(hung))
     # m g - F = 0 along the arm, and the force across it follows the torque: M / L (m L^2) / (m L^2 + I)
     across = -1.0 / LENGTH * MASS * LENGTH**2 / (MASS * LENGTH**2 + INERTIA)
-    assert plant.d[:, 0] == pytest.approx([across, across], rel=1e-8)
+    assert plant.D[:, 0] == pytest.approx([across, across], rel=1e-8)
     result = run_deck(parse_deck(hung), parse_script("a\nb\nsimulate/dynamics, end=0.5, steps=5\n"))
     assert result.request(1)[-1, 1:3] == pytest.approx(0.5 * MASS * 9.81, rel=1e-6)

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
 
 
-from gearmbs.dae.analyses.eigenvalues import Reduced, reduce, spectrum, warn_of_varying
+from gearmbs.dae.analyses.eigenvalues import spectrum
+from gearmbs.dae.analyses.linearisation import Reduced, reduce, warn_of_varying
 
 RIGID, OSCILLATING, REAL, SLIDING = "rigid", "oscillating", "real", "damped rigid"
 

@@ -1,90 +1,250 @@
-"""A linear plant x' = A x + B u, y = C x + D u from a DAE linearised at one instant.
+"""A linear plant x' = A x + B u, y = C x + D u from a DAE linearised about one of its states.
 
-Inputs u are states of the DAE with the rate zero, outputs y the rates of others: with both among the states z of
+All of it comes from one linearisation, see `gearmbs.dae.analyses.linearisation`:
 
-    M x'' + C x' + K x + H z = 0,    z' = P x + Q x' + S z
+    M q'' + C q' + K q + H z + U0 u + U1 u' + U2 u'' = 0,    z' = P q + Q q' + S z + V0 u + V1 u' + V2 u''.
 
-their columns of M^-1 H and S are B and D, their rows of P, Q and S are C and D. All derivatives are those of the exact
-Jacobian.
+Outputs are rates of states z without influence: their rows of P, Q, S and V are rows of C and D. Inputs of decks are
+states z of constant value, whose columns of H and S are U0 and V0.
+
+An input that moves something, as a motion or a transmission error, acts with its rates. It is led over its highest rate
+w = u^(h): u, u' .. are states of their own then, and b is the column of w in B. Of what is to be driven by a lower rate
+r, r' = w, the new state is x - b r: (x - b r)' = A (x - b r) + A b r, y = C (x - b r) + C b r + d w, which needs d = 0.
+The state that held r vanishes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, expm
+from scipy.linalg import cho_factor, cho_solve, expm, hessenberg, schur, solve_sylvester
 
-from gearmbs.dae.analyses.eigenvalues import Reduced, reduce, warn_of_varying
 from gearmbs.dae.analyses.kinematics import Instant
+from gearmbs.dae.analyses.linearisation import Driven, Reduced, reduce, warn_of_varying
 from gearmbs.dae.problem import ModelError, SingularModelError
+from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
+    from scipy.signal import TransferFunction
+
     from gearmbs.dae.model.system import System
+    from gearmbs.dae.state import State
 
 FORMATS = (".mat", ".npz")
+
+STANDING = 1e-7
+"""Magnitude of a pole, of the fastest one, up to which it is an integrator: the error of a double pole is the root of
+rounding, 1.5e-8 of the fastest."""
+SHOWN = 1e-9
+"""What an output shows of an integrator, of the sizes of its row and column: rounding is 1e-13 of them."""
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """What a plant's changes are counted from.
+
+    Attributes
+    ----------
+    t : float
+        Time at which functions of time are frozen, s.
+    inputs, outputs : ndarray
+        Values u0 and y0 there.
+    state : State or None
+        The state it was asked for, if it was one.
+    """
+
+    t: float
+    inputs: np.ndarray
+    outputs: np.ndarray
+    state: State | None = None
 
 
 @dataclass(repr=False)
 class LinearPlant:
     """x' = A x + B u, y = C x + D u about an operating point, in changes from it.
 
+    It unpacks as (A, B, C, D): ``scipy.signal.StateSpace(*plant)``, ``control.ss(*plant)``.
+
     Attributes
     ----------
-    a : ndarray, shape (n, n)
-    b : ndarray, shape (n, inputs)
-    c : ndarray, shape (outputs, n)
-    d : ndarray, shape (outputs, inputs)
+    A : ndarray, shape (n, n)
+    B : ndarray, shape (n, inputs)
+    C : ndarray, shape (outputs, n)
+    D : ndarray, shape (outputs, inputs)
     states, inputs, outputs : list of str
         Displacements are in m and rad, velocities and rates by ``time_unit``.
+    state_units, input_units, output_units : list of str
+        "" where they are not known, as of expressions.
     time_unit : float
         Unit of time, s.
+    point : OperatingPoint or None
     """
 
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    d: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
     states: list[str]
     inputs: list[str]
     outputs: list[str]
     time_unit: float = 1.0
+    state_units: list[str] = field(default_factory=list)
+    input_units: list[str] = field(default_factory=list)
+    output_units: list[str] = field(default_factory=list)
+    point: OperatingPoint | None = None
+
+    def __post_init__(self) -> None:
+        for names, units in (
+            (self.states, self.state_units),
+            (self.inputs, self.input_units),
+            (self.outputs, self.output_units),
+        ):
+            units += [""] * (len(names) - len(units))
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return iter((self.A, self.B, self.C, self.D))
 
     @property
     def poles(self) -> np.ndarray:
         """Eigenvalues of A, shape (n,)."""
-        return np.linalg.eigvals(self.a) if self.a.size else np.zeros(0, dtype=complex)
+        return np.linalg.eigvals(self.A) if self.A.size else np.zeros(0, dtype=complex)
+
+    def place(self, name: str | int, kind: str = "input") -> int:
+        """Return the number of an input, output or state, given by its name or number.
+
+        Raises
+        ------
+        ModelError
+            If there is none.
+        """
+        names = {"input": self.inputs, "output": self.outputs, "state": self.states}[kind]
+        if isinstance(name, str) and name in names:
+            return names.index(name)
+        if isinstance(name, int | np.integer) and -len(names) <= name < len(names):
+            return int(name) % len(names)
+        hint = did_you_mean(str(name), names, shown=repr, otherwise=f"they are {', '.join(map(repr, names)) or 'none'}")
+        raise ModelError(f"plant: there is no {kind} {name!r}; {hint}")
 
     def transfer(self, s: complex) -> np.ndarray:
-        """Return C (s - A)^-1 B + D, shape (outputs, inputs)."""
-        n = len(self.a)
-        return self.c @ np.linalg.solve(s * np.eye(n) - self.a, self.b) + self.d
+        """Return C (s - A)^-1 B + D, shape (outputs, inputs); s is by the plant's unit of time."""
+        n = len(self.A)
+        return self.C @ np.linalg.solve(s * np.eye(n) - self.A, self.B.astype(complex)) + self.D
 
-    def step(self, times: np.ndarray, which: int = 0) -> np.ndarray:
+    def frequency_response(self, f: np.ndarray) -> np.ndarray:
+        """Return C (2 pi i f - A)^-1 B + D.
+
+        Parameters
+        ----------
+        f : ndarray, shape (m,)
+            Frequencies, Hz.
+
+        Returns
+        -------
+        ndarray of complex, shape (m, outputs, inputs)
+            Amplitude and phase lead of each output over each input; infinite at a pole.
+        """
+        # A = Q H Q^T once: each frequency is then a solution with a matrix that has one diagonal below its main one
+        points = 2j * np.pi * self.time_unit * np.atleast_1d(np.asarray(f, dtype=float))
+        out = np.zeros((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
+        out += self.D
+        if not len(self.A) or not out.size:
+            return out
+        reduced, turned = hessenberg(self.A, calc_q=True)
+        left, right = self.C @ turned, turned.T @ self.B.astype(complex)
+        for row, s in zip(out, points, strict=True):
+            try:
+                row += left @ np.linalg.solve(s * np.eye(len(reduced)) - reduced, right)
+            except np.linalg.LinAlgError:
+                row[:] = np.inf
+        return out
+
+    def transfer_function(self, which: str | int = 0, output: str | int = 0) -> TransferFunction:
+        """Return the transfer function from one input to one output as polynomials in s.
+
+        Parameters
+        ----------
+        which, output : str or int
+            Input and output, by name or number.
+
+        Returns
+        -------
+        scipy.signal.TransferFunction
+            Poles that the output does not show are in numerator and denominator, as far as rounding leaves them.
+
+        Raises
+        ------
+        ModelError
+            If there is no such input or output.
+        """
+        from scipy.signal import TransferFunction
+
+        k, j = self.place(output, "output"), self.place(which)
+        poles = self.poles
+        denominator = np.real(np.poly(poles)) if poles.size else np.ones(1)
+        # det(s - A + b c) = (1 + c (s - A)^-1 b) det(s - A)
+        closed = np.real(np.poly(np.linalg.eigvals(self.A - np.outer(self.B[:, j], self.C[k])))) if poles.size else 1.0
+        numerator = np.atleast_1d(closed - denominator + self.D[k, j] * denominator)
+        # the first coefficients are D, C B, C A B ..: zero as long as these are rounding
+        row, zeros = self.C[k], int(self.D[k, j] == 0.0)
+        while 0 < zeros < numerator.size:
+            if abs(row @ self.B[:, j]) > IMPROPER * (np.abs(row) @ np.abs(self.B[:, j])):
+                break
+            row, zeros = row @ self.A, zeros + 1
+        numerator = numerator[min(zeros, numerator.size - 1) :]
+        return TransferFunction(numerator, denominator)
+
+    @property
+    def dc_gain(self) -> np.ndarray:
+        """The gain at rest, D - C A^-1 B, shape (outputs, inputs); infinite where an integrator stands between.
+
+        Integrators that an output does not show, or an input does not move, are left out.
+        """
+        if not len(self.A):
+            return self.D.copy()
+        size = float(np.abs(self.poles).max())
+        schur_form, vectors, standing = schur(self.A.astype(complex), sort=lambda s: abs(s) <= STANDING * size)
+        b, c = vectors.conj().T @ self.B, self.C @ vectors
+        slow, fast = slice(0, standing), slice(standing, None)
+        slow_part, fast_part, between = schur_form[slow, slow], schur_form[fast, fast], schur_form[slow, fast]
+        # [1 X; 0 1] parts them: slow X - X fast = -between
+        parting = solve_sylvester(slow_part, -fast_part, -between) if standing and between.size else between
+        c_fast, b_slow = c[:, fast] + c[:, slow] @ parting, b[slow] - parting @ b[fast]
+        gain = self.D - (c_fast @ np.linalg.solve(fast_part, b[fast]) if fast_part.size else 0.0)
+        gain = gain.real
+        moved = b_slow
+        # the terms C A^k B / s^(k+1) of the integrators
+        for _ in range(standing):
+            sizes = np.outer(np.linalg.norm(self.C, axis=1), np.linalg.norm(moved, axis=0))
+            gain[np.abs(c[:, slow] @ moved) > SHOWN * sizes] = np.inf
+            moved = slow_part @ moved
+        return gain
+
+    def step(self, times: np.ndarray, which: str | int = 0) -> np.ndarray:
         """Return the outputs after a unit step of one input from rest.
 
         Parameters
         ----------
         times : ndarray, shape (m,)
             In the unit of time of the plant.
-        which : int
-            Index of the input.
+        which : str or int
+            The input, by name or number.
 
         Returns
         -------
         ndarray, shape (m, outputs)
         """
-        n = len(self.a)
+        n, j = len(self.A), self.place(which)
         held = np.zeros((n + 1, n + 1))
-        held[:n, :n], held[:n, n] = self.a, self.b[:, which]
-        out = [self.c @ expm(held * float(t))[:n, n] + self.d[:, which] for t in np.asarray(times, dtype=float)]
+        held[:n, :n], held[:n, n] = self.A, self.B[:, j]
+        out = [self.C @ expm(held * float(t))[:n, n] + self.D[:, j] for t in np.asarray(times, dtype=float)]
         return np.array(out).reshape(-1, len(self.outputs))
 
     def save(self, path: str | Path) -> Path:
-        """Write the matrices and names to a .mat file for MATLAB or a .npz file for NumPy.
+        """Write the matrices, names and units to a .mat file for MATLAB or a .npz file for NumPy.
 
         Raises
         ------
@@ -92,8 +252,9 @@ class LinearPlant:
             If the file name ends otherwise.
         """
         path = check_format(path)
-        content: dict[str, Any] = {"A": self.a, "B": self.b, "C": self.c, "D": self.d, "time_unit": self.time_unit}
+        content: dict[str, Any] = dict(zip("ABCD", self, strict=True)) | {"time_unit": self.time_unit}
         labels = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
+        labels |= {"state_units": self.state_units, "input_units": self.input_units, "output_units": self.output_units}
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_name(f".{path.stem}.part{path.suffix}")
         if path.suffix == ".mat":
@@ -109,19 +270,21 @@ class LinearPlant:
 
     def table(self) -> str:
         """Return sizes, names, poles and matrices as text."""
-        lines = [repr(self), f"  states   {', '.join(self.states) or 'none'}", f"  inputs   {', '.join(self.inputs)}"]
-        lines.append(f"  outputs  {', '.join(self.outputs)}")
-        for name in "abcd":
-            matrix = getattr(self, name)
+        kinds = (("states", self.states, self.state_units), ("inputs", self.inputs, self.input_units))
+        lines = [repr(self)]
+        for title, names, units in (*kinds, ("outputs", self.outputs, self.output_units)):
+            told = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)]
+            lines.append(f"  {title:<8} {', '.join(told) or 'none'}")
+        for name, matrix in zip("ABCD", self, strict=True):
             rows = [" ".join(f"{v:13.6g}" for v in row) for row in matrix]
-            lines += [f"  {name.upper()} ({matrix.shape[0]} by {matrix.shape[1]})", *(f"    {row}" for row in rows)]
+            lines += [f"  {name} ({matrix.shape[0]} by {matrix.shape[1]})", *(f"    {row}" for row in rows)]
         return "\n".join(lines)
 
     def __str__(self) -> str:
         return self.table()
 
     def __repr__(self) -> str:
-        return f"LinearPlant({len(self.a)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs)"
+        return f"LinearPlant({len(self.A)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs)"
 
 
 def check_format(path: str | Path) -> Path:
@@ -136,6 +299,180 @@ def check_format(path: str | Path) -> Path:
     if path.suffix not in FORMATS:
         raise ModelError(f"{path.name}: a plant is written as {' or '.join(FORMATS)}")
     return path
+
+
+# From a linearisation to the matrices.
+
+
+@dataclass
+class Realised:
+    """A plant in which inputs act by their highest rates; rows over the states x, then the inputs w = u^(h).
+
+    Attributes
+    ----------
+    rows : ndarray, shape (n, n + inputs)
+        [A B] of x = (q, q', z, then of each input u, u' .. up to its highest rate).
+    places : tuple of ndarray, shape (coordinates, n + inputs)
+        Changes of the coordinates (R, phi or theta, q_f), and of their first and second rates.
+    outputs : ndarray, shape (outputs, n + inputs)
+        [C D].
+    chains : list of list of int
+        Of each input the states u, u' ..
+    """
+
+    rows: np.ndarray
+    places: tuple[np.ndarray, np.ndarray, np.ndarray]
+    outputs: np.ndarray
+    chains: list[list[int]]
+
+
+def realised(reduced: Reduced, own: np.ndarray, told: np.ndarray, given: np.ndarray) -> Realised:
+    """Return the plant of a linearisation.
+
+    Parameters
+    ----------
+    reduced : Reduced
+        With what its inputs do, if it has some.
+    own : ndarray of int
+        Differential states that are states of the plant.
+    told : ndarray of int
+        Differential states whose rates are the outputs.
+    given : ndarray of int
+        Differential states of constant value that are inputs, before all others.
+
+    Raises
+    ------
+    SingularModelError
+        If a motion left free by the constraints has no inertia.
+    """
+    n, m = len(reduced.mass), own.size
+    driven, between = reduced.driven, reduced.state_state
+    orders = [0] * given.size + ([] if driven is None else _orders(driven, own, told))
+    size = 2 * n + m
+    chains: list[list[int]] = []
+    for h in orders:
+        chains.append(list(range(size, size + h)))
+        size += h
+    width = size + len(orders)
+
+    def selected(columns: Sequence[int]) -> np.ndarray:
+        """Return the rows that take these places of (x, w)."""
+        out = np.zeros((len(columns), width))
+        out[np.arange(len(columns)), columns] = 1.0
+        return out
+
+    position, velocity, inner = (selected(range(*ends)) for ends in ((0, n), (n, 2 * n), (2 * n, 2 * n + m)))
+    of_given = selected(range(size, size + given.size))
+    count = len(orders) - given.size
+    # u, u' and u'' of the other inputs
+    levels = [np.zeros((count, width)) for _ in range(3)]
+    for k, (chain, h) in enumerate(zip(chains[given.size :], orders[given.size :], strict=True)):
+        for level, place in enumerate([*chain, size + given.size + k][: h + 1]):
+            levels[level][k, place] = 1.0
+    force = reduced.stiffness @ position + reduced.damping @ velocity
+    force = force + reduced.state_force[:, own] @ inner + reduced.state_force[:, given] @ of_given
+    rates = reduced.state_position @ position + reduced.state_velocity @ velocity
+    rates = rates + between[:, own] @ inner + between[:, given] @ of_given
+    if driven is not None:
+        for pushed, moved, rate in zip(driven.force, driven.state, levels, strict=True):
+            force, rates = force + pushed @ rate, rates + moved @ rate
+    rows = np.zeros((size, width))
+    rows[:n], rows[n : 2 * n], rows[2 * n : 2 * n + m] = velocity, -_over_mass(reduced.mass, force), rates[own]
+    for k, chain in enumerate(chains):
+        for state, following in zip(chain, [*chain, size + k][1:], strict=True):
+            rows[state, following] = 1.0
+    motion = reduced.motion
+    accelerated = rows[n : 2 * n]
+    places = [
+        motion.now @ position,
+        motion.now @ velocity + motion.first @ position,
+        motion.now @ accelerated + 2.0 * motion.first @ velocity + motion.second @ position,
+    ]
+    if driven is not None:
+        put, put_first, put_second = driven.place
+        places[0] = places[0] + put @ levels[0]
+        places[1] = places[1] + put @ levels[1] + put_first @ levels[0]
+        places[2] = places[2] + put @ levels[2] + 2.0 * put_first @ levels[1] + put_second @ levels[0]
+    return Realised(rows, tuple(places), rates[told], chains)  # type: ignore[arg-type]
+
+
+def _orders(driven: Driven, own: np.ndarray, told: np.ndarray) -> list[int]:
+    """Return the highest rate with which each input acts."""
+    count = driven.force[0].shape[1]
+    orders = []
+    for k in range(count):
+        acts = [
+            h
+            for h in range(3)
+            if driven.force[h][:, k].any() or driven.state[h][:, k].any() or (h == 2 and driven.place[0][:, k].any())
+        ]
+        orders.append(max(acts, default=0))
+    return orders
+
+
+def _over_mass(mass: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return M^-1 times forces."""
+    if not len(mass):
+        return force
+    try:
+        return cho_solve(cho_factor(0.5 * (mass + mass.T)), force)
+    except np.linalg.LinAlgError as error:
+        raise SingularModelError("a motion that the constraints leave free has no inertia") from error
+
+
+IMPROPER = 1e-9
+"""Direct effect of a rate, of the sum of its terms, above which an output follows it: rounding is 1e-13."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """An input as it is wanted: its name and unit, and by which rate (0, 1, 2) it is given."""
+
+    name: str
+    unit: str
+    level: int = 0
+    value: float = 0.0
+    remedy: str = ""
+
+
+def lowered(
+    found: Realised, asked: Sequence[Asked], outputs: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return A, B, C, D with inputs at the levels asked for.
+
+    Raises
+    ------
+    ModelError
+        If an output follows a rate that is higher than the one asked for.
+    """
+    n = len(found.rows)
+    a, b = found.rows[:, :n].copy(), found.rows[:, n:].copy()
+    c, d = found.outputs[:, :n].copy(), found.outputs[:, n:].copy()
+    kept = np.ones(n, dtype=bool)
+    for k, (want, chain) in enumerate(zip(asked, found.chains, strict=True)):
+        for place in reversed(chain[want.level :]):
+            terms = np.abs(found.outputs[:, :n]) @ np.abs(found.rows[:, n + k]) + np.abs(d).max(axis=1, initial=0.0)
+            follows = np.abs(d[:, k]) > IMPROPER * terms
+            if follows.any():
+                raise ModelError(
+                    f"output {outputs[int(np.argmax(follows))]!r} follows the rate of input {want.name!r}, so that no "
+                    f"D is finite; {want.remedy}"
+                )
+            moved = b[:, k].copy()
+            d[:, k] = c @ moved
+            b[:, k] = a @ moved
+            b[place, k] = 0.0
+            kept[place] = False
+    # inputs that are asked for by a rate that is higher than those that act: the states that integrate it
+    for k, (want, chain) in enumerate(zip(asked, found.chains, strict=True)):
+        for _ in range(want.level - len(chain)):
+            size = len(a)
+            a = np.block([[a, b[:, k : k + 1]], [np.zeros((1, size + 1))]])
+            b = np.vstack([b, np.zeros((1, b.shape[1]))])
+            b[:, k], b[size, k] = 0.0, 1.0
+            c, d[:, k] = np.hstack([c, d[:, k : k + 1]]), 0.0
+            kept = np.append(kept, True)
+    return a[np.ix_(kept, kept)], b[kept], c[:, kept], d
 
 
 def linear_plant(
@@ -166,33 +503,17 @@ def linear_plant(
     warn_of_varying(reduced, stacklevel=3)
     own = np.array([k for k in range(len(names)) if k not in (*inputs, *outputs)], dtype=int)
     u, y = np.array(inputs, dtype=int), np.array(outputs, dtype=int)
-    accelerated = _accelerations(reduced)
-    n, m, unit = len(reduced.mass), own.size, time_unit
-    position, velocity, between = reduced.state_position, reduced.state_velocity, reduced.state_state
-
-    a = np.zeros((2 * n + m, 2 * n + m))
-    a[:n, n : 2 * n] = np.eye(n)
-    a[n : 2 * n] = np.hstack([unit**2 * accelerated[0], unit * accelerated[1], unit**2 * accelerated[2][:, own]])
-    a[2 * n :] = np.hstack([unit * position[own], velocity[own], unit * between[np.ix_(own, own)]])
-    b = np.vstack([np.zeros((n, u.size)), unit**2 * accelerated[2][:, u], unit * between[np.ix_(own, u)]])
-    c = np.hstack([unit * position[y], velocity[y], unit * between[np.ix_(y, own)]])
-    d = unit * between[np.ix_(y, u)]
+    asked = [Asked(names[k], "") for k in u]
+    a, b, c, d = lowered(realised(reduced, own, y, u), asked, [names[k] for k in y])
+    n = len(reduced.mass)
+    # rates by another unit of time; the outputs are rates, too
+    scale = np.concatenate([np.ones(n), np.full(n, time_unit), np.ones(own.size)])
+    a, b = time_unit * scale[:, None] * a / scale, time_unit * scale[:, None] * b
+    c, d = time_unit * c / scale, time_unit * d
     moving = _moving(instant, reduced)
     states = [f"x{k + 1} ({body})" for k, body in enumerate(moving)]
     states += [f"v{k + 1} ({body})" for k, body in enumerate(moving)] + [names[k] for k in own]
-    return LinearPlant(a, b, c, d, states, [names[k] for k in u], [names[k] for k in y], unit)
-
-
-def _accelerations(reduced: Reduced) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return -M^-1 times K, C and H."""
-    forces = (reduced.stiffness, reduced.damping, reduced.state_force)
-    if not len(reduced.mass):
-        return forces
-    try:
-        factor = cho_factor(0.5 * (reduced.mass + reduced.mass.T))
-    except np.linalg.LinAlgError as error:
-        raise SingularModelError("a motion that the constraints leave free has no inertia") from error
-    return tuple(-cho_solve(factor, force) for force in forces)  # type: ignore[return-value]
+    return LinearPlant(a, b, c, d, states, [names[k] for k in u], [names[k] for k in y], time_unit)
 
 
 def _moving(instant: Instant, reduced: Reduced) -> list[str]:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.sparse import block_diag, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from gearmbs.dae.analyses.eigenvalues import free_motions, reduce
+from gearmbs.dae.analyses.eigenvalues import free_motions
 from gearmbs.dae.analyses.kinematics import Instant
+from gearmbs.dae.analyses.linearisation import reduce
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.problem import AssemblyError, ModelError, SingularModelError
 

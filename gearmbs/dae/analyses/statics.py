@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 
 from gearmbs._lazy import former_name
-from gearmbs.dae.analyses.eigenvalues import free_motions, reduce
+from gearmbs.dae.analyses.eigenvalues import free_motions
 from gearmbs.dae.analyses.kinematics import Instant
+from gearmbs.dae.analyses.linearisation import reduce
 from gearmbs.dae.analyses.relaxation import DENSE_LIMIT, LARGEST_TURN, ROUNDING_STEP, Relaxation, describe
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V

@@ -55,6 +55,23 @@ SLOW = 1e-9
 
 
 @dataclass
+class GivenInputs:
+    """What inputs do in all coordinates.
+
+    Attributes
+    ----------
+    force, state : list of ndarray, shapes (n, inputs), (states, inputs)
+        Forces on the left-hand side, and rates of states, by u and u'.
+    place : ndarray, shape (rows, inputs)
+        Phi_u.
+    """
+
+    force: list[np.ndarray]
+    state: list[np.ndarray]
+    place: np.ndarray
+
+
+@dataclass
 class Linearised:
     """M x'' + C x' + K x + H z + J^T lambda = 0, J x = 0 and z' = P x + Q x' + S z in all coordinates x.
 
@@ -75,6 +92,7 @@ class Linearised:
     own_reaction: np.ndarray
     state_reaction: np.ndarray
     transform: np.ndarray | None
+    inputs: GivenInputs | None = None
 
     def within(self, rows: np.ndarray) -> Linearised:
         """Return the equations of some coordinates alone."""
@@ -95,6 +113,8 @@ class Basis:
         w of the chain that each body belongs to, rad/s.
     varying : list of list of str
         Bodies of each chain whose coefficients are constant in no axes.
+    turn : ndarray, shape (n, n)
+        W.
     """
 
     now: np.ndarray
@@ -102,6 +122,7 @@ class Basis:
     second: np.ndarray
     axes: np.ndarray
     varying: list[list[str]]
+    turn: np.ndarray
 
 
 def weights(instant: Instant) -> np.ndarray:
@@ -131,7 +152,7 @@ def turning_basis(
     """
     velocity = instant.configuration().pose[:, POSE_V:]
     axes = np.zeros((len(velocity), 3))
-    none = Basis(basis, np.zeros_like(basis), np.zeros_like(basis), axes, [])
+    none = Basis(basis, np.zeros_like(basis), np.zeros_like(basis), axes, [], np.zeros((len(basis),) * 2))
     if not basis.shape[1] or not velocity.any():
         return none
     acceleration = instant.system.accelerations(instant.configuration(), instant.t)[0]
@@ -184,7 +205,7 @@ def turning_basis(
         if not every.change(turn, seen_turn, back, forces=True) <= 1.0:
             varying.append([instant.system.body_names[b] for b in np.flatnonzero(axes.any(axis=1))])
     first = turn @ basis - basis @ back
-    return Basis(basis, first, turn @ first - first @ back, axes, varying)
+    return Basis(basis, first, turn @ first - first @ back, axes, varying, turn)
 
 
 @dataclass

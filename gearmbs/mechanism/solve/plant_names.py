@@ -1,0 +1,455 @@
+"""What the inputs and outputs of a plant stand for in a mechanism, by name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from gearmbs.dae.equations.expressions import ExpressionError
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.joints import JOINTS, Joint, kinds_with_angle, kinds_with_displacement
+from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.wording import any_of, did_you_mean
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.mechanism import Mechanism
+
+LEVELS = ("position", "rate", "acceleration")
+AXES = ("x", "y", "z")
+WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
+COMPONENT = (2, 3, 4, 6, 7, 8)
+"""Of JOINT and its kin: force and torque along x, y and z."""
+MOTIONS = {"rotation": "rad", "translation": "m"}
+"""Kinds of motions and the units of what they prescribe."""
+ACCELERATIONS = {"ACC": False, "WDT": True}
+"""Beginnings of the functions that ask for accelerations: whether for angular ones."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """An input.
+
+    Attributes
+    ----------
+    kind : {"force", "torque", "motion", "transmission_error"}
+    name, unit : str
+    level : int
+        By which of its rates it is given.
+    base : str
+        Unit of the input itself.
+    i, j : Marker
+        Where a force or torque acts, and where it goes back to; without J it comes from outside.
+    axis : int
+        Of a force or torque from outside, a global one.
+    joint : Joint
+        The motion.
+    element, lever
+        The mesh, and r_b2, negative of internal pairs.
+    """
+
+    kind: str
+    name: str
+    unit: str
+    level: int = 0
+    base: str = ""
+    i: Marker | None = None
+    j: Marker | None = None
+    axis: int = 2
+    joint: Joint | None = None
+    element: Any = None
+    lever: float = 1.0
+
+    def unit_of(self, level: int) -> str:
+        """Return the unit of one of its rates."""
+        return f"{self.base}{('', '/s', '/s^2')[level]}"
+
+    @property
+    def remedy(self) -> str:
+        """What to ask for instead where an output follows a higher rate."""
+        place = self.element if self.kind == "transmission_error" else self.joint
+        others = LEVELS[self.level + 1 :] or LEVELS[-1:]
+        return f"give ({self.kind!r}, {getattr(place, 'name', '')!r}, {any_of(map(repr, others))})"
+
+
+@dataclass(frozen=True)
+class Acceleration:
+    """An acceleration that an output asks for, by the names of the states that stand for its components."""
+
+    marker: Marker
+    angular: bool
+    labels: tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Told:
+    """An output: an expression, with the accelerations in it."""
+
+    name: str
+    unit: str
+    expression: str
+    accelerations: tuple[Acceleration, ...] = ()
+
+
+@dataclass
+class PlantNames:
+    """Reads the inputs and outputs of a plant; adds markers to bodies that expressions need."""
+
+    mechanism: Mechanism
+    _held: dict[tuple[int, bool], Acceleration] = field(default_factory=dict)
+
+    # --- inputs -------------------------------------------------------------------------------------
+
+    def inputs(self, item: Any) -> list[Given]:
+        """Return the input that an item stands for.
+
+        Raises
+        ------
+        ModelError
+            One line with what is there.
+        """
+        known: dict[str, Callable[..., Given]] = {
+            "force": self._force, "torque": self._torque, "motion": self._motion,
+            "transmission_error": self._transmission_error,
+        }  # fmt: skip
+        return [self._read("input", item, known)]
+
+    def _read(self, role: str, item: Any, known: Mapping[str, Callable[..., Any]]) -> Any:
+        if not isinstance(item, tuple | list) or not item or not isinstance(item[0], str):
+            raise ModelError(f"{role} {item!r}; give a tuple, such as {next(iter(known))!r} and the name of a part")
+        kind, *rest = item
+        if kind not in known:
+            hint = did_you_mean(kind, list(known), shown=repr, otherwise=f"they are {', '.join(known)}")
+            raise ModelError(f"{role} {item!r}: there is no {role} of the kind {kind!r}; {hint}")
+        try:
+            return known[kind](*rest)
+        except TypeError as error:
+            if "argument" not in str(error) or "_" not in str(error):
+                raise
+            raise ModelError(f"{role} {item!r}: {len(rest)} entries follow {kind!r}; see Mechanism.linearize") from None
+        except ModelError as error:
+            raise ModelError(f"{role} {item!r}: {error}") from None
+
+    def _force(self, where: Any, axis: str | None = None) -> Given:
+        return self._wrench("force", "N", where, axis)
+
+    def _torque(self, where: Any, axis: str | None = None) -> Given:
+        return self._wrench("torque", "N m", where, axis)
+
+    def _wrench(self, kind: str, unit: str, where: Any, axis: str | None) -> Given:
+        m = self.mechanism
+        name = where if isinstance(where, str) else getattr(where, "name", where)
+        between = where if hasattr(where, "i") else m.joints.get(name) or m.elements.get(name)
+        # a body has the name of none of its joints and elements
+        if axis is None and between is not None:
+            for marker in (between.i, between.j):
+                self._check_rigid(marker, kind)
+            return Given(kind, f"{kind} {between.name}", unit, base=unit, i=between.i, j=between.j)
+        if axis is not None and (isinstance(where, Marker | Body) or between is None):
+            marker = self._marker(where)
+            self._check_rigid(marker, kind)
+            return Given(kind, f"{kind} {name} {axis}", unit, base=unit, i=marker, axis=_one_of("axis", axis, AXES))
+        if axis is not None:
+            raise ModelError(
+                f"{name!r} is a {getattr(between, 'kind', 'joint')}, which has its own axis; leave {axis!r} away"
+            )
+        if name in m.bodies:
+            raise ModelError(f"on a body give the axis, too: ({kind!r}, {name!r}, 'x')")
+        there = [*m.joints, *m.elements]
+        raise ModelError(f"there is no joint or element {name!r}; {_there(name, there)}")
+
+    def _motion(self, motion: Any, level: str = "position") -> Given:
+        joint = self._joint(motion)
+        if joint.kind not in MOTIONS:
+            there = [name for name, one in self.mechanism.joints.items() if one.kind in MOTIONS]
+            raise ModelError(
+                f"joint {joint.name!r} is {joint.kind}, no motion; the motions are {', '.join(there) or 'none'}"
+            )
+        k = _one_of("level", level, LEVELS)
+        base = MOTIONS[joint.kind]
+        one = Given("motion", f"motion {joint.name}", base, k, base, joint=joint)
+        return _at_level(one)
+
+    def _transmission_error(self, mesh: Any, level: str = "position") -> Given:
+        element = self._mesh(mesh)
+        one = Given(
+            "transmission_error", f"transmission_error {element.name}", "m", _one_of("level", level, LEVELS), "m",
+            element=element, lever=_levers(element)[1],
+        )  # fmt: skip
+        return _at_level(one)
+
+    # --- outputs ------------------------------------------------------------------------------------
+
+    def outputs(self, item: Any) -> list[Told]:
+        """Return the outputs that an item stands for.
+
+        Raises
+        ------
+        ModelError
+            One line with what is there.
+        """
+        if isinstance(item, str):
+            return [self._expression(item)]
+        known: dict[str, Callable[..., list[Told]]] = {
+            "joint_angle": self._angle, "joint_displacement": self._displacement, "joint_rate": self._rate,
+            "com_position": self._vector("com_position", "D", "m"),
+            "com_velocity": self._vector("com_velocity", "V", "m/s"),
+            "com_acceleration": self._vector("com_acceleration", "ACC", "m/s^2"),
+            "angular_velocity": self._vector("angular_velocity", "W", "rad/s"),
+            "angular_acceleration": self._vector("angular_acceleration", "WDT", "rad/s^2"),
+            "marker_position": self._vector("marker_position", "D", "m"),
+            "marker_velocity": self._vector("marker_velocity", "V", "m/s"),
+            "marker_acceleration": self._vector("marker_acceleration", "ACC", "m/s^2"),
+            "reaction": self._reaction, "load": self._load, "state": self._state,
+            "transmission_error": self._error,
+        }  # fmt: skip
+        return self._read("output", item, known)
+
+    def _expression(self, text: str) -> Told:
+        """Return an expression in which states stand for the accelerations of markers."""
+        from gearmbs.mechanism.language.syntax import Call, parse
+
+        try:
+            parse(text)
+        except ExpressionError as error:
+            raise ModelError(f"output {text!r}: {error}") from None
+        asked: dict[tuple[int, bool], Acceleration] = {}
+        out, rest = "", text
+        while True:
+            found = _first_call(rest, ACCELERATIONS)
+            if found is None:
+                break
+            start, end, name = found
+            call = parse(rest[start:end])
+            assert isinstance(call, Call)
+            out += rest[:start] + self._substitute(text, name, call, asked)
+            rest = rest[end:]
+        return Told(text, "", out + rest, tuple(asked.values()))
+
+    def _substitute(self, text: str, name: str, call: Any, asked: dict[tuple[int, bool], Acceleration]) -> str:
+        """Return what takes the place of ACCX(i, j, k, l) and its kin: components of vectors along axes of k."""
+        angular, magnitude = ACCELERATIONS[name[:3]], name.endswith("M")
+        refs = [getattr(arg, "text", None) for arg in call.args] + [None] * 4
+        numbers = [getattr(arg, "integer", None) for arg in call.args] + [None] * 4
+        markers = [self._named(ref, number) for ref, number in zip(refs, numbers)]
+        i, j = markers[0], markers[1]
+        along, seen = (None, markers[2]) if magnitude else (markers[2], markers[3])
+        if seen is not None and not seen.body.is_ground:
+            raise ModelError(f"output {text!r}: {name} seen from '{seen.name}', which moves, is no output of a plant")
+        sides: list[tuple[str, ...]] = []
+        for marker in (i, j):
+            if marker is None or marker.body.is_ground:
+                sides.append(("0", "0", "0"))
+            else:
+                one = self._acceleration(marker, angular)
+                asked[id(marker), angular] = one
+                sides.append(tuple(f'DIF("{label}")' for label in one.labels))
+        parts = [f"({a} - {b})" for a, b in zip(*sides, strict=True)]
+        if magnitude:
+            return f"SQRT({' + '.join(f'{part}**2' for part in parts)})"
+        k = "XYZ".index(name[3])
+        if along is None:
+            return parts[k]
+        tip = along.body.marker(along.position + along.orientation[:, k], name=f"{along.name} plant tip {k}")
+        shown = [f'D{c}("{tip.name}", "{along.name}")' for c in "XYZ"]
+        return f"({' + '.join(f'{part}*{cosine}' for part, cosine in zip(parts, shown, strict=True))})"
+
+    def _acceleration(self, marker: Marker, angular: bool) -> Acceleration:
+        if isinstance(marker.body, ModalBody):
+            raise ModelError(
+                f"the acceleration of '{marker.name}' on '{marker.body.name}', which deforms, is no output of a plant; "
+                "take its velocity and multiply by s, or measure at a rigid body"
+            )
+        key = id(marker), angular
+        if key not in self._held:
+            labels = tuple(f"plant acceleration {len(self._held)} {c}" for c in AXES)
+            self._held[key] = Acceleration(marker, angular, labels)  # type: ignore[arg-type]
+        return self._held[key]
+
+    def _vector(self, kind: str, function: str, unit: str) -> Callable[..., list[Told]]:
+        def read(where: Any, component: str | None = None) -> list[Told]:
+            if kind.startswith("marker"):
+                marker = self._marker(where, of_body=False)
+            else:
+                marker = self._marker(where)
+            name = where if isinstance(where, str) else where.name
+            axes = AXES if component is None else (AXES[_one_of("component", component, AXES)],)
+            told = [self._expression(f'{function}{c.upper()}("{marker.name}")') for c in axes]
+            return [Told(f"{kind} {name} {c}", unit, one.expression, one.accelerations) for c, one in zip(axes, told)]
+
+        return read
+
+    def _angle(self, joint: Any) -> list[Told]:
+        one = self._of_kind(joint, kinds_with_angle(), "angle")
+        return [Told(f"joint_angle {one.name}", "rad", f'AZ("{one.i.name}", "{one.j.name}")')]
+
+    def _displacement(self, joint: Any) -> list[Told]:
+        one = self._of_kind(joint, kinds_with_displacement(), "displacement")
+        return [Told(f"joint_displacement {one.name}", "m", f'DZ("{one.i.name}", "{one.j.name}", "{one.j.name}")')]
+
+    def _rate(self, joint: Any) -> list[Told]:
+        one = self._of_kind(joint, [*kinds_with_angle(), *kinds_with_displacement()], "rate")
+        i, j = one.i.name, one.j.name
+        if one.kind in kinds_with_angle():
+            return [Told(f"joint_rate {one.name}", "rad/s", f'WZ("{i}", "{j}", "{j}")')]
+        return [Told(f"joint_rate {one.name}", "m/s", f'VZ("{i}", "{j}", "{j}", "{j}")')]
+
+    def _reaction(self, joint: Any, component: str | None = None) -> list[Told]:
+        from gearmbs.mechanism.compile import REACTION_KINDS
+
+        one = self._joint(joint)
+        function = REACTION_KINDS.get(one.kind, ("joint" if one.kind in JOINTS or one.kind == "screw" else "jprim",))[0]
+        told = []
+        for k in _components(component):
+            text = f'{function.upper()}("{one.name}", 0, {COMPONENT[k]})'
+            told.append(Told(f"reaction {one.name} {WRENCH[k]}", "N" if k < 3 else "N m", text))
+        return told
+
+    def _load(self, element: Any, component: str | None = None) -> list[Told]:
+        m = self.mechanism
+        name = element if isinstance(element, str) else getattr(element, "name", element)
+        one = m.elements.get(name)
+        if one is None:
+            raise ModelError(f"there is no element {name!r}; {_there(name, list(m.elements))}")
+        pair = {id(one.i), id(one.j)}
+        parts = [*m.joints.values(), *m.elements.values()]
+        sharing = [other.name for other in parts if other is not one and {id(other.i), id(other.j)} == pair]
+        if sharing or len(one.markers) != 2:
+            why = f"its markers are also those of '{sharing[0]}'" if sharing else "it has not two markers"
+            raise ModelError(f"the load of '{name}' cannot be told apart: {why}; give each its own two markers")
+        absent = {True: one.has_force, False: one.has_torque}
+        return [
+            Told(
+                f"load {name} {WRENCH[k]}", "N" if k < 3 else "N m",
+                f'{WRENCH[k].upper()}("{one.i.name}", "{one.j.name}")' if absent[k < 3] else "0",
+            )
+            for k in _components(component)
+        ]  # fmt: skip
+
+    def _state(self, state: Any) -> list[Told]:
+        m = self.mechanism
+        name = getattr(state, "name", state)
+        known = {s_name: s for s_name, s in zip(m.state_names, m.every_state, strict=True)}
+        if name not in known:
+            raise ModelError(f"there is no state {name!r}; {_there(name, list(known))}")
+        function = "VARVAL" if known[name].algebraic else "DIF"
+        return [Told(f"state {name}", "", f'{function}("{name}")')]
+
+    def _error(self, mesh: Any) -> list[Told]:
+        element = self._mesh(mesh)
+        parts = []
+        for marker, lever in zip((element.i, element.j), _levers(element), strict=True):
+            at = self.mechanism.ground.marker_at(
+                marker.global_position(), marker.global_orientation(), name=f"{marker.name} plant ground"
+            )
+            parts.append(f'{lever!r}*AZ("{marker.name}", "{at.name}")')
+        return [Told(f"transmission_error {element.name}", "m", " + ".join(parts))]
+
+    # --- what is there ------------------------------------------------------------------------------
+
+    def _joint(self, joint: Any) -> Joint:
+        name = getattr(joint, "name", joint)
+        found = self.mechanism.joints.get(name)
+        if found is None:
+            raise ModelError(f"there is no joint {name!r}; {_there(name, list(self.mechanism.joints))}")
+        return found
+
+    def _of_kind(self, joint: Any, kinds: Collection[str], what: str) -> Joint:
+        found = self._joint(joint)
+        if found.kind not in kinds:
+            raise ModelError(
+                f"joint '{found.name}' is {found.kind}; {what} is for {any_of(dict.fromkeys(kinds))} joints"
+            )
+        return found
+
+    def _mesh(self, mesh: Any) -> Any:
+        name = getattr(mesh, "name", mesh)
+        meshes = {n: e for n, e in self.mechanism.elements.items() if _pair(e) is not None}
+        if name not in meshes:
+            raise ModelError(f"there is no gear contact {name!r}; {_there(name, list(meshes))}")
+        return meshes[name]
+
+    def _marker(self, where: Any, of_body: bool = True) -> Marker:
+        """Return a marker by name, or one at the centre of mass of a body, made for it."""
+        m = self.mechanism
+        if isinstance(where, Marker):
+            return where
+        body = where if isinstance(where, Body) else m.bodies.get(where) if of_body else None
+        if body is not None:
+            name = f"{body.name} plant centre"
+            own = next((one for one in body.markers if one.name == name), None)
+            return own or body.marker(body.com, name=name)
+        found = self._named(where, None)
+        if found is None:
+            there = [
+                *(m.bodies if of_body else ()),
+                *(one.name for b in (m.ground, *m.bodies.values()) for one in b.markers),
+            ]
+            what = "body or marker" if of_body else "marker"
+            raise ModelError(f"there is no {what} {where!r}; {_there(where, there)}")
+        return found
+
+    def _named(self, name: str | None, number: int | None) -> Marker | None:
+        for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
+            for one in body.markers:
+                if (name is not None and one.name.upper() == name.upper()) or (number and one.number == number):
+                    return one
+        return None
+
+    def _check_rigid(self, marker: Marker, kind: str) -> None:
+        if isinstance(marker.body, ModalBody):
+            raise ModelError(
+                f"'{marker.body.name}' deforms, so that a {kind} also acts on its modes; fix a body to '{marker.name}' "
+                "and give this one"
+            )
+
+
+def _at_level(given: Given) -> Given:
+    name = given.name if given.level == 0 else f"{given.name} {LEVELS[given.level]}"
+    return replace(given, name=name, unit=given.unit_of(given.level))
+
+
+def _one_of(what: str, value: Any, known: Collection[str]) -> int:
+    names = list(known)
+    if value not in names:
+        raise ModelError(f"{what} {value!r}; choose {any_of(map(repr, names))}")
+    return names.index(value)
+
+
+def _components(component: str | None) -> list[int]:
+    return list(range(len(WRENCH))) if component is None else [_one_of("component", component, WRENCH)]
+
+
+def _there(name: Any, names: list[str]) -> str:
+    return did_you_mean(str(name), names, shown=repr, otherwise=f"there are {', '.join(names) or 'none'}")
+
+
+def _pair(element: Any) -> Any:
+    """Return the two wheels of a gear contact or an ideal mesh, None of other elements."""
+    return getattr(element, "pair", None) or getattr(getattr(element, "mesh", None), "pair", None)
+
+
+def _levers(element: Any) -> tuple[float, float]:
+    """Return r_b1 and s r_b2 of a mesh, s = 1 for external and -1 for internal pairs."""
+    pair = _pair(element)
+    one, two = pair.driver, pair.driven
+    return float(one.base_radius), float(two.sign * two.base_radius)
+
+
+def _first_call(text: str, beginnings: Collection[str]) -> tuple[int, int, str] | None:
+    """Return where the first call of a function with one of the beginnings stands, its end, and its name."""
+    pattern = rf"(?<![A-Za-z0-9_.$\"'])({'|'.join(beginnings)})([XYZM])\s*\("
+    found = re.search(pattern, text, re.IGNORECASE)
+    if found is None:
+        return None
+    depth = 0
+    for k in range(found.end() - 1, len(text)):
+        depth += (text[k] == "(") - (text[k] == ")")
+        if depth == 0:
+            return found.start(), k + 1, found.group(0).rstrip("( \t").upper()
+    return None
+
+
+__all__ = ["LEVELS", "Acceleration", "Given", "PlantNames", "Told"]

@@ -1,0 +1,414 @@
+"""Linear plants of a mechanism: from inputs and outputs by name to A, B, C and D."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import qr
+
+from gearmbs.dae.analyses.kinematics import Instant
+from gearmbs.dae.analyses.linearisation import Inputs, Reduced, reduce, warn_of_varying
+from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, Realised, lowered, realised
+from gearmbs.dae.analyses.turning import skew, turning
+from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.checks import warn_of_stiff_seats
+from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.elements import State as ElementState
+from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told
+from gearmbs.mechanism.solve.points import instant_at, point_of
+from gearmbs.progress import waiting
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.mechanism import Mechanism
+
+TOLD = "plant output {}"
+"""Name of the state whose rate is an output."""
+
+
+@waiting("plant")
+def linearize(
+    mechanism: Mechanism, inputs: Sequence[Any], outputs: Sequence[Any], *, at: Any = "initial", t: float | None = None
+) -> LinearPlant:
+    """Return the linear plant x' = A x + B u, y = C x + D u of a mechanism at one of its states.
+
+    Constraints are eliminated: the states are the independent displacements, their rates, and the states of elements.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    inputs : sequence
+        Of texts and tuples:
+
+        * ``"load"``: an input of the mechanism, see `Mechanism.input`
+        * ``("torque", joint or element)``: about z_J, on I's body and back on J's, N m; ``("force", ...)`` along z_J, N
+        * ``("torque", body or marker, axis)``, ``("force", ...)`` with axis "x", "y" or "z": from the ground along a
+          global axis, on a body at its centre of mass, N m and N
+        * ``("motion", motion, level)``: what a motion prescribes, by its "position" (m, rad), "rate" or "acceleration"
+        * ``("transmission_error", mesh, level)``: an error of the flanks of a gear contact along the line of action, m
+    outputs : sequence
+        Of texts and tuples:
+
+        * an expression in the function language, accelerations included
+        * ``("joint_angle", joint)``, ``("joint_displacement", joint)``, ``("joint_rate", joint)``: of I about or
+          along z_J
+        * ``("com_position", body, component)``, ``("com_velocity", ...)``, ``("com_acceleration", ...)``,
+          ``("angular_velocity", ...)``, ``("angular_acceleration", ...)``, of a marker's origin
+          ``("marker_position", marker, component)``, ``("marker_velocity", ...)``, ``("marker_acceleration", ...)``;
+          component "x", "y" or "z" of the global frame, all three when left out
+        * ``("reaction", joint, component)``, ``("load", element, component)``: on I's body at marker I, component "fx",
+          "fy", "fz", "tx", "ty" or "tz"
+        * ``("state", name)``, ``("transmission_error", mesh)``
+    at : {"initial", "equilibrium"}, StaticResult, State or Solution
+        Operating point: the initial position and velocity, the equilibrium reached from there, one found before, a
+        state, or the state of a solution at ``t``. Where it moves, changes are those from the motion.
+    t : float, optional
+        Time at which functions of time are frozen, s; default 0, of a Solution its end.
+
+    Returns
+    -------
+    LinearPlant
+
+    Raises
+    ------
+    ModelError
+        For a name, a component or a level that is not there; if a motion left free has no inertia; and for an output
+        that follows a rate of an input that is not given by this rate.
+
+    Warns
+    -----
+    UserWarning
+        If the coefficients vary with time along the motion: they are those of this instant.
+
+    Examples
+    --------
+    >>> import gearmbs as gm
+    >>> m = gm.Mechanism("pendulum", gravity=(0, 0, -9.81))
+    >>> rod = m.body("rod", mass=1.0, inertia=(0.01, 0.01, 0.01), position=(0, 0, -0.5))
+    >>> pin = m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    >>> plant = m.linearize([("torque", "pin")], [("joint_angle", "pin")])
+    >>> [round(float(v), 6) for v in (plant.A[1, 0], plant.B[1, 0])]
+    [-18.865385, 3.846154]
+    """
+    warn_of_stiff_seats(mechanism.joints, mechanism.elements)
+    names = PlantNames(mechanism)
+    point = point_of(mechanism, at, t)
+    with _markers_kept(mechanism):
+        given = [one for item in inputs for one in names.inputs(item)]
+        whole, told = _with_outputs(mechanism, names, outputs)
+        instant = instant_at(whole, point)
+        held = _held(instant, told)
+        if held:
+            # expressions look at the accelerations of the operating point
+            for state, value in held.items():
+                instant.y[instant.at["z"] + instant.system.state_names.index(state)] = value
+            instant.y = instant.settle(instant.y)
+        return _plant(whole, instant, given, told, point.state)
+
+
+@dataclass
+class _Frame:
+    """Where a marker of a body is at an instant, global components; the ground has the body -1.
+
+    Attributes
+    ----------
+    body : int
+    place, arm : ndarray, shape (3,)
+        Origin, and origin from the centre of mass, m.
+    axes : ndarray, shape (3, 3)
+    """
+
+    body: int
+    place: np.ndarray
+    arm: np.ndarray
+    axes: np.ndarray
+
+
+def _frame(instant: Instant, marker: Marker | None) -> _Frame:
+    assert marker is not None
+    body = marker.body
+    if body.is_ground:
+        return _Frame(-1, marker.position, np.zeros(3), marker.orientation)
+    number = instant.system.body_names.index(body.name)
+    row = instant.pose()[number]
+    axes = row[POSE_A:POSE_V].reshape(3, 3)
+    arm = axes @ (marker.position - body.com)
+    return _Frame(number, row[POSE_R:POSE_A] + arm, arm, axes @ marker.orientation)
+
+
+class _Columns:
+    """Makes the columns of the residual by inputs at an instant."""
+
+    def __init__(self, mechanism: Mechanism, instant: Instant) -> None:
+        self.mechanism, self.instant = mechanism, instant
+        self.axes = instant.axes()
+        counts = instant.system.model.counts
+        # place of the three angles of each body, -1 of one that does not turn
+        self.angle = np.full(len(instant.system.body_names), -1)
+        self.angle[counts.turning] = 3 * np.arange(counts.turning.size)
+        self.matrix = instant.matrix(instant.y)
+        self.turn = turning(instant)
+
+    def of(self, given: Given) -> tuple[np.ndarray, np.ndarray]:
+        """Return the columns by u and u'."""
+        value, rate = np.zeros(self.instant.y.size), np.zeros(self.instant.y.size)
+        if given.kind in ("force", "torque"):
+            self._wrench(given, value)
+        elif given.kind == "motion":
+            self._motion(given, value)
+        else:
+            self._flank(given, value, rate)
+        return value, rate
+
+    def _wrench(self, given: Given, value: np.ndarray) -> None:
+        """Write what a force or torque of one does: on the body of I at its origin, the opposite on J's body there."""
+        i = _frame(self.instant, given.i)
+        direction = np.eye(3)[given.axis] if given.j is None else _frame(self.instant, given.j).axes[:, 2]
+        self._push(value, i, i.place, direction, given.kind == "torque", 1.0)
+        if given.j is not None:
+            self._push(value, _frame(self.instant, given.j), i.place, direction, given.kind == "torque", -1.0)
+
+    def _push(
+        self, value: np.ndarray, frame: _Frame, place: np.ndarray, direction: np.ndarray, torque: bool, sign: float
+    ) -> None:
+        if frame.body < 0:
+            return
+        at, centre = self.instant.at, frame.place - frame.arm
+        moment = direction if torque else np.cross(place - centre, direction)
+        if not torque:
+            first = at["u"] + 3 * frame.body
+            value[first : first + 3] -= sign * direction
+        if self.angle[frame.body] >= 0:
+            first = at["p"] + self.angle[frame.body]
+            value[first : first + 3] -= sign * self.axes[frame.body] @ moment
+
+    def _motion(self, given: Given, value: np.ndarray) -> None:
+        """Write how the constraint of a motion changes with what it prescribes."""
+        joint = given.joint
+        assert joint is not None
+        names, row = self.instant.system.row_names, joint.rows[0]
+        label = f"{joint.name}: {row.label}"
+        if label not in names:
+            raise ModelError(
+                f"input {given.name!r}: motion '{joint.name}' was removed as redundant; take a motion that does not "
+                "repeat other constraints"
+            )
+        place = self.instant.at["lambda"] + names.index(label)
+        if row.rotation is None:
+            value[place] = -1.0
+            return
+        # a turn of I about z_J by what the motion asks for leaves its constraint satisfied
+        term = row.terms[0]
+        i, j = _frame(self.instant, term.i), _frame(self.instant, term.j)
+        moved = self._turned(i, j.axes[:, 2]) if i.body >= 0 else -self._turned(j, j.axes[:, 2])
+        value[place] = -float((self.matrix[[place]] @ moved)[0])
+
+    def _turned(self, frame: _Frame, axis: np.ndarray) -> np.ndarray:
+        """Return the change of y by a small rotation of a body about an axis through a point fixed in it."""
+        out = np.zeros(self.instant.y.size)
+        at, start = self.instant.at, self.angle[frame.body]
+        out[at["R"] + 3 * frame.body : at["R"] + 3 * frame.body + 3] = -np.cross(axis, frame.arm)
+        out[at["theta"] + start : at["theta"] + start + 3] = np.linalg.solve(self.axes[frame.body].T, axis)
+        return out
+
+    def _flank(self, given: Given, value: np.ndarray, rate: np.ndarray) -> None:
+        """Write what a turn of the flanks of the second wheel in its body does to the force of a mesh.
+
+        The force sees the frame of this wheel turned by -u/r about its axis z, at a rate that is fixed in the body.
+        """
+        instant, element = self.instant, given.element
+        j = _frame(instant, element.j)
+        if j.body < 0 or self.angle[j.body] < 0:
+            raise ModelError(f"input {given.name!r}: the second wheel of '{element.name}' is fixed; give another mesh")
+        axis = j.axes[:, 2]
+        spin = instant.pose()[j.body, POSE_W:]
+        at, start, first = instant.at, self.angle[j.body], instant.at["R"]
+        # phi = axis; phi' = omega x axis, since the axis turns with the body
+        moved, sped = self._turned(j, axis), np.zeros(instant.y.size)
+        angles, rates = at["theta"] + start, at["eps"] + start
+        to = np.linalg.inv(self.axes[j.body].T)
+        sped[rates : rates + 3] = to @ axis
+        sped[at["u"] + 3 * j.body : at["u"] + 3 * j.body + 3] = -np.cross(axis, j.arm)
+        along = np.cross(spin, axis)
+        change = to @ along
+        if self.turn is not None:
+            places = slice(angles - first, angles - first + 3)
+            change = change + self.turn.transform_rate[places, places] @ axis
+        moved[rates : rates + 3] = change
+        pushed = np.cross(along, j.arm) + np.cross(axis, np.cross(spin, j.arm))
+        moved[at["u"] + 3 * j.body : at["u"] + 3 * j.body + 3] = -pushed
+        rows = self._unknowns_of(element.name)
+        value[rows] = -(self.matrix[rows] @ moved) / given.lever
+        rate[rows] = -(self.matrix[rows] @ sped) / given.lever
+
+    def _unknowns_of(self, name: str) -> np.ndarray:
+        """Return the places in y of the force and torque of an element, and of its states."""
+        instant = self.instant
+        force, torque = instant.at["F"], instant.at["N"]
+        for element in self.mechanism.elements.values():
+            f, n = 3 * element.has_force * element.wrenches, 3 * element.has_torque * element.wrenches
+            if element.name == name:
+                return np.concatenate([np.arange(force, force + f), np.arange(torque, torque + n)])
+            force, torque = force + f, torque + n
+        raise AssertionError(name)
+
+
+@contextmanager
+def _markers_kept(mechanism: Mechanism) -> Iterator[None]:
+    """Remove the markers that inputs and outputs have needed."""
+    bodies = mechanism.ground, *mechanism.bodies.values()
+    kept = [list(body.markers) for body in bodies]
+    try:
+        yield
+    finally:
+        for body, markers in zip(bodies, kept, strict=True):
+            body.markers[:] = markers
+
+
+def _with_outputs(mechanism: Mechanism, names: PlantNames, outputs: Sequence[Any]) -> tuple[Mechanism, list[Told]]:
+    """Return a copy of the mechanism whose last states have the outputs as their rates."""
+    whole = copy.copy(mechanism)
+    whole.states = dict(mechanism.states)
+    told = [one for item in outputs for one in names.outputs(item)]
+    for k, one in enumerate(told):
+        for acceleration in one.accelerations:
+            for label in acceleration.labels:
+                whole.states[label] = ElementState(label, "0")
+        whole.states[TOLD.format(k)] = ElementState(TOLD.format(k), one.expression)
+    return whole, told
+
+
+def _held(instant: Instant, told: Sequence[Told]) -> dict[str, float]:
+    """Return the accelerations that outputs ask for, by the names of the states that stand for them."""
+    asked = [acceleration for one in told for acceleration in one.accelerations]
+    if not asked:
+        return {}
+    acc = instant.system.accelerations(instant.configuration(), instant.t)[0]
+    found: dict[str, float] = {}
+    for one in asked:
+        frame = _frame(instant, one.marker)
+        alpha, spin = acc[frame.body, 3:6], instant.pose()[frame.body, POSE_W:]
+        vector = alpha if one.angular else acc[frame.body, 0:3] + np.cross(alpha, frame.arm)
+        if not one.angular:
+            vector = vector + np.cross(spin, np.cross(spin, frame.arm))
+        found.update(zip(one.labels, vector.tolist(), strict=True))
+    return found
+
+
+def _plant(
+    mechanism: Mechanism, instant: Instant, given: Sequence[Given], told: Sequence[Told], state: Any
+) -> LinearPlant:
+    columns = _Columns(mechanism, instant)
+    pairs = [columns.of(one) for one in given]
+    size = instant.y.size
+    stacked = [np.array([pair[k] for pair in pairs]).reshape(-1, size).T for k in (0, 1)]
+    reduced = reduce(instant, Inputs(*stacked))
+    warn_of_varying(reduced, stacklevel=5)
+    kinds = instant.system.model.differential_states
+    names = [name for name, differential in zip(instant.system.state_names, kinds, strict=True) if differential]
+    outputs = [names.index(TOLD.format(k)) for k in range(len(told))]
+    held = [
+        (names.index(label), one, c)
+        for item in told
+        for one in item.accelerations
+        for c, label in enumerate(one.labels)
+    ]
+    own = np.array([k for k in range(len(names)) if k not in outputs and k not in {h[0] for h in held}], dtype=int)
+    found = realised(reduced, own, np.array(outputs, dtype=int), np.zeros(0, dtype=int))
+    if held:
+        rows = np.array([_acceleration(instant, reduced, found, one)[c] for _, one, c in held])
+        found.outputs = found.outputs + reduced.state_state[np.ix_(outputs, [k for k, _, _ in held])] @ rows
+    asked = [Asked(one.name, one.unit, one.level, remedy=one.remedy) for one in given]
+    labels = [one.name for one in told]
+    a, b, c, d = lowered(found, asked, labels)
+    n = len(reduced.mass)
+    scale, titles, units = _coordinates(instant, reduced)
+    change = np.eye(len(a))
+    change[:n, :n] = change[n : 2 * n, n : 2 * n] = scale
+    back = np.linalg.inv(change)
+    states = [*titles, *(f"{title}, rate" for title in titles), *(names[k] for k in own)]
+    state_units = [*units, *(f"{unit}/s" for unit in units), *[""] * own.size]
+    for k, one in enumerate(given):
+        chain = len(found.chains[k])
+        for level in range(min(one.level, chain)):
+            states.append(f"{one.name} ({LEVELS[level]})")
+            state_units.append(one.unit_of(level))
+    for one, acting in zip(given, found.chains, strict=True):
+        for level in range(one.level - len(acting)):
+            states.append(f"{one.name} ({LEVELS[level]})")
+            state_units.append(one.unit_of(level))
+    point = OperatingPoint(
+        instant.t,
+        np.zeros(len(given)),
+        -instant.residual(instant.y)[instant.at["z"] + np.flatnonzero(kinds)][outputs],
+        state,
+    )
+    return LinearPlant(
+        change @ a @ back, change @ b, c @ back, d, states, [one.name for one in given], labels, 1.0, state_units,
+        [one.unit for one in given], [one.unit for one in told], point,
+    )  # fmt: skip
+
+
+def _spatial(instant: Instant, reduced: Reduced, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return displacements and small rotations in global components of all bodies, (bodies, 3, k), from coordinates."""
+    bodies, first = len(instant.system.body_names), instant.at["R"]
+    angle, mode = instant.at["theta"] - first, instant.at["q_f"] - first
+    moved = changes[:angle].reshape(bodies, 3, -1)
+    turned = np.zeros_like(moved)
+    rotating = instant.system.model.counts.turning
+    turned[rotating] = changes[angle:mode].reshape(rotating.size, 3, -1)
+    if not reduced.turning:
+        turned = np.einsum("bmc,bmk->bck", instant.axes(), turned)
+    return moved, turned
+
+
+def _acceleration(instant: Instant, reduced: Reduced, found: Realised, asked: Acceleration) -> np.ndarray:
+    """Return the rows (3, n + inputs) of the change of an acceleration.
+
+    With small rotations phi, delta omega = phi' + phi x omega, delta alpha = phi'' + phi' x omega + phi x alpha, and of
+    a point with the arm s, delta s = phi x s, what follows from a + alpha x s + omega x (omega x s).
+    """
+    (_, turn), (_, rate), (moved, bent) = (_spatial(instant, reduced, rows) for rows in found.places)
+    frame = _frame(instant, asked.marker)
+    k = frame.body
+    spin = skew(instant.pose()[k, POSE_W:])
+    alpha = skew(instant.system.accelerations(instant.configuration(), instant.t)[0][k, 3:6])
+    by_rate = rate[k] - spin @ turn[k]
+    by_acceleration = bent[k] - spin @ rate[k] - alpha @ turn[k]
+    if asked.angular:
+        return by_acceleration
+    arm = skew(frame.arm)
+    shift = -arm @ turn[k]
+    out = moved[k] - arm @ by_acceleration + alpha @ shift
+    return out - skew(spin @ frame.arm) @ by_rate - spin @ arm @ by_rate + spin @ spin @ shift
+
+
+def _coordinates(instant: Instant, reduced: Reduced) -> tuple[np.ndarray, list[str], list[str]]:
+    """Return what the states of the plant are of q, (dof, dof), their names and units.
+
+    They are displacements of centres of mass and small rotations about global axes: those the others follow best.
+    """
+    n = reduced.basis.shape[1]
+    if not n:
+        return np.zeros((0, 0)), [], []
+    moved, turned = _spatial(instant, reduced, reduced.motion.now)
+    model = instant.system.model
+    modal = reduced.motion.now[instant.at["q_f"] - instant.at["R"] :]
+    arm = max(min(instant.system.length, 1.0), 1e-3)
+    bodies = instant.system.body_names
+    rows = np.concatenate([moved.reshape(-1, n), turned.reshape(-1, n), modal])
+    weight = np.concatenate([np.ones(3 * len(bodies)), np.full(3 * len(bodies), arm), arm / model.modal_sizes[:, 0]])
+    order = qr((weight[:, None] * rows).T, mode="r", pivoting=True)[1][:n]
+    order = np.sort(order)
+    places = [(name, c) for name in bodies for c in "xyz"]
+    titles = [f"{name}: {c}" for name, c in places] + [f"{name}: rotation about {c}" for name, c in places]
+    units = ["m"] * len(places) + ["rad"] * len(places)
+    for name, count in zip(bodies, model.modes[1:], strict=True):
+        titles += [f"{name}: mode {k + 1}" for k in range(count)]
+        units += ["1"] * count
+    return rows[order], [titles[k] for k in order], [units[k] for k in order]

@@ -1,0 +1,183 @@
+"""Operating points: a mechanism, with expressions added to it, at one of its states."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.dae.analyses.kinematics import Instant
+from gearmbs.dae.analyses.statics import StaticResult
+from gearmbs.dae.analyses.statics import static_equilibrium as _static_equilibrium
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.unknowns import FORMULATIONS
+from gearmbs.dae.model.model import Configuration, Model
+from gearmbs.dae.problem import ModelError
+from gearmbs.dae.result import DAEResult, Status
+from gearmbs.dae.results.solution import Solution
+from gearmbs.dae.state import State
+from gearmbs.mechanism.solve.simulate import prepared
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.system import System
+    from gearmbs.mechanism.mechanism import Mechanism
+
+CHOICES = "choose 'initial', 'equilibrium', or give a StaticResult, a State or a Solution"
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a mechanism stands.
+
+    Attributes
+    ----------
+    t : float
+        Time at which functions of time are frozen, s.
+    configuration : Configuration or None
+        Positions and velocities; None: as the mechanism starts.
+    states : dict of str to float
+        User-defined states and those of elements.
+    system : System or None
+        What ``idata`` and ``rdata`` are the tables of: rows kept, turns counted.
+    idata, rdata : ndarray or None
+    unknowns : dict of str to float
+        Of an equilibrium, in which nothing moves whatever its motions do: all unknowns of the I3 formulation.
+    state : State or None
+        The state it was made from.
+    """
+
+    t: float
+    configuration: Configuration | None = None
+    states: dict[str, float] | None = None
+    system: System | None = None
+    idata: np.ndarray | None = None
+    rdata: np.ndarray | None = None
+    unknowns: dict[str, float] | None = None
+    state: State | None = None
+
+
+def point_of(mechanism: Mechanism, at: Any, t: float | None) -> Point:
+    """Return the operating point that is asked for.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    at : {"initial", "equilibrium"}, StaticResult, State or Solution
+    t : float, optional
+        Time of functions of time, s; of a Solution the output time, default its last.
+
+    Raises
+    ------
+    ModelError
+        For anything else, for a time that a State or an equilibrium has of its own, and for a state of another model.
+    """
+    if isinstance(at, Solution):
+        time = float(at.t[-1]) if t is None else float(t)
+        state = at.state_at(time)
+        return _of_solution(at.system, at.problem, at.members, state)
+    if isinstance(at, State):
+        if t is not None and t != at.t:
+            raise ModelError(f"t = {t:g} s; the state is one at t = {at.t:g} s; leave t away")
+        return _of_state(mechanism, at)
+    if isinstance(at, str) and at in ("initial", "equilibrium"):
+        time = 0.0 if t is None else float(t)
+        if at == "initial":
+            return Point(time)
+        at = _static_equilibrium(mechanism.compile(time))
+    if not isinstance(at, StaticResult):
+        raise ModelError(f"at = {at!r}; {CHOICES}")
+    return _of_equilibrium(mechanism, at)
+
+
+def _of_equilibrium(mechanism: Mechanism, at: StaticResult) -> Point:
+    if list(mechanism.bodies) != list(at.body_names):
+        raise ModelError(f"the equilibrium is not one of mechanism '{mechanism.name}': its bodies differ")
+    instant = at.solution.instant()
+    names = instant.problem.names
+    unknowns = dict(zip(names, instant.y.tolist(), strict=True))
+    z = slice(instant.at["z"], instant.at["mu"])
+    states = dict(zip(instant.system.state_names, instant.y[z].tolist(), strict=True))
+    return Point(
+        instant.t, instant.configuration(), states, instant.system, instant.idata, instant.rdata, unknowns
+    )  # fmt: skip
+
+
+def _of_state(mechanism: Mechanism, state: State) -> Point:
+    """Return the point of a state: of the model it belongs to, whatever of it was integrated, and how."""
+    refusal: ModelError | None = None
+    for lump in dict.fromkeys([mechanism.lump, False, True]):
+        for formulation in FORMULATIONS:
+            with suppress(KeyError):
+                system, problem, members, _ = prepared(mechanism, state.t_model, lump, formulation, 1.0, True)
+                try:
+                    state.check(problem)
+                except ModelError as error:
+                    refusal = refusal or error
+                    continue
+                return _of_solution(system, problem, members, state)
+    assert refusal is not None
+    raise refusal
+
+
+def _of_solution(system: System, problem: Any, members: Any, state: State) -> Point:
+    idata, rdata = state.tables(problem)
+    nothing = np.empty((0, problem.n))
+    row = Solution(system, problem, DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, ""), members)
+    now = row.over(np.array([state.t]), state.y[None, :], [(0, idata)])
+    places = int(idata[T.H_Z]) + np.arange(len(system.state_names))
+    states = dict(zip(system.state_names, state.y[places].tolist(), strict=True))
+    point = Point(state.t, now._configuration(0), states, state=state)
+    return point if members is not None else replace(point, system=system, idata=idata, rdata=rdata)
+
+
+def instant_at(mechanism: Mechanism, point: Point) -> Instant:
+    """Return the unknowns of a mechanism at a point; it may have more states than that which the point was made of."""
+    system = mechanism.compile(point.t)
+    if point.configuration is None:
+        return _settled(Instant(system, "I3"))
+    system.configuration = point.configuration
+    known = point.states or {}
+    system.state_start = np.array(
+        [known.get(name, start) for name, start in zip(system.state_names, system.state_start, strict=True)]
+    )
+    if point.system is not None and point.idata is not None and point.rdata is not None:
+        names = system.row_names
+        system.keep_rows(np.array([names.index(name) for name in point.system.row_names], dtype=np.int64))
+        system.model = _counted(system.model, point.system.model, point.idata, point.rdata, point.t)
+        system.assembler = type(system.assembler)(system.model)
+    instant = Instant(system, "I3")
+    if point.unknowns is not None and point.idata is not None:
+        codes = int(point.idata[T.H_I_CODE]) + np.arange(int(point.idata[T.H_BODIES]))
+        own = int(instant.idata[T.H_I_CODE]) + np.arange(codes.size)
+        instant.idata[own] = point.idata[codes]
+        instant.y = np.array(
+            [point.unknowns.get(name, value) for name, value in zip(instant.problem.names, instant.y, strict=True)]
+        )
+    return _settled(instant)
+
+
+def _settled(instant: Instant) -> Instant:
+    instant.y = instant.settle(instant.y)
+    return instant
+
+
+def _counted(model: Model, source: Model, idata: np.ndarray, rdata: np.ndarray, t: float) -> Model:
+    """Return a model whose counted angles start where those of the tables of another one are.
+
+    It has the other's constraint rows, and its expressions and elements before those of its own.
+    """
+    reference, n = int(idata[T.H_R_REFERENCE]), len(source.reference)
+    past = t - rdata[reference + n]
+    values = rdata[reference + n + 1 : reference + 2 * n + 1] + past * rdata[reference + 2 * n + 1 :][:n]
+    extra, first = model.extra_r.copy(), int(idata[T.H_R_EXTRA])
+    for own, other, tape in zip(model.tape_rows, source.tape_rows, source.tapes, strict=False):
+        m, at = tape.n_angles, first + int(other[T.TAPE_REFERENCE])
+        now = rdata[at + m : at + 2 * m] + past * rdata[at + 2 * m : at + 3 * m]
+        start = int(own[T.TAPE_REFERENCE])
+        extra[start : start + m] = extra[start + m : start + 2 * m] = now
+    for own, other in zip(model.angles, source.angles, strict=False):
+        at = first + int(other[T.ANGLE_AT])
+        extra[int(own[T.ANGLE_AT]) : int(own[T.ANGLE_AT]) + 2] = rdata[at + 1] + past * rdata[at + 2]
+    return replace(model, reference=values, extra_r=extra)

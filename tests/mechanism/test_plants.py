@@ -1,0 +1,284 @@
+"""Linear plants against closed forms, eigenvalues and simulations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.dae.problem import ModelError
+from tests.says import says
+
+MOTOR, LOAD, STIFFNESS, DAMPING = 0.4, 1.7, 850.0, 3.0
+GRAVITY = 9.81
+
+
+def two_masses() -> gm.Mechanism:
+    """Return two inertias on a shaft, each in its bearing."""
+    m = gm.Mechanism("two masses")
+    motor = m.body("motor", 2.0, (0.3, 0.3, MOTOR))
+    load = m.body("load", 3.0, (1.0, 1.0, LOAD), position=(0, 0, 0.3))
+    m.revolute("motor bearing", motor, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.revolute("load bearing", load, m.ground, at=(0, 0, 0.3), axis=(0, 0, 1))
+    ends = load.marker(name="shaft.I"), motor.marker((0, 0, 0.3), name="shaft.J")
+    m.torsion_spring("shaft", *ends, stiffness=STIFFNESS, damping=DAMPING)
+    return m
+
+
+def test_two_masses_have_the_matrices_of_their_equations():
+    """x = (phi_1, phi_2, omega_1, omega_2), J omega' = +-(k (phi_2 - phi_1) + c (omega_2 - omega_1)) + T."""
+    outputs = [
+        ("joint_angle", "load bearing"), ("joint_rate", "motor bearing"), ("angular_acceleration", "load", "z"),
+        ("load", "shaft", "tz"), "WDTZ(shaft.I, shaft.J) + 2*WZ(shaft.I)",
+    ]  # fmt: skip
+    plant = two_masses().linearize([("torque", "motor bearing"), ("torque", "load", "z")], outputs)
+    k, c = STIFFNESS, DAMPING
+    a = np.zeros((4, 4))
+    a[:2, 2:] = np.eye(2)
+    a[2] = np.array([-k, k, -c, c]) / MOTOR
+    a[3] = np.array([k, -k, c, -c]) / LOAD
+    b = np.zeros((4, 2))
+    b[2, 0], b[3, 1] = 1.0 / MOTOR, 1.0 / LOAD
+    shown = np.array([[0, 1, 0, 0], [0, 0, 1, 0], a[3], [k, -k, c, -c], a[3] - a[2] + [0, 0, 0, 2]])
+    direct = np.array([[0, 0], [0, 0], b[3], [0, 0], b[3] - b[2]])
+    for found, exact in zip(plant, (a, b, shown, direct), strict=True):
+        np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-12 * k / MOTOR)
+    assert plant.states == ["motor: rotation about z", "load: rotation about z", "motor: rotation about z, rate",
+                            "load: rotation about z, rate"]  # fmt: skip
+    assert plant.input_units == ["N m", "N m"]
+    assert plant.output_units == ["rad", "rad/s", "rad/s^2", "N m", ""]
+
+
+def test_the_transfer_function_of_two_masses():
+    """omega_1 / T = (J_2 s^2 + c s + k) / (s (J_1 J_2 s^2 + (J_1 + J_2)(c s + k)))."""
+    plant = two_masses().linearize(
+        [("torque", "motor bearing")], [("joint_rate", "motor bearing"), ("load", "shaft", "tz")]
+    )
+    f = np.array([0.1, 3.0, 8.0, 200.0])
+    s = 2j * np.pi * f
+    exact = (LOAD * s**2 + DAMPING * s + STIFFNESS) / (
+        s * (MOTOR * LOAD * s**2 + (MOTOR + LOAD) * (DAMPING * s + STIFFNESS))
+    )
+    np.testing.assert_allclose(plant.frequency_response(f)[:, 0, 0], exact, rtol=1e-9)
+    np.testing.assert_allclose([plant.transfer(one)[0, 0] for one in s], exact, rtol=1e-9)
+    polynomials = plant.transfer_function("torque motor bearing", "joint_rate motor bearing")
+    found = np.polyval(polynomials.num, s) / np.polyval(polynomials.den, s)
+    np.testing.assert_allclose(found, exact, rtol=1e-6)
+    # a constant torque turns both ever faster; the shaft carries the share of the load's inertia
+    assert plant.dc_gain[:, 0] == pytest.approx([np.inf, LOAD / (MOTOR + LOAD)], rel=1e-9)
+
+
+def test_a_plant_is_what_control_programs_take():
+    from scipy.signal import StateSpace, lsim
+
+    plant = two_masses().linearize([("torque", "motor bearing")], [("load", "shaft", "tz")])
+    t = np.linspace(0.0, 0.2, 401)
+    _, answer, _ = lsim(StateSpace(*plant), np.ones_like(t), t)
+    assert answer == pytest.approx(plant.step(t)[:, 0], abs=1e-9)
+
+
+def pendulum(angle: float = 0.0) -> gm.Mechanism:
+    m = gm.Mechanism("pendulum", gravity=(0, 0, -GRAVITY))
+    turned = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    rod = m.body("rod", 2.0, (0.1, 0.1, 0.02), position=turned @ (0, 0, -0.4), orientation=turned)
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    return m
+
+
+def test_a_pendulum_held_aslant_by_its_torque():
+    """(I + m l^2) phi'' + m g l sin phi = T about the angle at which T balances the weight."""
+    angle = 0.6
+    m = pendulum(angle)
+    rod, inertia = m.bodies["rod"], 0.1 + 2.0 * 0.4**2
+    # about y a positive turn lifts the rod to negative x
+    holding = 2.0 * GRAVITY * 0.4 * np.sin(angle)
+    m.torque("hold", rod, holding, axis=(0, 1, 0))
+    plant = m.linearize([("torque", "pin"), ("force", "rod", "x")], [("joint_angle", "pin"), ("reaction", "pin", "fz")])
+    assert plant.A[1] == pytest.approx([-2.0 * GRAVITY * 0.4 * np.cos(angle) / inertia, 0.0], rel=1e-9)
+    assert plant.B[1] == pytest.approx([1.0 / inertia, -0.4 * np.cos(angle) / inertia], rel=1e-9)
+    # the bearing carries m (z'' + g), z = -l cos phi
+    rise = 2.0 * 0.4 * np.sin(angle)
+    assert plant.C == pytest.approx(np.array([[1.0, 0.0], rise * plant.A[1]]), rel=1e-9)
+    assert plant.D[1] == pytest.approx(rise * plant.B[1], rel=1e-9)
+    assert plant.point.outputs == pytest.approx([0.0, 2.0 * GRAVITY], abs=1e-9)
+
+
+CRANK, ROD, CRANK_INERTIA, SLIDER = 0.1, 0.35, 0.02, 1.5
+
+
+def slider_crank(angle: float, speed: float = 0.0) -> gm.Mechanism:
+    """Return a crank about z, a rod without mass (a fixed distance), and a slider along x that a spring holds."""
+    m = gm.Mechanism("slider crank")
+    c, s = np.cos(angle), np.sin(angle)
+    turned = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+    crank = m.body("crank", 1.0, (0.01, 0.01, CRANK_INERTIA), orientation=turned, angular_velocity=(0, 0, speed))
+    place, rate = _slide(angle)
+    slider = m.body("slider", SLIDER, (0.01, 0.01, 0.01), position=(place, 0, 0), velocity=(rate * speed, 0, 0))
+    m.revolute("main", crank, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.translational("guide", slider, m.ground, at=(place, 0, 0), axis=(1, 0, 0))
+    m.distance("rod", crank.marker((CRANK, 0, 0), name="pin"), slider.marker(name="wrist"), ROD)
+    return m
+
+
+def _slide(angle):
+    """Return x = r cos a + sqrt(l^2 - r^2 sin^2 a) and dx/da."""
+    root = np.sqrt(ROD**2 - (CRANK * np.sin(angle)) ** 2)
+    return CRANK * np.cos(angle) + root, -CRANK * np.sin(angle) - CRANK**2 * np.sin(angle) * np.cos(angle) / root
+
+
+def _crank_acceleration(angle: float, speed: float, torque: float, force: float) -> float:
+    """Return a'' of I(a) a'' + I'(a) a'^2/2 = T + F x', I = J + m x'^2, derivatives by complex steps."""
+    h = 1e-30
+    first, second = _slide(angle)[1], np.imag(_slide(angle + 1j * h)[1]) / h
+    inertia = CRANK_INERTIA + SLIDER * first**2
+    return (torque + force * first - SLIDER * first * second * speed**2) / inertia
+
+
+def test_a_slider_crank_at_rest_under_forces_in_balance():
+    angle, force = 0.9, -120.0
+    slope = _slide(angle)[1]
+    m = slider_crank(angle)
+    m.torque("brake", m.bodies["crank"], -force * slope)
+    m.load("gas", m.bodies["slider"].marker(name="gas.I"), m.ground.marker(name="gas.J"), fx=force)
+    plant = m.linearize(
+        [("torque", "main"), ("force", "slider", "x")],
+        ["AZ(main.I, main.J)", ("com_velocity", "slider", "x"), ("com_acceleration", "slider", "x")],
+    )
+    h = 1e-5
+    by_angle = (_crank_acceleration(angle + h, 0, -force * slope, force) - _crank_acceleration(
+        angle - h, 0, -force * slope, force)) / (2 * h)  # fmt: skip
+    inertia = CRANK_INERTIA + SLIDER * slope**2
+    # whatever its coordinate, its poles are the crank's
+    assert np.sort_complex(plant.poles) == pytest.approx(np.sort_complex(np.roots([1.0, 0.0, -by_angle])), rel=1e-7)
+    s = 2.0 + 9.0j
+    turned = np.array([1.0, slope]) / (inertia * (s**2 - by_angle))
+    exact = np.array([turned, turned * slope * s, turned * slope * s**2])
+    assert plant.transfer(s) == pytest.approx(exact, rel=1e-7)
+
+
+def test_a_prescribed_displacement_moves_a_mass_on_a_spring():
+    """m x'' + c (x' - u') + k (x - u) = 0; the force on the motion is -c (x' - u') - k (x - u) + M u''."""
+    mass, base, k, c = 2.0, 0.7, 300.0, 5.0
+    m = gm.Mechanism("shaker")
+    table = m.body("table", base, (1, 1, 1))
+    rider = m.body("rider", mass, (1, 1, 1), position=(0.5, 0, 0))
+    guide = m.translational("guide", table, m.ground, at=(0, 0, 0), axis=(1, 0, 0))
+    m.translational("slide", rider, m.ground, at=(0.5, 0, 0), axis=(1, 0, 0))
+    m.spring_damper("spring", rider.marker(name="s.I"), table.marker(name="s.J"), stiffness=k, damping=c)
+    m.translation("shake", guide, 0.0)
+    shown = [("com_position", "rider", "x"), ("com_velocity", "rider", "x"), ("com_acceleration", "rider", "x"),
+             ("reaction", "shake", "fx")]  # fmt: skip
+    s = 3.0 + 11.0j
+    ratio = (c * s + k) / (mass * s**2 + c * s + k)
+    exact = np.array([ratio, s * ratio, s**2 * ratio, base * s**2 + mass * s**2 * ratio])
+    by_acceleration = m.linearize([("motion", "shake", "acceleration")], shown)
+    assert by_acceleration.transfer(s)[:, 0] == pytest.approx(exact / s**2, rel=1e-9)
+    assert by_acceleration.states[-2:] == ["motion shake acceleration (position)", "motion shake acceleration (rate)"]
+    by_rate = m.linearize([("motion", "shake", "rate")], shown[:3])
+    assert by_rate.transfer(s)[:, 0] == pytest.approx(exact[:3] / s, rel=1e-9)
+    by_place = m.linearize([("motion", "shake")], shown[:2])
+    assert by_place.transfer(s)[:, 0] == pytest.approx(exact[:2], rel=1e-9)
+    assert len(by_place.A) == 2
+    poles = np.sort_complex(np.roots([mass, c, k]))
+    for plant in (by_place, by_rate, by_acceleration):
+        moving = plant.poles[np.abs(plant.poles) > 1e-6]
+        assert np.sort_complex(moving) == pytest.approx(poles, rel=1e-9)
+    assert by_rate.input_units == ["m/s"]
+    with pytest.raises(ModelError, match=says("reaction shake fx", "motion shake rate", "'acceleration'")):
+        m.linearize([("motion", "shake", "rate")], shown)
+    with pytest.raises(ModelError, match=says("com_acceleration rider x", "motion shake", "'rate' or 'acceleration'")):
+        m.linearize([("motion", "shake")], shown[:3])
+
+
+def test_a_prescribed_rotation_drives_a_rotor_through_a_shaft():
+    m = two_masses()
+    m.rotation("drive", m.joints["motor bearing"], "20*TIME", level="displacement")
+    m.bodies["motor"].angular_velocity = m.bodies["load"].angular_velocity = np.array([0, 0, 20.0])
+    plant = m.linearize([("motion", "drive", "rate")], [("joint_rate", "load bearing"), ("load", "shaft", "tz")])
+    s = 4.0 + 30.0j
+    over = LOAD * s**2 + DAMPING * s + STIFFNESS
+    carried = (DAMPING * s + STIFFNESS) * LOAD * s**2 / over / s
+    exact = [(DAMPING * s + STIFFNESS) / over, carried]
+    assert plant.transfer(s)[:, 0] == pytest.approx(exact, rel=1e-9)
+
+
+def test_poles_are_the_eigenvalues_of_the_linear_modes():
+    m = pendulum()
+    arm = m.body("arm", 0.8, (0.02, 0.02, 0.005), position=(0, 0, -1.0))
+    m.revolute("elbow", arm, m.bodies["rod"], at=(0, 0, -0.8), axis=(0, 1, 0))
+    m.torsion_spring("stiff", arm.marker((0, 0, 0.2), name="e.I"), m.bodies["rod"].marker((0, 0, -0.4), name="e.J"),
+                     stiffness=2.0, damping=0.1)  # fmt: skip
+    plant = m.linearize([("torque", "elbow")], [("joint_angle", "elbow")])
+    modes = m.linear_modes().eigenvalues
+    both = np.concatenate([modes, modes[modes.imag > 0].conj()])
+    assert np.sort_complex(plant.poles) == pytest.approx(np.sort_complex(both), rel=1e-9)
+
+
+def test_a_spinning_rotor_on_springs_whirls():
+    """J p'' -+ i C w p' + k p = 0 in the plane of complex tilts: forward and backward whirl, in axes at rest."""
+    polar, transverse, k, speed = 0.5, 0.3, 4000.0, 60.0
+    m = gm.Mechanism("rotor")
+    disc = m.body("disc", 5.0, (transverse, transverse, polar), angular_velocity=(0, 0, speed))
+    m.spherical("centre", disc, m.ground, at=(0, 0, 0))
+    top = disc.marker((0, 0, 1.0), name="top")
+    m.load("springs", top, m.ground.marker(name="springs.J"), fx=f"-{k}*DX(top)", fy=f"-{k}*DY(top)")
+    plant = m.linearize(
+        [("torque", "disc", "x")], [("angular_velocity", "disc", "x"), ("angular_velocity", "disc", "y")]
+    )
+    whirl = np.roots([transverse, -1j * polar * speed, k])
+    found = np.sort(plant.poles.imag[plant.poles.imag > 1e-3])
+    assert found == pytest.approx(np.sort(np.abs(whirl.imag)), rel=1e-9)
+    # with p = phi_x + i phi_y, J p'' - i C w p' + k p = T; omega = (phi_x' + w phi_y, phi_y' - w phi_x) in axes at rest
+    s = 1.0 + 40.0j
+    forward = 1.0 / (transverse * s**2 - 1j * polar * speed * s + k)
+    backward = 1.0 / (transverse * s**2 + 1j * polar * speed * s + k)
+    tilted = 0.5 * (forward + backward), -0.5j * (forward - backward)
+    exact = [s * tilted[0] + speed * tilted[1], s * tilted[1] - speed * tilted[0]]
+    assert plant.transfer(s)[:, 0] == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_state_of_a_simulation_is_an_operating_point():
+    m = two_masses()
+    m.torque("push", m.bodies["motor"], 5.0)
+    m.load("wind", m.bodies["load"].marker(name="w.I"), m.ground.marker(name="w.J"), tz="-0.02*WZ(w.I)*ABS(WZ(w.I))")
+    solution = m.simulate(2.0, tol=1e-9, t_eval=np.linspace(0, 2, 401))
+    plant = m.linearize([("torque", "motor bearing")], [("joint_rate", "load bearing")], at=solution)
+    speed = solution.angular_velocity("load")[-1, 2]
+    assert plant.point.t == 2.0
+    assert plant.point.outputs == pytest.approx([speed], rel=1e-9)
+    assert plant.A[3, 3] == pytest.approx(-(DAMPING + 0.04 * speed) / LOAD, rel=1e-8)
+    again = m.linearize([("torque", "motor bearing")], [("joint_rate", "load bearing")], at=solution.state_at(2.0))
+    for one, two in zip(plant, again, strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert again.point.state is not None
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "options", "message"),
+    [
+        ([("torqe", "motor bearing")], [], {}, says("torqe", "did you mean 'torque'")),
+        ([("torque", "moter bearing")], [], {}, says("moter bearing", "did you mean 'motor bearing'")),
+        ([("torque", "motor")], [], {}, says("motor", "axis", "'x'")),
+        ([("torque", "motor", "w")], [], {}, says("'w'", "'x', 'y' or 'z'")),
+        ([("torque", "motor bearing", "z")], [], {}, says("motor bearing", "leave 'z'")),
+        ([("motion", "motor bearing")], [], {}, says("motor bearing", "revolute", "none")),
+        (["torque"], [], {}, says("'torque'", "tuple")),
+        ([], [("joint_angle", "shaft")], {}, says("'shaft'", "motor bearing")),
+        ([], [("joint_displacement", "load bearing")], {}, says("load bearing", "revolute", "translational")),
+        ([], [("com_velocity", "lod", "x")], {}, says("'lod'", "did you mean 'load'")),
+        ([], [("reaction", "load bearing", "mx")], {}, says("'mx'", "'fx'", "'tz'")),
+        ([], [("load", "spring")], {}, says("'spring'", "shaft")),
+        ([], [("state", "heat")], {}, says("'heat'", "none")),
+        ([], ["WZ(motr.I)"], {}, says("MOTR.I", "WZ")),
+        ([], ["WZ(shaft.I"], {}, says("WZ(shaft.I", "column")),
+        ([], [("transmission_error", "shaft")], {}, says("'shaft'", "none")),
+        ([], ["1"], {"at": "rest"}, says("'rest'", "'equilibrium'")),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_in_one_line(inputs, outputs, options, message):
+    m = two_masses()
+    markers = [one.name for body in m.bodies.values() for one in body.markers]
+    with pytest.raises(ModelError, match=message) as told:
+        m.linearize(inputs, outputs, **options)
+    assert "\n" not in str(told.value)
+    assert [one.name for body in m.bodies.values() for one in body.markers] == markers
