@@ -56,8 +56,9 @@ class Place:
 
     def write(self, table: np.ndarray, t: float, value: float, slope: float) -> None:
         """Let the number be ``value + slope (t' - t)`` from ``t`` on; its integrals go on from where they are."""
-        if self.size == 0:
-            table[self.at] = value
+        if self.order == 0:
+            # the coefficients behind stay zero
+            table[self.at : self.at + 1 + min(self.size, 2)] = (t, value, slope) if self.size else value
             return
         known = self.polynomial(table, t)[: self.order]
         derivatives = [*known, value, slope]
@@ -91,7 +92,8 @@ class Number:
 
     def value(self, table: np.ndarray, t: float) -> float:
         """Return the value at a time."""
-        return self.places[0].polynomial(table, t)[0]
+        at = self.places[0].at
+        return float(table[at + 1] + table[at + 2] * (t - table[at])) if self.kind == INPUT else float(table[at])
 
     def slope(self, table: np.ndarray) -> float:
         """Return the rate, zero of what is held."""
@@ -105,6 +107,10 @@ class Number:
     def placed(self, first: Callable[[int], int]) -> Number:
         """Return the number with all places counted in the whole table, in which a part begins at ``first(part)``."""
         return replace(self, places=tuple(replace(p, at=p.at + first(p.table), table=-1) for p in self.places))
+
+    def moved_to(self, cells: np.ndarray) -> Number:
+        """Return the number with its places in a table that holds those in ``cells``, which increase, alone."""
+        return replace(self, places=tuple(replace(p, at=int(np.searchsorted(cells, p.at))) for p in self.places))
 
     def cells(self) -> np.ndarray:
         """Return all places in the table that :meth:`write` may write to."""

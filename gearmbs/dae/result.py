@@ -380,6 +380,9 @@ class DAEResult:
     epochs : list of (int, ndarray)
         Index of the first output row and the integer table ``idata`` that is valid from there on. A run whose
         coordinates never change has one epoch, ``(0, idata)``.
+    held : (ndarray of int, ndarray) or None
+        Places in the table of numbers ``rdata`` that were changed on the way, and what stands there up to each output,
+        shape (m, places).
     t_last : float
         Time the integration reached, which may lie beyond the last output.
     checkpoint : object or None
@@ -396,6 +399,7 @@ class DAEResult:
     t_events: list[np.ndarray] = field(default_factory=list)
     y_events: list[np.ndarray] = field(default_factory=list)
     epochs: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    held: tuple[np.ndarray, np.ndarray] | None = None
     t_last: float = float("nan")
     checkpoint: Any = None
 

@@ -64,6 +64,7 @@ def scope_of(mechanism: Mechanism) -> tuple[Scope, TableBuilder, Callable[[int],
     compiler = _Compiler(mechanism, [])
     compiler.add_bodies()
     compiler.index_all_markers()
+    compiler.measures = True
     return compiler.scope(), compiler.builder, compiler.marker_named
 
 
@@ -80,6 +81,8 @@ class _Compiler:
         self.row_names: list[str] = []
         self.force_names: list[str] = []
         self._scope: Scope | None = None
+        self.measures = False
+        """Whether expressions are about a solution, which knows all inputs, and not part of the equations."""
 
     def run(self, t0: float) -> System:
         m = self.mechanism
@@ -242,7 +245,7 @@ class _Compiler:
                 modes={_upper(name): b.modal.modes for name, b in m.bodies.items() if isinstance(b, ModalBody)},
                 splines={_upper(k): v for k, v in m.splines.items()},
                 arrays={_upper(k): v for k, v in m.arrays.items()},
-                numbers=named_numbers(m),
+                numbers=named_numbers(m, self.measures),
                 functions=m.functions,
                 plants={(kind, _upper(k)): v for (kind, k), v in m.plants.items()},
                 forces=forces,

@@ -10,6 +10,7 @@ import copy
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -72,6 +73,8 @@ CONFLICT_SAMPLES = 50
 
 class Fills(Protocol):
     """What evaluates outputs: fills records piece by piece, in the order of time."""
+
+    rdata: np.ndarray
 
     def fill(self, t: np.ndarray, y: np.ndarray, epochs: Any, records: outputs.Records) -> None:
         """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on."""
@@ -194,7 +197,7 @@ class Solution(Shown):
         rows = [row for row in (0, last) if row >= 0 and float(self.t[row]) in self.inside]
         # the start comes before all others, for turns are counted
         limits = {row: self._just_inside(evaluator, row) for row in rows if row == 0}
-        evaluator.fill(self.t, self.result.y, self.result.epochs, records)
+        self._fill_held(evaluator, records)
         limits |= {row: self._just_inside(evaluator, row) for row in rows if row > 0}
         for row, limit in limits.items():
             near = slice(max(row - NEAR, 0), row + NEAR + 1)
@@ -207,16 +210,42 @@ class Solution(Shown):
     def _just_inside(self, evaluator: Fills, row: int) -> outputs.Records:
         """Return records of an output at an end of the run as they are next to it."""
         record, t, y = self._new_records(1), self.inside[float(self.t[row])], self.result.y[row : row + 1]
+        if self.result.held is not None:
+            cells, values = self.result.held
+            evaluator.rdata[cells] = values[row]
         evaluator.fill(np.array([t]), y, [(0, self.result.epoch_of(row))], record)
         return record
 
-    def over(self, t: np.ndarray, y: np.ndarray, epochs: list[tuple[int, np.ndarray]]) -> Solution:
-        """Return a solution of the same equations over other times, with unknowns ``y`` and their ``epochs``."""
+    def _fill_held(self, evaluator: Fills, records: outputs.Records) -> None:
+        """Fill ``records`` with the numbers of the equations as they were at each output time."""
+        result = self.result
+        if result.held is None:
+            evaluator.fill(self.t, result.y, result.epochs, records)
+            return
+        cells, values = result.held
+        changed = np.flatnonzero((values[1:] != values[:-1]).any(axis=1)) + 1
+        for first, last in pairwise([0, *changed.tolist(), self.t.size]):
+            if last == first:
+                continue
+            evaluator.rdata[cells] = values[first]
+            epochs = [(max(row - first, 0), table) for row, table in result.epochs if row < last]
+            own = [k for k, (row, _) in enumerate(epochs) if row == 0]
+            part = outputs.Records(*(column[first:last] for column in records))
+            evaluator.fill(self.t[first:last], result.y[first:last], epochs[own[-1] :], part)
+
+    def over(
+        self, t: np.ndarray, y: np.ndarray, epochs: list[tuple[int, np.ndarray]], held: np.ndarray | None = None
+    ) -> Solution:
+        """Return a solution of the same equations over other times, with unknowns ``y`` and their ``epochs``.
+
+        ``held`` is what stands in the places of the result's ``held``, a row for each time.
+        """
         part = copy.copy(self)
         for name in ("_records", "kinetic_energy"):
             part.__dict__.pop(name, None)
         part.t = t
-        part.result = replace(self.result, t=t, y=y, yp=np.empty((0, y.shape[1])), epochs=epochs)
+        kept = None if held is None or self.result.held is None else (self.result.held[0], held)
+        part.result = replace(self.result, t=t, y=y, yp=np.empty((0, y.shape[1])), epochs=epochs, held=kept)
         return part
 
     def _evaluator(self) -> Fills:
@@ -290,7 +319,8 @@ class Solution(Shown):
             wanted = rows[k : k + size]
             places = [int(np.searchsorted(wanted, row)) for row, _ in self.result.epochs]
             epochs = [(place, table) for place, (_, table) in zip(places, self.result.epochs)]
-            part = self.over(self.t[wanted], self.result.y[wanted], epochs)
+            held = None if self.result.held is None else self.result.held[1][wanted]
+            part = self.over(self.t[wanted], self.result.y[wanted], epochs, held)
             if len(self.result.yp):
                 part.result.yp = self.result.yp[wanted]
             if evaluator is not None and room is not None:
@@ -322,6 +352,27 @@ class Solution(Shown):
         self._shared = (self._evaluator(), self._new_records(size))
 
     # --- access by name -----------------------------------------------------------------------------
+
+    def input(self, name: str) -> np.ndarray:
+        """Return an input or a parameter by its name, SI, shape (m,): up to each output time, where it may jump.
+
+        Raises
+        ------
+        KeyError
+            For a name that is not there.
+        """
+        numbers = self.problem.numbers
+        if name not in numbers:
+            raise KeyError(f"input {name!r}; there are {', '.join(numbers) or 'none'}")
+        table = self.problem.rdata.copy()
+        if self.result.held is None:
+            return np.array([numbers[name].value(table, float(t)) for t in self.t])
+        found = np.empty(self.t.size)
+        cells, values = self.result.held
+        for k, t in enumerate(self.t.tolist()):
+            table[cells] = values[k]
+            found[k] = numbers[name].value(table, t)
+        return found
 
     def _body(self, body) -> int:
         """Return the number of a body, given as such or by its name."""

@@ -168,6 +168,8 @@ class Measures:
     def _unknown(self, key: tuple) -> np.ndarray:
         if key[0] in ("diff", "variable"):
             return self.state(str(key[1]))
+        if key[0] == "number":
+            return self.solution.input(str(key[1]))
         kind, ref, component = key
         if kind in ("mode", "mode1"):
             body = next(name for name in self.mechanism.bodies if name.upper() == ref)

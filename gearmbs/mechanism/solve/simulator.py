@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import time
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from gearmbs._lazy import uncollected
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
+from gearmbs.dae.numbers import INPUT, Number, cells_of
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
@@ -37,6 +39,32 @@ COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 """AX, AY and AZ of the function language."""
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")
 """Options of integrators that are about outputs and events of a run that is told its end."""
+
+
+Point = tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Time, y, y', the table of integers, and what stands in the cells of named numbers up to there."""
+
+
+@dataclass
+class Control:
+    """A function that gives an input its value a sample time after the other."""
+
+    name: str
+    function: Callable[[float, Any], Any]
+    start: float
+    period: float
+    count: int = 0
+
+    @property
+    def next(self) -> float:
+        """Time of the next sample, s."""
+        return self.start + self.count * self.period
+
+    def go_back(self, t: float) -> None:
+        """Let the next sample be the first one that is not before a time."""
+        self.count = max(0, int((t - self.start) / self.period) - 1)
+        while self.next < t:
+            self.count += 1
 
 
 class Simulator(OwnAttributes):
@@ -69,6 +97,8 @@ class Simulator(OwnAttributes):
     t : float
         Present time, s.
     t_end : float
+    numbers : mapping of str to Number
+        Inputs and parameters that :meth:`set` changes: unit, places in the tables, what they prescribe.
 
     Raises
     ------
@@ -120,36 +150,48 @@ class Simulator(OwnAttributes):
         )
         self._base.advice = ADVICE
         self._functions = list(mechanism.functions.values())
+        self._mechanism = mechanism
+        self._controls: list[Control] = []
         self._options = Options.gather(name, None, {"corrector": "modified", "tol": tol, **options})
         self._records = records
+        self.numbers = self._base.numbers
+        self._cells = cells_of(self.numbers)
+        # the same numbers where these cells alone are a table
+        self._own = {name: number.moved_to(self._cells) for name, number in self.numbers.items()}
+        self._set: dict[str, tuple[float, int]] = {}
         self._wall_time = self._simulated = 0.0
         self._begin(initial)
         self._t_start = self.t
 
-    def _begin(self, state: State | None) -> None:
-        """Make a run that starts in a state, by default in that which the model was assembled in."""
+    def _begin(self, state: State | None, repair: bool = False) -> None:
+        """Make a run that starts in a state, by default in that which the model was assembled in.
+
+        With ``repair`` velocities that a motion prescribes jump to it at once, and others with them, as at an impact
+        without rebound.
+        """
         problem, history = self._base, None
         if state is not None:
             problem, history = state.problem(problem), state.history_for(problem, self._options.method)
         self._problem, self._origin = problem, state
         with uncollected():
-            self._run = HeldRun(problem, self.t_end, replace(self._options, history=history))
+            self._run = HeldRun(problem, self.t_end, replace(self._options, history=history, check_start=not repair))
         nothing = np.empty((0, problem.n))
-        empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "")
+        held = (self._cells, np.empty((0, self._cells.size)))
+        empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "", held=held)
         self._row = Solution(self._system, problem, empty, self._members)
         self._row.inside = just_inside(np.array([problem.t0, self.t_end]))
         self._row.share(1)
         self._next_look = problem.t0
-        self._points: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
+        self._points: list[Point] = []
         self._counted: dict[tuple, tuple[int, float]] = {}
         self._failed: str | None = None
         self._stand_at(float(problem.t0), problem.y0, problem.yp0, problem.idata)
 
-    def _stand_at(self, t: float, y: np.ndarray, yp: np.ndarray, idata: np.ndarray) -> None:
+    def _stand_at(self, t: float, y: np.ndarray, yp: np.ndarray, idata: np.ndarray, record: bool = True) -> None:
         self.t = t
-        self._point = t, y, yp, idata
+        self._point = t, y, yp, idata, self._run.state.rdata[self._cells]
         self._present: Solution | None = None
-        if self._records:
+        if record and self._records:
             self._points.append(self._point)
 
     # --- going on -----------------------------------------------------------------------------------
@@ -174,8 +216,13 @@ class Simulator(OwnAttributes):
             raise ModelError(
                 f"t = {t:.9g} s lies after t_end = {self.t_end:.9g} s; make the simulator with a later t_end"
             )
-        if t == self.t:
-            return
+        while self.t < t:
+            end = self._sample(t)
+            self._apply(end)
+            self._go_to(end, end == t)
+
+    def _go_to(self, t: float, record: bool) -> None:
+        """Go on to a time with what is set, and keep it as a point of the solution."""
         started = time.perf_counter()
         with raised_errors(self._functions):
             status, message = self._run.go_to(t)
@@ -187,7 +234,7 @@ class Simulator(OwnAttributes):
         y, yp, idata = self._run.values_at(t)
         self._simulated += t - self.t
         self._wall_time += time.perf_counter() - started
-        self._stand_at(t, y, yp, idata)
+        self._stand_at(t, y, yp, idata, record)
         if self._system.has_dropped_rows and t >= self._next_look:
             self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
             found = self._now().find_conflict(np.array([0]))
@@ -199,6 +246,135 @@ class Simulator(OwnAttributes):
     def real_time_factor(self) -> float:
         """Seconds simulated in a second of the clock, in all calls of :meth:`advance`; 0 before the first."""
         return self._simulated / self._wall_time if self._wall_time > 0.0 else 0.0
+
+    # --- acting on it ---------------------------------------------------------------------------------
+
+    def set(self, name: str, value: Any, hold: int = 0) -> None:
+        """Give an input or a parameter another value, from the present time on.
+
+        Values up to the present time stay as they were returned. The step that has gone past it is cut back to it.
+
+        Parameters
+        ----------
+        name : str
+            See ``numbers`` of the simulator.
+        value : float or str
+            SI or text with a unit.
+        hold : {0, 1}
+            0: it jumps to the value and stays there. 1: it goes there from its present value, evenly until the time of
+            the :meth:`advance` that follows, and stays there.
+
+        Raises
+        ------
+        ModelError
+            For a name that is not there, a value that is no number in its unit, and an input that would let a body
+            jump: the position of a motion with ``hold=0``.
+        """
+        number = self._number(name)
+        if isinstance(hold, bool) or hold not in (0, 1):
+            raise ModelError(f"set: hold = {hold!r} of {name!r}; 0 holds the value, 1 goes there evenly")
+        if hold == 1 and number.kind != INPUT:
+            raise ModelError(f"set: {name!r} is a {number.kind}, which jumps; hold=1 is for inputs")
+        given = quantity(value, number.unit, f"set: {name!r}")
+        if not np.isfinite(given):
+            raise ModelError(f"set: {name!r} = {given}; give a finite number")
+        for row, order in number.prescribes if hold == 0 else ():
+            if order == 0:
+                raise ModelError(
+                    f"set: {name!r} is the position of {row!r}, which cannot jump; give hold=1, or let it be the speed "
+                    "of the motion (level='velocity')"
+                )
+        self._set[name] = float(given), int(hold)
+
+    def _number(self, name: str) -> Number:
+        if name not in self.numbers:
+            known = list(self.numbers)
+            hint = did_you_mean(name, known)
+            listed = f"there are {', '.join(known)}" if known else "the mechanism has none; add one with m.input(...)"
+            raise ModelError(f"there is no input or parameter {name!r}{': ' + hint if hint else ''}; {listed}")
+        return self.numbers[name]
+
+    def _value(self, name: str) -> float:
+        """Return the present value of an input or a parameter, the one that was set last."""
+        value, hold = self._set.get(self._number(name).name, (0.0, 1))
+        return self._own[name].value(self._run.state.rdata[self._cells], self.t) if hold == 1 else value
+
+    def control(self, name: str, function: Callable[[float, Simulator], Any], sample_time: float) -> None:
+        """Let a function give an input its value at sample times, which is held in between.
+
+        Parameters
+        ----------
+        name : str
+            An input or a parameter.
+        function : callable
+            ``function(t, simulator)`` returns the value. It is called at the present time and a sample time after the
+            other, where the simulation then stands: :meth:`get` tells of that instant. What it remembers is its own: a
+            state does not hold it.
+        sample_time : float
+            s.
+
+        Raises
+        ------
+        ModelError
+            For a name that is not there or has a controller, and a sample time that is not positive.
+        """
+        self._number(name)
+        if not callable(function):
+            raise ModelError(f"control: {function!r} for {name!r} cannot be called; give a function of t and simulator")
+        if name in (control.name for control in self._controls):
+            raise ModelError(f"control: {name!r} has a controller already; let one function do what both are to")
+        period = quantity(sample_time, "time", "control: sample_time")
+        if not (np.isfinite(period) and period > 0.0):
+            raise ModelError(f"control: sample_time = {period} s for {name!r}; it must be positive")
+        self._controls.append(Control(name, function, self.t, period))
+
+    def _sample(self, t: float) -> float:
+        """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""
+        for control in self._controls:
+            if control.next <= self.t:
+                self.set(control.name, control.function(self.t, self))
+                control.count += 1
+        return min([t, *(control.next for control in self._controls)])
+
+    def _apply(self, end: float) -> None:
+        """Let what has been set take effect at the present time; lines that were set end at ``end``."""
+        t, y, yp, *_ = self._point
+        before = self._run.state.rdata[self._cells]
+        led = [n for n, own in self._own.items() if n not in self._set and own.slope(before) != 0.0]
+        if not self._set and not led:
+            return
+        after, changed = before.copy(), []
+        for name in (*self._set, *led):
+            own = self._own[name]
+            now, slope_before = own.value(before, t), own.slope(before)
+            value, hold = self._set.get(name, (now, 0))
+            slope = (value - now) / (end - t) if hold else 0.0
+            if slope != slope_before or (not hold and value != now):
+                own.write(after, t, now if hold else value, slope)
+                changed.append((self.numbers[name], slope - slope_before))
+        self._set.clear()
+        if not changed:
+            return
+        if any(number.prescribes for number, _ in changed) or not self._run.state.steps:
+            self._start_with(after)
+            return
+        started = time.perf_counter()
+        loads = all(number.kind == INPUT for number, _ in changed)
+        with raised_errors(self._functions):
+            self._run.change(t, y, yp, self._cells, after, loads, any(slope for _, slope in changed))
+        self._wall_time += time.perf_counter() - started
+
+    def _start_with(self, values: np.ndarray) -> None:
+        """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""
+        t, y, yp, idata, _ = point = self._point
+        rdata = self._run.state.rdata.copy()
+        rdata[self._cells] = values
+        first, points, started = (self._problem, self._origin), self._points, self._run.started
+        self._begin(State.of(self._base, t, y, yp, (idata, rdata)), repair=True)
+        if started:
+            self._problem, self._origin = first
+            self._points = points
+            self._point = point
 
     # --- looking at it ------------------------------------------------------------------------------
 
@@ -226,8 +402,10 @@ class Simulator(OwnAttributes):
         KeyError
             For a name that is not there; the message lists those that are.
         """
+        if what == "input":
+            return self._value(*names)
         if what not in AT_AN_INSTANT + COUNTED:
-            known = [*AT_AN_INSTANT, *COUNTED]
+            known = [*AT_AN_INSTANT, *COUNTED, "input"]
             hint = did_you_mean(what, known)
             raise ModelError(f"get: there is no {what!r}{': ' + hint if hint else ''}; there are {', '.join(known)}")
         if what == "joint_angle":
@@ -240,8 +418,8 @@ class Simulator(OwnAttributes):
     def _now(self) -> Solution:
         """Return the solution at the present time alone, valid until the next."""
         if self._present is None:
-            t, y, _, idata = self._point
-            self._present = self._row.over(np.array([t]), y[None, :], [(0, idata)])
+            t, y, _, idata, held = self._point
+            self._present = self._row.over(np.array([t]), y[None, :], [(0, idata)], held[None, :])
             # turns as the run counts them at every step
             evaluator: Any = self._row._shared
             evaluator[0].rdata[:] = self._run.state.rdata
@@ -273,7 +451,7 @@ class Simulator(OwnAttributes):
 
     def _over(self, first: int) -> Solution:
         """Return the solution over the points from one on."""
-        t, y, yp, tables = zip(*self._points[first:], strict=True)
+        t, y, yp, tables, held = zip(*self._points[first:], strict=True)
         epochs: list[tuple[int, np.ndarray]] = []
         for row, table in enumerate(tables):
             if not epochs or not (table is epochs[-1][1] or np.array_equal(table, epochs[-1][1])):
@@ -282,7 +460,7 @@ class Simulator(OwnAttributes):
         told = Status.SUCCESS if self._failed is None else Status.SOLVER_FAILURE
         result = DAEResult(
             np.array(t), np.array(y), np.array(yp), told, self._failed or f"Advanced to t = {self.t:.9g} s.", stats,
-            epochs=epochs, t_last=self.t,
+            epochs=epochs, t_last=self.t, held=(self._cells, np.array(held)) if self._cells.size else None,
         )  # fmt: skip
         solution = Solution(self._system, self._problem, result, self._members, self._remark)
         solution.initial = self._origin
@@ -295,7 +473,12 @@ class Simulator(OwnAttributes):
         """Return the present state with the integrator's history: what follows from it is the same, bit for bit."""
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
-        t, y, yp, idata = self._point
+        led = [name for name, (_, hold) in self._set.items() if hold]
+        if led:
+            raise ModelError(f"state: {led[0]!r} is on its way from the next advance on; take the state before set")
+        if self._set:
+            self._apply(self.t)
+        t, y, yp, idata, _ = self._point
         run = self._run
         history = replace(run.history(), equations=equations_of(self._base)) if run.started else None
         return State.of(self._base, t, y, yp, (idata, run.state.rdata), history)
@@ -322,10 +505,15 @@ class Simulator(OwnAttributes):
                 "start both simulators at the same time"
             )
         own = [k for k, (t, y, *_) in enumerate(self._points) if t == state.t and np.array_equal(y, state.y)]
-        kept = self._points[: own[0]] if own else []
+        kept = self._points[: own[0] + 1] if own else []
         first = self._problem, self._origin
+        self._set.clear()
         self._begin(state)
+        for control in self._controls:
+            control.go_back(self.t)
         if kept:
+            # what stood there up to the state, which a jump may follow
+            self._points.clear()
             self._problem, self._origin = first
             self._points[:0] = kept
 

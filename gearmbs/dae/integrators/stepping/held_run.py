@@ -14,10 +14,12 @@ from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.driver import InterruptFlag, Run, StallWatch
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
+from gearmbs.dae.integrators.stepping.jumps import TERMS, pass_jump
 from gearmbs.dae.integrators.stepping.memory import LastStep, put_memory, record_window, take_memory, value_in
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
+from gearmbs.kernels.pointers import direct
 
 ROWS = 16 * HISTORY
 """Records between two calls of the compiled loop: enough for it to be called seldom, few enough for the cache."""
@@ -86,6 +88,7 @@ class HeldRun(Run):
         self.last_records = LastRecords(st)
         self.records = self.last_records  # type: ignore[assignment]
         self._given: tuple[int, LastStep] | None = None
+        self._scratch: np.ndarray | None = None
         if options.history is not None:
             self.put_back(options.history)
 
@@ -107,6 +110,46 @@ class HeldRun(Run):
             return st.y_out[0].copy(), st.yp_out[0].copy(), table
         last = self._last_step()
         return *value_in(self, last, t), last.idata
+
+    def change(
+        self, t: float, y: np.ndarray, yp: np.ndarray, cells: np.ndarray, values: np.ndarray, loads: bool, leads: bool
+    ) -> None:
+        """Cut the last step back to a time within it, and go on from there with other numbers in the equations.
+
+        Parameters
+        ----------
+        t : float
+        y, yp : ndarray, shape (n,)
+            Values there, as of :meth:`values_at`.
+        cells, values : ndarray
+            Places in the table of numbers, and what is to stand there.
+        loads : bool
+            Whether they only act as loads do, which leave the matrix as it is.
+        leads : bool
+            Whether the change grows with the time.
+        """
+        st, kept = self.state, True
+        if self.last_records.changed_at == st.steps or (self._given is not None and self._given[0] == st.steps):
+            last = self._last_step()
+            kept = np.array_equal(last.idata, st.idata)
+            if not kept:
+                # the coordinates were changed at an end of the step that is no end any more
+                count, n, first = len(last.nodes), len(st.y), int(st.newest)
+                st.idata[:] = last.idata
+                st.n_past, st.order = count, min(int(st.order), max(1, count - 1))
+                st.window_t[first : first + count] = last.nodes
+                st.window_y[first * n : (first + count) * n] = last.rows.ravel()
+        if not (kept and loads):
+            st.matrix_wanted = True
+        if self._scratch is None:
+            self._scratch = np.empty((TERMS + 3, len(st.y)))
+        direct(pass_jump)(
+            self.functions, st, self.plan, self.factors, t, y, yp, cells, values, leads, kept, self._scratch
+        )
+        if not kept:
+            self.last_records = LastRecords(st)
+            self.records = self.last_records  # type: ignore[assignment]
+        self._given = int(st.steps), LastStep(np.array([t]), y[None, :], y, yp, self.last_records.table)
 
     def history(self) -> History:
         """Return what the next steps depend on; a run that has not been started remembers nothing yet."""

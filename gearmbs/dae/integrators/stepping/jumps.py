@@ -1,0 +1,163 @@
+"""How a held run goes on where numbers of its equations jump: its past as it would have been with the new ones.
+
+At a time t_0 the equations G become G + b_0 + b_1 tau + ..., tau = t - t_0. Unknowns with a rate go on from where they
+are, their rates jump, and so do the others. To forget the past and start at order one would cost some fifty steps. But
+to first order the solution differs from the old one by what the linear equations make of the jump,
+
+    E delta' + A delta = -b_0 - b_1 tau,    delta = 0 at tau = 0 where there is a rate,
+
+A = dG/dy, E = dG/dy'. Added to the points behind t_0 it makes them those of a solution of the new equations, along
+which prediction and differences are smooth. With M = A + gamma E, the matrix that is factored anyway, N = gamma M^-1 E
+and s = gamma'/gamma, the Laplace transform of the answer to a step is, as a function of gamma',
+
+    (1 + (s - 1) N)^-1 d = d - sum_m (1 - 1/s)^m g_m,    d = -M^-1 b_0,  g_1 = N d,  g_(m+1) = g_m - N g_m,
+
+the series about gamma' = gamma, and (1 - gamma/gamma')^m is the transform of a Laguerre polynomial [1]_:
+
+    delta(tau) = d - sum_m g_m L_m(gamma tau).
+
+A mode lambda converges like (lambda/(lambda - gamma))^m, that is at once where the steps resolve it. One whose decay is
+faster than the steps does not, nor need it: the step beyond t_0 is tested as any other, and where it fails the past is
+forgotten after all. A few solutions with factors at hand are what it costs.
+
+References
+----------
+.. [1] W. T. Weeks, "Numerical inversion of Laplace transforms using Laguerre functions", J. ACM 13 (1966) 419-429.
+"""
+
+from __future__ import annotations
+
+from numba import boolean, float64, int64, types
+
+from gearmbs.dae.integrators.run_state import STATE_TYPE, copy, record_history, rows_from, times_from
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
+from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
+from gearmbs.kernels.jit import njit
+
+TERMS = 6
+"""Terms of the series at most: one for each power that a step of the highest order resolves."""
+CLOSE = 0.05
+"""Part of the step before below which the point of a jump replaces the one behind it: differences over a shorter
+distance would amplify what the polynomial through both is off by."""
+
+_VEC = float64[::1]
+
+
+@njit(
+    types.void(FUNCTIONS_TYPE, STATE_TYPE, PLAN_TYPE, FACTORS_TYPE, float64, _VEC, _VEC, int64[::1], _VEC, boolean,
+               boolean, float64[:, ::1]),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)  # fmt: skip
+def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, leads, follows, g):
+    """Cut the last step back to ``t``, change numbers of the equations there, and the past along with them.
+
+    Parameters
+    ----------
+    bound, st, plan, factors
+        Of a run with no step open.
+    t : float
+        Within the last step.
+    y, yp : ndarray, shape (n,)
+        Values there.
+    cells : ndarray of int
+        Places in the table of numbers that change.
+    values : ndarray
+        What is to stand there.
+    leads : bool
+        Whether the change grows with the time, b_1.
+    follows : bool
+        Whether factors and past are of use: else the past is left to the test of the step.
+    g : ndarray, shape (TERMS + 3, n)
+        Scratch.
+    """
+    functions = unbound(bound)
+    times, rows = times_from(st, 0), rows_from(st, 0)
+    n = st.y.shape[0]
+    st.t = times[0] = t
+    copy(y, rows[0])
+    copy(y, st.y)
+    copy(yp, st.yp)
+    if st.n_past > 2 and times[0] - times[1] < CLOSE * (times[1] - times[2]):
+        for j in range(1, st.n_past - 1):
+            times[j] = times[j + 1]
+            copy(rows[j + 1], rows[j])
+        st.n_past -= 1
+    terms = min(max(st.order, 1), TERMS)
+    first, later, d = g[TERMS], g[TERMS + 1], g[TERMS + 2]
+    theta = st.h
+    if follows:
+        functions.residual(t, y, yp, first, st.idata, st.rdata, st.work)
+        if leads:
+            functions.residual(t + theta, y, yp, later, st.idata, st.rdata, st.work)
+    for k in range(cells.shape[0]):
+        st.rdata[cells[k]] = values[k]
+    if follows:
+        functions.residual(t, y, yp, st.res, st.idata, st.rdata, st.work)
+        for i in range(n):
+            first[i] = st.res[i] - first[i]
+        _follow(st, plan, factors, t, first, d, g, terms, False)
+        if leads:
+            functions.residual(t + theta, y, yp, st.res, st.idata, st.rdata, st.work)
+            for i in range(n):
+                later[i] = (st.res[i] - later[i] - first[i]) / theta
+            _follow(st, plan, factors, t, later, d, g, terms, True)
+        st.residuals += 4 if leads else 2
+    copy(st.yp, st.yp_start)
+    st.order = min(st.order, max(1, st.n_past - 1))
+    st.restarts += 1
+    st.sign_last = 0.0
+    st.sign_pencil = 0.0
+    st.passing = True
+    st.n_records = 0
+    record_history(st, 0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _follow(st, plan, factors, t, b, d, g, terms, integrated):
+    """Add the answer to a jump ``b`` of the equations, or to one of its rate, to the past and the point at ``t``."""
+    n = st.y.shape[0]
+    gamma = st.gamma_factored
+    times, rows = times_from(st, 0), rows_from(st, 0)
+    solve(plan, factors, b, d)
+    st.solves += 1 + terms
+    for i in range(n):
+        d[i] = -d[i]
+    for m in range(terms):
+        before = d if m == 0 else g[m - 1]
+        st.res[:] = 0.0
+        for k in range(st.n_carried):
+            p = st.carried[k]
+            st.res[st.entry_row[p]] += gamma * st.jac_slope[p] * before[st.entry_col[p]]
+        solve(plan, factors, st.res, st.delta)
+        for i in range(n):
+            g[m, i] = st.delta[i] if m == 0 else before[i] - st.delta[i]
+    # unknowns with a rate go on from where they are: the series begins with what it leaves of zero
+    for i in range(n):
+        if st.differential[i] != 0.0:
+            d[i] = 0.0
+            for m in range(terms):
+                d[i] += g[m, i]
+    for j in range(st.n_past):
+        past = times[j] - t
+        x = gamma * past
+        # L_0 and L_1; of a jump of the rate what stands for L_m is its integral from 0
+        low, high = 1.0, 1.0 - x
+        row, whole = rows[j], past if integrated else 1.0
+        for i in range(n):
+            row[i] += whole * d[i]
+        for m in range(1, terms + 1):
+            beyond = ((2.0 * m + 1.0 - x) * high - m * low) / (m + 1.0)
+            weight = (high - beyond) / gamma if integrated else high
+            own = g[m - 1]
+            for i in range(n):
+                row[i] -= weight * own[i]
+            low, high = high, beyond
+    copy(rows[0], st.y)
+    if not integrated:
+        # L_m' = -m at 0
+        for m in range(terms):
+            for i in range(n):
+                st.yp[i] += gamma * (m + 1.0) * g[m, i] * st.differential[i]

@@ -1,0 +1,229 @@
+"""Inputs that are set while a simulator goes on: against exact solutions, and bit for bit after going back."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import gearmbs as gm
+from gearmbs.mechanism import Mechanism, ModelError
+from tests.says import says
+
+PERIOD = 1e-3
+SHAFT = {"stiffness": 400.0, "damping": 0.8}
+A = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-200, 200, -0.4, 0.4], [400, -400, 0.8, -0.8]])
+B = np.array([0, 0, 0.5, 0.0])
+"""Angles and speeds of two discs, 2 and 1 kg m^2, on a shaft; a torque on the first."""
+
+
+def two_discs(lump=False):
+    m = Mechanism("two discs")
+    markers = []
+    for name, inertia in (("a", 2.0), ("b", 1.0)):
+        body = m.body(name, mass=1.0, inertia=(inertia,) * 3)
+        m.revolute(f"pin {name}", body, m.ground, axis=(0, 0, 1))
+        markers.append(body.marker(name=f"on {name}"))
+    m.torsion_spring("shaft", *markers, **SHAFT)
+    m.torque("drive", m.bodies["a"], m.input("load", "N m"))
+    m.lump = lump
+    return m
+
+
+def held(x, u, slope, span):
+    """Return x after a span with the torque u + slope t, exactly."""
+    m = np.zeros((6, 6))
+    m[:4, :4], m[:4, 4], m[4, 5] = A, B, 1.0
+    return (expm(m * span) @ np.concatenate([x, [u, slope]]))[:4]
+
+
+def unknowns(sim):
+    angles = [sim.get("joint_angle", f"pin {name}") for name in "ab"]
+    return np.array(angles + [sim.get("angular_velocity", name)[2] for name in "ab"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lump", [False, True])
+def test_a_sampled_controller(lump):
+    """PI control of the speed each millisecond, the torque held in between: the exact solution of the sampled plant."""
+
+    def torque(speed, memory):
+        memory[0] += PERIOD * (10.0 - speed)
+        return 3.0 * (10.0 - speed) + 5.0 * memory[0]
+
+    x, memory = np.zeros(4), [0.0]
+    for _ in range(300):
+        x = held(x, torque(x[2], memory), 0.0, PERIOD)
+    off = []
+    for tol in (1e-8, 1e-10):
+        sim, own = gm.Simulator(two_discs(lump), 1.0, tol=tol), [0.0]
+        sim.control("load", lambda t, s, own=own: torque(s.get("angular_velocity", "a")[2], own), PERIOD)
+        sim.advance(0.3)
+        off.append(np.abs(unknowns(sim) - x).max())
+        # a step or two for each sample, and not the fifty of a start
+        assert sim.solution().stats.steps < 900
+    assert off[1] < 1e-8
+    assert off[1] < off[0] < 1e-6
+
+
+@pytest.mark.parametrize("lump", [False, True])
+def test_lines_and_steps(lump):
+    """Held, led evenly, held where it was led to; and a second value at the same time counts alone."""
+    sim, x = gm.Simulator(two_discs(lump), 1.0, tol=1e-9), np.zeros(4)
+    sim.set("load", 50.0)
+    assert sim.get("input", "load") == 50.0
+    before = 0.0
+    for k, (value, hold) in enumerate([(4.0, 0), (10.0, 1), (None, 0), (-2.0, 1), (6.0, 0), (0.0, 1), (0.0, 0)]):
+        if value is not None:
+            sim.set("load", value, hold)
+        u = before if hold or value is None else value
+        slope = (value - before) / 0.05 if hold else 0.0
+        sim.advance(0.05 * (k + 1))
+        x, before = held(x, u, slope, 0.05), before if value is None else value
+        assert sim.get("input", "load") == pytest.approx(before, abs=1e-12)
+        np.testing.assert_allclose(unknowns(sim), x, rtol=0, atol=3e-7)
+    assert sim.get("com_acceleration", "a") == pytest.approx(0.0, abs=1e-9)
+    solution = sim.solution()
+    np.testing.assert_allclose(solution.input("load"), [4.0, 4.0, 10.0, 10.0, -2.0, 6.0, 0.0, 0.0], atol=1e-12)
+    # the acceleration and expressions up to each point, where the torque jumps
+    twist = solution.evaluate('0.5*(load - 400*AZ("on a", "on b") - 0.8*WZ("on a", "on b"))')
+    np.testing.assert_allclose(solution.angular_acceleration("a")[:, 2], twist, rtol=0, atol=1e-9)
+
+
+def test_the_past_is_left_alone():
+    """What was returned up to the point of a jump stays, and does not depend on it."""
+    ends = []
+    for values in ((1.0, 1.0), (1.0, -7.0)):
+        sim = gm.Simulator(two_discs(), 1.0)
+        for k, value in enumerate(values):
+            sim.set("load", value)
+            sim.advance(0.01 * (k + 1))
+        ends.append(sim.solution())
+    np.testing.assert_array_equal(ends[0].result.y[:2], ends[1].result.y[:2])
+    np.testing.assert_array_equal(ends[0].angular_acceleration("a")[:2], ends[1].angular_acceleration("a")[:2])
+    assert abs(ends[0].angular_velocity("a")[2, 2] - ends[1].angular_velocity("a")[2, 2]) > 0.03
+
+
+def tumbling():
+    """A body that changes its Euler angles on the way, pulled by an input."""
+    m = Mechanism("top", gravity=(0.0, 0.0, -9.81))
+    body = m.body("top", mass=1.0, inertia=(0.02, 0.03, 0.045), position=(0, 0, 0.2), angular_velocity=(3.0, 9.0, 4.0))
+    m.spherical("foot", body, m.ground, at=(0, 0, 0))
+    i, j = body.marker(name="tip"), m.ground.marker(name="base")
+    m.input("load", "N", 0.0)
+    m.load("pull", i, j, fx="0.3*load", fy="-0.2*load")
+    return m
+
+
+@pytest.mark.parametrize("model", [two_discs, tumbling])
+def test_going_back_is_exact(model, tmp_path):
+    """From a state taken before and after a value is set, in another simulator too, the same follows bit for bit."""
+    values = np.random.default_rng(5).normal(size=60)
+
+    def go(sim, first):
+        for k in range(first, 60):
+            sim.set("load", values[k], hold=int(k % 3 == 2))
+            sim.advance(0.016 * (k + 1))
+        return sim.solution()
+
+    sim = gm.Simulator(model(), 1.0)
+    wanted = go(sim, 0)
+    if model is tumbling:
+        assert len(wanted.result.epochs) > 1
+    for at in (7, 33):
+        sim = gm.Simulator(model(), 1.0)
+        for k in range(at):
+            sim.set("load", values[k], hold=int(k % 3 == 2))
+            sim.advance(0.016 * (k + 1))
+        before = sim.state()
+        if at % 3 != 2:
+            sim.set("load", values[at])
+        states = [before, sim.state(), gm.State.load(before.save(tmp_path / "s.npz"))]
+        again = go(sim, at)
+        np.testing.assert_array_equal(again.result.y, wanted.result.y)
+        for state in states:
+            sim.restore(state)
+            again = go(sim, at)
+            np.testing.assert_array_equal(again.result.y, wanted.result.y)
+            np.testing.assert_array_equal(again.input("load"), wanted.input("load"))
+            other = go(gm.Simulator(model(), 1.0, initial=state), at)
+            np.testing.assert_array_equal(other.result.y, wanted.result.y[at:])
+
+
+def driven(level):
+    """A disc that a motion drives, and another on a shaft."""
+    m = two_discs()
+    unit = {"displacement": "rad", "velocity": "rad/s", "acceleration": "rad/s^2"}[level]
+    m.rotation("motion", m.joints["pin a"], m.input("given", unit), level=level)
+    return m
+
+
+@pytest.mark.parametrize(
+    ("level", "hold", "angle", "speed"),
+    [("velocity", 0, 0.5, 5.0), ("velocity", 1, 0.25, 5.0), ("acceleration", 0, 0.025, 0.5),
+     ("displacement", 1, 5.0, 50.0)],
+)  # fmt: skip
+def test_motions_are_led(level, hold, angle, speed):
+    """A speed may jump, as at an impact without rebound, an angle may not; both go on from where they are."""
+    sim = gm.Simulator(driven(level), 1.0, tol=1e-8)
+    sim.advance(0.1)
+    sim.set("given", 5.0, hold)
+    sim.advance(0.2)
+    assert sim.get("joint_angle", "pin a") == pytest.approx(angle, abs=1e-7)
+    assert sim.get("angular_velocity", "a")[2] == pytest.approx(speed, abs=1e-6)
+    sim.set("given", sim.get("input", "given"), 1)
+    sim.advance(0.3)
+    further = {"velocity": 0.5, "acceleration": 0.05 + 0.025, "displacement": 0.0}[level]
+    assert sim.get("joint_angle", "pin a") == pytest.approx(angle + further, abs=1e-7)
+
+
+def test_a_speed_that_jumps_takes_others_along():
+    """Momentum: a coupled disc jumps with the driven one, one on a spring does not."""
+    m = driven("velocity")
+    body = m.body("c", mass=1.0, inertia=(3.0, 3.0, 3.0))
+    pin = m.revolute("pin c", body, m.ground, axis=(0, 0, 1))
+    m.gear("gear", m.joints["pin a"], pin, -0.5)
+    sim = gm.Simulator(m, 1.0, tol=1e-8)
+    sim.advance(0.1)
+    sim.set("given", 4.0)
+    sim.advance(0.1 + 1e-6)
+    assert sim.get("angular_velocity", "c")[2] == pytest.approx(-2.0, abs=1e-6)
+    assert sim.get("angular_velocity", "b")[2] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_parameters_are_set():
+    """A brake that is let go: the speed falls by exp(-c t / J) and stays."""
+    m = Mechanism("disc")
+    disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0), angular_velocity=(0, 0, 3.0))
+    pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    m.parameter("drag", "N m s/rad", 1.0)
+    m.axis_torque("brake", pin.i, pin.j, "-drag*WZ(pin.I, pin.J)")
+    sim = gm.Simulator(m, 3.0, tol=1e-9)
+    for t, drag in ((0.5, 4.0), (1.0, 0.0), (1.5, 0.0)):
+        sim.advance(t)
+        sim.set("drag", drag)
+    assert sim.get("angular_velocity", "disc")[2] == pytest.approx(3.0 * np.exp(-0.25 - 1.0), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: s.set("lod", 1.0), ("lod", "load")),
+        (lambda s: s.set("load", "3 rpm"), ("load", "3 rpm", "N m")),
+        (lambda s: s.set("load", [1.0, 2.0]), ("load", "[1.0, 2.0]")),
+        (lambda s: s.set("load", np.inf), ("load", "inf", "finite")),
+        (lambda s: s.set("load", 1.0, hold=2), ("load", "hold", "2")),
+        (lambda s: s.set("given", 1.0), ("given", "motion: angle", "hold=1", "speed")),
+        (lambda s: (s.set("load", 1.0, 1), s.state()), ("load", "before")),
+        (lambda s: s.control("lod", lambda t, s: 0.0, 1e-3), ("lod", "load")),
+        (lambda s: s.control("load", 3.0, 1e-3), ("load", "3.0", "function")),
+        (lambda s: s.control("load", lambda t, s: 0.0, 0.0), ("load", "0.0", "positive")),
+        (lambda s: [s.control("load", lambda t, s: 0.0, 0.1) for _ in "12"], ("load", "controller")),
+        (lambda s: s.get("input", "lod"), ("lod", "load")),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(call, words):
+    sim = gm.Simulator(driven("displacement"), 1.0)
+    with pytest.raises(ModelError, match=says(*words)) as error:
+        call(sim)
+    assert "\n" not in str(error.value)
+    sim.set("load", "3 N m")
+    sim.advance(0.01)
