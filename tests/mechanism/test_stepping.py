@@ -165,7 +165,12 @@ def test_the_page_on_steps_says_what_comes_out(tmp_path, monkeypatch, capsys):
     exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), {})
     told = capsys.readouterr().out.splitlines()
     assert told[0].startswith("lowest at")
-    assert told[1:] == ["True", "True"]
+    assert told[1:3] == ["True", "True"]
+    # 2 w' = u - 0.5 w: u = 4 for 0.5 s, then 4 + 60 t for 0.1 s with the solution 120 t - 472; then w' = 5
+    speed = 8.0 * (1.0 - np.exp(-0.125))
+    speed = (speed + 472.0) * np.exp(-0.025) - 472.0 + 120.0 * 0.1 + 5.0 * 0.4
+    assert float(told[3].split()[1]) == pytest.approx(speed, abs=1e-5)
+    assert float(told[4]) == pytest.approx(10.0, abs=0.5)
 
 
 def test_pair_of_the_paper():
