@@ -86,7 +86,7 @@ EXCEPTIONS = {
 CIRCLES = {
     ("kernels.ahead", "kernels.calls", "kernels.jit"):
         "a kernel that is not there is compiled when it is called",
-    ("drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.placement",
+    ("drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.placement", "drivetrain.plants",
      "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
     ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",

@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.torsional import MeshDynamics, TorsionalModel, TorsionalSpring
     from gearmbs.gears.spec import GearSpec
     from gearmbs.mechanism.mechanism import Mechanism
+    from gearmbs.mechanism.solve.plants import LinearPlant
 
 P = TypeVar("P", bound=Part)
 
@@ -316,6 +317,33 @@ class Drivetrain:
         warn_of_weak_drives(self)
         warn_of_lost_torques(self)
         return build(self)
+
+    def linearize(
+        self, inputs: Sequence[Any], outputs: Sequence[Any], *, at: Any = "loaded", t: float | None = None
+    ) -> LinearPlant:
+        """Return the linear plant x' = A x + B u, y = C x + D u of this drivetrain.
+
+        Parameters
+        ----------
+        inputs : sequence
+            As of `gearmbs.mechanism.linearize`, and ``("torque", shaft)`` about the shaft's own axis.
+        outputs : sequence
+            As of `gearmbs.mechanism.linearize`, the names of sensors, and ``("speed", shaft)``, ``("angle", shaft)``
+            about its own axis. Directions of sensors are those of the operating point.
+        at : {"loaded", "initial", "equilibrium"}, StaticResult, State or Solution
+            Operating point; "loaded": at rest under the torques of the operating point, as its modes are, friction and
+            the slopes of motors and loads over their speeds left out. A solution, or its state, has all of them.
+        t : float, optional
+            As of `gearmbs.mechanism.linearize`.
+
+        Raises
+        ------
+        ModelError, DrivetrainError
+            As of `gearmbs.mechanism.linearize`, and for unknown shafts.
+        """
+        from gearmbs.drivetrain.plants import linearize
+
+        return linearize(self, inputs, outputs, at, t)
 
     @classmethod
     def from_file(cls, path: str | Path) -> Drivetrain:

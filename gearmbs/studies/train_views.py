@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError, SpeedDrive, TorqueLoad
+from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
 from gearmbs.drivetrain.kinematics import RPM
+from gearmbs.drivetrain.plants import loaded
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.gears.geometry import turn_z
-from gearmbs.mechanism import linear_modes, static_equilibrium
-from gearmbs.mechanism.parts.functions import constant
+from gearmbs.mechanism import linear_modes
 from gearmbs.signals import spectrum
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import held_speed, holds_speed
@@ -244,23 +243,6 @@ def train_spectrum(
 # Modes under load.
 
 
-def resting(train: Drivetrain) -> Drivetrain:
-    """Return a drivetrain at rest under the loads of its operating point, without friction, its drives holding it."""
-    drives = [
-        SpeedDrive(name=drive.name, shaft=drive.shaft, speed=drive.speed, station=drive.station, on=drive.on,
-                   function=constant(0.0))
-        for drive in train.drives
-    ]  # fmt: skip
-    loads = [
-        TorqueLoad(name=load.name, shaft=load.shaft, station=load.station, on=load.on,
-                   torque=load.nominal(abs(train.speeds[load.shaft])))
-        for load in train.loads
-    ]  # fmt: skip
-    # flanks that rest on each other would stick
-    meshes = [replace(mesh, settings={**mesh.settings, "friction": False}) for mesh in train.meshes]
-    return replace(train, drives=drives, loads=loads, meshes=meshes, running=False)
-
-
 def train_modes(train: Drivetrain) -> Modes:
     """Return the modes of a whole drivetrain about its position of rest under the operating torques.
 
@@ -288,15 +270,7 @@ def train_modes(train: Drivetrain) -> Modes:
         Of meshes that are damped above critical: their modes do not oscillate.
     """
     warn_of_overdamped_meshes(train)
-    still = resting(train)
-    m = still.build()
-    after = 2.0 * still.run_up
-    rest = static_equilibrium(m, t=after, move=True)
-    for drive in train.drives:
-        if not isinstance(drive, SpeedDrive):
-            held = m.joints.pop(drive.name)
-            torque = float(rest.solution.reaction(drive.name)[1][-1] @ held.j.global_orientation()[:, 2])
-            m.axis_torque(drive.name, held.i, held.j, torque)
+    m, after = loaded(train)
     return linear_modes(m, t=after)
 
 

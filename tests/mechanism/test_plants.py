@@ -237,6 +237,7 @@ def test_a_spinning_rotor_on_springs_whirls():
     assert plant.transfer(s)[:, 0] == pytest.approx(exact, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_state_of_a_simulation_is_an_operating_point():
     m = two_masses()
     m.torque("push", m.bodies["motor"], 5.0)
@@ -282,3 +283,54 @@ def test_what_is_wrong_is_named_in_one_line(inputs, outputs, options, message):
         m.linearize(inputs, outputs, **options)
     assert "\n" not in str(told.value)
     assert [one.name for body in m.bodies.values() for one in body.markers] == markers
+
+
+def test_inputs_of_the_mechanism_by_their_names():
+    """A torque that an expression makes of an input, exactly as its derivative by it, at the value it has."""
+    m = two_masses()
+    m.input("current", "1", 3.0)
+    m.torque("motor", m.bodies["motor"], m.input("pull", "N m", 2.0))
+    m.load("coil", m.bodies["motor"].marker(name="c.I"), m.ground.marker(name="c.J"), tz="0.5*current**2 - 0.1*WZ(c.I)")
+    plant = m.linearize(["current", "pull"], [("joint_rate", "load bearing")])
+    assert plant.B[2] == pytest.approx([3.0 / MOTOR, 1.0 / MOTOR], rel=1e-9)
+    assert plant.A[2, 2] == pytest.approx(-(DAMPING + 0.1) / MOTOR, rel=1e-9)
+    assert plant.point.inputs.tolist() == [3.0, 2.0]
+    assert plant.input_units == ["dimensionless", "N m"]
+    with pytest.raises(ModelError, match=says("'curent'", "did you mean 'current'")):
+        m.linearize(["curent"], [])
+
+
+def test_an_input_that_is_the_speed_of_a_motion():
+    m = two_masses()
+    m.rotation("drive", m.joints["motor bearing"], m.input("speed", "rad/s", 20.0), level="velocity")
+    for body in m.bodies.values():
+        body.angular_velocity = np.array([0, 0, 20.0])
+    plant = m.linearize(["speed"], [("joint_rate", "load bearing"), ("load", "shaft", "tz")])
+    s = 4.0 + 30.0j
+    over = LOAD * s**2 + DAMPING * s + STIFFNESS
+    exact = [(DAMPING * s + STIFFNESS) / over, (DAMPING * s + STIFFNESS) * LOAD * s / over]
+    assert plant.transfer(s)[:, 0] == pytest.approx(exact, rel=1e-9)
+    with pytest.raises(ModelError, match=says("reaction drive tz", "'speed'", "level='acceleration'", "'drive'")):
+        m.linearize(["speed"], [("reaction", "drive", "tz")])
+
+
+def _held() -> gm.Mechanism:
+    """Return two masses on springs and dampers to the ground, so that transients die away."""
+    m = two_masses()
+    for name in ("motor", "load"):
+        i, j = m.joints[f"{name} bearing"].i, m.joints[f"{name} bearing"].j
+        m.torsion_spring(f"{name} spring", i, j, stiffness=40.0, damping=4.0)
+    return m
+
+
+def test_the_frequency_response_is_what_sines_leave_behind():
+    """Amplitude and phase after the transients, at three frequencies about the resonance; of small swings."""
+    plant = _held().linearize([("torque", "motor bearing")], [("joint_angle", "load bearing")])
+    for f in (0.6, 4.0, 9.0):
+        m = _held()
+        m.torque("shake", m.bodies["motor"], f"0.2*SIN({2 * np.pi * f!r}*TIME)")
+        last = 8.0 + 3.0 / f * np.arange(64) / 64
+        solution = m.simulate(last[-1], t_eval=np.concatenate([[0.0], last]), tol=1e-9)
+        angle = solution.evaluate('AZ("load bearing.I", "load bearing.J")')[1:]
+        found = 2.0 / 64 * np.sum(angle * np.exp(-2j * np.pi * f * last)) / 0.2 / -1j
+        assert found == pytest.approx(plant.frequency_response(f)[0, 0, 0], rel=1e-2)

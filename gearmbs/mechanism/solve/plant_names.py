@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.parts.joints import JOINTS, Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.wording import any_of, did_you_mean
@@ -34,7 +35,7 @@ class Given:
 
     Attributes
     ----------
-    kind : {"force", "torque", "motion", "transmission_error"}
+    kind : {"input", "force", "torque", "motion", "transmission_error"}
     name, unit : str
     level : int
         By which of its rates it is given.
@@ -44,8 +45,8 @@ class Given:
         Where a force or torque acts, and where it goes back to; without J it comes from outside.
     axis : int
         Of a force or torque from outside, a global one.
-    joint : Joint
-        The motion.
+    joints : tuple of Joint
+        The motions it is prescribed by.
     element, lever
         The mesh, and r_b2, negative of internal pairs.
     """
@@ -58,18 +59,24 @@ class Given:
     i: Marker | None = None
     j: Marker | None = None
     axis: int = 2
-    joint: Joint | None = None
+    joints: tuple[Joint, ...] = ()
     element: Any = None
     lever: float = 1.0
 
     def unit_of(self, level: int) -> str:
         """Return the unit of one of its rates."""
+        if self.kind == "input":
+            return ""
         return f"{self.base}{('', '/s', '/s^2')[level]}"
 
     @property
     def remedy(self) -> str:
         """What to ask for instead where an output follows a higher rate."""
-        place = self.element if self.kind == "transmission_error" else self.joint
+        if self.kind in ("force", "torque") or (self.kind == "input" and not self.joints):
+            return ""
+        if self.kind == "input":
+            return f"let it prescribe the acceleration, by level='acceleration' of motion '{self.joints[0].name}'"
+        place = self.element if self.kind == "transmission_error" else self.joints[0]
         others = LEVELS[self.level + 1 :] or LEVELS[-1:]
         return f"give ({self.kind!r}, {getattr(place, 'name', '')!r}, {any_of(map(repr, others))})"
 
@@ -110,11 +117,37 @@ class PlantNames:
         ModelError
             One line with what is there.
         """
+        if isinstance(item, str | Input):
+            return [self._input(item)]
+        if isinstance(item, Given):
+            return [item]
         known: dict[str, Callable[..., Given]] = {
             "force": self._force, "torque": self._torque, "motion": self._motion,
             "transmission_error": self._transmission_error,
         }  # fmt: skip
         return [self._read("input", item, known)]
+
+    def _input(self, item: str | Input) -> Given:
+        """Return an input of the mechanism; it may be the speed or the acceleration that motions prescribe."""
+        m = self.mechanism
+        name = item if isinstance(item, str) else item.name
+        made = m.inputs.get(name)
+        if made is None:
+            remedy = _there(name, list(m.inputs)) if m.inputs else "add one with Mechanism.input, or give a tuple"
+            raise ModelError(f"input {name!r}: the mechanism has no input of this name; {remedy}")
+        orders: dict[int, list[Joint]] = {}
+        for joint in m.joints.values():
+            for row in joint.rows:
+                for function in (row.function, row.rotation):
+                    if isinstance(function, Input) and function.name == name:
+                        orders.setdefault(function.order, []).append(joint)
+        if len(orders) > 1:
+            names = ", ".join(joint.name for joints in orders.values() for joint in joints)
+            raise ModelError(
+                f"input {name!r}: motions {names} take it at different levels; give each an input of its own"
+            )
+        order = max(orders, default=0)
+        return Given("input", name, made.unit, order, "", joints=tuple(orders.get(order, ())))
 
     def _read(self, role: str, item: Any, known: Mapping[str, Callable[..., Any]]) -> Any:
         if not isinstance(item, tuple | list) or not item or not isinstance(item[0], str):
@@ -169,7 +202,7 @@ class PlantNames:
             )
         k = _one_of("level", level, LEVELS)
         base = MOTIONS[joint.kind]
-        one = Given("motion", f"motion {joint.name}", base, k, base, joint=joint)
+        one = Given("motion", f"motion {joint.name}", base, k, base, joints=(joint,))
         return _at_level(one)
 
     def _transmission_error(self, mesh: Any, level: str = "position") -> Given:
@@ -192,6 +225,9 @@ class PlantNames:
         """
         if isinstance(item, str):
             return [self._expression(item)]
+        if isinstance(item, Told):
+            one = self._expression(item.expression)
+            return [replace(item, expression=one.expression, accelerations=one.accelerations)]
         known: dict[str, Callable[..., list[Told]]] = {
             "joint_angle": self._angle, "joint_displacement": self._displacement, "joint_rate": self._rate,
             "com_position": self._vector("com_position", "D", "m"),
@@ -252,7 +288,8 @@ class PlantNames:
         k = "XYZ".index(name[3])
         if along is None:
             return parts[k]
-        tip = along.body.marker(along.position + along.orientation[:, k], name=f"{along.name} plant tip {k}")
+        place = along.position + along.orientation[:, k]
+        tip = own_marker(along.body, f"{along.name} plant tip {k}", along.body.marker, place)
         shown = [f'D{c}("{tip.name}", "{along.name}")' for c in "XYZ"]
         return f"({' + '.join(f'{part}*{cosine}' for part, cosine in zip(parts, shown, strict=True))})"
 
@@ -341,9 +378,9 @@ class PlantNames:
         element = self._mesh(mesh)
         parts = []
         for marker, lever in zip((element.i, element.j), _levers(element), strict=True):
-            at = self.mechanism.ground.marker_at(
-                marker.global_position(), marker.global_orientation(), name=f"{marker.name} plant ground"
-            )
+            ground = self.mechanism.ground
+            where = marker.global_position(), marker.global_orientation()
+            at = own_marker(ground, f"{marker.name} plant ground", ground.marker_at, *where)
             parts.append(f'{lever!r}*AZ("{marker.name}", "{at.name}")')
         return [Told(f"transmission_error {element.name}", "m", " + ".join(parts))]
 
@@ -378,9 +415,7 @@ class PlantNames:
             return where
         body = where if isinstance(where, Body) else m.bodies.get(where) if of_body else None
         if body is not None:
-            name = f"{body.name} plant centre"
-            own = next((one for one in body.markers if one.name == name), None)
-            return own or body.marker(body.com, name=name)
+            return own_marker(body, f"{body.name} plant centre", body.marker, body.com)
         found = self._named(where, None)
         if found is None:
             there = [
@@ -404,6 +439,11 @@ class PlantNames:
                 f"'{marker.body.name}' deforms, so that a {kind} also acts on its modes; fix a body to '{marker.name}' "
                 "and give this one"
             )
+
+
+def own_marker(body: Body, name: str, make: Callable[..., Marker], *where: Any) -> Marker:
+    """Return the marker of a body that has a name, made by a method of the body if it is not there yet."""
+    return next((one for one in body.markers if one.name == name), None) or make(*where, name=name)
 
 
 def _at_level(given: Given) -> Given:

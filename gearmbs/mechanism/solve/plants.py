@@ -20,6 +20,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import State as ElementState
+from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told
 from gearmbs.mechanism.solve.points import instant_at, point_of
 from gearmbs.progress import waiting
@@ -27,6 +28,11 @@ from gearmbs.progress import waiting
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
 
+INPUT_STEP = 1e-3
+"""Step of differences by an input, of its value or 1: what is linear in it, as most loads are, is exact with any; of
+what is not 1e-12 of its fifth derivative is left out."""
+DIFFERENCE = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0))
+"""Central differences of fourth order: places in steps, and their weights."""
 TOLD = "plant output {}"
 """Name of the state whose rate is an output."""
 
@@ -46,6 +52,7 @@ def linearize(
         Of texts and tuples:
 
         * ``"load"``: an input of the mechanism, see `Mechanism.input`
+        * ``"load"``: an input of the mechanism, see `Mechanism.input`, in its unit, whatever it enters
         * ``("torque", joint or element)``: about z_J, on I's body and back on J's, N m; ``("force", ...)`` along z_J, N
         * ``("torque", body or marker, axis)``, ``("force", ...)`` with axis "x", "y" or "z": from the ground along a
           global axis, on a body at its centre of mass, N m and N
@@ -160,7 +167,9 @@ class _Columns:
         if given.kind in ("force", "torque"):
             self._wrench(given, value)
         elif given.kind == "motion":
-            self._motion(given, value)
+            self._motion(given, given.joints[0], value)
+        elif given.kind == "input":
+            self._number(given, value)
         else:
             self._flank(given, value, rate)
         return value, rate
@@ -187,10 +196,27 @@ class _Columns:
             first = at["p"] + self.angle[frame.body]
             value[first : first + 3] -= sign * self.axes[frame.body] @ moment
 
-    def _motion(self, given: Given, value: np.ndarray) -> None:
+    def _number(self, given: Given, value: np.ndarray) -> None:
+        """Write what an input of the mechanism does: motions exactly, all else by differences of fourth order."""
+        instant, number = self.instant, self.instant.problem.numbers[given.name]
+        if given.level > 0 and any(place.order != given.level for place in number.places[1:]):
+            raise ModelError(
+                f"input {given.name!r}: it prescribes a {LEVELS[given.level]} and enters expressions as it is; give "
+                "the motion an input of its own"
+            )
+        if given.level == 0:
+            tables, now = instant.rdata, number.value(instant.rdata, instant.t)
+            step = INPUT_STEP * max(abs(now), 1.0)
+            for share, weight in DIFFERENCE:
+                instant.rdata = tables.copy()
+                number.write(instant.rdata, instant.t, now + share * step)
+                value += weight / step * instant.residual(instant.y)
+            instant.rdata = tables
+        for joint in given.joints:
+            self._motion(given, joint, value)
+
+    def _motion(self, given: Given, joint: Joint, value: np.ndarray) -> None:
         """Write how the constraint of a motion changes with what it prescribes."""
-        joint = given.joint
-        assert joint is not None
         names, row = self.instant.system.row_names, joint.rows[0]
         label = f"{joint.name}: {row.label}"
         if label not in names:
@@ -344,7 +370,7 @@ def _plant(
             state_units.append(one.unit_of(level))
     point = OperatingPoint(
         instant.t,
-        np.zeros(len(given)),
+        np.array([_value(instant, one) for one in given]),
         -instant.residual(instant.y)[instant.at["z"] + np.flatnonzero(kinds)][outputs],
         state,
     )
@@ -352,6 +378,12 @@ def _plant(
         change @ a @ back, change @ b, c @ back, d, states, [one.name for one in given], labels, 1.0, state_units,
         [one.unit for one in given], [one.unit for one in told], point,
     )  # fmt: skip
+
+
+def _value(instant: Instant, given: Given) -> float:
+    """Return the value of an input of the mechanism; what is added to it else is 0."""
+    number = instant.problem.numbers.get(given.name) if given.kind == "input" else None
+    return 0.0 if number is None else number.value(instant.rdata, instant.t)
 
 
 def _spatial(instant: Instant, reduced: Reduced, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from gearmbs.dae.analyses.statics import static_equilibrium as _static_equilibri
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.unknowns import FORMULATIONS
 from gearmbs.dae.model.model import Configuration, Model
+from gearmbs.dae.numbers import Number
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
@@ -44,6 +46,8 @@ class Point:
     idata, rdata : ndarray or None
     unknowns : dict of str to float
         Of an equilibrium, in which nothing moves whatever its motions do: all unknowns of the I3 formulation.
+    numbers : dict of str to list of ndarray
+        What stands in the places of inputs and parameters.
     state : State or None
         The state it was made from.
     """
@@ -55,6 +59,7 @@ class Point:
     idata: np.ndarray | None = None
     rdata: np.ndarray | None = None
     unknowns: dict[str, float] | None = None
+    numbers: dict[str, list[np.ndarray]] = field(default_factory=dict)
     state: State | None = None
 
 
@@ -99,9 +104,9 @@ def _of_equilibrium(mechanism: Mechanism, at: StaticResult) -> Point:
     unknowns = dict(zip(names, instant.y.tolist(), strict=True))
     z = slice(instant.at["z"], instant.at["mu"])
     states = dict(zip(instant.system.state_names, instant.y[z].tolist(), strict=True))
-    return Point(
-        instant.t, instant.configuration(), states, instant.system, instant.idata, instant.rdata, unknowns
-    )  # fmt: skip
+    numbers = _numbers(instant.problem.numbers, instant.rdata)
+    tables = instant.system, instant.idata, instant.rdata
+    return Point(instant.t, instant.configuration(), states, *tables, unknowns, numbers)
 
 
 def _of_state(mechanism: Mechanism, state: State) -> Point:
@@ -128,8 +133,23 @@ def _of_solution(system: System, problem: Any, members: Any, state: State) -> Po
     now = row.over(np.array([state.t]), state.y[None, :], [(0, idata)])
     places = int(idata[T.H_Z]) + np.arange(len(system.state_names))
     states = dict(zip(system.state_names, state.y[places].tolist(), strict=True))
-    point = Point(state.t, now._configuration(0), states, state=state)
+    numbers = _numbers(problem.numbers, rdata)
+    point = Point(state.t, now._configuration(0), states, numbers=numbers, state=state)
     return point if members is not None else replace(point, system=system, idata=idata, rdata=rdata)
+
+
+def _numbers(known: Mapping[str, Number], rdata: np.ndarray) -> dict[str, list[np.ndarray]]:
+    """Return what stands in the places of inputs and parameters."""
+    return {name: [rdata[p.at : p.at + 1 + p.size].copy() for p in one.places] for name, one in known.items()}
+
+
+def _with_numbers(model: Model, numbers: Mapping[str, list[np.ndarray]]) -> Model:
+    """Return a model whose inputs and parameters have the values of another one of the same mechanism."""
+    tables = {T.H_R_EXTRA: model.extra_r.copy(), T.H_R_FUNCTION: model.function_r.copy()}
+    for name, number in model.numbers.items():
+        for place, values in zip(number.places, numbers.get(name, ()), strict=False):
+            tables[place.table][place.at : place.at + values.size] = values
+    return replace(model, extra_r=tables[T.H_R_EXTRA], function_r=tables[T.H_R_FUNCTION])
 
 
 def instant_at(mechanism: Mechanism, point: Point) -> Instant:
@@ -146,7 +166,9 @@ def instant_at(mechanism: Mechanism, point: Point) -> Instant:
         names = system.row_names
         system.keep_rows(np.array([names.index(name) for name in point.system.row_names], dtype=np.int64))
         system.model = _counted(system.model, point.system.model, point.idata, point.rdata, point.t)
-        system.assembler = type(system.assembler)(system.model)
+    if point.numbers:
+        system.model = _with_numbers(system.model, point.numbers)
+    system.assembler = type(system.assembler)(system.model)
     instant = Instant(system, "I3")
     if point.unknowns is not None and point.idata is not None:
         codes = int(point.idata[T.H_I_CODE]) + np.arange(int(point.idata[T.H_BODIES]))

@@ -1,0 +1,150 @@
+"""A drivetrain under load: where its modes and linear plants are taken, and their inputs and outputs by its names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.drivetrain.drives import SpeedDrive
+from gearmbs.drivetrain.loads import TorqueLoad
+from gearmbs.drivetrain.part import DrivetrainError
+from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, Shaft, SpeedSensor, TorqueSensor
+from gearmbs.mechanism.parts.functions import constant
+from gearmbs.mechanism.solve.analyses import static_equilibrium
+from gearmbs.mechanism.solve.plant_names import Given, Told, own_marker
+from gearmbs.mechanism.solve.plants import linearize as linear_plant
+from gearmbs.wording import did_you_mean
+
+if TYPE_CHECKING:
+    from gearmbs.drivetrain.drivetrain import Drivetrain
+    from gearmbs.mechanism.mechanism import Mechanism
+    from gearmbs.mechanism.parts.bodies import Body, Marker
+    from gearmbs.mechanism.solve.plants import LinearPlant
+
+
+def resting(train: Drivetrain) -> Drivetrain:
+    """Return a drivetrain at rest under the loads of its operating point, without friction, its drives holding it."""
+    drives = [
+        SpeedDrive(name=drive.name, shaft=drive.shaft, speed=drive.speed, station=drive.station, on=drive.on,
+                   function=constant(0.0))
+        for drive in train.drives
+    ]  # fmt: skip
+    loads = [
+        TorqueLoad(name=load.name, shaft=load.shaft, station=load.station, on=load.on,
+                   torque=load.nominal(abs(train.speeds[load.shaft])))
+        for load in train.loads
+    ]  # fmt: skip
+    # flanks that rest on each other would stick
+    meshes = [replace(mesh, settings={**mesh.settings, "friction": False}) for mesh in train.meshes]
+    return replace(train, drives=drives, loads=loads, meshes=meshes, running=False)
+
+
+def loaded(train: Drivetrain) -> tuple[Mechanism, float]:
+    """Return the mechanism of a drivetrain at rest under the torques of its operating point, and a time at which.
+
+    Shafts of prescribed speed are held; other drives hold the train while it comes to rest, and then give way to the
+    torque they held it with.
+
+    Raises
+    ------
+    ModelError
+        If no position of rest is found.
+    """
+    still = resting(train)
+    m = still.build()
+    after = 2.0 * still.run_up
+    rest = static_equilibrium(m, t=after, move=True)
+    for drive in train.drives:
+        if not isinstance(drive, SpeedDrive):
+            held = m.joints.pop(drive.name)
+            torque = float(rest.solution.reaction(drive.name)[1][-1] @ held.j.global_orientation()[:, 2])
+            m.axis_torque(drive.name, held.i, held.j, torque)
+    return m, after
+
+
+def linearize(
+    train: Drivetrain, inputs: Sequence[Any], outputs: Sequence[Any], at: Any = "loaded", t: float | None = None
+) -> LinearPlant:
+    """Return the linear plant of a drivetrain; see :meth:`gearmbs.drivetrain.Drivetrain.linearize`."""
+    if isinstance(at, str) and at == "loaded":
+        m, after = loaded(train)
+        at, t = "initial", after if t is None else t
+    else:
+        m = train.build()
+    given = [_input(train, m, item) for item in inputs]
+    return linear_plant(m, given, [_output(train, m, item) for item in outputs], at=at, t=t)
+
+
+def _input(train: Drivetrain, m: Mechanism, item: Any) -> Any:
+    """Return an input in the names of the mechanism: the torque on a shaft is one about its own axis."""
+    if not (isinstance(item, tuple | list) and len(item) == 2 and item[0] == "torque"):
+        return item
+    shaft = train.parts.get(item[1])
+    if not isinstance(shaft, Shaft):
+        return item
+    seat = train.layout.seats[shaft.name]
+    where = seat.origin, seat.axes
+    i = _marker(m.bodies[shaft.name], f"{shaft.name} plant shaft", *where)
+    j = _marker(m.ground, f"{shaft.name} plant axis", *where)
+    return Given("torque", f"torque {shaft.name}", "N m", base="N m", i=i, j=j)
+
+
+def _output(train: Drivetrain, m: Mechanism, item: Any) -> Any:
+    """Return an output in the names of the mechanism: that of a sensor, or the speed or angle of a shaft."""
+    if isinstance(item, str):
+        sensor = train.parts.get(item)
+        return _sensed(train, m, sensor) if isinstance(sensor, Sensor) else item
+    if isinstance(item, tuple | list) and len(item) == 2 and item[0] in ("speed", "angle"):
+        shaft = train.part(item[1], Shaft, f"output {tuple(item)!r}")
+        function, unit = ("WZ", "rad/s") if item[0] == "speed" else ("AZ", "rad")
+        return Told(f"{item[0]} {shaft.name}", unit, _about_axis(train, m, shaft.name, function))
+    return item
+
+
+def _about_axis(train: Drivetrain, m: Mechanism, shaft: str, function: str) -> str:
+    """Return the speed or the angle of a shaft about its own axis."""
+    seat = train.layout.seats[shaft]
+    i = _marker(m.bodies[shaft], f"{shaft} plant shaft", seat.origin, seat.axes).name
+    j = _marker(m.ground, f"{shaft} plant axis", seat.origin, seat.axes).name
+    return f'WZ("{i}", "{j}", "{j}")' if function == "WZ" else f'AZ("{i}", "{j}")'
+
+
+def _marker(body: Body, name: str, place: np.ndarray, axes: np.ndarray) -> Marker:
+    """Return a marker of a body at a global place, made once."""
+    return own_marker(body, name, body.marker_at, place, axes)
+
+
+def _sensed(train: Drivetrain, m: Mechanism, sensor: Sensor) -> Told:
+    """Return what a sensor measures, along directions at rest."""
+    if isinstance(sensor, SpeedSensor):
+        text = _about_axis(train, m, sensor.shaft, "WZ")
+    elif isinstance(sensor, TorqueSensor):
+        element = m.elements.get(sensor.of)
+        joint = m.joints.get(sensor.of)
+        between = element if element is not None else joint
+        if between is None:
+            there = [*m.joints, *m.elements]
+            raise DrivetrainError(f"{sensor.label}: nothing is called {sensor.of!r}; {did_you_mean(sensor.of, there)}")
+        text = f'TZ("{between.i.name}", "{between.j.name}", "{between.j.name}")'
+    elif isinstance(sensor, Laser):
+        seat, body = train.layout.seats[sensor.shaft], m.bodies[sensor.shaft]
+        d = np.asarray(sensor.direction, dtype=float) / np.linalg.norm(sensor.direction)
+        place = seat.at(train.station(sensor))
+        at = _marker(body, f"{sensor.name} plant spot", place, np.eye(3))
+        # the spot is fixed in space: (v + omega x arm) . d = v . d + omega . (arm x d)
+        turned = np.cross(sensor.offset * np.cross(seat.axes[:, 2], d), d)
+        text = " + ".join(
+            f'({float(v)!r})*V{c}("{at.name}") + ({float(w)!r})*W{c}("{at.name}")'
+            for c, v, w in zip("XYZ", d, turned, strict=True)
+        )
+    else:
+        assert isinstance(sensor, Accelerometer)
+        bearing = next(one for one in train.bearings if one.name == sensor.bearing)
+        place = train.layout.seats[bearing.shaft].at(train.station(bearing))
+        d = np.asarray(sensor.direction, dtype=float) / np.linalg.norm(sensor.direction)
+        at = _marker(m.bodies[train.carrier(bearing)], f"{sensor.name} plant seat", place, np.eye(3))
+        text = " + ".join(f'({float(v)!r})*ACC{c}("{at.name}", 0, "{at.name}")' for c, v in zip("XYZ", d, strict=True))
+    return Told(sensor.name, sensor.unit, text)

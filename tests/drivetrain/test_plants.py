@@ -1,0 +1,94 @@
+"""Linear plants of drivetrains: two shafts and a mesh against their equations, sensors, transmission error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.drivetrain import (
+    Drivetrain,
+    GearMesh,
+    IdealBearing,
+    Shaft,
+    SpeedDrive,
+    SpeedSensor,
+    TorqueDrive,
+    TorqueLoad,
+    Wheel,
+)
+from gearmbs.gears import GearSpec
+from gearmbs.studies import train_modes
+from tests.says import says
+
+
+def stage(drive: str = "torque") -> Drivetrain:
+    """Return one stage, 20 to 60 teeth."""
+    kind = {"torque": TorqueDrive(name="motor", shaft="in", speed="1500 rpm", torque="100 N m"),
+            "speed": SpeedDrive(name="motor", shaft="in", speed="1500 rpm")}[drive]  # fmt: skip
+    return Drivetrain(
+        "one stage",
+        shafts=[Shaft(name="in"), Shaft(name="out")],
+        wheels=[
+            Wheel(name="pinion", shaft="in", gear=GearSpec(20, "3 mm")),
+            Wheel(name="gear", shaft="out", gear=GearSpec(60, "3 mm")),
+        ],
+        meshes=[GearMesh(name="stage", driver="pinion", driven="gear", settings={"backlash": "0.1 mm"})],
+        bearings=[IdealBearing(name="a", shaft="in"), IdealBearing(name="b", shaft="out")],
+        drives=[kind],
+        loads=[TorqueLoad(name="brake", shaft="out", torque="300 N m")],
+        sensors=[SpeedSensor(name="tacho", shaft="out")],
+    )
+
+
+@pytest.mark.slow
+def test_two_shafts_and_a_mesh_move_as_two_masses_on_a_spring():
+    """J_1 w_1' = T - r_1 F, J_2 w_2' = -r_2 F, F = k (d - e) + c (d' - e'), d = r_1 phi_1 + r_2 phi_2."""
+    train = stage()
+    plant = train.linearize([("torque", "in"), ("transmission_error", "stage")],
+                            ["tacho", ("angle", "in"), ("transmission_error", "stage")])  # fmt: skip
+    first, second = (train.part(name).gear.base_radius for name in ("pinion", "gear"))
+    m = train.build()
+    inertia = np.array([m.bodies[name].inertia[2, 2] for name in ("in", "out")])
+    lever = np.array([first, second])
+    # stiffness and damping of the flanks that touch, from one entry each
+    k, c = (-plant.A[2, column] * inertia[0] / first**2 for column in (0, 2))
+    a = np.zeros((4, 4))
+    a[:2, 2:] = np.eye(2)
+    a[2:, :2] = -k * np.outer(lever, lever) / inertia[:, None]
+    a[2:, 2:] = -c * np.outer(lever, lever) / inertia[:, None]
+    np.testing.assert_allclose(plant.A, a, rtol=1e-6, atol=1e-9 * np.abs(a).max())
+    assert plant.B[2, 0] == pytest.approx(1.0 / inertia[0], rel=1e-9)
+    s = 300.0 + 9000.0j
+    driven = (c * s + k) * lever
+    dynamic = np.diag(inertia) * s**2 + np.outer(lever, driven)
+    turned = np.linalg.solve(dynamic, np.array([[1.0, driven[0]], [0.0, driven[1]]]))
+    exact = np.array([s * turned[1], turned[0], lever @ turned])
+    np.testing.assert_allclose(plant.transfer(s), exact, rtol=1e-6)
+    # at rest a transmission error is what it says
+    assert plant.dc_gain[2, 1] == pytest.approx(1.0, rel=1e-9)
+    assert plant.output_units == ["rad/s", "rad", "m"]
+
+
+@pytest.mark.slow
+def test_poles_are_the_modes_of_the_drivetrain():
+    train = stage("speed")
+    plant, modes = train.linearize([], ["tacho"]), train_modes(train).eigenvalues
+    assert plant.poles[plant.poles.imag > 0] == pytest.approx(modes[modes.imag > 0], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_drivetrain_that_runs_is_linearised_where_it_is():
+    train = stage("speed")
+    m = train.build()
+    solution = m.simulate(0.2, rate=20000, tol=1e-7, rate_scale=train.rate_scale)
+    plant = train.linearize([("motion", "motor", "rate")], ["tacho", ("speed", "in")], at=solution)
+    assert plant.point.outputs == pytest.approx([solution.angular_velocity("out")[-1, 2], 50.0 * np.pi], rel=1e-6)
+    # slowly the driven shaft follows by the ratio, the other way round
+    low = plant.frequency_response(1.0)[0]
+    assert low[1, 0] == pytest.approx(1.0, abs=1e-9)
+    assert low[0, 0] == pytest.approx(-1.0 / 3.0, rel=1e-3)
+
+
+def test_names_that_are_none_are_told():
+    with pytest.raises(ValueError, match=says("'inn'", "did you mean 'in'")):
+        stage().linearize([], [("speed", "inn")], at="initial")
