@@ -93,8 +93,7 @@ CIRCLES = {
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.plant_names",
      "mechanism.solve.plants", "mechanism.solve.points", "mechanism.solve.simulate"):
         "methods of Mechanism, and the functions that carry them out",
-    ("campaigns.campaign", "campaigns.report", "campaigns.results", "campaigns.sensitivity",
-     "campaigns.surrogates"):
+    ("campaigns.campaign", "campaigns.results", "campaigns.sensitivity", "campaigns.surrogates"):
         "methods of Campaign, and the functions that carry them out",
 }  # fmt: skip
 """Groups of modules that may know each other, and why."""

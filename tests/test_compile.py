@@ -90,7 +90,7 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess:
 PROGRAM = f"""
 import sys
 sys.path[:0] = {[path for path in sys.path if path]}
-from gearmbs.dae.equations.kinematics.rotation import rotation_matrix
+from gearmbs.dae.equations.rotation import rotation_matrix
 import numpy as np
 a = np.zeros((3, 3))
 print(rotation_matrix.ready() is rotation_matrix)
@@ -108,8 +108,8 @@ def test_a_program_says_that_it_compiles(tmp_path):
     assert "failed" not in first.stderr
     assert first.stdout == "True\n"
     kept = {path.name.partition("-")[0] for path in tmp_path.rglob("*.entry")}
-    assert "dae.equations.kinematics.rotation.rotation_matrix" in kept
-    assert all(name.startswith("dae.equations.kinematics.rotation.") for name in kept)
+    assert "dae.equations.rotation.rotation_matrix" in kept
+    assert all(name.startswith("dae.equations.rotation.") for name in kept)
     second = run(tmp_path, "-c", PROGRAM)
     assert second.stderr == ""
     assert second.stdout == "True\n"
@@ -168,7 +168,7 @@ def test_looking_for_calls_imports_nothing():
 @pytest.mark.slow
 def test_failing_helpers(monkeypatch):
     """What a helper cannot compile is told with its traceback."""
-    kernel = calls.find("gearmbs.dae.equations.kinematics.rotation", "rotation_matrix")
+    kernel = calls.find("gearmbs.dae.equations.rotation", "rotation_matrix")
     monkeypatch.setattr(cache, "stored", lambda *rest: False)
     monkeypatch.setattr(calls, "address", lambda kernel: f"{kernel.__module__}:not_there")
     with pytest.raises(RuntimeError, match=says("not_there", "LookupError")):
@@ -182,7 +182,7 @@ def missing(monkeypatch):
     monkeypatch.setattr(compiling, "_said", set())
     monkeypatch.setattr(compiling, "_failures", [])
     monkeypatch.delenv(compiling.HELPER, raising=False)
-    return calls.find("gearmbs.dae.equations.kinematics.rotation", "rotation_matrix")
+    return calls.find("gearmbs.dae.equations.rotation", "rotation_matrix")
 
 
 @pytest.mark.slow

@@ -105,9 +105,9 @@ MORE = {
         "gearmbs.dae.model.initial": ["InitialReport", "assemble_position", "consistent_velocity", "independent_rows"],
         "gearmbs.dae.equations.residual": ["residual", "add_constraints", "add_load"],
         "gearmbs.dae.equations.jacobian": ["jacobian", "body_entries", "row_entries"],
-        "gearmbs.dae.equations.outputs.accelerations": ["saddle"],
-        "gearmbs.dae.equations.kinematics.update": ["hook", "rewrite_point"],
-        "gearmbs.dae.equations.kinematics.rotation": [
+        "gearmbs.dae.equations.accelerations": ["saddle"],
+        "gearmbs.dae.equations.kinematics": ["hook", "rewrite_point"],
+        "gearmbs.dae.equations.rotation": [
             "matrix_from_euler",
             "euler_from_matrix",
             "rotation_matrix",

@@ -41,7 +41,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import types
 
-from gearmbs.dae.equations.kinematics.update import angle_gradient, counted_angle
+from gearmbs.dae.equations.kinematics import angle_gradient, counted_angle
 from gearmbs.dae.equations.loads.forces import (
     DERIVATIVES,
     DISSIPATED,

@@ -11,7 +11,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_ACCELERATION, LEVEL_TIME
-from gearmbs.dae.equations.kinematics.update import AXES as COUNTED
+from gearmbs.dae.equations.kinematics import AXES as COUNTED
 from gearmbs.dae.equations.loads import time_functions
 from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.model.builder import TableBuilder
@@ -128,10 +128,11 @@ class _Compiler:
     # --- bodies and markers -------------------------------------------------------------------------
 
     def add_bodies(self) -> None:
-        for body in self.mechanism.bodies.values():
+        bodies = [(body, body.numbers) for body in self.mechanism.bodies.values()]
+        for body, numbers in bodies:
             modal = body.modal if isinstance(body, ModalBody) else None
             self.body_index[id(body)] = self.builder.add_body(
-                body.mass, body.inertia, modal, kind=body.kind, numbers=body.numbers
+                body.mass, body.inertia, modal, kind=body.kind, numbers=numbers
             )
 
     def index_all_markers(self) -> None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model.fixed_axes import Axis, fixed_axis_problem, starting_values
 from gearmbs.dae.model.members import TURN_COLUMNS, TURN_I, TURN_J, TURN_ROOT, TURN_ROWS, TURN_SIDE
 from gearmbs.mechanism.parts.bodies import Body, Marker

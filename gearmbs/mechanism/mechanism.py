@@ -14,7 +14,6 @@ from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.forces.friction import FrictionForce, add_friction, friction_of
 from gearmbs.mechanism.forces.functions import FunctionForce, function_force
-from gearmbs.mechanism.joint_methods import JointMethods
 from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.language.user_functions import UserFunction
 from gearmbs.mechanism.load_methods import Expression, LoadMethods
@@ -24,6 +23,7 @@ from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 from gearmbs.mechanism.parts.inputs import Input, Parameter, make_input, make_parameter
+from gearmbs.mechanism.parts.joints import JointMethods
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
@@ -283,10 +283,12 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         """
         self._check_name(element.name)
         label = f"{element.kind} '{element.name}'"
-        for marker in element.markers:
+        markers = element.markers
+        for marker in markers:
             if not isinstance(marker, Marker):
                 raise ModelError(f"{label}: {marker!r} is not a marker; make one with body.marker(...)")
             self._check_body(label, marker.body)
+        for marker in markers:
             marker.body.check(element)
         self.elements[element.name] = element
         return element

@@ -34,7 +34,7 @@ from gearmbs.adams.parse.check import MARKER_FIELDS
 from gearmbs.adams.parse.data import curve_points, spline_data
 from gearmbs.adams.parse.deck import Deck, read_variables
 from gearmbs.dae.equations.expressions import SplineData
-from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
+from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.language.library import ELEMENT_FORCES

@@ -15,7 +15,7 @@ from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import matrix_values
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
+from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Call, Scope, parse, walk
 

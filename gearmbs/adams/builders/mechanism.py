@@ -17,7 +17,7 @@ from gearmbs.adams.builders.scopes import IN_DYNAMICS, AdamsModel, BodyState, Pr
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.parts.functions import polynomial

@@ -438,7 +438,7 @@ def part_motion(segment: Segment, number: int, kind: str = "part") -> np.ndarray
 
 
 def _frame_motion(segment: Segment, name: str) -> np.ndarray:
-    from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
+    from gearmbs.dae.equations.rotation import euler_from_matrix
 
     s = segment.solution
     body = segment.model.mechanism.bodies[name]

@@ -14,7 +14,7 @@ from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.expressions import eval_gradient
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_R, ExpressionError
 from gearmbs.dae.equations.expressions.tape import Tape
-from gearmbs.dae.equations.kinematics.update import AXES as ANGLE_NAMES
+from gearmbs.dae.equations.kinematics import AXES as ANGLE_NAMES
 from gearmbs.dae.results.frames import frame_motion
 from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit

@@ -26,7 +26,7 @@ from gearmbs.adams.write.elements import (
 )
 from gearmbs.adams.write.gear_expressions import is_gear_contact
 from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
-from gearmbs.dae.equations.kinematics.rotation import euler_from_matrix
+from gearmbs.dae.equations.rotation import euler_from_matrix
 from gearmbs.dae.methods import FORMULATIONS, INTEGRATORS
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism

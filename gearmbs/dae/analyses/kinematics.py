@@ -9,9 +9,9 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from gearmbs.dae.equations import accelerations
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.kinematics.rotation import KIN_AXES, POSE_COLUMNS
-from gearmbs.dae.equations.outputs import accelerations
+from gearmbs.dae.equations.rotation import KIN_AXES, POSE_COLUMNS
 from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.problem import AssemblyError, ModelError
 from gearmbs.dae.result import DAEResult, SolverStats, Status

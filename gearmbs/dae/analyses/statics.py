@@ -23,10 +23,10 @@ from gearmbs.dae.analyses.eigenvalues import free_motions
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import reduce
 from gearmbs.dae.analyses.relaxation import DENSE_LIMIT, LARGEST_TURN, ROUNDING_STEP, Relaxation, describe
+from gearmbs.dae.equations import accelerations
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V
-from gearmbs.dae.equations.kinematics.update import AXES
-from gearmbs.dae.equations.outputs import accelerations
+from gearmbs.dae.equations.kinematics import AXES
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.model.evaluator import Records
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem, ModelError, SingularModelError

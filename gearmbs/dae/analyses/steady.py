@@ -30,7 +30,7 @@ from scipy.sparse.csgraph import connected_components
 
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.turning import skew, spinning_modes
-from gearmbs.dae.equations.kinematics.rotation import POSE_V, POSE_W
+from gearmbs.dae.equations.rotation import POSE_V, POSE_W
 from gearmbs.dae.model.system import accelerations
 from gearmbs.dae.problem import ModelError
 

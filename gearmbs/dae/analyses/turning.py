@@ -39,7 +39,7 @@ import numpy as np
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
-from gearmbs.dae.equations.kinematics.rotation import KIN_ADOT, KIN_AXES, POSE_A, POSE_V, POSE_W
+from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, POSE_A, POSE_V, POSE_W
 
 # How the modes of a body that is alike about an axis turn with it, for the whirl of flexible bodies.
 #

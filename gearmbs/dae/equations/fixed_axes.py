@@ -21,8 +21,7 @@ import numpy as np
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
-from gearmbs.dae.equations.kinematics.rotation import KIN_A, KIN_FORCE, KIN_R, KIN_V, KIN_W
-from gearmbs.dae.equations.kinematics.update import (
+from gearmbs.dae.equations.kinematics import (
     counts_angles,
     predict_angles,
     track,
@@ -33,6 +32,7 @@ from gearmbs.dae.equations.kinematics.update import (
 from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, evaluate_element
 from gearmbs.dae.equations.residual import S_VECTOR, S_WRENCH, add_own_states
+from gearmbs.dae.equations.rotation import KIN_A, KIN_FORCE, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed, put
 from gearmbs.dae.problem import HOOK_SIG, JACOBIAN_SIG, KEPT, RESIDUAL_SIG
 from gearmbs.kernels.jit import njit

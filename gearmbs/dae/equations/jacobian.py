@@ -11,7 +11,7 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.body import body_entries
 from gearmbs.dae.equations.constraints.jacobian import row_entries, tape_row_entries
-from gearmbs.dae.equations.kinematics.update import update_tables
+from gearmbs.dae.equations.kinematics import update_tables
 from gearmbs.dae.equations.loads.jacobian import element_entries, load_entries, state_entries
 from gearmbs.dae.equations.residual import S_TERM
 from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed

@@ -11,7 +11,7 @@ from collections import namedtuple
 import numpy as np
 from numba import types
 
-from gearmbs.dae.equations.kinematics.rotation import KIN_COLUMNS
+from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import IMAT, IVEC, MAT, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at

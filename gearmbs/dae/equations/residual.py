@@ -29,7 +29,12 @@ from gearmbs.dae.equations.bodies.body import add_wrench, body_residual
 from gearmbs.dae.equations.bodies.frames import is_elastic, own_rate
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.constraints.terms import add_dot_term, add_point_term
-from gearmbs.dae.equations.kinematics.rotation import (
+from gearmbs.dae.equations.kinematics import update_tables
+from gearmbs.dae.equations.loads import expressions
+from gearmbs.dae.equations.loads.elastic import bring_to_body
+from gearmbs.dae.equations.loads.forces import evaluate_element
+from gearmbs.dae.equations.loads.reactions import reaction_wrench
+from gearmbs.dae.equations.rotation import (
     KIN_COLUMNS,
     KIN_FORCE,
     KIN_MOMENT,
@@ -39,11 +44,6 @@ from gearmbs.dae.equations.kinematics.rotation import (
     KIN_V,
     KIN_W,
 )
-from gearmbs.dae.equations.kinematics.update import update_tables
-from gearmbs.dae.equations.loads import expressions
-from gearmbs.dae.equations.loads.elastic import bring_to_body
-from gearmbs.dae.equations.loads.forces import evaluate_element
-from gearmbs.dae.equations.loads.reactions import reaction_wrench
 from gearmbs.dae.equations.unknowns import has_rate_rows, multipliers_are_rates, multipliers_of_row
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.kernels.jit import njit

@@ -184,6 +184,14 @@ class _Unscaled(NamedTuple):
     pivots: tuple[np.ndarray, np.ndarray]
 
 
+def _rows_and_columns(
+    entries: np.ndarray, taken: np.ndarray, indptr: np.ndarray, indices: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where entries of the matrix stand, which are among those taken."""
+    k = np.searchsorted(taken, entries)
+    return indices[k], np.searchsorted(indptr, k, side="right") - 1
+
+
 @lru_cache(maxsize=KNOWN)
 def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     """Return the plan that follows from pivots, the same object for the same ones."""
@@ -191,8 +199,9 @@ def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, left = pivots.lists
     ones = np.ones(len(rows))
     tail = tail_of_plan(rank, l_ptr, u_ptr) if with_tail else len(rows)
-    l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
-    u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
+    if tail < len(rows):
+        l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
+        u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
     lists = entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices)
     f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=nodes(l_ptr, lists[L_POS]))
     n, blocks = len(rows), None
@@ -211,8 +220,8 @@ def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     else:
         f |= operations_on_blocks(tail, step, f["u_ptr"], f["u_pos"], u_at, blocks)
     none, u_tail = np.empty(0), np.count_nonzero(f["u_col"] >= tail)
-    places = [np.searchsorted(taken, f[entries]) for entries in ("a_src", "tail_src")]
-    of_a, of_tail = ((indices[k], np.searchsorted(indptr, k, side="right") - 1) for k in places)
+    of_a = _rows_and_columns(f["a_src"], taken, indptr, indices)
+    of_tail = _rows_and_columns(f["tail_src"], taken, indptr, indices)
     plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, u_tail=u_tail, **f, **order)
     return _Unscaled(plan, of_a, of_tail, (rows, cols))
 

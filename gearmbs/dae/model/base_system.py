@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_COLUMNS, POSE_R
+from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R
 from gearmbs.dae.model.evaluator import Assembler
 from gearmbs.dae.model.model import Configuration, Model
 

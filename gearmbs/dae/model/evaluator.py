@@ -10,18 +10,9 @@ import numpy as np
 import scipy
 from numba import float64, int64
 
+from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.bodies.body import body_from_pose
-from gearmbs.dae.equations.constraints.projection import are_satisfied, displace, largest_violation, violations
-from gearmbs.dae.equations.kinematics.rotation import (
-    POSE_A,
-    POSE_COLUMNS,
-    best_reference,
-)
-from gearmbs.dae.equations.kinematics.update import track, turns_are_counted, update_tables
-from gearmbs.dae.equations.loads.reactions import renew_reactions
-from gearmbs.dae.equations.outputs import accelerations as index1
-from gearmbs.dae.equations.outputs.accelerations import (
+from gearmbs.dae.equations.accelerations import (
     ROW_PHI,
     ROW_RATE,
     ROW_RECORD,
@@ -30,12 +21,25 @@ from gearmbs.dae.equations.outputs.accelerations import (
     pose_record,
     poses,
 )
+from gearmbs.dae.equations.bodies.body import body_from_pose
+from gearmbs.dae.equations.kinematics import track, turns_are_counted, update_tables
+from gearmbs.dae.equations.loads.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
+from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, best_reference
 from gearmbs.dae.equations.unknowns import COUNT, I3, NUMBERS, PLACES, compressed
 from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
-from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding
+from gearmbs.dae.model.records import (
+    FARTHEST,
+    RECORDS_TYPE,
+    Records,
+    allow_rounding,
+    are_satisfied,
+    displace,
+    largest_violation,
+    violations,
+)
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at

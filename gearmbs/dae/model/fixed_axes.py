@@ -11,6 +11,7 @@ from numba import float64, int64, void
 
 from gearmbs.dae.equations import fixed_axes as fx
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.accelerations import ROW_PARTIAL, ROW_RECORD, apply_loads
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.fixed_axes import (
@@ -26,9 +27,8 @@ from gearmbs.dae.equations.fixed_axes import (
     axes_pattern,
     update_axes,
 )
-from gearmbs.dae.equations.kinematics.rotation import KIN_R, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
-from gearmbs.dae.equations.kinematics.update import track, turns_are_counted, update_markers
-from gearmbs.dae.equations.outputs.accelerations import ROW_PARTIAL, ROW_RECORD, apply_loads
+from gearmbs.dae.equations.kinematics import track, turns_are_counted, update_markers
+from gearmbs.dae.equations.rotation import KIN_R, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.equations.unknowns import SI2
 from gearmbs.dae.model.members import (
     MEMBERS_TYPE,

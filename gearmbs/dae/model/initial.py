@@ -15,8 +15,8 @@ import scipy
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints.terms import ROTATION
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.equations.loads.time_functions import CONSTANT
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.model.evaluator import POSE_PLACES, Assembler
 from gearmbs.dae.model.model import Model, frozen
 from gearmbs.dae.problem import AssemblyError, SingularModelError

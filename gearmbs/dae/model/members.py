@@ -13,21 +13,11 @@ import numpy as np
 from numba import float64, int64, types, void
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.accelerations import ROW_RECORD
 from gearmbs.dae.equations.constraints import terms
-from gearmbs.dae.equations.kinematics.rotation import (
-    KIN_A,
-    KIN_R,
-    KIN_V,
-    KIN_W,
-    POSE_A,
-    POSE_COLUMNS,
-    POSE_R,
-    POSE_V,
-    POSE_W,
-)
-from gearmbs.dae.equations.kinematics.update import update_functions, update_markers
-from gearmbs.dae.equations.outputs.accelerations import ROW_RECORD
+from gearmbs.dae.equations.kinematics import update_functions, update_markers
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
+from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model.evaluator import Evaluator, new_records
 from gearmbs.dae.model.records import RECORDS_TYPE, Records
 from gearmbs.kernels.jit import njit

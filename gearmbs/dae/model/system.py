@@ -14,7 +14,7 @@ from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.body import turning_rates
 from gearmbs.dae.equations.constraints.terms import ANGLE
-from gearmbs.dae.equations.kinematics.update import hook
+from gearmbs.dae.equations.kinematics import hook
 from gearmbs.dae.equations.loads.reactions import reactions_from
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Unknown, multipliers_are_rates
 from gearmbs.dae.model import diagnosis, initial
@@ -282,8 +282,7 @@ def _rates(y, yp, acc: np.ndarray, t: float, idata, rdata, work) -> None:
     u, p, r, th = (int(idata[k]) for k in (T.H_U, T.H_P, T.H_R, T.H_THETA))
     yp[r:th] = y[u:p]
     _momentum_rates(t, y, yp, idata, rdata, work)
-    for b, at in enumerate(places, start=1):
-        turning_rates(b, acc[at[T.AT_V] : at[T.AT_V] + 6], y, yp, at, kin)
+    turning_rates(places, acc, y, yp, kin)
 
 
 def _momentum_rates(t: float, y, yp, idata, rdata, work) -> None:
@@ -332,7 +331,7 @@ class System(BaseSystem):
     # --- the start ----------------------------------------------------------------------------------
 
     def accelerations(self, configuration: Configuration | np.ndarray, t: float):
-        """Return (a, alpha) a row per body, lambda, and the load records at a configuration; see `model.start`."""
+        """Return (a, alpha) a row per body, lambda, and the load records at a configuration; see `accelerations`."""
         configuration = self._configuration(configuration)
         acc, multipliers, found = accelerations(self, configuration, t)
         return configuration.parts(acc)[0], multipliers, found.loads

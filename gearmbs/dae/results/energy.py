@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.kinematics.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_V, POSE_W
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED
+from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_V, POSE_W
 from gearmbs.dae.results.frames import Evaluated, frame_motion
 
 if TYPE_CHECKING:

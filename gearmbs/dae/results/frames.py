@@ -12,17 +12,7 @@ import numpy as np
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions.opcodes import ACC_A, ACC_ALPHA
-from gearmbs.dae.equations.kinematics.rotation import (
-    KIN_A,
-    KIN_AXES,
-    KIN_R,
-    KIN_V,
-    KIN_W,
-    POSE_A,
-    POSE_R,
-    POSE_V,
-    POSE_W,
-)
+from gearmbs.dae.equations.rotation import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model.evaluator import Records
 from gearmbs.dae.model.model import Model
 from gearmbs.dae.model.system import turns_of_one

@@ -18,7 +18,7 @@ import numpy as np
 
 from gearmbs._lazy import former_name
 from gearmbs._shown import Shown, html_table
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.model.system import System
@@ -196,9 +196,10 @@ class Solution(Shown):
         last = self.t.size - 1
         rows = [row for row in (0, last) if row >= 0 and float(self.t[row]) in self.inside]
         # the start comes before all others, for turns are counted
-        limits = {row: self._just_inside(evaluator, row) for row in rows if row == 0}
+        limits = {0: self._just_inside(evaluator, 0)} if 0 in rows else {}
         self._fill_held(evaluator, records)
-        limits |= {row: self._just_inside(evaluator, row) for row in rows if row > 0}
+        if last in rows and last > 0:
+            limits[last] = self._just_inside(evaluator, last)
         for row, limit in limits.items():
             near = slice(max(row - NEAR, 0), row + NEAR + 1)
             pairs = [(limit.solution[0], records.solution[near]), (limit.loads[0], records.loads[near])]

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.equations.kinematics.update import angle_gradient, counted_angle
+from gearmbs.dae.equations.kinematics import angle_gradient, counted_angle
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
 from gearmbs.kernels.jit import njit
 

@@ -185,9 +185,16 @@ class Body(OwnAttributes):
     def marker_at(self, point: Vector, matrix: np.ndarray, name: str | None = None) -> Marker:
         """Add a marker given in global components at the initial position of the body."""
         label = self._marker_label(name)
-        place = vector(point, f"body '{self.name}': marker position", "length") - self.position
-        matrix = rotation_matrix(self.orientation.T @ matrix, f"marker '{label}': orientation")
-        marker = Marker(label, self, self.orientation.T @ place, matrix)
+        place = vector(point, f"body '{self.name}': marker position", "length")
+        axes = rotation_matrix(self.orientation.T @ matrix, f"marker '{label}': orientation")
+        return self._with_marker(Marker(label, self, self.orientation.T @ (place - self.position), axes))
+
+    def placed_marker(self, point: np.ndarray, axes: np.ndarray, name: str) -> Marker:
+        """Add a marker as `marker_at` does, of a position in m and a rotation matrix that have been checked."""
+        place = self.orientation.T @ (point - self.position)
+        return self._with_marker(Marker(self._marker_label(name), self, place, self.orientation.T @ axes))
+
+    def _with_marker(self, marker: Marker) -> Marker:
         self.markers.append(marker)
         return marker
 

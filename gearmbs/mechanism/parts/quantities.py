@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gearmbs.dae.equations.expressions import ExpressionError
-from gearmbs.dae.equations.kinematics.rotation import matrix_from_euler
+from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.dae.problem import ModelError
 from gearmbs.units import NUMBER, Given, to_si
 

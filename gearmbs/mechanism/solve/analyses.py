@@ -13,7 +13,7 @@ from gearmbs.dae.analyses import statics as _sequence
 from gearmbs.dae.analyses import statics as _statics
 from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.statics import StaticResult
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.modal import ModalBody

@@ -15,7 +15,7 @@ from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Inputs, Reduced, reduce, warn_of_varying
 from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, Realised, lowered, realised
 from gearmbs.dae.analyses.turning import skew, turning
-from gearmbs.dae.equations.kinematics.rotation import POSE_A, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.bodies import Marker

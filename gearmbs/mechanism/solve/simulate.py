@@ -11,15 +11,15 @@ import numpy as np
 
 from gearmbs._lazy import uncollected
 from gearmbs.dae.equations import layout as tables
-from gearmbs.dae.equations.kinematics.update import update_tables
+from gearmbs.dae.equations.kinematics import update_tables
 from gearmbs.dae.equations.loads.expressions import value
 from gearmbs.dae.integrators.events import STOP
 from gearmbs.dae.integrators.options import Options, beside
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
-from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
-from gearmbs.dae.results.solution import CONFLICT_SAMPLES, PART_SIZE, Solution
+from gearmbs.dae.results.solution import Solution
+from gearmbs.dae.results.stream import Stream
 from gearmbs.dae.state import State
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
@@ -38,6 +38,7 @@ from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.system import System
 
 # Ends of a simulation where an expression passes a value.
 
@@ -189,7 +190,7 @@ def simulate(
     consumer : callable, optional
         With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
         and each valid during the call only, instead of keeping all steps in memory; see
-        `gearmbs.mechanism.solve.simulate.Stream`. The solution returned then holds nothing but the last step.
+        `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
     lump : bool, optional
         Integrate bodies that fixed joints connect, or fix to the ground, as one, and if all that is left turns about
         fixed axes, its angles alone; default the mechanism's ``lump``, which only some presets set, and not with
@@ -411,66 +412,3 @@ SETTINGS = (
     "continued",
     "initial",
 )
-
-
-AXIS_PART_SIZE = 1024
-"""The same where nothing has to be prepared for a part, since all bodies turn about fixed axes."""
-
-
-class Stream:
-    """Consumer of an integrator's steps that hands them on as solutions.
-
-    Parameters
-    ----------
-    system : System
-    problem : DAEProblem
-    t_end : float
-        End of the run, s.
-    consumer : callable
-        Called as ``consumer(part)`` with a `Solution` of some accepted steps, in the order of time. It is valid until
-        the next call: parts share their memory. Forces and accelerations are evaluated when first asked for.
-
-    members : Members, optional
-        Of bodies that are integrated as one.
-
-    Attributes
-    ----------
-    part_size : int
-        About how many steps a part has.
-    conflict : str or None
-        The first violation found of a constraint row removed as redundant.
-    """
-
-    def __init__(
-        self,
-        system: System,
-        problem: DAEProblem,
-        t_end: float,
-        consumer: Callable[[Solution], None],
-        members: Members | None = None,
-    ) -> None:
-        nothing = np.empty((0, problem.n))
-        result = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "")
-        self.whole = Solution(system, problem, result, members)
-        self.part_size = PART_SIZE if members is None or not len(members.turn) else AXIS_PART_SIZE
-        self.whole.share(2 * self.part_size)
-        self.consumer = consumer
-        self.conflict: str | None = None
-        self.interval = (t_end - problem.t0) / CONFLICT_SAMPLES
-        self.next_look = problem.t0
-
-    def __call__(self, t: np.ndarray, y: np.ndarray, idata: np.ndarray) -> None:
-        """Hand on accepted steps and the integer table that is valid for them."""
-        # in equal parts: a small rest would cost as much beside its evaluation as a full part
-        size = -(-t.size // max(1, round(t.size / self.part_size)))
-        for k in range(0, t.size, size):
-            part = self.whole.over(t[k : k + size], y[k : k + size], [(0, idata)])
-            if self.conflict is None and part.t[-1] >= self.next_look:
-                self.next_look = float(part.t[-1]) + self.interval
-                self.conflict = part.find_conflict(np.array([part.t.size - 1]))
-            self.consumer(part)
-
-    def close(self, solution: Solution) -> Solution:
-        """Give what was found on the way to the solution that the run ended with, and return it."""
-        solution.note_conflict(self.conflict)
-        return solution

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from gearmbs.dae.equations.rotation import FARTHEST_ANGLE, put_turns
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES
-from gearmbs.kernels.sines import FARTHEST_ANGLE, put_turns
 
 
 @njit(error_model="numpy")

@@ -8,6 +8,7 @@ directions that a kind does not have it stands still, held by an inertia without
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class BodyKind:
     directions: tuple[int, ...] = tuple(range(6))
     lumps: bool = False
 
-    @property
+    @cached_property
     def angles(self) -> int:
         """Number of Euler angles among its coordinates."""
         return sum(direction >= 3 for direction in self.directions)

@@ -17,7 +17,7 @@ from gearmbs.dae.equations.bodies.inertia import (
     update_inertia,
 )
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
-from gearmbs.dae.equations.kinematics.rotation import (
+from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_ADOT,
     KIN_AXES,
@@ -346,10 +346,18 @@ def body_from_pose(b, pose, y, at, code, body_row, modal, partial, kin, s):
         y[p + m] = dot3(kin[b], KIN_AXES + 3 * m, kin[b], KIN_H)
 
 
-def turning_rates(b, acceleration, y, yp, at, kin) -> None:
-    """Write the rates of a body's Euler rates to y' from its spatial accelerations, six; its row must be up to date."""
-    if not at[T.AT_ANGLES]:
-        return
-    e = at[T.AT_EPS]
-    adot = kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
-    euler_rates(kin, b, acceleration[3:] - y[e : e + 3] @ adot, 0, yp, e)
+def turning_rates(places, acc, y, yp, kin) -> None:
+    """Write the rates of the bodies' Euler rates to y' from their spatial accelerations; their rows must be up to date.
+
+    Parameters
+    ----------
+    places : list
+        Row of the table ``at`` of each body but the ground.
+    acc : ndarray
+        Spatial accelerations and those of the modal coordinates.
+    """
+    for b, at in enumerate(places, start=1):
+        if at[T.AT_ANGLES]:
+            v, e = at[T.AT_V], at[T.AT_EPS]
+            adot = kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
+            euler_rates(kin, b, acc[v + 3 : v + 6] - y[e : e + 3] @ adot, 0, yp, e)

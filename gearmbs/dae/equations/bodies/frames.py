@@ -32,7 +32,7 @@ from numba import types
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.inertia import to_global
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
-from gearmbs.dae.equations.kinematics.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_DW, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_DW, KIN_R, KIN_V, KIN_W
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes
 from gearmbs.kernels.pointers import I8, IMAT, MAT, VEC

@@ -12,7 +12,7 @@ from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints.terms import dot3
-from gearmbs.dae.equations.kinematics.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_H, KIN_W
+from gearmbs.dae.equations.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_H, KIN_W
 from gearmbs.dae.equations.unknowns import put
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes

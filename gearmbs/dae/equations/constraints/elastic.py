@@ -24,7 +24,7 @@ from gearmbs.dae.equations.bodies.frames import (
     tail_of,
 )
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
-from gearmbs.dae.equations.kinematics.rotation import KIN_R
+from gearmbs.dae.equations.rotation import KIN_R
 from gearmbs.dae.equations.unknowns import put, put_pair
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, IMAT, IVEC, MAT, VEC

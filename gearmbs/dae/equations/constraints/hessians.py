@@ -18,7 +18,7 @@ from gearmbs.dae.equations.constraints.terms import (
     separation,
     turned_axis,
 )
-from gearmbs.dae.equations.kinematics.rotation import KIN_AXES
+from gearmbs.dae.equations.rotation import KIN_AXES
 from gearmbs.kernels.jit import njit
 
 HESSIAN_BLOCKS = np.zeros((6, 4, 4), dtype=np.bool_)

@@ -10,7 +10,7 @@ from gearmbs.dae.equations.bodies.frames import is_elastic, touches_elastic
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.constraints.elastic import put_linear_side, put_row
 from gearmbs.dae.equations.constraints.hessians import HESSIAN_BLOCKS, hessian
-from gearmbs.dae.equations.kinematics.update import euler_component
+from gearmbs.dae.equations.kinematics import euler_component
 from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_HESSIAN, S_TERM, S_VECTOR
 from gearmbs.dae.equations.unknowns import has_rate_rows, multiplier_factor, multipliers_of_row, put

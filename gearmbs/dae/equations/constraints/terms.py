@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.kinematics.rotation import KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN, KIN_V, KIN_W
+from gearmbs.dae.equations.rotation import KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN, KIN_V, KIN_W
 from gearmbs.dae.equations.unknowns import NUMBERS, add_pair, put_pair
 from gearmbs.kernels.jit import njit
 

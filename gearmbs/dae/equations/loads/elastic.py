@@ -27,7 +27,7 @@ from gearmbs.dae.equations.bodies.frames import (
 )
 from gearmbs.dae.equations.bodies.inertia import to_body
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
-from gearmbs.dae.equations.kinematics.rotation import KIN_AXES, KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN
+from gearmbs.dae.equations.rotation import KIN_AXES, KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN
 from gearmbs.dae.equations.unknowns import put
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES, lanes_at, put_lanes

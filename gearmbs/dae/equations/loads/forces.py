@@ -11,8 +11,8 @@ from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints.terms import cross3
-from gearmbs.dae.equations.kinematics.rotation import KIN_R, KIN_V, KIN_W
 from gearmbs.dae.equations.loads.time_functions import cubic
+from gearmbs.dae.equations.rotation import KIN_R, KIN_V, KIN_W
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, IVEC, MAT, VEC, caller
 from gearmbs.kernels.structs import matrix_at, vector_at
@@ -45,7 +45,7 @@ from gearmbs.kernels.structs import matrix_at, vector_at
 #     Its own states z, differential or algebraic, read only.
 # inputs : ndarray
 #     Further unknowns of y it declares, then values of the functions of time, then the references of the angles it
-#     counts: the values near which those are to be expected, see `gearmbs.dae.equations.kinematics.update`. Read only.
+#     counts: the values near which those are to be expected, see `gearmbs.dae.equations.kinematics`. Read only.
 # want : int
 #     Sum of `DERIVATIVES` and `DIAGNOSTICS`, or 0 for the values alone.
 # work : ndarray

@@ -7,13 +7,13 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.frames import is_elastic
 from gearmbs.dae.equations.constraints import terms
-from gearmbs.dae.equations.kinematics.rotation import KIN_AXES, KIN_DW
-from gearmbs.dae.equations.kinematics.update import euler_component
+from gearmbs.dae.equations.kinematics import euler_component
 from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.loads.elastic import load_at, put_arm, put_chain, put_load
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, evaluate_element
 from gearmbs.dae.equations.loads.reactions import reaction_wrench
 from gearmbs.dae.equations.residual import S_VECTOR, S_WRENCH, arm_to
+from gearmbs.dae.equations.rotation import KIN_AXES, KIN_DW
 from gearmbs.dae.equations.unknowns import multipliers_are_rates, put
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC

@@ -27,7 +27,12 @@ from gearmbs.dae.equations.constraints.terms import (
     put_point,
     relative_motion,
 )
-from gearmbs.dae.equations.kinematics.rotation import (
+from gearmbs.dae.equations.kinematics import update_bodies
+from gearmbs.dae.equations.loads import expressions
+from gearmbs.dae.equations.loads.elastic import apply_frame_load, wrench_at
+from gearmbs.dae.equations.loads.forces import DIAGNOSTICS, evaluate_element
+from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
+from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_ADOT,
     KIN_H,
@@ -41,11 +46,6 @@ from gearmbs.dae.equations.kinematics.rotation import (
     POSE_W,
     momentum_from_conjugate,
 )
-from gearmbs.dae.equations.kinematics.update import update_bodies
-from gearmbs.dae.equations.loads import expressions
-from gearmbs.dae.equations.loads.elastic import apply_frame_load, wrench_at
-from gearmbs.dae.equations.loads.forces import DIAGNOSTICS, evaluate_element
-from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
 from gearmbs.dae.equations.unknowns import NUMBERS, add_number, put, put_pair
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC

@@ -8,7 +8,10 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.body import has_angles, update_body, update_ground
 from gearmbs.dae.equations.bodies.frames import update_frame
 from gearmbs.dae.equations.constraints.terms import ANGLE, dot3, gradient
-from gearmbs.dae.equations.kinematics.rotation import (
+from gearmbs.dae.equations.loads import expressions, time_functions
+from gearmbs.dae.equations.loads.expressions import TIME, time_at
+from gearmbs.dae.equations.loads.forces import FRAME_A, marker_pose
+from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_AXES,
     KIN_W,
@@ -18,22 +21,19 @@ from gearmbs.dae.equations.kinematics.rotation import (
     euler_angles,
     euler_rates,
     momentum_from_conjugate,
+    put_turns,
     rotation_matrix,
 )
-from gearmbs.dae.equations.loads import expressions, time_functions
-from gearmbs.dae.equations.loads.expressions import TIME, time_at
-from gearmbs.dae.equations.loads.forces import FRAME_A, marker_pose
 from gearmbs.dae.problem import HISTORY_CHANGED, HOOK_SIG, KEPT, MATRIX_OUTDATED
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES
-from gearmbs.kernels.sines import put_turns
 from gearmbs.kernels.structs import vector_at
 
 # Angles of a marker about an axis of another one, counted through full turns: AX, AY and AZ of the elements.
 #
 # AZ is the turn of x_I from x_J towards y_J, AX and AY turn z_I likewise. Of the values that differ by full turns the
 # one nearest to a reference is meant, which the hook moves along with the motion; see
-# `gearmbs.dae.equations.kinematics.update`.
+# `gearmbs.dae.equations.kinematics`.
 
 
 AXES = ("AX", "AY", "AZ")

@@ -1,1 +1,0 @@
-"""Rotations: direction cosines, their variations and rates, and how a step updates them."""

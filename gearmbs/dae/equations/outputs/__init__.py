@@ -1,1 +1,0 @@
-"""What is evaluated at output times: accelerations, multipliers and reactions."""
