@@ -448,7 +448,6 @@ def _work(folder: Folder, unit: int, claim: Claim) -> bool:
     stop = folder.plan.on_failure == "stop"
     try:
         for row in rows:
-            claim.beat()
             result = _one(runner, row, known, reuse)
             if stop and result.outcome.status != DONE:
                 case = f"case {row['index']}: {result.outcome.message}"

@@ -5,16 +5,26 @@ import pickle
 import signal
 import subprocess
 import sys
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-import xarray as xr
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
-from gearmbs.studies.run.engine import DEATH, RESULT, WorkerDied, claimed, here, processes, run_jobs, take, threads
+from gearmbs.studies.run.engine import (
+    DEATH,
+    RESULT,
+    Claim,
+    WorkerDied,
+    claimed,
+    here,
+    processes,
+    run_jobs,
+    take,
+    threads,
+)
 from gearmbs.studies.run.simulation import simulate_case
-from gearmbs.studies.run.store import RecordFolder
 from tests.says import says
 from tests.studies.jobs import (
     Unreadable,
@@ -153,22 +163,28 @@ def test_jobs_without_a_result_are_known():
     assert run_jobs(square, [3, 1], where=here, seconds=0.0).left == [3, 1]
 
 
-def test_a_case_at_work_gives_signs_of_life(tmp_path, monkeypatch):
+def test_a_job_at_work_gives_signs_of_life_without_a_report(tmp_path, monkeypatch):
     """So that its claim is not taken over elsewhere after a lease, which here would have ended long ago."""
-    monkeypatch.setattr("gearmbs.studies.run.engine.BEAT", 0.0)
-    case = Case(name="long", operation=SHORT)
-    seen = []
+    monkeypatch.setattr("gearmbs.studies.run.engine.BEAT", 0.001)
+    ledger, beaten = Squares(tmp_path), threading.Event()
+    path = ledger.claim(7)
+    here_too = Claim.beat
 
-    def run(case, report):
-        claim = RecordFolder(tmp_path).claim(case)
-        os.utime(claim, (0.0, 0.0))
-        report(0.01)
-        seen.append(claim.stat().st_mtime)
-        return xr.Dataset(attrs={"case": case.name})
+    def beat(claim):
+        here_too(claim)
+        if path.stat().st_mtime > 1e9:
+            beaten.set()
 
-    monkeypatch.setattr("gearmbs.studies.run.parallel.run_case", run)
-    run_cases([case], workers=1, folder=tmp_path)
-    assert seen[0] > 1e9
+    def work(claim):
+        os.utime(path, (0.0, 0.0))
+        beaten.clear()
+        return beaten.wait(60.0)
+
+    monkeypatch.setattr(Claim, "beat", beat)
+    before = threading.active_count()
+    assert claimed(ledger, 7, work)
+    assert threading.active_count() == before
+    assert not path.exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals to process groups are POSIX")

@@ -16,7 +16,6 @@ parent ends it. Its work, jobs and results are picklable.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import multiprocessing
 import os
@@ -59,7 +58,7 @@ LEASE = 1800.0
 """Seconds without a sign of life after which a claim of another machine is void."""
 
 BEAT = LEASE / 30.0
-"""Seconds between the signs of life of a job that reports progress, many to a lease: files show late elsewhere."""
+"""Seconds between the signs of life of a job, many to a lease: files show late elsewhere."""
 
 WRITING = 5.0
 """Seconds for which a claim that cannot be read is taken for one that is being written."""
@@ -427,22 +426,26 @@ class Claim:
     path: Path
     attempts: int
 
-    def beating(self, report: Callable[[float], None]) -> Callable[[float], None]:
-        """Return a report of progress that gives a sign of life, now and then, as well."""
-        last = time.monotonic()
+    @contextmanager
+    def beating(self) -> Iterator[None]:
+        """Give signs of life from a thread of its own, for as long as the process lives: a job may report nothing."""
+        over = threading.Event()
 
-        def both(number: float) -> None:
-            nonlocal last
-            if time.monotonic() - last >= BEAT:
-                last = time.monotonic()
+        def beats() -> None:
+            while not over.wait(BEAT):
                 self.beat()
-            report(number)
 
-        return both
+        thread = threading.Thread(target=beats, name="signs of life", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
 
     def beat(self) -> None:
-        """Give a sign of life."""
-        with contextlib.suppress(FileNotFoundError):
+        """Give a sign of life; a disk that does not take it now may take the next one."""
+        with suppress(OSError):
             os.utime(self.path)
 
     def release(self) -> None:
@@ -451,7 +454,7 @@ class Claim:
 
 
 def claimed(ledger: Ledger, job: Any, work: Callable[[Claim], T]) -> T:
-    """Return the result of a job that is done, else that of the work, during which the job is claimed.
+    """Return the result of a job that is done, else that of the work, during which the job is claimed, however long.
 
     Raises
     ------
@@ -463,7 +466,10 @@ def claimed(ledger: Ledger, job: Any, work: Callable[[Claim], T]) -> T:
         raise Claimed
     try:
         known = ledger.result(job)
-        return work(claim) if known is None else known
+        if known is not None:
+            return known
+        with claim.beating():
+            return work(claim)
     finally:
         claim.release()
 

@@ -164,12 +164,11 @@ def _carried_out(
 
     begun = False
 
-    def work(claim: Claim | None = None) -> tuple[Any, str]:
+    def work(_claim: Claim | None = None) -> tuple[Any, str]:
         nonlocal begun
         begun = True
-        told = report if claim is None else claim.beating(report)
         try:
-            record = run_case(case, lambda t: told(min(t / _span(case), 1.0)))
+            record = run_case(case, lambda t: report(min(t / _span(case), 1.0)))
         except SimulationFailed as failure:
             if not keep or isinstance(failure, SimulationInterrupted):
                 raise
