@@ -15,6 +15,10 @@ VALUES = set("True False None nan inf mm kg Hz kHz rad deg ms MPa GPa rpm min".s
 """Numbers and units that are written as words."""
 
 
+HOLE, NOWHERE = "\0", "\1"
+"""What stands in texts for something that is formatted into them, and in patterns for what no text says."""
+
+
 def says(*words: str) -> str:
     """Return a pattern of messages in which all words stand, in any order and each as a whole.
 
@@ -77,6 +81,50 @@ def text(node: ast.expr) -> str:
         return " ".join(text(argument) for argument in node.args)
     parts = [part.value for part in ast.walk(node) if isinstance(part, ast.Constant) and isinstance(part.value, str)]
     return " ".join(parts)
+
+
+def raisable(tree: ast.Module) -> set[str]:
+    """Return the texts of three words or more of a module, but docstrings; what is formatted into them is a `HOLE`."""
+    documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    found, left = set(), [tree]
+    while left:
+        node: ast.AST = left.pop()
+        whole = None if id(node) in documents else _written_out(node)
+        if whole is None:
+            left += ast.iter_child_nodes(node)
+            continue
+        if len(whole.replace(HOLE, " x ").split()) >= 3:
+            found.add(whole)
+        left += [part.value for part in ast.walk(node) if isinstance(part, ast.FormattedValue)]
+    return found
+
+
+def _written_out(node: ast.AST) -> str | None:
+    """Return what a text, a formatted one or a sum of such says, None of any other node."""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else HOLE for part in node.values)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        parts = _written_out(node.left), _written_out(node.right)
+        return None if parts == (None, None) else "".join(HOLE if part is None else part for part in parts)
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+
+def fitting(node: ast.expr, texts: set[str]) -> list[str]:
+    """Return which of the texts that can be raised a test's pattern fits by what is written in both of them.
+
+    Names and values that a test fills in are written in none.
+    """
+    parts = [(_written_out(part) or HOLE).replace(HOLE, NOWHERE) for part in getattr(node, "args", [node])]
+    called = _name(node.func) if isinstance(node, ast.Call) else ""
+    if called == "escape":
+        return [text for text in texts if parts[0] in text]
+    if called == "says":
+        pattern, inside = says(*parts), parts
+    else:
+        # a letter that may be missing, or one of two words, need not be there
+        pattern, inside = parts[0], [] if re.search(r"\w[?*{]|[|\[(\\]", parts[0]) else re.findall(r"\w+", parts[0])
+    near = [text for text in texts if all(part in text for part in inside)]
+    return [text for text in near if re.search(pattern, text)] if called in ("", "says") else []
 
 
 def _asked(function: ast.FunctionDef, tree: ast.Module) -> Iterator[ast.expr]:

@@ -10,11 +10,13 @@ import pytest
 import gearmbs
 from gearmbs.files import plain, python_scalar
 from gearmbs.wording import any_of, closest, did_you_mean
-from tests.says import prose, says
+from tests.says import fitting, prose, raisable, says
 
 PACKAGE = Path(gearmbs.__file__).parent
 LONGEST = 3
 """Words beside names and values that a test may ask of a message: "not a rotation", "give a positive"."""
+BROADEST = 3
+"""Texts of the package that a pattern may fit: one, and those that say the same of another kind of part."""
 
 
 def sources(pattern):
@@ -64,15 +66,54 @@ def test_plain_values():
     assert python_scalar((np.int64(3),)) == (np.int64(3),)
 
 
-@pytest.mark.slow
-def test_tests_ask_for_names_values_and_remedies_not_for_sentences():
-    """An edit of English must not cost tests; `says` asks for words in any order."""
-    wrong = []
+@pytest.fixture(scope="module")
+def patterns():
+    """Return where each pattern of a message is, the pattern, and its words that are no names or values."""
+    found = []
     for path in sorted(Path(__file__).parent.rglob("*.py")):
         for node, words in prose(ast.parse(path.read_text(encoding="utf-8"))):
-            if len(words) > LONGEST:
-                wrong.append(f"{path.name}:{node.lineno}: {' '.join(words)}")
-    assert not wrong
+            found.append((f"{path.name}:{node.lineno}", node, words))
+    assert len(found) > 1500
+    return found
+
+
+@pytest.mark.slow
+def test_tests_ask_for_names_values_and_remedies_not_for_sentences(patterns):
+    """An edit of English must not cost tests; `says` asks for words in any order."""
+    assert [f"{where}: {' '.join(words)}" for where, _, words in patterns if len(words) > LONGEST] == []
+
+
+@pytest.mark.slow
+def test_tests_ask_for_more_than_many_messages_say(patterns):
+    """A pattern that fits any refusal, as "positive" does, would be content with that of another field."""
+    texts = set().union(*(raisable(ast.parse(path.read_text(encoding="utf-8"))) for path in PACKAGE.rglob("*.py")))
+    assert len(texts) > 3000
+    asked = {ast.unparse(node): (where, node) for where, node, _ in patterns if ast.unparse(node) != "None"}
+    broad = {told: (where, len(fitting(node, texts))) for told, (where, node) in asked.items()}
+    assert {told: found for told, found in broad.items() if found[1] > BROADEST} == {}
+
+
+def test_what_a_pattern_fits():
+    code = """
+"A docstring that says gauge is negative."
+def check(gauge, name):
+    "Refuse a gauge that is negative."
+    if gauge < 0:
+        raise ValueError(f"{name} is {gauge}; it must not be negative" + hint(name))
+    raise ValueError("gauge " + f"{'is not known' if name else 'has no name'}; give a name")
+"""
+    texts = raisable(ast.parse(code))
+    assert texts == {"\0 is \0; it must not be negative\0", "gauge \0; give a name", "is not known", "has no name"}
+    for pattern, expected in {
+        "'negative'": 1,
+        "says('name', 'give')": 1,
+        "'name'": 2,
+        "says('negative', '-5')": 0,
+        "says(f'{name}', 'give')": 0,
+        "re.escape(str(path))": 0,
+        "re.escape(f'{path}')": 0,
+    }.items():
+        assert len(fitting(ast.parse(pattern, mode="eval").body, texts)) == expected, pattern
 
 
 def test_what_counts_as_prose():

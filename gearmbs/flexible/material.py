@@ -122,5 +122,5 @@ def damping_ratios(frequencies: np.ndarray, damping: Damping) -> np.ndarray:
     else:
         raise FlexibleError(f"damping: {given.size} values for {frequencies.size} modes; give one, one each, or pairs")
     if not np.all(np.isfinite(out) & (out >= 0.0)):
-        raise FlexibleError(f"damping: ratios {out[~(out >= 0.0)].tolist()} must not be negative")
+        raise FlexibleError(f"damping: ratios {out[~(out >= 0.0)].tolist()}; give 0 or more")
     return out

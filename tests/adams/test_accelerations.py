@@ -81,7 +81,7 @@ def test_what_is_no_unknown_is_named():
     with pytest.raises(DeckError, match=says("MARKER/20")):
         run("VARIABLE/1, FUNCTION=ACCX(22,10,20,20)\nVARIABLE/2,FUNCTION=1\nVARIABLE/3,FUNCTION=1\n"
             "DIFF/1, IC=0, FUNCTION=VARVAL(1)")  # fmt: skip
-    with pytest.raises(DeckError, match="accelerations"):
+    with pytest.raises(DeckError, match=says("GCON/1", "FUNCTION", "'ACCX(22)'")):
         run(ASKED + "GCON/1, FUNCTION=ACCX(22)")
 
 

@@ -41,8 +41,8 @@ def test_changes_replace_only_what_they_give():
     [
         ("sim/foo, end=1, steps=1", "unknown argument FOO"),
         ("simulate/dynamics, end=1", "give STEPS or DTOUT"),
-        ("simulate/dynamics, end=1, steps=3, dtout=1", "not both"),
-        ("simulate/dynamics, end=1, steps=0", "must be positive"),
+        ("simulate/dynamics, end=1, steps=3, dtout=1", says("SIMULATE", "STEPS", "DTOUT", "not both")),
+        ("simulate/dynamics, end=1, steps=0", says("STEPS", "0", "positive")),
         ("simulate/end=1, steps=3", "give one of DYNAMICS"),
         ("deactivate/joint", says("DEACTIVATE", "JOINT", "give an element")),
         ("stop\n", None),

@@ -184,7 +184,7 @@ def test_curves_of_points():
     assert nearest == pytest.approx([np.cos(angle), np.sin(angle), 0.0], abs=1e-5)
     for points, message in (
         ([(0, 0)], "rows of x, y and z"),
-        ([(0, 0, 0), (1, 0, 0)], "at least four"),
+        ([(0, 0, 0), (1, 0, 0)], says("curve", "2 points", "four")),
         ([(0, 0, 0), (1, 0, 0), (1, 0, 0), (2, 0, 0)], "are the same"),
     ):
         with pytest.raises(ModelError, match=message):

@@ -11,6 +11,7 @@ from gearmbs.adams import DeckError, parse_deck
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import FORCE, LENGTH, MASS, deck_units
 from gearmbs.adams.parse.grammar import CONTINUED, joined_expression
+from tests.says import says
 
 from .decks import EVERYTHING, PENDULUM
 
@@ -161,9 +162,9 @@ def test_units():
     assert mm.factor("inertia") == pytest.approx(1e-6)
     assert mm.factor("stiffness") == pytest.approx(1e3)
     for bad, word in (
-        (st.Units(force="NEWTON"), "missing"),
-        (st.Units(force="X", mass="KILO", length="METER", time="SEC"), "unknown"),
-        (st.Units(ucf=0), "positive"),
+        (st.Units(force="NEWTON"), says("MASS", "LENGTH", "TIME", "missing")),
+        (st.Units(force="X", mass="KILO", length="METER", time="SEC"), says("FORCE", "X", "choose", "NEWTON")),
+        (st.Units(ucf=0), says("UCF", "0", "positive")),
     ):
         with pytest.raises(ValueError, match=word):
             deck_units(bad)

@@ -119,8 +119,11 @@ def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
     np.testing.assert_array_equal(data.flex_body_1_modal, result.modal(1)[0])
     whole = (tmp_path / "bar.res").read_text()
     for text, message in (
-        (whole[: len(whole) // 2], "cut off"),
-        (whole.replace("<Step type", "<Step kind", 1).replace("</Step>", "1.0</Step>", 1), "numbers for"),
+        (whole[: len(whole) // 2], says("bad.res:89", "XRF", "cut off")),
+        (
+            whole.replace("<Step type", "<Step kind", 1).replace("</Step>", "1.0</Step>", 1),
+            says("bad.res", "step 1", "50", "49"),
+        ),
         ("<a></a>", "no StepMap"),
     ):
         (tmp_path / "bad.res").write_text(text)

@@ -70,7 +70,7 @@ def test_a_range_of_elements_is_switched():
         ("deactivate/sforce, range=10,20", says("SFORCE", "10", "20", "deck")),
         ("deactivate/sforce, range=1,2", says("SFORCE", "1", "2")),
         ("deactivate/sforce, range=9,3", says("DEACTIVATE", "RANGE", "larger", "first")),
-        ("deactivate/sforce, id=3, range=3,9", "not both"),
+        ("deactivate/sforce, id=3, range=3,9", says("DEACTIVATE", "ID", "RANGE", "not both")),
     ):
         with pytest.raises(DeckError, match=message):
             run_deck(deck, parse_script(f"m\no\n{text}\nsimulate/dynamics, end=0.01, steps=1\n"))

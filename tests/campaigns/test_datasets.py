@@ -90,7 +90,7 @@ def test_no_specimen_is_in_two_splits():
     assert ((severity[held == "train"] < 0.4) | (severity[held == "train"] > 0.6)).all()
     np.testing.assert_array_equal(held == "test", split == "test")
     assert shared_groups(random_split(groups.size), groups)[("test", "train")] >= 40
-    with pytest.raises(CampaignError, match="too few"):
+    with pytest.raises(CampaignError, match=says("split", "2 groups", "0.5")):
         split_by_group(np.array([1, 1, 2]), test=0.5, validation=0.5)
 
 

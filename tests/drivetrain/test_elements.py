@@ -244,7 +244,7 @@ def test_load_over_time_from_a_table():
     (lambda: InductionMotor(**{**MOTOR, "poles": 3}), "poles is 3"),
     (lambda: ElasticClutch(name="c", first="a", second="b", stiffness=1.0, relative_damping=0.5), "damping_frequency"),
     (lambda: ElasticClutch(name="c", first="a", second="b", stiffness=-1.0), "coupling 'c': stiffness is -1"),
-    (lambda: Pump(name="p", shaft="a", displacement="1 kg", pressure=1.0), "displacement"),
+    (lambda: Pump(name="p", shaft="a", displacement="1 kg", pressure=1), says("displacement", "'1 kg'", "'1 m^3'")),
     (lambda: TorsionalShaft(name="t", first="a", second="b", length=1.0), says("length", "give stiffness")),
     (lambda: TableLoad(name="t", shaft="a", over="moon", places=(1,), torques=(1,)), "over is 'moon'"),
 ])  # fmt: skip

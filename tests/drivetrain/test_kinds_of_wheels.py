@@ -16,6 +16,7 @@ from gearmbs.drivetrain import (
 )
 from gearmbs.gears import GearSpec
 from tests.drivetrain.support import stage
+from tests.says import says
 
 QUIET = {"backlash": "0.1 mm", "contact": {"kind": "linear", "stiffness": 3e8, "damping": 2e3, "depth": "2 um"},
          "friction": False}  # fmt: skip
@@ -105,5 +106,5 @@ torque = "100 N m"
     pair = Drivetrain.from_file(path).pairs["mesh"]
     assert pair.overlap_ratio == pytest.approx(0.04 * np.sin(np.deg2rad(15)) / (np.pi * 3e-3))
     path.write_text(text.replace("left", "right") + rest)
-    with pytest.raises(DrivetrainError, match="hand"):
+    with pytest.raises(DrivetrainError, match=says("mesh 'mesh'", "p", "g", "right-handed", "opposite")):
         Drivetrain.from_file(path)

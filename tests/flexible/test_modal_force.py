@@ -56,7 +56,10 @@ def test_modal_coordinates_that_do_not_exist_are_named(bar):
     m.body("rigid", 1.0, (1.0, 1.0, 1.0))
     with pytest.raises(ModelError, match=says("body 'bar'", "mode 5", "1", "4")):
         body.mode(5)
-    for text, message in (("MODAL(bar,9)", "4"), ("MODAL(rigid,1)", says("body RIGID", "BAR"))):
+    for text, message in (
+        ("MODAL(bar,9)", says("mforce 'f'", "MODAL", "1 to 4")),
+        ("MODAL(rigid,1)", says("body RIGID", "BAR")),
+    ):
         m.elements.pop("f", None)
         add_modal_force(m, "f", body, np.eye(10)[6], text)
         with pytest.raises(ModelError, match=message):

@@ -123,9 +123,18 @@ def test_damping_by_number_mode_and_band(damping, expected):
     np.testing.assert_allclose(damping_ratios(np.array([50.0, 150.0, 500.0, 2000.0]), damping), expected)
 
 
-@pytest.mark.parametrize("damping", ["weak", [0.1, 0.2], -0.1, [(900.0, 0.1), (200.0, 0.2)], np.nan])
-def test_wrong_damping_is_refused(damping):
-    with pytest.raises(FlexibleError, match="damping"):
+@pytest.mark.parametrize(
+    ("damping", "words"),
+    [
+        ("weak", says("damping", "'weak'", "give a ratio")),
+        ([0.1, 0.2], says("damping", "2 values", "3 modes", "give")),
+        (-0.1, says("damping", "-0.1", "give 0 or more")),
+        ([(900.0, 0.1), (200.0, 0.2)], says("damping", "[900.0, 200.0] Hz", "rise")),
+        (np.nan, says("damping", "nan", "give 0 or more")),
+    ],
+)
+def test_wrong_damping_is_refused(damping, words):
+    with pytest.raises(FlexibleError, match=words):
         damping_ratios(np.array([50.0, 150.0, 500.0]), damping)
 
 

@@ -86,9 +86,9 @@ def test_materials_in_other_units_are_warned_of(case):
     for field, value in metal.items():
         for factor in (1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9):
             wrong = {**metal, field: value * factor}
-            with pytest.warns(UserWarning, match=r"kg/m\^3"):
+            with pytest.warns(UserWarning, match=says("ElasticMaterial 'steel'", "kg/m^3")):
                 ElasticMaterial(**wrong)
-            with pytest.warns(UserWarning, match=r"kg/m\^3"):
+            with pytest.warns(UserWarning, match=says("Material 'steel'", "kg/m^3")):
                 Material(**wrong)
     solids = {
         "rubber": (2e6, 1100.0), "PTFE": (4e8, 2200.0), "lead": (1.6e10, 11340.0), "diamond": (1.1e12, 3510.0),
@@ -132,7 +132,7 @@ def test_lengths_in_millimetres_are_doubted():
         RigidShaft(name="s", length=120.0)
     with pytest.warns(UserWarning, match=says("7.85", "3", "density", "7850")):
         RigidShaft(name="s", length=0.1, density=7.85)
-    with pytest.raises(DrivetrainError, match=says("negative", "none")):
+    with pytest.raises(DrivetrainError, match=says("bearing 'b'", "stiffness", "diagonal", "negative")):
         ElasticBearing(name="b", shaft="s", stiffness=np.diag([1e8, 1e8, -1e8, 0, 0, 0]).tolist())
     with pytest.raises(SignalError, match=says("teeth", "True")):
         make_signal(np.zeros(9), 1e3, teeth=True)

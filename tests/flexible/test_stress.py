@@ -117,7 +117,7 @@ def test_von_mises_and_what_is_refused():
         shear.peak(np.zeros((0, 1)))
     with pytest.raises(FlexibleError, match=says("1", "2", "6", "values have shape")):
         StressModes(np.zeros((1, 3)), np.zeros((1, 2, 6)))
-    with pytest.raises(FlexibleError, match="not finite"):
+    with pytest.raises(FlexibleError, match=says("StressModes", "values", "not finite")):
         StressModes(np.zeros((1, 3)), np.full((1, 1, 6), np.nan))
     chain = np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     bare = from_matrices(np.kron(chain, np.eye(3)), np.eye(9), [[0, 0, 0], [1, 0, 0], [1, 1, 0]])

@@ -150,11 +150,14 @@ HELIX = {"helix_angle": "10 deg"}
         (lambda: PairGeometry(GearSpec(60, "2 mm"), GearSpec(-45, "2 mm")), "no larger than"),
         (lambda: PairGeometry(GearSpec(38, "2 mm"), GearSpec(-44, "2 mm")), "interference|foul"),
         (lambda: GearSpec(-30, "2 mm"), says("inside the base")),
-        (lambda: GearSpec(-60, "2 mm", bore_radius="5 mm"), "bore_radius"),
+        (lambda: GearSpec(-60, "2 mm", bore_radius="5 mm"), says("gear.bore_radius", "5.0000 mm", "internal")),
         (lambda: GearSpec(60, "2 mm", rim_thickness="5 mm"), "rim_thickness"),
         (lambda: GearSpec(60, "2 mm", helix_angle="50 deg"), "helix_angle is 50"),
         (lambda: GearSpec(60, "2 mm", hand="up"), "hand is 'up'"),
-        (lambda: GearSpec.ring(60, "2 mm", profile_shift=0.1, outward_shift=0.1), "give one"),
+        (
+            lambda: GearSpec.ring(60, "2 mm", profile_shift=0.1, outward_shift=0.1),
+            says("ring", "profile_shift", "outward_shift", "give one"),
+        ),
     ],
 )
 def test_bad_wheels_are_one_line(build, words):

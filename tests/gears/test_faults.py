@@ -220,7 +220,7 @@ def test_cumulative_pitch_error_is_a_wave_of_displaced_teeth(rotation):
         plain, moved = (mesh.gaps(angle, driven, np.zeros(1)).copy() for mesh in meshes)
         side = np.where(plain[:, 0] == rotation, 1.0, -1.0)
         assert moved[:, 4] - plain[:, 4] == pytest.approx(-side * index[plain[:, 1].astype(int)], abs=1e-15)
-    with pytest.raises(ValueError, match="order"):
+    with pytest.raises(ValueError, match=says("CumulativePitchError.order", "20", "give 1 up to 14")):
         pair.with_faults(CumulativePitchError(order=20)).contact_tables()
 
 

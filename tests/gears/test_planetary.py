@@ -369,7 +369,7 @@ def test_the_set_that_is_recommended_fits(teeth, planets):
         (lambda: planetary((24, 60, 50), "2 mm", 3), "ring has 50 teeth and planet 60"),
         (lambda: planetary((24, 30, 84), "2 mm", 3, faults=[("planet 4", faults.BrokenTooth())]), "planet 4"),
         (lambda: planetary((24, 30, 84), "2 mm", 3, angles=[0, 1]), "2 numbers for 3 planets"),
-        (lambda: small_set().speeds(sun=1.0), "give two"),
+        (lambda: small_set().speeds(sun=1.0), says("speeds", "sun", "give two", "carrier", "ring")),
         (lambda: mechanism_of(small_set(), speeds={"ring": 1.0}), "ring is held"),
         (lambda: mechanism_of(small_set(), speeds={"sun": 1.0, "carrier": 1.0}), "all three members"),
         (lambda: mechanism_of(small_set(), held="planet"), "choose among"),

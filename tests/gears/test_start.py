@@ -79,7 +79,7 @@ def test_wheels_both_held_are_refused_where_they_are_deep():
 
 
 def test_teeth_that_jam_by_their_drawing_start():
-    with pytest.warns(UserWarning, match="negative backlash"):
+    with pytest.warns(UserWarning, match=says("88.6710 mm", "-0.1356 mm", "give backlash 0.1356 mm")):
         tight = GearPair.paper(centre_distance_error="-0.2 mm")
     two_wheels(tight).simulate(1e-5)
     two_wheels(GearPair.paper(misalignment="1 deg")).simulate(1e-5)

@@ -28,6 +28,7 @@ from gearmbs.mechanism.contacts import (
 from gearmbs.mechanism.contacts.kernel import SOLID
 from gearmbs.mechanism.contacts.shapes import volume
 from gearmbs.mechanism.forces.functions import vary
+from tests.says import says
 
 G = 9.81
 
@@ -431,7 +432,7 @@ def test_meshes_are_read(tmp_path):
     ("name", "content", "message"),
     [
         ("a.step", b"", "is read from"),
-        ("none.stl", None, "cannot be read"),
+        ("none.stl", None, says("none.stl", "No such file")),
         ("a.stl", b"solid\nendsolid", "holds no triangles"),
         (
             "a.obj",
@@ -456,7 +457,7 @@ def test_mistakes_are_named():
     for make, message in (
         (lambda: Sphere(-1.0), "sphere: radius = -1.0 m"),
         (lambda: Box((1, 2)), "three lengths"),
-        (lambda: Torus(0.1, 0.2), "thinner"),
+        (lambda: Torus(0.1, 0.2), says("torus", "tube", "0.2", "thinner", "0.1")),
         (lambda: Frustum(0.0, 0.0, 1.0), "both radii"),
         (lambda: m.contact("c", i, Sphere(0.1), j, HalfSpace(), Impact(-1.0)), "impact: stiffness"),
         (lambda: m.contact("c", i, Sphere(0.1), j, HalfSpace(), Poisson(1.0, 2.0)), "restitution 2.0"),

@@ -289,7 +289,11 @@ def test_a_load_may_depend_on_a_reaction():
         ("revolute", {"radius": 1.0}, says("'radius'", "mu_static")),
         ("revolute", {"effect": "none"}, says("effect = 'none'", "choose")),
         ("revolute", {"inputs": ("weight",)}, "inputs has 'weight'"),
-        ("revolute", {"stiction_transition_velocity": 0.0}, "must be positive"),
+        (
+            "revolute",
+            {"stiction_transition_velocity": 0.0},
+            says("friction 'friction'", "stiction_transition_velocity", "positive"),
+        ),
         ("revolute", {"max_torque": 0.0}, "max_torque must be positive"),
     ],
 )

@@ -80,7 +80,7 @@ def test_expressions(machine):
     if "late too" not in [k.name for k in m.ground.markers]:
         m.ground.marker((0, 0, 4), name="late too")
     np.testing.assert_allclose(solution.evaluate('DZ(shoe, "late too")'), -4.0, atol=1e-12)
-    with pytest.raises(ModelError, match="TIM"):
+    with pytest.raises(ModelError, match=says("TIM", "TIME", "column 3", "'2*TIM'")):
         solution.evaluate("2*TIM")
 
 

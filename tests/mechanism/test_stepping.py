@@ -278,7 +278,12 @@ def test_what_does_not_fit_is_refused(tmp_path):
 def test_wrong_calls_say_what_to_do():
     sim = gm.Simulator(top(), 1.0, records=False)
     sim.advance(0.2)
-    for t, told in ((0.1, "restore"), (float("nan"), "finite"), (2.0, "later t_end"), ("5 mm", "t")):
+    for t, told in (
+        (0.1, "restore"),
+        (float("nan"), says("t", "NaN", "give a finite")),
+        (2.0, "later t_end"),
+        ("5 mm", says("t", "'5 mm'", "'1 s'")),
+    ):
         with pytest.raises(ModelError, match=told) as error:
             sim.advance(t)
         assert "\n" not in str(error.value)
@@ -304,11 +309,11 @@ def test_a_failure_can_be_gone_back_from():
     sim = gm.Simulator(m, 1.0)
     sim.advance(0.3)
     state = sim.state()
-    with pytest.raises(ModelError, match="finite"):
+    with pytest.raises(ModelError, match=says("finite", "0.5", "N_x(load)")):
         sim.advance(0.7)
     with pytest.raises(ModelError, match=says("failed", "restore")):
         sim.advance(0.4)
-    with pytest.raises(ModelError, match=says("failed")):
+    with pytest.raises(ModelError, match=says("simulation has failed", "0.5")):
         sim.state()
     sim.restore(state)
     sim.advance(0.4)

@@ -182,7 +182,7 @@ def test_compare_files(tmp_path):
         ),
         (lambda: compare(cases(), {"other": cases()["low"]}), "none in common"),
         (lambda: compare(cases(), scope="both"), "scope"),
-        (lambda: compare(cases(), way="both"), "way"),
+        (lambda: compare(cases(), way="both"), says("way", "'band'", "'orders'", "'both'")),
         (lambda: compare(cases(), channel="nope"), "has no 'nope'"),
     ],
 )

@@ -1,6 +1,7 @@
 """Files: round trips keep samples, rate and units; what is damaged, empty or mislabelled says so."""
 
 import gzip
+import re
 import struct
 import warnings
 
@@ -119,7 +120,7 @@ def test_csv_round_trip_of_any_doubles(tmp_path_factory, values, rate, unit):
 def test_empty_file_is_named(tmp_path, format):
     path = tmp_path / NAMES[format]
     path.write_bytes(b"")
-    with pytest.raises(SignalFileError, match="is empty") as caught:
+    with pytest.raises(SignalFileError, match=re.escape(f"{path}: is empty")) as caught:
         read_signal(path)
     assert str(path) in str(caught.value)
 
@@ -159,7 +160,7 @@ def test_mislabelled_files_say_what_they_hold(tmp_path, content):
 def test_garbage_is_refused(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     path.write_bytes(np.random.default_rng(0).integers(0, 256, 5000, dtype=np.uint8).tobytes())
-    with pytest.raises(SignalFileError, match="x"):
+    with pytest.raises(SignalFileError, match=says("binary", "rename", "format=")):
         read_signal(path)
 
 
@@ -257,7 +258,7 @@ def test_damaged_gzip(tmp_path):
     path = tmp_path / "x.csv.gz"
     body = gzip.compress(b"a\n" + b"1.5\n" * 20000)
     path.write_bytes(body[:-30])
-    with pytest.raises(SignalFileError, match=says("damaged or cut")):
+    with pytest.raises(SignalFileError, match=says("x.csv.gz", "gzip", "cut short")):
         read_signal(path, rate=1.0)
 
 

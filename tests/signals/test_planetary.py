@@ -128,7 +128,7 @@ def test_order_tracking_by_the_carrier():
         (lambda: PlanetaryModel((1, 2, 3), 0), says("planets", "0", "1 or more")),
         (lambda: PlanetaryModel((20, 30, 80), 3, fault="shaft"), says("fault", "'shaft'", "'sun'")),
         (lambda: PlanetaryModel((20, 30, 80), 3, planet=3), says("planet", "3", "0 to 2")),
-        (lambda: fixed_sensor(np.zeros((5, 2)), np.zeros(5), 3), "does not fit"),
+        (lambda: fixed_sensor(np.zeros((5, 2)), np.zeros(5), 3), says("sources", "(5, 2)", "5 angles", "3 planets")),
     ],
 )
 def test_errors(build, words):

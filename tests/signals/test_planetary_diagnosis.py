@@ -141,7 +141,7 @@ def test_the_report_shows_itself(tmp_path):
     [
         ({"planetary": (23, 31)}, says("ring", "teeth of sun")),
         ({"planetary": (85, 31, 23)}, says("planetary", "most teeth")),
-        ({"planets": 0}, "1 or more"),
+        ({"planets": 0}, says("planets", "0", "1 or more", "angles")),
         ({"speed": "20 rpm"}, says("turns", "24 s")),
         ({"speed": "6000 rpm"}, "sampling rate above"),
         ({"speed": "60 rpm", "member": "ring"}, "'carrier' or 'sun'"),

@@ -111,7 +111,7 @@ def test_an_analysis_says_what_was_mended():
     t = np.arange(round(8.0 * RATE)) / RATE
     angle = np.interp(t, edges, math.tau * np.arange(edges.size))
     record = tacho(np.delete(edges, [40]), a=np.cos(17 * angle))
-    with pytest.warns(UserWarning, match="is missing"):
+    with pytest.warns(UserWarning, match=says("Tacho", "1 pulse", "3.9997", "Mended")):
         report = analyse(record, 17, tacho="tacho")
     assert report.harmonics["orders"].values[0, 0] == pytest.approx(math.sqrt(0.5), rel=0.03)
     assert any("1 pulse is missing" in note for note in report.notes)

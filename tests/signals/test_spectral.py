@@ -106,7 +106,7 @@ def test_units_that_measure_no_vibration(unit):
         ({"to": "jerk", "band": (10.0, 100.0)}, "to: .*one of"),
         ({"to": "velocity", "band": (100.0, 10.0)}, says("band", "(100.0, 10.0)", "6400 Hz")),
         ({"to": "velocity", "band": (0.0, 10.0)}, says("band", "(0.0, 10.0)", "6400 Hz")),
-        ({"to": "velocity", "band": (1.0, 10.0)}, "too short"),
+        ({"to": "velocity", "band": (1.0, 10.0)}, says("1.5625 s", "6 s", "raise band[0]", "edges='keep'")),
     ],
 )
 def test_conversion_errors(kwargs, match):
@@ -124,7 +124,7 @@ def test_envelope_of_an_am_tone():
     lines = envelope_spectrum(signal, (1800.0, 2200.0), segment=0.5)
     assert lines.sel(frequency=30.0).item() == pytest.approx(1.0, rel=1e-3)
     assert units_of(lines) == ["g"]
-    with pytest.raises(SignalError, match="band"):
+    with pytest.raises(SignalError, match=says("band", "6400 Hz", "(2000.0, 7000.0)")):
         envelope(signal, (2000.0, 7000.0))
 
 
@@ -167,7 +167,7 @@ def test_kurtogram_of_noise_tone_and_bursts():
     high = found["best_centre"].item() + found["best_bandwidth"].item() / 2
     assert low <= 3000 <= high
     assert found["best_kurtosis"].item() > 5
-    with pytest.raises(SignalError, match="levels"):
+    with pytest.raises(SignalError, match=says("levels", "7", "16 bins", "100 samples")):
         kurtogram(make_signal(np.ones(100), RATE))
 
 
@@ -190,6 +190,6 @@ def test_cepstrum_finds_the_spacing_of_sidebands():
     window = (cepstrum["quefrency"] > 0.02) & (cepstrum["quefrency"] < 0.05)
     best = float(cepstrum["quefrency"][window][cepstrum.values[window, 0].argmax()])
     assert best == pytest.approx(1 / 32, rel=0.01)
-    with pytest.raises(SignalError, match="is zero"):
+    with pytest.raises(SignalError, match=says("channel 'ch1'", "sample 0", "logarithm")):
         power_cepstrum(make_signal(np.zeros(100), RATE))
     assert math.isfinite(float(cepstrum.max()))

@@ -7,6 +7,7 @@ from gearmbs.drivetrain import RunSettings
 from gearmbs.studies import BenchSettings, bench_choices, bench_train
 from gearmbs.studies.presets.bench import BenchStudy, levels, run_bench
 from gearmbs.studies.run.rig import gear_rig
+from tests.says import says
 from tests.studies.presets import agrees_with_its_file
 
 
@@ -33,7 +34,7 @@ def test_joints_need_no_inertia_of_the_pump():
     train = bench_train(settings=BenchSettings(bearings="ideal", pump_inertia=0.0, shafts=0.0))
     assert [shaft.name for shaft in train.shafts] == ["motor", "one", "two", "four"]
     assert not train.housings
-    with pytest.raises(ValueError, match="inertia"):
+    with pytest.raises(ValueError, match=says("shaft 'pump'", "inertia", "0.0", "positive")):
         bench_train(settings=BenchSettings(pump_inertia=0.0))
 
 

@@ -165,7 +165,7 @@ tolerance = 1e-6
 
 
 @pytest.mark.parametrize(("curve", "words"), [
-    ([("0 s", "100 rpm")], says("give two")),
+    ([("0 s", "100 rpm")], says("drive 'd'", "curve", "(0.0,)", "give two")),
     ([("0 s", "100 rpm"), ("1 s", "2000 rpm")], says("speed", "give the fastest")),
     ([("0 s", "-100 rpm"), ("1 s", "1500 rpm")], says("speed", "give the fastest")),
     (3.0, "give points"),

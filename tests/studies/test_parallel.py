@@ -60,7 +60,13 @@ def test_results_in_order_with_progress():
     assert finished == {3: 9, 1: 1, 2: 4}
 
 
-@pytest.mark.parametrize(("job", "kind", "words"), [("fail", ValueError, "job failed"), ("die", WorkerDied, "memory")])
+@pytest.mark.parametrize(
+    ("job", "kind", "words"),
+    [
+        ("fail", ValueError, "job failed"),
+        ("die", WorkerDied, says("worker process", "memory", "__name__ == '__main__'")),
+    ],
+)
 def test_a_failure_ends_the_others(job, kind, words):
     """The other job would never end; its process is gone when the error arrives."""
     pids = []

@@ -18,6 +18,7 @@ from gearmbs.studies.presets.paper_cases import judge, paper_cases
 from gearmbs.studies.run import rig as parts
 from gearmbs.studies.run.simulation import case_mechanism
 from gearmbs.studies.run.store import write_dataset
+from tests.says import says
 
 SHORT = {"run_up": 0.03, "settling": 0.01, "duration": 0.06}
 
@@ -82,9 +83,9 @@ def test_files_appear_whole_or_not_at_all(tmp_path):
     def interrupted():
         with whole_file(target) as part:
             part.write_text("half")
-            raise RuntimeError("stop")
+            raise RuntimeError("interrupted by the test")
 
-    with pytest.raises(RuntimeError, match="stop"):
+    with pytest.raises(RuntimeError, match="interrupted by the test"):
         interrupted()
     assert list(tmp_path.rglob("*.*")) == []
     with whole_file(target) as part:
@@ -156,7 +157,7 @@ def test_exchange_with_measurements(short_study, tmp_path):
     assert list(parse_states(["low:healthy=a.csv", "low:broken=b.csv"])["low"]) == ["healthy", "broken"]
     with pytest.raises(ValueError, match="load:state=path"):
         parse_states(["healthy"])
-    with pytest.raises(ValueError, match="choose one of"):
+    with pytest.raises(ValueError, match=says("component", "'sideways'", "choose", "resultant")):
         model_signals(path, "sideways")
 
 

@@ -71,10 +71,10 @@ def test_campbell_diagram_over_a_measurement(signal):
     ("call", "said"),
     [
         (lambda s: order_map_plot(s, channel="c"), "there is no 'c'"),
-        (lambda s: order_map_plot(s, over="angle"), "over"),
-        (lambda s: waterfall_plot(s, style="bars"), "style"),
+        (lambda s: order_map_plot(s, over="angle"), says("over", "'time'", "'speed'", "'angle'")),
+        (lambda s: waterfall_plot(s, style="bars"), says("style", "'lines'", "'map'", "'bars'")),
         (lambda s: spectrogram_plot(s.drop_vars("speed"), orders=[1]), says("speed", "known")),
-        (lambda s: spectrogram_plot(s, maximum=0.0), "maximum"),
+        (lambda s: spectrogram_plot(s, maximum=0.0), says("maximum", "0.0 Hz", "31.25 Hz")),
     ],
 )
 def test_wrong_calls_name_the_argument(signal, call, said):

@@ -6,6 +6,7 @@ from gearmbs.gears import GearPair
 from gearmbs.gears.faults import BrokenTooth
 from gearmbs.view import ContactProbe, mesh_view, static_motion
 from gearmbs.view.motion import chosen_times
+from tests.says import says
 from tests.view.looking import assert_readable
 
 CASES = {
@@ -90,7 +91,11 @@ def test_outlines_touch_where_the_contacts_are():
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"width": -1.0}, "width"), ({"torque": -5.0}, "torque"), ({"driver_angle": 0.1, "torque": -5.0}, "torque")],
+    [
+        ({"width": -1.0}, says("width", "-1.0", "give a positive")),
+        ({"torque": -5.0}, says("torque", "-5.0", "give 0")),
+        ({"driver_angle": 0.1, "torque": -5.0}, says("torque", "-5.0", "give 0")),
+    ],
 )
 def test_wrong_views_are_named(options, message):
     with pytest.raises(ValueError, match=message):

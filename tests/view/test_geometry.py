@@ -10,6 +10,7 @@ from gearmbs.gears.faults import BrokenTooth, ChippedCorner, Eccentricity, Pit, 
 from gearmbs.view import gear_outline, gear_solid, pair_solids, profile_area, read_stl, write_dxf, write_step, write_stl
 from gearmbs.view.mesh import ball, box, cylinder, rod
 from gearmbs.view.profile import Arc, Spline, bore_edges, half_tooth, profile_edges
+from tests.says import says
 from tests.view.looking_at_step import check_shell, check_volume, step_entities
 
 PAPER = GearPair.paper().driver
@@ -114,7 +115,7 @@ def test_stl_of_the_bore_and_units(tmp_path):
     assert radius.min() == pytest.approx(gear.bore_radius, rel=1e-5)
     with pytest.raises(ValueError, match="furlong"):
         write_stl(gear, tmp_path / "x.stl", unit="furlong")
-    with pytest.raises(ValueError, match="GearSpec"):
+    with pytest.raises(ValueError, match=says("solid", "str", "give a GearSpec")):
         write_stl("gear", tmp_path / "x.stl")
     (tmp_path / "bad.stl").write_bytes(b"x" * 100)
     with pytest.raises(ValueError, match=r"bad\.stl"):
@@ -227,9 +228,9 @@ def test_dxf_of_a_pair_stands_where_the_pair_stands(tmp_path):
     # vertices repeat every pitch, so that their mean is the wheel's centre
     np.testing.assert_allclose(one[:, :2].mean(axis=0), [0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(two[:, :2].mean(axis=0), [pair.centre_distance * 1e3, 0.0], atol=1e-6)
-    with pytest.raises(ValueError, match="misalignment"):
+    with pytest.raises(ValueError, match=says("gears", "with_changes", "misalignment=0")):
         write_dxf(pair.with_changes(misalignment=0.01), tmp_path / "x.dxf")
-    with pytest.raises(ValueError, match="faults"):
+    with pytest.raises(ValueError, match=says("gears", "with_changes", "faults=()")):
         write_dxf(pair.with_faults(BrokenTooth()), tmp_path / "x.dxf")
 
 
@@ -270,5 +271,5 @@ def test_simple_solids():
     assert ball(1.0, 60).volume == pytest.approx(4 / 3 * math.pi, rel=2e-3)
     with pytest.raises(ValueError, match="two different points"):
         rod([1, 1, 1], [1, 1, 1], 0.1)
-    with pytest.raises(ValueError, match="tolerance"):
+    with pytest.raises(ValueError, match=says("tolerance", "0.0", "give", "1e-6")):
         gear_outline(PAPER, 0.0)

@@ -342,7 +342,7 @@ def test_measures_and_accelerations_of_elastic_markers():
         ([Mode(mass=1.0)], "frequency or its stiffness"),
         ([Mode(stiffness=1.0, frequency=1.0)], "frequency or its stiffness"),
         ([Mode(stiffness=1.0, mass=0.0)], "modal mass"),
-        ([Mode(stiffness=-1.0)], "not be negative"),
+        ([Mode(stiffness=-1.0)], says("body 'b'", "mode 1", "stiffness", "-1.0", "negative")),
         ([Mode(stiffness=1.0, mass=0.1, momentum=(1.0, 0, 0))], "more momentum"),
     ],
 )

@@ -7,6 +7,7 @@ from numba import njit
 from gearmbs.dae.integrators.differences import colour_columns
 from gearmbs.dae.solve import solve_dae
 from tests.dae.integrators.problems import pendulum
+from tests.says import says
 
 
 def robertson(t, y, yp, out):
@@ -294,23 +295,23 @@ def test_problem_with_its_own_tolerances():
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        ({"method": "Euler"}, "method"),
+        ({"method": "Euler"}, says("method", "'Euler'", "choose", "WSTIFF")),
         ({"t_span": (1.0, 0.0)}, "t_span"),
-        ({"y0": None}, "y0"),
-        ({"y0": []}, "y0"),
+        ({"y0": None}, says("y0", "missing")),
+        ({"y0": []}, says("y0", "empty")),
         ({"yp0": [0.0]}, "yp0"),
         ({"atol": [1e-6] * 3}, "atol"),
         ({"atol": 0.0}, "atol"),
-        ({"error_mask": [1, 0]}, "error_mask"),
-        ({"error_mask": np.zeros(2, bool)}, "error_mask"),
+        ({"error_mask": [1, 0]}, says("error_mask", "2 booleans", "int64")),
+        ({"error_mask": np.zeros(2, bool)}, says("error_mask", "set it", "unknowns")),
         ({"jac_sparsity": np.ones((3, 3))}, "jac_sparsity"),
-        ({"fun": lambda t, y: None}, "arguments"),
-        ({"method": "IDA", "dense_output": True}, "IDA"),
+        ({"fun": lambda t, y: None}, says("2 arguments", "4", "5", "p")),
+        ({"method": "IDA", "dense_output": True}, says("method='IDA'", "dense_output", "tol")),
         ({"method": "IDA", "corrector": "modified"}, "corrector"),
         ({"corector": "modified"}, "corector; .* corrector, "),
         ({"method": "IDA", "max_order": 6}, "max_order"),
         ({"method": "IDA", "rtol": -1e-6}, "rtol"),
-        ({"method": "IDA", "t_eval": []}, "t_eval"),
+        ({"method": "IDA", "t_eval": []}, says("t_eval", "(0,)", "at least one")),
     ],
 )
 def test_wrong_arguments_are_named(change, names):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.mechanism import Mechanism, ModelError
+from tests.says import says
 
 
 def tumbling() -> Mechanism:
@@ -53,5 +54,5 @@ def test_a_conflict_on_the_way_is_found():
 
 
 def test_a_consumer_needs_the_steps():
-    with pytest.raises(ModelError, match="every_step"):
+    with pytest.raises(ModelError, match=says("consumer", "give every_step=True")):
         tumbling().simulate(1.0, consumer=print)

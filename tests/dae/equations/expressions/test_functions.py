@@ -12,6 +12,7 @@ from gearmbs.dae.equations.expressions import ExpressionError, SplineData
 from gearmbs.dae.equations.expressions.splines import spline_table, spline_value
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Scope, Units
+from tests.says import says
 
 from .support import World, time_series
 
@@ -143,12 +144,17 @@ def test_spline_surface_is_linear_between_curves_and_extrapolates():
 
 
 @pytest.mark.parametrize(
-    ("x", "y", "z"),
-    [((0, 1, 2), ((1, 2, 3),), ()), ((0, 1, 1, 2), ((1, 2, 3, 4),), ()), ((0, 1, 2, 3), ((1, 2, 3),), ()),
-     ((0, 1, 2, 3), ((1, 2, 3, 4), (1, 2, 3, 4)), ()), ((0, 1, 2, math.nan), ((1, 2, 3, 4),), ())],
-)  # fmt: skip
-def test_bad_splines_are_refused(x, y, z):
-    with pytest.raises(ValueError, match="spline"):
+    ("x", "y", "z", "words"),
+    [
+        ((0, 1, 2), ((1, 2, 3),), (), says("spline", "four x", "3")),
+        ((0, 1, 1, 2), ((1, 2, 3, 4),), (), says("spline", "x values", "increase")),
+        ((0, 1, 2, 3), ((1, 2, 3),), (), says("spline", "one y", "4 x values")),
+        ((0, 1, 2, 3), ((1, 2, 3, 4), (1, 2, 3, 4)), (), says("spline", "2 curves", "z values", "0")),
+        ((0, 1, 2, math.nan), ((1, 2, 3, 4),), (), says("spline", "finite")),
+    ],
+)
+def test_bad_splines_are_refused(x, y, z, words):
+    with pytest.raises(ValueError, match=words):
         SplineData(x, y, z)
 
 
