@@ -53,6 +53,8 @@ HOPELESS_DIGITS = 4.0
 """The same in the course of a run, where an unknown may have grown."""
 UNSATISFIED = 1e-3
 """Part of its terms by which an equation set aside may be off at the end of a run."""
+REACHED = Status.SUCCESS, Status.SUCCESS.sentence
+"""How a run ends that has come to where it is to pause, or to its end."""
 DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
 
 
@@ -235,11 +237,13 @@ class Run:
             if failure is not None:
                 return failure
             self.started = True
-        chunk = FIRST_CHUNK
+        chunk, st = FIRST_CHUNK, self.state
         while True:
             tic = time.perf_counter()
             few = 1 if self.stall.looking else chunk
-            code = direct(advance)(self.functions, self.state, self.algebraic.part, self.plan, self.factors, few)
+            if st.code == s.RUNNING:
+                direct(advance)(self.functions, st, self.algebraic.part, self.plan, self.factors, few)
+            code, st.code = st.code, s.RUNNING
             ending = self.user_failure() if self.user_exception() is not None else self._heed(code)
             if ending is not None:
                 return ending
@@ -250,8 +254,8 @@ class Run:
                 return ending
             if code == s.RUNNING:
                 self._report()
-                if self.state.t >= self.state.t_pause:
-                    return Status.SUCCESS, Status.SUCCESS.sentence
+                if st.t >= st.t_pause:
+                    return REACHED
                 if few < chunk:
                     continue
                 elapsed = time.perf_counter() - tic

@@ -127,6 +127,7 @@ class RunState(Struct):
     keep_rows: bool  # whether y of every step is recorded
     step_in_weights: bool  # whether the size of the step enters the weights of the corrector test
     t_pause: float  # the loop returns after the first step that ends here or later
+    code: int  # with which the compiled loop has returned, RUNNING where that has been seen to
     # where the run stands
     t: float  # end of the last accepted step
     h: float  # size wanted of the next step

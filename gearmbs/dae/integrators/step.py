@@ -482,33 +482,9 @@ def close_step(functions, st):
     return s.RUNNING
 
 
-@njit(
-    int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, PLAN_TYPE, FACTORS_TYPE, int64),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def advance(bound, st, part, plan, factors, max_accepted):
-    """Take at most ``max_accepted`` accepted steps, none after one that ends at ``st.t_pause`` or later.
-
-    Parameters
-    ----------
-    bound : Functions
-        Residual, Jacobian, hook and events.
-    st : RunState
-        State, read and written.
-    part : AlgebraicPart
-        What is solved for at outputs and crossings.
-    plan, factors : LUPlan, LUFactors
-        Plan and numbers of the sparse factorisation.
-    max_accepted : int
-
-    Returns
-    -------
-    code : int
-        RUNNING, DONE, TERMINAL, PAUSED, REPIVOT, BUFFER_FULL or a failure of `gearmbs.dae.integrators.run_state`.
-    """
-    functions = unbound(bound)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take_steps(functions, st, part, plan, factors, max_accepted):
+    """Take steps, see `advance`; return the code."""
     accepted = 0
     while accepted < max_accepted and st.t < st.t_pause:
         code = open_step(st)
@@ -543,3 +519,34 @@ def advance(bound, st, part, plan, factors, max_accepted):
             if code != s.RUNNING:
                 return code
     return s.RUNNING
+
+
+@njit(
+    int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, PLAN_TYPE, FACTORS_TYPE, int64),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def advance(bound, st, part, plan, factors, max_accepted):
+    """Take at most ``max_accepted`` accepted steps, none after one that ends at ``st.t_pause`` or later.
+
+    Parameters
+    ----------
+    bound : Functions
+        Residual, Jacobian, hook and events.
+    st : RunState
+        State, read and written.
+    part : AlgebraicPart
+        What is solved for at outputs and crossings.
+    plan, factors : LUPlan, LUFactors
+        Plan and numbers of the sparse factorisation.
+    max_accepted : int
+
+    Returns
+    -------
+    code : int
+        RUNNING, DONE, TERMINAL, PAUSED, REPIVOT, BUFFER_FULL or a failure of `gearmbs.dae.integrators.run_state`; kept in
+        ``st.code``, too, where an exception of Python cannot lose it.
+    """
+    st.code = _take_steps(unbound(bound), st, part, plan, factors, max_accepted)
+    return st.code

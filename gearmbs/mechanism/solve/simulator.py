@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,6 +38,8 @@ COUNTED = ("joint_angle", "evaluate")
 """What it tells with full turns counted from the first point on."""
 COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 """AX, AY and AZ of the function language."""
+NOTHING = nullcontext()
+"""What errors of functions are looked for in where there are none."""
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")
 """Options of integrators that are about outputs and events of a run that is told its end."""
 
@@ -181,7 +184,7 @@ class Simulator(OwnAttributes):
         self._row = Solution(self._system, problem, empty, self._members)
         self._row.inside = just_inside(np.array([problem.t0, self.t_end]))
         self._row.share(1)
-        self._next_look = problem.t0
+        self._next_look = problem.t0 if self._system.has_dropped_rows else np.inf
         self._points: list[Point] = []
         self._counted: dict[tuple, tuple[int, float]] = {}
         self._failed: str | None = None
@@ -205,6 +208,17 @@ class Simulator(OwnAttributes):
             For a time that is no number, that lies behind or after the end, and where the integration fails: the
             simulator then stands where it stood, and can only be restored to an earlier state.
         """
+        if not (isinstance(t, float) and self.t <= t <= self.t_end and self._failed is None):
+            t = self._time(t)
+        t = float(t)
+        while self.t < t:
+            end = self._sample(t) if self._controls else t
+            if self._own:
+                self._apply(end)
+            self._go_to(end, end == t)
+
+    def _time(self, t: Any) -> float:
+        """Return a time to go on to, s; raise a ModelError for any other."""
         t = quantity(t, "time", "t")
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
@@ -216,15 +230,12 @@ class Simulator(OwnAttributes):
             raise ModelError(
                 f"t = {t:.9g} s lies after t_end = {self.t_end:.9g} s; make the simulator with a later t_end"
             )
-        while self.t < t:
-            end = self._sample(t)
-            self._apply(end)
-            self._go_to(end, end == t)
+        return t
 
     def _go_to(self, t: float, record: bool) -> None:
         """Go on to a time with what is set, and keep it as a point of the solution."""
         started = time.perf_counter()
-        with raised_errors(self._functions):
+        with raised_errors(self._functions) if self._functions else NOTHING:
             status, message = self._run.go_to(t)
         if status is Status.INTERRUPTED:
             raise KeyboardInterrupt
@@ -235,7 +246,7 @@ class Simulator(OwnAttributes):
         self._simulated += t - self.t
         self._wall_time += time.perf_counter() - started
         self._stand_at(t, y, yp, idata, record)
-        if self._system.has_dropped_rows and t >= self._next_look:
+        if t >= self._next_look:
             self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
             found = self._now().find_conflict(np.array([0]))
             if found is not None:

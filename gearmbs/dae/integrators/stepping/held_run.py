@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from gearmbs.dae.integrators.bdf import HISTORY
-from gearmbs.dae.integrators.driver import InterruptFlag, Run, StallWatch
+from gearmbs.dae.integrators.driver import FIRST_CHUNK, REACHED, InterruptFlag, Run, StallWatch
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.run_state import RunState
+from gearmbs.dae.integrators.run_state import RUNNING, RunState
+from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.integrators.stepping.jumps import TERMS, pass_jump
 from gearmbs.dae.integrators.stepping.memory import LastStep, put_memory, record_window, take_memory, value_in
 from gearmbs.dae.problem import DAEProblem
@@ -21,6 +22,9 @@ from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
 from gearmbs.kernels.pointers import direct
 
+LOOK = 32 * FIRST_CHUNK
+"""Steps between two looks at whether the run gets on: a look takes as long as some steps of a small model, and what it looks for
+shows over thousands."""
 ROWS = 16 * HISTORY
 """Records between two calls of the compiled loop: enough for it to be called seldom, few enough for the cache."""
 
@@ -85,6 +89,8 @@ class HeldRun(Run):
         st = self.state
         st.outputs, st.y_out, st.yp_out = np.empty(1), np.empty((1, problem.n)), np.empty((1, problem.n))
         st.next_output = 1
+        self._at, self._y, self._yp = st.outputs, st.y_out[0], st.yp_out[0]
+        self._looked = 0
         self.last_records = LastRecords(st)
         self.records = self.last_records  # type: ignore[assignment]
         self._given: tuple[int, LastStep] | None = None
@@ -93,21 +99,30 @@ class HeldRun(Run):
             self.put_back(options.history)
 
     def go_to(self, t: float) -> tuple[Status, str]:
-        """Take steps until one ends at ``t`` or later; return a success, or how the run has failed."""
+        """Take steps until one ends at ``t`` or later; return a success, or how the run has failed.
+
+        Some steps are taken at once, whatever else there is to do, for which Python takes as long as they do. Ctrl-C
+        comes in between then, after them: ``st.code`` knows what is left to do.
+        """
         st = self.state
         if self.started and t <= st.t:
-            return Status.SUCCESS, Status.SUCCESS.sentence
-        st.outputs[0] = st.t_pause = t
+            return REACHED
+        self._at[0] = st.t_pause = t
         st.next_output = 0
+        if self.started and st.code == RUNNING and st.steps - self._looked < LOOK and not self.stall.looking:
+            direct(advance)(self.functions, st, self.algebraic.part, self.plan, self.factors, FIRST_CHUNK)
+            if st.code == RUNNING and st.t >= t and not self.options.errors:
+                return REACHED
+        self._looked = st.steps
         with InterruptFlag() as interrupt:
             return self._loop(interrupt)
 
     def values_at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return y, y' and the integer table valid for them at a time within the last step."""
         st, records = self.state, self.last_records
-        if st.next_output == 1 and st.outputs[0] == t:
+        if st.next_output == 1 and self._at[0] == t:
             table = records.before if records.changed_at == st.steps else records.table
-            return st.y_out[0].copy(), st.yp_out[0].copy(), table
+            return self._y.copy(), self._yp.copy(), table
         last = self._last_step()
         return *value_in(self, last, t), last.idata
 
@@ -162,7 +177,8 @@ class HeldRun(Run):
         self.pivots, last = put_memory(self, history)
         st.n_records, st.next_output = 0, 1
         record_window(st)
-        st.outputs[0] = np.nan
+        self._at[0] = np.nan
+        self._looked = st.steps
         self.stall = StallWatch(st.steps, st.t)
         records = self.last_records = LastRecords(st)
         self.records = records  # type: ignore[assignment]
@@ -170,8 +186,10 @@ class HeldRun(Run):
 
     def _last_step(self) -> LastStep:
         st = self.state
-        if self._given is not None and self._given[0] == st.steps:
-            return self._given[1]
-        if not st.steps:
-            return LastStep(np.array([st.t]), st.y[None, :].copy(), st.y.copy(), st.yp.copy(), st.idata.copy())
-        return self.last_records.last_step()
+        if self._given is None or self._given[0] != st.steps:
+            if st.steps:
+                last = self.last_records.last_step()
+            else:
+                last = LastStep(np.array([st.t]), st.y[None, :].copy(), st.y.copy(), st.yp.copy(), st.idata.copy())
+            self._given = int(st.steps), last
+        return self._given[1]

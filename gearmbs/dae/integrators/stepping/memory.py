@@ -28,7 +28,7 @@ from gearmbs.kernels.pointers import FUNCTIONS_TYPE, direct
 ASKED = {
     "t_end", "h_max", "rtol", "max_order", "max_iterations", "max_steps", "n_events", "most_crossings", "fixed_leading",
     "interpolate", "has_hook", "has_index_one", "nonlinear_rates", "watches_pencil", "constrained", "keep_rows",
-    "step_in_weights", "t_pause", "next_output", "next_stop", "n_records", "n_crossings",
+    "step_in_weights", "t_pause", "code", "next_output", "next_stop", "n_records", "n_crossings",
 }  # fmt: skip
 """Scalars of a run that are its own."""
 SCALARS = tuple(name for name in RunState.scalar_members if name not in ASKED)
@@ -254,7 +254,8 @@ def value_between(functions, part, t, t_old, y_old, h, nodes, rows, count, y, yp
 def value_in(run: Remembers, last: LastStep, t: float) -> tuple[np.ndarray, np.ndarray]:
     """Return y and y' at a time within the last step, as an output there; the run itself is left alone."""
     st, part = run.state, run.algebraic.part
-    tables = last.idata, st.rdata.copy(), st.work.copy()
+    # without anything to solve for they are not looked at
+    tables = last.idata, *((st.rdata.copy(), st.work.copy()) if part.count else (st.rdata, st.work))
     nodes, rows = last.nodes, last.rows
     if len(nodes) < 2 or t == nodes[0]:
         y, yp = last.y.copy(), last.yp.copy()
