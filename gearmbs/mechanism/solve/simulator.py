@@ -40,6 +40,7 @@ COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 """AX, AY and AZ of the function language."""
 NOTHING = nullcontext()
 """What errors of functions are looked for in where there are none."""
+NO_NUMBERS = np.empty(0)
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")
 """Options of integrators that are about outputs and events of a run that is told its end."""
 
@@ -120,6 +121,10 @@ class Simulator(OwnAttributes):
     -0.0471
     """
 
+    t: float
+    _point: Point
+    _present: Solution | None
+
     def __init__(
         self,
         mechanism: Mechanism,
@@ -162,7 +167,7 @@ class Simulator(OwnAttributes):
         # the same numbers where these cells alone are a table
         self._own = {name: number.moved_to(self._cells) for name, number in self.numbers.items()}
         self._set: dict[str, tuple[float, int]] = {}
-        self._wall_time = self._simulated = 0.0
+        self._clock = [0.0, 0.0]
         self._begin(initial)
         self._t_start = self.t
 
@@ -191,11 +196,11 @@ class Simulator(OwnAttributes):
         self._stand_at(float(problem.t0), problem.y0, problem.yp0, problem.idata)
 
     def _stand_at(self, t: float, y: np.ndarray, yp: np.ndarray, idata: np.ndarray, record: bool = True) -> None:
-        self.t = t
-        self._point = t, y, yp, idata, self._run.state.rdata[self._cells]
-        self._present: Solution | None = None
+        point = t, y, yp, idata, self._run.state.rdata[self._cells] if self._cells.size else NO_NUMBERS
+        # past the look at names that are assigned, which takes as long as all the rest
+        vars(self).update(t=t, _point=point, _present=None)
         if record and self._records:
-            self._points.append(self._point)
+            self._points.append(point)
 
     # --- going on -----------------------------------------------------------------------------------
 
@@ -243,8 +248,8 @@ class Simulator(OwnAttributes):
             self._failed = message
             raise ModelError(message)
         y, yp, idata = self._run.values_at(t)
-        self._simulated += t - self.t
-        self._wall_time += time.perf_counter() - started
+        self._clock[0] += t - self.t
+        self._clock[1] += time.perf_counter() - started
         self._stand_at(t, y, yp, idata, record)
         if t >= self._next_look:
             self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
@@ -256,7 +261,8 @@ class Simulator(OwnAttributes):
     @property
     def real_time_factor(self) -> float:
         """Seconds simulated in a second of the clock, in all calls of :meth:`advance`; 0 before the first."""
-        return self._simulated / self._wall_time if self._wall_time > 0.0 else 0.0
+        simulated, took = self._clock
+        return simulated / took if took > 0.0 else 0.0
 
     # --- acting on it ---------------------------------------------------------------------------------
 
@@ -373,7 +379,7 @@ class Simulator(OwnAttributes):
         loads = all(number.kind == INPUT for number, _ in changed)
         with raised_errors(self._functions):
             self._run.change(t, y, yp, self._cells, after, loads, any(slope for _, slope in changed))
-        self._wall_time += time.perf_counter() - started
+        self._clock[1] += time.perf_counter() - started
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""
