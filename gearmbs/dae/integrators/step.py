@@ -545,8 +545,8 @@ def advance(bound, st, part, plan, factors, max_accepted):
     Returns
     -------
     code : int
-        RUNNING, DONE, TERMINAL, PAUSED, REPIVOT, BUFFER_FULL or a failure of `gearmbs.dae.integrators.run_state`; kept in
-        ``st.code``, too, where an exception of Python cannot lose it.
+        RUNNING, DONE, TERMINAL, PAUSED, REPIVOT, BUFFER_FULL or a failure of `gearmbs.dae.integrators.run_state`; kept
+        in ``st.code``, too, where an exception of Python cannot lose it.
     """
     st.code = _take_steps(unbound(bound), st, part, plan, factors, max_accepted)
     return st.code

@@ -23,8 +23,8 @@ from gearmbs.dae.state import History
 from gearmbs.kernels.pointers import direct
 
 LOOK = 32 * FIRST_CHUNK
-"""Steps between two looks at whether the run gets on: a look takes as long as some steps of a small model, and what it looks for
-shows over thousands."""
+"""Steps between two looks at whether the run gets on: a look takes as long as some steps of a small model, and what it
+looks for shows over thousands."""
 ROWS = 16 * HISTORY
 """Records between two calls of the compiled loop: enough for it to be called seldom, few enough for the cache."""
 
