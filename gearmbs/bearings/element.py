@@ -87,6 +87,7 @@ class RollingBearing(ForceElement):
     """
 
     kind = "rolling bearing"
+    instead = "take an elastic bearing of its stiffness (ElasticBearing, Mechanism.bushing), or take it out first"
     diagnostics = (
         Diagnostic("elastic_energy", "J", STORED),
         Diagnostic("damping_power", "W", DISSIPATED),

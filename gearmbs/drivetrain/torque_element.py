@@ -53,10 +53,12 @@ from gearmbs.dae.equations.loads.forces import (
     impact,
 )
 from gearmbs.drivetrain.part import require
+from gearmbs.drivetrain.torque_text import LINEAR_SHARE, STATE_UNIT, torque_text
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, VEC, caller
 from gearmbs.kernels.structs import vector_at
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
+from gearmbs.mechanism.language.syntax import Units
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Load, State
 from gearmbs.mechanism.parts.functions import TimeFunction
 
 LAW_SIG = types.void(VEC, F8, F8, F8, VEC, VEC, VEC)
@@ -69,9 +71,6 @@ STORED_TORQUE, LOST, TOLD = 4, 5, 6
 RATE, RATE_BY_ANGLE, RATE_BY_SPEED, RATE_BY_STATE = 7, 8, 9, 10
 """The state's rate and its derivatives."""
 OUT_SIZE = 11
-
-LINEAR_SHARE = 0.8
-"""Part of the largest torque up to which a controller's torque is what it asks for."""
 
 SENSE, SYNCHRONOUS, LAG = 0, 1, 2
 """Parameters of induction motors: sense of rotation, synchronous speed (rad/s), lag (s); then those of the law."""
@@ -153,9 +152,6 @@ def controller(p, t, angle, speed, times, states, out):
 
 PUMP_SENSE, PER_PRESSURE, IDLE, VISCOUS, PUMP_SMOOTH, PUMP_TEETH, PUMP_START, PUMP_LAG, EFFICIENCY = range(9)
 """Parameters of a pump: sense, V_g/2pi (m^3/rad), T_0, c, w_0, Z, a_0, lag, eta; then a_1, a_2, ..."""
-
-STATE_UNIT = 1e6
-"""Pa in a unit of the state z, which is in MPa: errors of states are controlled absolutely."""
 
 
 @njit(LAW_SIG, cache=True, nogil=True, error_model="numpy")
@@ -405,6 +401,10 @@ class ShaftTorque(ForceElement):
             angles=((2, self.i, self.j),) if self.counts_angle else (),
             scratch=WORK,
         )
+
+    def by_expressions(self, units: Units) -> tuple[Load, dict[str, tuple[str, float]]]:
+        """Return the torque and its state in the function language; see `gearmbs.drivetrain.torque_text`."""
+        return torque_text(self, units)
 
     def __repr__(self) -> str:
         return f"ShaftTorque({self.name!r}, {self.kind} on {self.i.body.name!r} about z of {self.j.name!r})"

@@ -221,6 +221,7 @@ class IdealMeshForce(ForceElement):
     mesh: IdealMesh
 
     kind = "ideal mesh"
+    instead = "take a gear contact with ContactLaw.impact, or take it out of the mechanism first"
     diagnostics = (
         Diagnostic("elastic_energy", "J", STORED),
         Diagnostic("damping_power", "W", DISSIPATED),

@@ -170,7 +170,8 @@ class DeckNames:
             yield name, "gcon"
         for name, element in self.mechanism.elements.items():
             solid = isinstance(element, SolidContact) or (self.gears == "solids" and is_gear_contact(element))
-            yield name, "contact" if solid else self.kept.get(name) or load_statement(as_expressions(element)).lower()
+            statement = load_statement(as_expressions(element, self.units)).lower()
+            yield name, "contact" if solid else self.kept.get(name, statement)
 
     def expression(self, text: str) -> str:
         """Return an expression with names replaced by ids."""

@@ -23,10 +23,10 @@ from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism, Torque
 from gearmbs.mechanism.contacts import SolidContact
-from gearmbs.mechanism.forces.friction import INPUTS, KINDS, FrictionForce, JointFriction
+from gearmbs.mechanism.forces.friction import INPUTS, KINDS, JointFriction
 from gearmbs.mechanism.forces.springs import LineSpring
 from gearmbs.mechanism.parts.bodies import Marker
-from gearmbs.mechanism.parts.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load, State
+from gearmbs.mechanism.parts.elements import AXIS_FORCE, AXIS_TORQUE, LINE, ForceElement, Load, State
 from gearmbs.mechanism.parts.elements import COMPONENTS as COMPONENT_MODE
 from gearmbs.mechanism.parts.functions import function_text
 from gearmbs.mechanism.parts.joints import Joint
@@ -120,19 +120,20 @@ def element_arguments(writer: WriterContext, load: Any) -> list[str]:
     return [*ends, *{"bushing": _bushing, "field": _field, "beam": _beam}[load.kind](p)]
 
 
-def as_expressions(element: Any) -> Any:
-    """Return the load by expressions that stands for a friction; other elements as they are."""
-    return element.text.load if isinstance(element, FrictionForce) else element
+def as_expressions(element: Any, units: Units) -> Any:
+    """Return the load by expressions that stands for an element, as a friction; those without one as they are."""
+    made = element.by_expressions(units) if isinstance(element, ForceElement) else None
+    return element if made is None else made[0]
 
 
 def states_of(mechanism: Mechanism) -> dict[Any, State]:
-    """Return the states that are written: those of the mechanism, and of frictions that are written as expressions."""
+    """Return the states that are written: those of the mechanism, and of elements that are written as expressions."""
     found: dict[Any, State] = dict(mechanism.states)
     whole = kept(mechanism)
     for name, element in mechanism.elements.items():
-        if isinstance(element, FrictionForce) and name not in whole:
-            for state, text in zip(element.states, element.text.states.values()):
-                found[state.name] = State(state.name, text, state.start)
+        made = element.by_expressions(mechanism.units) if isinstance(element, ForceElement) else None
+        if made is not None and name not in whole:
+            found |= {state: State(state, text, start) for state, (text, start) in made[1].items()}
     return found
 
 
@@ -368,8 +369,8 @@ def element_statements(w: WriterContext, name: str, element: Any) -> None:
     if name in w.kept:
         kind = w.kept[name]
         w.statement(f"{KEYWORDS[kind]}/{w.elements[kind, name]}", element_arguments(w, element), name)
-    elif isinstance(element, Load | FrictionForce):
-        _load(w, name, as_expressions(element))
+    elif isinstance(made := as_expressions(element, w.units), Load):
+        _load(w, name, made)
     elif isinstance(element, Torque):
         text = w.expression(function_text(element.function, w.units.time, w.units.factor("torque")))
         _gforce(w, name, element.i, element.j, element.axis, {"TZ": text})
@@ -382,7 +383,7 @@ def element_statements(w: WriterContext, name: str, element: Any) -> None:
     else:
         raise ModelError(
             f"{element.kind} '{name}': it has a compiled function of its own, which has no form in an ADAMS deck; "
-            "describe it by expressions (Mechanism.load) or take it out of the mechanism first"
+            f"{element.instead}"
         )
 
 

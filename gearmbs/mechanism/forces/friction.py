@@ -410,6 +410,12 @@ class FrictionForce(ForceElement):
     text: FrictionText
 
     settled = (*ForceElement.settled, "joint", "friction", "units", "own_states", "text")
+
+    def by_expressions(self, units: Units) -> tuple[Load, dict[str, tuple[str, float]]]:
+        """Return the load that stands for the friction; its texts are in the mechanism's units already."""
+        rates = zip(self.states, self.text.states.values(), strict=True)
+        return self.text.load, {state.name: (text, state.start) for state, text in rates}
+
     kind = "friction"
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.language.syntax import Units
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,8 @@ class ForceElement(OwnAttributes):
     """Whether F is an unknown."""
     has_torque: ClassVar[bool] = True
     """Whether N is an unknown."""
+    instead: ClassVar[str] = "describe it by expressions (Mechanism.load) or take it out of the mechanism first"
+    """What to take where a deck is written, which has no form for a compiled function."""
 
     @property
     def markers(self) -> tuple[Marker, ...]:
@@ -111,6 +116,22 @@ class ForceElement(OwnAttributes):
 
     def start_overlap(self) -> StartOverlap | None:
         """Return how parts stand in each other at the start, if that is deeper than a small share of their size."""
+        return None
+
+    def by_expressions(self, units: Units) -> tuple[Load, dict[str, tuple[str, float]]] | None:
+        """Return the same in the function language, for a deck; None where it has no form there.
+
+        Parameters
+        ----------
+        units : Units
+            Of the mechanism, in which the texts are.
+
+        Returns
+        -------
+        load : Load
+        states : dict
+            Rate and start of each of its states, by name.
+        """
         return None
 
     @abstractmethod
