@@ -15,6 +15,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Support, planetary, planetary_mechanism
 from gearmbs.gears.faults import BrokenTooth, Crowning, Fault, FlankMap, PitchError, TipRelief
+from gearmbs.gears.ideal_mesh import IdealMesh, IdealMeshForce
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.mechanism.contacts import (
     Box,
@@ -347,5 +348,8 @@ def test_the_speed_drive_of_a_shaft_in_one_ideal_bearing_comes_back():
 def test_what_a_deck_has_not_of_a_drivetrain_is_named():
     with pytest.raises(ModelError, match=says("dr.I", "'in'", "IdealBearing")):
         write_deck(train(("10 mm", "70 mm")).build())
-    with pytest.raises(ModelError, match=says("load 'ld'", "Mechanism.load")):
-        write_deck(train(loads=[TorqueLoad(name="ld", shaft="out", torque="20 N m")]).build())
+    m = train().build()
+    m.add(IdealMeshForce("ideal", m.elements["m"].i, m.elements["m"].j, IdealMesh(m.elements["m"].pair, 1e8)))
+    with pytest.raises(ModelError, match=says("ideal mesh 'ideal'", "ContactLaw.impact")):
+        write_deck(m)
+    assert "SFORCE/1" in write_deck(train(loads=[TorqueLoad(name="ld", shaft="out", torque="20 N m")]).build())
