@@ -51,8 +51,10 @@ def kind_of(path: Path) -> str | None:
         return None
     if "planetary" in data:
         return "planetary set"
-    # the shafts of a case are two, with one size
-    if "meshes" in data or "wheels" in data:
+    # the shafts of a case are two, with one size; those of a drivetrain have tables of their own, wheels or not
+    shafts = data.get("shafts")
+    named = isinstance(shafts, dict) and any(isinstance(table, dict) for table in shafts.values())
+    if named or "meshes" in data or "wheels" in data:
         return "drivetrain"
     return "case" if "gears" in data or "operation" in data else None
 

@@ -421,7 +421,13 @@ def campbell(
         limits = sorted(to_si(text, "angular speed", "--speeds") for text in speeds or [])
         if len(limits) > 2:
             raise ValueError(f"--speeds is given {len(limits)} times; give the highest, or the lowest and the highest")
-        turned = np.linspace(0.0 if len(limits) == 1 else limits[0], limits[-1], 13).tolist() if limits else None
+        lowest, highest = (0.0, *limits)[-2:] if limits else (0.0, 1.0)
+        if not 0.0 <= lowest < highest:
+            raise ValueError(
+                f"--speeds is {' and '.join(speeds or [])}; give one above 0 rpm, or two that differ and are not "
+                "negative: the diagram is over the magnitude of the drive's speed"
+            )
+        turned = np.linspace(lowest, highest, 13).tolist() if limits else None
         move(0.1, "modes")
         diagram = train_campbell(read_description(train).train, turned, harmonics=harmonics, maximum=top)
         measured = None

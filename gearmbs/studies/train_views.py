@@ -33,8 +33,13 @@ ROUNDEST = 4000.0
 
 
 def train_report(train: Drivetrain, record: xr.Dataset) -> str:
-    """Return the report of a record: frequencies, torques, meshes, bearings, sensors, harmonics, cost."""
-    sections = (_frequencies, _meshes, _bearings, _sensors, _levels, _cost)
+    """Return the report of a record: frequencies, torques, meshes, bearings, sensors, harmonics, cost.
+
+    What the drivetrain has none of has no section.
+    """
+    sections = [_frequencies, _bearings, _sensors, _cost]
+    if train.meshes:
+        sections = [_frequencies, _meshes, _bearings, _sensors, _levels, _cost]
     lines = [f"# {train.name}", ""]
     for section in sections:
         lines += [*section(train, record), ""]
@@ -275,7 +280,15 @@ def train_modes(train: Drivetrain) -> Modes:
 
 
 def mesh_orders(train: Drivetrain, harmonics: int = 2) -> dict[str, float]:
-    """Return the mesh harmonics of a drivetrain as multiples of its first drive's speed, by name."""
+    """Return the mesh harmonics of a drivetrain as multiples of its first drive's speed, by name.
+
+    Raises
+    ------
+    ValueError
+        For fewer than one harmonic.
+    """
+    if harmonics < 1:
+        raise ValueError(f"harmonics is {harmonics}; give 1 or more")
     turns = train.kinematics.shaft_frequency(train.drives[0].shaft)
     return {
         f"{h} x {mesh.name}": h * train.kinematics.mesh_frequency(mesh.name) / turns
@@ -298,7 +311,7 @@ def train_campbell(
     speeds : sequence, optional
         Of the first drive, rad/s or text; default 0 to 1.2 of the operating speed.
     harmonics : int
-        Mesh harmonics that excite.
+        Mesh harmonics that excite; where nothing meshes, the shafts do, once a turn, as unbalances excite them.
     maximum : float
         Modes and crossings up to this frequency, Hz.
 
@@ -311,5 +324,11 @@ def train_campbell(
     from gearmbs.signals import campbell
 
     turned = np.linspace(0.0, 1.2 * abs(train.drives[0].speed), 13) if speeds is None else speeds
-    found = campbell(train_modes(train), turned, mesh_orders(train, harmonics), maximum=maximum)
+    turns = train.kinematics.shaft_frequency
+    orders = mesh_orders(train, harmonics) or {
+        f"1 x {shaft.name}": turns(shaft.name) / turns(train.drives[0].shaft)
+        for shaft in train.shafts
+        if turns(shaft.name) > 0.0
+    }
+    found = campbell(train_modes(train), turned, orders, maximum=maximum)
     return found.assign_attrs(operating_speed=abs(train.drives[0].speed))

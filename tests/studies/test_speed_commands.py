@@ -172,6 +172,60 @@ def test_campbell_of_a_drivetrain(tmp_path):
     assert "is in mm where" in invoked("campbell", train, "--speeds", "1 mm").output
 
 
+ROTOR = """
+name = "rotor"
+running = true
+[shafts.rotor]
+length = "600 mm"
+radius = "20 mm"
+[drives.motor]
+kind = "speed"
+shaft = "rotor"
+speed = "1000 rpm"
+[run]
+duration = "20 ms"
+settling = "5 ms"
+""" + "".join(
+    f"[bearings.{name}]\nkind = 'elastic'\nshaft = 'rotor'\nstation = '{place} mm'\nstiffness = [1e7, 1e7, 1e7]\n"
+    f"damping = [1e2, 1e2, 1e2]\n"
+    for name, place in (("left", 50), ("right", 550))
+)
+"""A rotor in two bearings; along x, y and z its first modes are those of its mass on both springs."""
+
+
+@pytest.mark.slow
+def test_a_train_without_meshes_is_excited_by_its_turning(tmp_path):
+    train = tmp_path / "rotor.toml"
+    train.write_text(ROTOR)
+    result = invoked("campbell", train, "--speeds", "20000 rpm", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    own = np.sqrt(2e7 / (7850.0 * np.pi * 0.02**2 * 0.6)) / (2.0 * np.pi)
+    critical = [line.split()[0] for line in result.output.splitlines() if "1 x rotor" in line]
+    assert critical == 3 * [f"{60.0 * own:.5g}"]
+    assert invoked("run", train, "--out", tmp_path / "rotor.nc").exit_code == 0
+    report = (tmp_path / "rotor.md").read_text(encoding="utf-8")
+    assert "## Bearings" in report
+    assert "Mesh" not in report
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--speeds", "-1000 rpm"], ("--speeds", "-1000 rpm", "give")),
+        (["--speeds", "0 rpm"], ("--speeds", "0 rpm", "give")),
+        (["--speeds", "9 rpm", "--speeds", "9 rpm"], ("--speeds", "9 rpm", "give")),
+        (["--harmonics", "0"], ("harmonics", "0", "give")),
+    ],
+)
+def test_campbell_refuses_ranges_that_are_none(tmp_path, options, words):
+    train = tmp_path / "train.toml"
+    train.write_text(TEXT.partition("[housings.box]")[0])
+    result = invoked("campbell", train, *options, "--out", tmp_path / "out")
+    assert result.exit_code == 1
+    assert re.search(says(*words), result.output)
+    assert not (tmp_path / "out").exists()
+
+
 def test_one_speed_makes_no_waterfall(tmp_path):
     signal = gm.make_signal({"housing": np.cos(2 * np.pi * 575 * TIME)}, RATE, units="m/s^2", speed=50 * np.pi)
     record = write_signal(signal, tmp_path / "x.csv") or tmp_path / "x.csv"
