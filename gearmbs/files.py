@@ -137,7 +137,7 @@ def _size(count: float) -> str:
     return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
 
 
-def plain(value: Any, other: Callable[[Any], Any] = str) -> Any:
+def json_value(value: Any, other: Callable[[Any], Any] = str) -> Any:
     """Return a value as JSON knows it: made of tables, lists, numbers and texts.
 
     Parameters
@@ -148,11 +148,11 @@ def plain(value: Any, other: Callable[[Any], Any] = str) -> Any:
         Turns anything else into something that JSON knows; default its text.
     """
     if isinstance(value, Mapping):
-        return {str(key): plain(item, other) for key, item in value.items()}
+        return {str(key): json_value(item, other) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item, other) for item in value]
+        return [json_value(item, other) for item in value]
     if isinstance(value, np.ndarray):
-        return plain(value.tolist(), other)
+        return json_value(value.tolist(), other)
     value = python_scalar(value)
     return value if value is None or isinstance(value, str | int | float | bool) else other(value)
 

@@ -18,7 +18,7 @@ ROOT = Path(gearmbs.__file__).parent
 PAGE = Path(__file__).parent.parent / "docs" / "architecture.md"
 
 SUPPORT = {
-    "_command", "_lazy", "_shown", "compile", "files", "progress", "saving", "schema", "units",
+    "_command", "_lazy", "_display", "compile", "files", "progress", "saving", "schema", "units",
     "wording",
 }  # fmt: skip
 """Modules of the top that any package may use: lazy imports, how objects show themselves and are saved, files that

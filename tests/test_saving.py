@@ -131,7 +131,7 @@ def test_what_ffmpeg_refuses_is_told(tmp_path):
 
 
 def test_nothing_draws_a_plain_thing():
-    from gearmbs._shown import draw
+    from gearmbs._display import draw
 
     with pytest.raises(TypeError, match=says("int", "draws")):
         draw(3)

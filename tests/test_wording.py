@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gearmbs
-from gearmbs.files import plain, python_scalar
+from gearmbs.files import json_value, python_scalar
 from gearmbs.wording import any_of, closest, did_you_mean
 from tests.says import fitting, prose, raisable, says
 
@@ -60,8 +60,8 @@ def test_lists_of_names():
 
 def test_plain_values():
     value = {1: (np.float64(2.0), np.arange(2)), "a": [np.bool_(True), None, Path("x")]}
-    assert plain(value) == {"1": [2.0, [0, 1]], "a": [True, None, "x"]}
-    assert plain([1j], other=repr) == ["1j"]
+    assert json_value(value) == {"1": [2.0, [0, 1]], "a": [True, None, "x"]}
+    assert json_value([1j], other=repr) == ["1j"]
     assert type(python_scalar(np.int64(3))) is int
     assert python_scalar((np.int64(3),)) == (np.int64(3),)
 

@@ -70,7 +70,7 @@ def folded(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
     return found
 
 
-def left_out(diagnostics: Sequence[Diagnostic]) -> list[str]:
+def skipped_labels(diagnostics: Sequence[Diagnostic]) -> list[str]:
     """Return the names of the statements that are not supported, or not wholly, in the order of the remarks."""
     matches = (_LABELLED.match(d.message) for d in diagnostics if d.severity == UNSUPPORTED)
     return list(dict.fromkeys(f"{m.group(1)}/{m.group(2)}" for m in matches if m is not None))

@@ -85,7 +85,7 @@ def run_deck(
     session = Session.of(deck)
     session.redundancy, session.check = redundancy, check
     session.tol, session.allow_unsupported, session.progress = tol, allow_unsupported, progress
-    with _kept(result, session, out):
+    with _errors_recorded(result, session, out):
         _without_unasked(result, session)
         for command in script:
             if isinstance(command, Stop) or not _carry_out(command, session, result):
@@ -96,7 +96,7 @@ def run_deck(
 
 
 @contextmanager
-def _kept(result: AdamsResult, session: Session, out: str | Path | None) -> Iterator[None]:
+def _errors_recorded(result: AdamsResult, session: Session, out: str | Path | None) -> Iterator[None]:
     """Write down what ends a script, and write what it has computed, whatever ends it."""
     try:
         yield

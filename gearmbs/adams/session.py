@@ -21,7 +21,14 @@ from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnos
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, refused_arguments
 from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch, apply_change
-from gearmbs.adams.parse.deck import READ_IN_DECKS, Deck, left_out, needed_by, read_variables, refused_functions
+from gearmbs.adams.parse.deck import (
+    READ_IN_DECKS,
+    Deck,
+    absent_statements,
+    needed_by,
+    read_variables,
+    refused_functions,
+)
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME, ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import Tape
@@ -235,7 +242,7 @@ def expression_errors(deck: Deck, session: Session, scope: Scope) -> list[Diagno
         What expressions may name: `gearmbs.adams.builders.scopes.deck_scope`, or that of a mechanism.
     """
     found = []
-    read, absent = read_variables(deck), left_out(deck)
+    read, absent = read_variables(deck), absent_statements(deck)
     told: set[str] = set()
     for statement in sorted(deck, key=lambda s: not isinstance(s, INTO_OTHERS)):
         if (statement.keyword, statement.id) in session.inactive:

@@ -84,11 +84,11 @@ class Plan:
     def __str__(self) -> str:
         size = f", n = {self.n}" if self.n else ""
         head = f"plan of a {self.subject.kind}: {self.design}{size}, seed {self.seed}, {self.dimensions} dimensions"
-        lines = [f"  {factor.name}: {self._shown(factor)}" for factor in self.factors]
+        lines = [f"  {factor.name}: {self._range_text(factor)}" for factor in self.factors]
         lines += [f"  where {constraint}" for constraint in self.constraints]
         return "\n".join([head, *lines, f"  keeps {', '.join(self.keep) or 'nothing'}"])
 
-    def _shown(self, factor: AnyFactor) -> str:
+    def _range_text(self, factor: AnyFactor) -> str:
         """Return what a factor may be, as text."""
         if isinstance(factor, Choice):
             return f"{'each' if factor.crossed else 'one'} of {', '.join(factor.options)}"

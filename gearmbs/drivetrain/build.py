@@ -12,7 +12,7 @@ from gearmbs.drivetrain.connections import Bearing, Coupling
 from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.kinematics import walk
 from gearmbs.drivetrain.loads import Load
-from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, require, told_of
+from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
 from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Shaft, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
 from gearmbs.gears.geometry import MM, turn_z
@@ -256,7 +256,7 @@ def build(train: Drivetrain) -> Mechanism:
     for housing in train.housings:
         builder.housing(housing)
     for bearing in train.bearings:
-        with told_of(bearing.label):
+        with errors_named(bearing.label):
             builder.bearing(bearing)
     for coupling in train.couplings:
         one, two = (train.part(n, Shaft) for n in (coupling.first, coupling.second))
@@ -265,13 +265,13 @@ def build(train: Drivetrain) -> Mechanism:
         where, axes = frame.at(stations[0]), frame.axes
         i = m.bodies[two.name].marker_at(where, axes, name=f"{coupling.name}.I")
         j = m.bodies[one.name].marker_at(where, axes, name=f"{coupling.name}.J")
-        with told_of(coupling.label):
+        with errors_named(coupling.label):
             coupling.add(Attached(m, i, j, train.speeds[two.name], train.run_up, train.running))
     for mesh in train.meshes:
         m.gear_contact(mesh.name, builder.wheels[mesh.driver], builder.wheels[mesh.driven], train.pairs[mesh.name])
     ends: tuple[Any, ...] = (*train.drives, *train.loads)
     for part in ends:
-        with told_of(part.label):
+        with errors_named(part.label):
             part.add(builder.attached(part, "left" if part in train.drives else "right"))
     return m
 

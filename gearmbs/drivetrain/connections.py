@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 
 from gearmbs.dae.equations.loads.forces import Diagnostic
-from gearmbs.drivetrain.part import Attached, Part, require, told_of
+from gearmbs.drivetrain.part import Attached, Part, errors_named, require
 from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement
@@ -67,7 +67,7 @@ class Bearing(Part, ABC):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rolling is not None:
-            with told_of(f"{self.label}: rolling"):
+            with errors_named(f"{self.label}: rolling"):
                 object.__setattr__(self, "rolling", rolling_bearing(self.rolling))
 
     def holds(self, count: int) -> np.ndarray:
@@ -254,7 +254,7 @@ class RollingContactBearing(Bearing):
         from gearmbs.bearings.defects import as_defects
         from gearmbs.bearings.settings import bearing_settings
 
-        with told_of(f"{self.label}: settings"):
+        with errors_named(f"{self.label}: settings"):
             on_rings = [d for d in as_defects(self.settings.get("defects", ())) if not isinstance(d, LooseFit)]
             checked = {**self.settings, "defects": on_rings}
             bearing_settings(self.rolling, checked, "RollingBearing")

@@ -58,7 +58,7 @@ from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.drivetrain.connections import BEARINGS, COUPLINGS, Bearing, Coupling
 from gearmbs.drivetrain.drives import DRIVES, Drive, SpeedDrive
 from gearmbs.drivetrain.loads import LOADS, Load
-from gearmbs.drivetrain.part import DrivetrainError, Part, parts_html, require, told_of
+from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, parts_html, require
 from gearmbs.drivetrain.parts import SENSORS, GearMesh, Housing, HousingMode, Mount, Sensor, Shaft, Wheel
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
@@ -524,7 +524,7 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
 
 
 def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
-    with told_of(where):
+    with errors_named(where):
         return make(kind, given, where, DrivetrainError, name=name)
 
 
@@ -535,7 +535,7 @@ def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
     check_keys(given, known, where, DrivetrainError, shown=repr)
     for key in ("teeth", "module"):
         require(key in given, f"{where}: {key} is missing")
-    with told_of(where):
+    with errors_named(where):
         if material:
             given["material"] = Material(**material)
         radii = [key for key in ("tip_radius", "root_radius") if key in given]
@@ -554,7 +554,7 @@ def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | Non
     if "faults" in given:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None
-        with told_of(f"{where}.faults"):
+        with errors_named(f"{where}.faults"):
             given["faults"] = tuple(fault(table) for table in given["faults"])
     return _of_kind(where, GearMesh, name, {**own, "settings": given})
 

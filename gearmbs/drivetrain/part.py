@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from gearmbs._shown import html_table, readable, settings_of
+from gearmbs._display import html_table, readable, settings_of
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, step
 from gearmbs.schema.described import Described
@@ -22,7 +22,7 @@ class DrivetrainError(ValueError):
 
 
 @contextmanager
-def told_of(part: str) -> Iterator[None]:
+def errors_named(part: str) -> Iterator[None]:
     """Turn errors of what a part is made of into a `DrivetrainError` that names the part."""
     try:
         yield

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
-from gearmbs.drivetrain.part import DrivetrainError, Part, require, told_of
+from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, require
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
@@ -222,7 +222,7 @@ class GearMesh(Part):
 
     def make(self, driver: GearSpec, driven: GearSpec, rotation: Any, torque: float) -> Any:
         """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""
-        with told_of(self.label):
+        with errors_named(self.label):
             # None takes a setting back, as in `Drivetrain.changed`, where settings are merged
             given = {key: value for key, value in self.settings.items() if value is not None}
             for name in ("torque", "input_torque", "rotation"):

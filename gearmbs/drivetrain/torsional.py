@@ -17,7 +17,7 @@ import scipy.linalg
 
 from gearmbs.dae.equations.loads.time_functions import smooth_step
 from gearmbs.drivetrain.drives import SpeedDrive
-from gearmbs.drivetrain.part import require, told_of
+from gearmbs.drivetrain.part import errors_named, require
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 from gearmbs.kernels.jit import njit
@@ -412,7 +412,7 @@ def _tilted_stiffness(train: Drivetrain, mesh: str, parallel: float, force: floa
         )
         return parallel
     warn_of_jam(pair)
-    with told_of(label), warnings.catch_warnings():
+    with errors_named(label), warnings.catch_warnings():
         # faults of single teeth need not pass
         warnings.simplefilter("ignore")
         return float(loaded_transmission_error(pair, points=CYCLE_POINTS).stiffness.mean())

@@ -17,7 +17,7 @@ from numbers import Number
 import numpy as np
 import scipy.linalg
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.flexible.beam import DOFS
 from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.shaft import Shaft

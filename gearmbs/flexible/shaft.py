@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.flexible.beam import (
     DOFS,
     GAUSS_W,

@@ -14,7 +14,7 @@ from typing import ClassVar, Literal, overload
 
 import numpy as np
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.gears.spec import GearSpec, convert_fields, involute
 from gearmbs.units import Quantity
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED, Diagnostic
 from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.mesh import DAMPING_RATIO, ContactLaw, ContactModel, FlankFriction, OperatingPoint

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.units import Quantity, shown, to_si, truth

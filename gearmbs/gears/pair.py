@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness
 from gearmbs.gears.mesh import (
@@ -20,10 +20,11 @@ from gearmbs.gears.mesh import (
     ContactModel,
     FlankFriction,
     OperatingPoint,
+    pair_html,
+    pair_table,
     varying_along_face,
 )
 from gearmbs.gears.modifications import Fault
-from gearmbs.gears.show import pair_html, pair_table
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 from gearmbs.gears.tables import fillet_clearance, pack

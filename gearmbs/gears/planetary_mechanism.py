@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED, Diagnostic
 from gearmbs.gears.geometry import turn_z
 from gearmbs.gears.ideal_mesh import IdealMesh

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import ContactLaw, FlankFriction, sense_of_rotation

@@ -9,7 +9,7 @@ from functools import cached_property
 from numbers import Integral, Real
 from typing import Any, Literal
 
-from gearmbs._shown import Shown, Written
+from gearmbs._display import Shown, Written
 from gearmbs.units import Given, Quantity, doubt_of_material, shown, to_si, truth
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)

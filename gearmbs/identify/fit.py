@@ -161,7 +161,7 @@ def fit(
         raise IdentifyError(f"fit: starts = {starts!r}; give a whole number, 1 or more")
     problem = _Problem(model, measured, free, sigma, many, step, lost, absolute_sigma)
     if progress is not None:
-        problem.tell = told_of_runs(progress, starts * USUAL_STEPS * (2 * len(free) + 1))
+        problem.tell = progress_of_runs(progress, starts * USUAL_STEPS * (2 * len(free) + 1))
     low, high = problem.scale.bounds()
     attempts = []
     for z0 in _starts(problem.scale, low, high, starts, seed):
@@ -180,7 +180,7 @@ def fit(
     return problem.result(z, waterfall=[cost for _, cost in attempts], runs=problem.total)
 
 
-def told_of_runs(progress: Progress, usual: int) -> Callable[[int], None]:
+def progress_of_runs(progress: Progress, usual: int) -> Callable[[int], None]:
     """Return what tells how many evaluations are done, as a part of a usual number and never all of them."""
     return lambda done: progress(min(done / usual, 0.99), f"{done} evaluations")
 

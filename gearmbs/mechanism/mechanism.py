@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.schema.quantities import Measure, NoQuantity, OutOfRange, counts, flag, no_truth
 from gearmbs.wording import did_you_mean
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from gearmbs._shown import html_table
+from gearmbs._display import html_table
 from gearmbs.studies.case.case import readable
 from gearmbs.studies.case.section import Section
 from gearmbs.view import mesh_view

@@ -18,7 +18,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
 from gearmbs.drivetrain.drivetrain import Description, read_description
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
-from gearmbs.files import plain
+from gearmbs.files import json_value
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
@@ -403,7 +403,7 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
 
 def described(value: Any) -> Any:
     """Return a description made of tables, lists, numbers and texts; objects become tables with their kind."""
-    return plain(value, _as_table)
+    return json_value(value, _as_table)
 
 
 def _as_table(value: Any) -> Any:

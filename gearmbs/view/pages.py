@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs._shown import draw
+from gearmbs._display import draw
 from gearmbs.files import write_whole
 from gearmbs.view.figures.style import look
 

@@ -282,7 +282,7 @@ def _parameter(b: Builder, curve: Curve, disp: Any, rm: Marker, icm: int | None)
     return curve.nearest(given)
 
 
-def _kept(b: Builder, runner: str) -> tuple[float | None, float | None]:
+def _state_before(b: Builder, runner: str) -> tuple[float | None, float | None]:
     """Return parameter and rate with which the analysis before has left a runner; None where it did not run."""
     state = b.state.get((runner, 0))
     if state is None:
@@ -300,7 +300,7 @@ def add_ptcv(b: Builder, s: st.Ptcv) -> None:
     """PTCV; after the first analysis it goes on from where the point is."""
     curve, rm = curve_points(b.deck, s.curve), b.markers[s.rm or 0]
     name = b.model.names["ptcv", s.id]
-    start, speed = _kept(b, f"{name}.runner")
+    start, speed = _state_before(b, f"{name}.runner")
     if not b.state:
         start = _parameter(b, curve, s.disp, rm, s.icm)
     slot = point_on_curve(b.mechanism, name, b.markers[s.i or 0], rm, curve, start, speed)
@@ -317,8 +317,8 @@ def add_cvcv(b: Builder, s: st.Cvcv) -> None:
     first, second = curve_points(b.deck, s.icurve), curve_points(b.deck, s.jcurve)
     i, j = b.markers[s.irm or 0], b.markers[s.jrm or 0]
     name = b.model.names["cvcv", s.id]
-    at_i, speed_i = _kept(b, f"{name}.runner I")
-    at_j, speed_j = _kept(b, f"{name}.runner J")
+    at_i, speed_i = _state_before(b, f"{name}.runner I")
+    at_j, speed_j = _state_before(b, f"{name}.runner J")
     starts = speeds = None
     if at_i is not None and at_j is not None and speed_i is not None and speed_j is not None:
         starts, speeds = (at_i, at_j), (speed_i, speed_j)

@@ -274,7 +274,7 @@ def _inputs(deck: Deck, system: Any) -> list[str]:
     ]
 
 
-def left_out(deck: Deck) -> dict[Key, str]:
+def absent_statements(deck: Deck) -> dict[Key, str]:
     """Return the labels of what is not supported and not in a deck any more, by name and id, also of their markers."""
     keys, absent = set(), {}
     for diagnostic in deck.unsupported:
@@ -296,7 +296,7 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement] = ()) -> list[Diagn
     Lists of a control program merely lose those members.
     """
     remarks = []
-    absent = left_out(deck)
+    absent = absent_statements(deck)
 
     def leave_out(s: st.Statement) -> None:
         absent[s.keyword, s.id] = s.label()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearmbs.adams.errors import folded, left_out
+from gearmbs.adams.errors import folded, skipped_labels
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Linear, Simulate
 from gearmbs.adams.parse.deck import unit_names
@@ -91,7 +91,7 @@ class AdamsResult(RunRecord):
 def message_text(result: RunRecord) -> str:
     """Return the content of the message file: remarks on the model, then the commands in their order."""
     out = [RULE, f"|{'Model Title':^77}|", f"|{'=' * 77}|", f"|{result.deck.title[:75]:^77}|", RULE, ""]
-    without = [label for label in left_out(result.deck.diagnostics) if label.split("/")[0] not in st.MERELY_READ]
+    without = [label for label in skipped_labels(result.deck.diagnostics) if label.split("/")[0] not in st.MERELY_READ]
     if without:
         text = f"The model is run without {', '.join(without)}, or parts of these: its motion is not that of the deck."
         out += _block("ERROR", text)

@@ -123,7 +123,7 @@ class TablesSubject(Subject):
         return super().explain(error)
 
 
-def told(progress: Callable[[float], None], span: float) -> Callable[[float], None]:
+def progress_by_time(progress: Callable[[float], None], span: float) -> Callable[[float], None]:
     """Return a progress function of the simulated time."""
     return lambda t: progress(min(1.0, t / span))
 
@@ -196,7 +196,7 @@ class DrivetrainSubject(TablesSubject):
         from gearmbs.studies.trains import run_train
 
         span = thing.train.run_up + thing.run.settling + thing.run.duration
-        return run_train(thing.train, thing.run, progress=told(progress, span))
+        return run_train(thing.train, thing.run, progress=progress_by_time(progress, span))
 
     def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
@@ -268,7 +268,7 @@ class PlanetarySubject(TablesSubject):
         from gearmbs.studies.planetary import run_planetary
 
         run = thing[0]
-        return run_planetary(run, told(progress, run.run_up + run.settling + run.duration))
+        return run_planetary(run, progress_by_time(progress, run.run_up + run.settling + run.duration))
 
     def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
@@ -380,7 +380,9 @@ class BearingSubject(TablesSubject):
 
         run = thing.run
         end = run["settling"] + run["duration"]
-        solution = thing.mechanism().simulate(end, rate=run["rate"], tol=run["tolerance"], progress=told(progress, end))
+        solution = thing.mechanism().simulate(
+            end, rate=run["rate"], tol=run["tolerance"], progress=progress_by_time(progress, end)
+        )
         if not solution.success:
             raise RuntimeError(solution.message)
         signal = housing_signal(solution, start=run["settling"])

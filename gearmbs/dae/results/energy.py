@@ -64,7 +64,7 @@ def energy_balance(found: Evaluated, frictions: Collection[int] = (), stacklevel
     stored = {
         "kinetic": kinetic_energy(found),
         "gravity": _gravity(found),
-        "elastic": sum((v for _, v in _told(found, STORED)), _strain(found)),
+        "elastic": sum((v for _, v in _diagnostics_of(found, STORED)), _strain(found)),
     }
     change = sum(e - e[0] for e in stored.values())
     net = works["work_motion"] + works["work_applied"]
@@ -125,7 +125,7 @@ def _powers(found: Evaluated, frictions: Collection[int]) -> dict[str, np.ndarra
     powers["dissipated_damping"] = _modal_damping(found)
     if frictions:
         powers[JOINT_FRICTION] = slipping
-    for name, power in _told(found, DISSIPATED):
+    for name, power in _diagnostics_of(found, DISSIPATED):
         key = f"dissipated_{name.removesuffix('_power')}"
         powers[key] = powers.get(key, zero) + power
     return powers
@@ -136,7 +136,7 @@ def _accounts(found: Evaluated, k: int) -> bool:
     return any(d.role in (STORED, DISSIPATED) for d in found.model.diagnostics[k])
 
 
-def _told(found: Evaluated, role: str) -> Iterator[tuple[str, np.ndarray]]:
+def _diagnostics_of(found: Evaluated, role: str) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the names and values of all diagnostics of a role."""
     for k, diagnostics in enumerate(found.model.diagnostics):
         for c, d in enumerate(diagnostics):

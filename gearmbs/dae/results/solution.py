@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from gearmbs._display import Shown, html_table
 from gearmbs._lazy import former_name
-from gearmbs._shown import Shown, html_table
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.model.model import Configuration

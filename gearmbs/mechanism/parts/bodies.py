@@ -175,7 +175,9 @@ class Body(OwnAttributes):
     def centre_of_mass(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position and velocity of the centre of mass at the start, global components, m and m/s."""
         arm = self.orientation @ self.com
-        return self.position + arm, self.velocity + cross(self.angular_velocity, arm)
+        # most bodies have their frame at the centre of mass
+        velocity = self.velocity + cross(self.angular_velocity, arm) if arm.any() else self.velocity
+        return self.position + arm, velocity
 
     def pose_record(self) -> np.ndarray:
         """Return R, A (row-major), v and omega of the centre of mass at the start, global components."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs._shown import html_table, readable
+from gearmbs._display import html_table, readable
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W

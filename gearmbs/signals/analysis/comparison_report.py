@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.signals.analysis.report import markdown_table, significant
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.signals.analysis.indicators import INDICATORS, crest_factor, kurtosis, peak_to_peak
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.speed import SpeedEstimate

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.signals.analysis.bands import harmonic_amplitudes
 from gearmbs.signals.analysis.report import (
     BAND_FEATURES,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.signals.analysis.report import markdown_table, significant
 from gearmbs.signals.errors import SignalError
 

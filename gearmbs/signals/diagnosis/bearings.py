@@ -215,7 +215,7 @@ def diagnose_bearing(
     SignalError
         If a bearing cannot be read, or the record is too short for its lines.
     """
-    known = _told_apart(_all_lines(bearing))
+    known = _distinct(_all_lines(bearing))
     _check_search(slip, harmonics)
     if phase is None and speed is not None and not isinstance(speed, (int, float, str)):
         phase = phase_from_speed(signal, speed)
@@ -235,7 +235,7 @@ def diagnose_bearing(
         bands[name], found = envelope_spectra(signal.isel(channel=[c]), shaft, highest, band=band, phase=phase)
         judged = judge(found, known, shaft, others, slip=slip, harmonics=harmonics, looks=signal.sizes["channel"])
         findings += [_finding(name, one, found, shaft, turning) for one in judged]
-        spectra[name] = _table(_shown(found, judged), highest * (harmonics + 1))
+        spectra[name] = _table(_clearest_spectrum(found, judged), highest * (harmonics + 1))
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
         rate=rate,
@@ -288,7 +288,7 @@ def _all_lines(bearing: Any) -> tuple[BearingLines, ...]:
     return (bearing_lines(bearing),)
 
 
-def _told_apart(bearings: Sequence[BearingLines]) -> tuple[BearingLines, ...]:
+def _distinct(bearings: Sequence[BearingLines]) -> tuple[BearingLines, ...]:
     """Return bearings with those of the same lines, as two alike on a shaft, as one: no record tells which it is."""
     names: dict[tuple[float, ...], list[str]] = {}
     for lines in bearings:
@@ -356,7 +356,7 @@ def _sidebands(spectrum: EnvelopeSpectrum, line: float, spacing: float) -> float
     return 0.5 * (near(line - spacing) + near(line + spacing)) / max(near(line), 1e-300)
 
 
-def _shown(spectra: Sequence[EnvelopeSpectrum], judged: Sequence[Judged]) -> EnvelopeSpectrum:
+def _clearest_spectrum(spectra: Sequence[EnvelopeSpectrum], judged: Sequence[Judged]) -> EnvelopeSpectrum:
     """Return the spectrum with the clearest of the lines that were named, without any the first."""
     named = [one.evidence for one in judged if one.grade in (CLEAR, SIGNS)]
     if not named:

@@ -28,7 +28,7 @@ import pandas as pd
 import scipy.fft
 import xarray as xr
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.progress import waiting
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.diagnosis.planetary_averages import PLANET, RING, SUN, PlanetaryLines, path_weight, planetary_lines

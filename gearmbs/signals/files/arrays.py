@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from gearmbs.files import plain
+from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.signal.record import (
@@ -99,7 +99,7 @@ def write_netcdf(record: Record, path: Path) -> None:
         "layout": LAYOUT,
         "sampling_rate": record.rate,
         "t0": record.t0,
-        "attrs": json.dumps(plain(record.attrs)),
+        "attrs": json.dumps(json_value(record.attrs)),
     }
     if record.speed is not None:
         attrs["speed"] = record.speed

@@ -22,7 +22,7 @@ from typing import IO, Any
 import numpy as np
 import pandas as pd
 
-from gearmbs.files import plain
+from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.labview import read_lvm
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
@@ -348,7 +348,7 @@ def write_csv(record: Record, path: Path, packed: bool, progress: Progress | Non
                     text.write(f"# {key}: {json.dumps(value)}\n")
             text.write(f"# {COUNT}: {len(record.values)}\n")
             if record.attrs:
-                text.write(f"# attrs: {json.dumps(plain(record.attrs))}\n")
+                text.write(f"# attrs: {json.dumps(json_value(record.attrs))}\n")
             cells = [f"{name} [{unit}]" for name, unit in zip(record.names, record.units)]
             text.write(",".join(_quoted(cell) for cell in cells) + "\n")
             count = record.values.shape[0]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.files import plain
+from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.files.text_tables import decoded
@@ -260,7 +260,7 @@ def _rate(path: Path, file: Any, channel: Any, root: dict, given: float | None) 
 def write_tdms(record: Record, path: Path) -> None:
     """Write one group with one channel per signal channel."""
     nptdms = _library(path)
-    root: dict[str, Any] = {"sampling_rate": record.rate, "attrs": json.dumps(plain(record.attrs))}
+    root: dict[str, Any] = {"sampling_rate": record.rate, "attrs": json.dumps(json_value(record.attrs))}
     if record.speed is not None:
         root["speed"] = record.speed
     if record.teeth is not None:

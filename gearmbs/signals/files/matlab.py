@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.files import plain
+from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.signal.record import Record, assemble
@@ -247,7 +247,7 @@ def write_mat(record: Record, path: Path, version: str) -> None:
         "t0": record.t0,
         "channels": record.names,
         "units": record.units,
-        "attrs": json.dumps(plain(record.attrs)),
+        "attrs": json.dumps(json_value(record.attrs)),
     }
     if record.speed is not None:
         contents["speed"] = record.speed

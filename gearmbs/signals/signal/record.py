@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import xarray as xr
 
-from gearmbs.files import plain
+from gearmbs.files import json_value
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
 from gearmbs.signals.signal.signal import (
     SHAFT,
@@ -485,7 +485,7 @@ def metadata_json(record: Record) -> str:
             "units": record.units,
             "speed": record.speed,
             "teeth": record.teeth,
-            "attrs": plain(record.attrs),
+            "attrs": json_value(record.attrs),
         }
     )
 

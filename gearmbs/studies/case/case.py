@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
-from gearmbs._shown import Shown
+from gearmbs._display import Shown
 from gearmbs.dae.methods import DEFAULT, FORMULATIONS, INTEGRATORS
 from gearmbs.schema.described import read_toml, toml_table
 from gearmbs.schema.quantities import SHOWN, Measure, flag, two
@@ -625,13 +625,13 @@ def readable(section: Section, key: str) -> str:
         return "default"
     if isinstance(value, tuple | list) and value and isinstance(value[0], tuple | list):
         inner = [(point[0], point[1]) for point in value]
-        return ", ".join(f"{_shown(t, Measure('time'))}: {_shown(v, measure)}" for t, v in inner)
+        return ", ".join(f"{_text_of(t, Measure('time'))}: {_text_of(v, measure)}" for t, v in inner)
     if isinstance(value, tuple | list):
-        return ", ".join(_shown(item, measure) for item in value)
-    return _shown(value, measure)
+        return ", ".join(_text_of(item, measure) for item in value)
+    return _text_of(value, measure)
 
 
-def _shown(value: Any, measure: Measure | None) -> str:
+def _text_of(value: Any, measure: Measure | None) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str) or measure is None:

@@ -83,7 +83,7 @@ class _OneError(ModelMetaclass):
     def __call__(cls: Any, *args: Any, **data: Any) -> Any:
         if args:
             raise CaseError(f"{cls.label(data)}: give its fields by name, not by place")
-        with told_by(cls, cls.label(data)):
+        with readable_errors(cls, cls.label(data)):
             return super().__call__(**data)
 
 
@@ -108,19 +108,19 @@ class Section(BaseModel, metaclass=_OneError):
         CaseError
             Naming every wrong field with its value, each in a line.
         """
-        with told_by(cls, source):
+        with readable_errors(cls, source):
             return cls.__pydantic_validator__.validate_python(data)
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Any:
         """Return the section made of a mapping, as pydantic does but with the package's own error."""
-        with told_by(cls, cls.label(obj)):
+        with readable_errors(cls, cls.label(obj)):
             return super().model_validate(obj, **options)
 
     @classmethod
     def model_validate_json(cls, json_data: Any, **options: Any) -> Any:
         """Return the section made of JSON, as pydantic does but with the package's own error."""
-        with told_by(cls, cls.label({})):
+        with readable_errors(cls, cls.label({})):
             return super().model_validate_json(json_data, **options)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -235,7 +235,7 @@ def _remark(field: str, value: Any, measure: Measure) -> None:
 
 
 @contextmanager
-def told_by(kind: Any, source: str) -> Iterator[None]:
+def readable_errors(kind: Any, source: str) -> Iterator[None]:
     """Turn what pydantic says into a CaseError, each fault in a line of its own that begins with ``source``."""
     try:
         yield

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from gearmbs._shown import Written
+from gearmbs._display import Written
 from gearmbs.drivetrain import Drivetrain, IdealBearing, RunSettings, Shaft, SpeedDrive
 from gearmbs.gears import ContactLaw
 from gearmbs.signals import convert

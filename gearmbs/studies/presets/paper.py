@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 import xarray as xr
 
-from gearmbs._shown import Shown, html_table
+from gearmbs._display import Shown, html_table
 from gearmbs.dae.result import SolverStats
 from gearmbs.files import write_whole
 from gearmbs.schema.described import chosen

@@ -120,7 +120,7 @@ class Recorder:
         if part.t[-1] < self._begin:
             return
         wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]))
-        self._columns = [self.columns(piece) for piece in self._kept(wanted).parts()]
+        self._columns = [self.columns(piece) for piece in self._solution_over(wanted).parts()]
 
     def measured(self) -> Measured:
         """Return what the record is made from: all steps inside the span of its filters, some before."""
@@ -128,11 +128,11 @@ class Recorder:
 
     def everything(self) -> Measured:
         """Return the same at all steps from the start on, for a run that failed."""
-        early = self._kept()
+        early = self._solution_over()
         columns = [self.columns(part) for part in early.parts()]
         return self.joined([*columns, *(c for c in self._columns if c.t[0] > early.t[-1])])
 
-    def _kept(self, wanted: np.ndarray | None = None) -> Solution:
+    def _solution_over(self, wanted: np.ndarray | None = None) -> Solution:
         """Return the solution over the steps whose unknowns were kept, or over some of them, by increasing numbers."""
         assert self._model is not None
         times, rows, tables = zip(*self._early, strict=True)

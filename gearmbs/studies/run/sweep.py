@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from gearmbs._shown import Shown, html_table
+from gearmbs._display import Shown, html_table
 from gearmbs.files import python_scalar
 from gearmbs.schema.quantities import SHOWN
 from gearmbs.signals.files.simulated import record_signal

@@ -32,7 +32,7 @@ PLOTS = {
 """What draws an object, by the name of its class."""
 
 TABLES = {
-    "GearSpec": "gearmbs.gears.show:wheel_html",
+    "GearSpec": "gearmbs.gears.mesh:wheel_html",
     "Mechanism": "gearmbs.mechanism.solve.measures:mechanism_html",
     "Solution": "gearmbs.dae.results.solution:solution_html",
     "Case": "gearmbs.studies.show:case_html",
