@@ -91,7 +91,8 @@ CIRCLES = {
         "methods of Drivetrain, and the functions that carry them out",
     ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.plant_names",
-     "mechanism.solve.plants", "mechanism.solve.points", "mechanism.solve.simulate"):
+     "mechanism.solve.plants", "mechanism.solve.points", "mechanism.solve.simulate", "mechanism.solve.simulator",
+     "mechanism.solve.led"):
         "methods of Mechanism, and the functions that carry them out",
     ("campaigns.campaign", "campaigns.results", "campaigns.sensitivity", "campaigns.surrogates"):
         "methods of Campaign, and the functions that carry them out",

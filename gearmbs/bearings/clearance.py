@@ -20,7 +20,7 @@ from gearmbs.dae.equations.loads.forces import (
     stored_energy,
 )
 from gearmbs.kernels.jit import njit
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting
 
 
 @dataclass(eq=False, repr=False)
@@ -39,7 +39,12 @@ class ClearanceForce(ForceElement):
 
     def compiled(self) -> Compiled:
 
-        return Compiled(clearance_bearing, reals=self.reals, scratch=WORK)
+        settings = {
+            "stiffness": Setting(STIFFNESS, f"N/m^{self.reals[EXPONENT]:g}"),
+            "damping": Setting(DAMPING, "N*s/m"),
+        }
+        settings["clearance"] = Setting(CLEARANCE, "m", 0.5)
+        return Compiled(clearance_bearing, reals=self.reals, scratch=WORK, settings=settings)
 
     def __repr__(self) -> str:
         return f"ClearanceForce({self.name!r}, {self.i.body.name!r} in {self.j.body.name!r})"

@@ -16,7 +16,7 @@ import numpy as np
 INPUT = "input"
 """A number that is set while a run goes on, held or led along a line."""
 PARAMETER = "parameter"
-"""One that is constant until it is set."""
+"""One that is constant until it is set, of the mechanism or of one of its elements."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Place:
         Number of coefficients; 0: the number alone stands there.
     order : int
         How often it is integrated there.
+    factor : float
+        What stands there for a unit of the number; of places without coefficients.
     table : int
         Which part of the table ``at`` counts in, as whoever makes the table knows; -1: the whole one.
     """
@@ -38,12 +40,13 @@ class Place:
     at: int
     size: int = 0
     order: int = 0
+    factor: float = 1.0
     table: int = -1
 
     def polynomial(self, table: np.ndarray, t: float) -> tuple[float, ...]:
         """Return the value at a time and all derivatives."""
         if self.size == 0:
-            return (float(table[self.at]),)
+            return (float(table[self.at]) / self.factor,)
         c = table[self.at + 1 : self.at + 1 + self.size].tolist()
         x = t - float(table[self.at])
         found = []
@@ -58,7 +61,7 @@ class Place:
         """Let the number be ``value + slope (t' - t)`` from ``t`` on; its integrals go on from where they are."""
         if self.order == 0:
             # the coefficients behind stay zero
-            table[self.at : self.at + 1 + min(self.size, 2)] = (t, value, slope) if self.size else value
+            table[self.at : self.at + 1 + min(self.size, 2)] = (t, value, slope) if self.size else self.factor * value
             return
         known = self.polynomial(table, t)[: self.order]
         derivatives = [*known, value, slope]
@@ -92,8 +95,11 @@ class Number:
 
     def value(self, table: np.ndarray, t: float) -> float:
         """Return the value at a time."""
-        at = self.places[0].at
-        return float(table[at + 1] + table[at + 2] * (t - table[at])) if self.kind == INPUT else float(table[at])
+        place = self.places[0]
+        at = place.at
+        if self.kind == INPUT:
+            return float(table[at + 1] + table[at + 2] * (t - table[at]))
+        return float(table[at]) / place.factor
 
     def slope(self, table: np.ndarray) -> float:
         """Return the rate, zero of what is held."""

@@ -400,6 +400,7 @@ class ShaftTorque(ForceElement):
             times=self.times,
             angles=((2, self.i, self.j),) if self.counts_angle else (),
             scratch=WORK,
+            given={"torque": 0} if self.law == "table" and len(self.times) == 1 else {},
         )
 
     def by_expressions(self, units: Units) -> tuple[Load, dict[str, tuple[str, float]]]:

@@ -11,7 +11,7 @@ import numpy as np
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.dae.problem import ModelError
 from gearmbs.gears.mesh import Mesh
-from gearmbs.gears.tables import pack
+from gearmbs.gears.tables import law_settings, pack
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, StartOverlap
 from gearmbs.units import shown
 
@@ -49,7 +49,7 @@ class GearContact(ForceElement):
     def compiled(self) -> Compiled:
         force, contact = contact_kernels()
         integers, reals, scratch = pack(self.pair)
-        return Compiled(force, integers, reals, (contact,), scratch=scratch)
+        return Compiled(force, integers, reals, (contact,), scratch=scratch, settings=law_settings(self.pair))
 
     def check(self) -> None:
         """Check the initial distance of the two wheels.

@@ -24,7 +24,7 @@ from gearmbs.mechanism.language.syntax import NamedNumber, Scope
 from gearmbs.mechanism.parts import elements as el
 from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Marker
-from gearmbs.mechanism.parts.elements import ForceElement, Load, State
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Load, State
 from gearmbs.mechanism.parts.functions import TimeFunction
 from gearmbs.mechanism.parts.inputs import COEFFICIENTS, Input, Parameter, unit_factor
 from gearmbs.mechanism.parts.modal import ModalBody
@@ -41,6 +41,8 @@ REACTION_KINDS = {
 }
 """Functions under which the reactions of joints, of the kind given, can be asked for; others are JOINT and JPRIM."""
 REACTION_KEYS = ("joint", "jprim", "motion", "coupler", "gear", "gcon")
+SETTLED = {time_functions.CONSTANT: 0, time_functions.STEP: 3, time_functions.STEP5: 3}
+"""Which parameter of a function of time is the value that it has, or ends at."""
 MODAL_BLOCKS = {"mode": "q_f", "mode1": "v_f"}
 """Blocks of y that hold modal coordinates and their rates."""
 
@@ -188,7 +190,9 @@ class _Compiler:
                 self.know(function)
                 # behind the number of its pieces
                 at = self.builder.functions[number][1] + 1
-                self.builder.add_place(function.name, Place(at, COEFFICIENTS, function.order, T.H_R_FUNCTION), row)
+                self.builder.add_place(
+                    function.name, Place(at, COEFFICIENTS, function.order, table=T.H_R_FUNCTION), row
+                )
             return number
         tape = self.tape(function.text, label, "number")
         if tape.level > LEVEL_TIME:
@@ -204,7 +208,7 @@ class _Compiler:
         number = self.builder.add_tape(tape)
         for name, place, size in tape.numbers:
             at = self.builder.tape_rows[-1][T.TAPE_R] + place
-            self.builder.add_place(name, Place(at, size, 0, T.H_R_EXTRA), row)
+            self.builder.add_place(name, Place(at, size, table=T.H_R_EXTRA), row)
         at, n = self.builder.tape_rows[-1][T.TAPE_REFERENCE], tape.n_angles
         for k, start in enumerate(starting_angles(tape, self.mechanism.turns, self.marker_named)):
             # the reference, and the value of the last point that was tracked
@@ -364,6 +368,19 @@ class _Compiler:
             scratch=made.scratch,
             diagnostics=element.diagnostics,
         )
+        self.add_settings(element.name, made)
+
+    def add_settings(self, name: str, made: Compiled) -> None:
+        """Add what of an element can be changed by its name; its tables have just been added."""
+        row, functions = self.builder.forces[-1], self.builder.functions
+        for what, setting in made.settings.items():
+            place = Place(row[T.FORCE_REXTRA] + setting.at, factor=setting.factor, table=T.H_R_EXTRA)
+            self.builder.add_setting(f"{name}.{what}", setting.unit, place)
+        for what, number in made.given.items():
+            kind, at = functions[len(functions) - len(made.times) + number]
+            if kind in SETTLED:
+                place = Place(at + SETTLED[kind], table=T.H_R_FUNCTION)
+                self.builder.add_setting(f"{name}.{what}", "N*m", place)
 
     def add_reaction(self, joint: jt.Joint) -> None:
         """Make the force and moment of a joint on its I marker's body unknowns."""

@@ -22,7 +22,7 @@ from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
-from gearmbs.mechanism.parts.inputs import Input, Parameter, make_input, make_parameter
+from gearmbs.mechanism.parts.inputs import Input, Output, Parameter, make_input, make_output, make_parameter
 from gearmbs.mechanism.parts.joints import JointMethods
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
@@ -68,6 +68,10 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
     turns : dict of (str, str, str) to float
         About which angle, in rad, AX, AY and AZ start to count, by function and names of the markers:
         ``m.turns["AZ", "shaft.I", "shaft.J"] = 4 * np.pi`` winds a torsion spring twice. Default: 0.
+    inputs, parameters, outputs : dict
+        What :meth:`input`, :meth:`parameter` and :meth:`output` have added, by name.
+    aliases : dict of str to str
+        Further names of numbers that `gearmbs.Simulator.set` changes, as of the case that a mechanism is made from.
     given : dict of str to dict
         Settings that were written with units, by the names of bodies, joints and forces.
     """
@@ -92,6 +96,8 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         self.functions: dict[str, UserFunction] = {}
         self.inputs: dict[str, Input] = {}
         self.parameters: dict[str, Parameter] = {}
+        self.outputs: dict[str, Output] = {}
+        self.aliases: dict[str, str] = {}
         self.plants: dict[tuple[str, Any], tuple[Any, ...]] = {}
         self.units = Units()
         self.reads_units = True
@@ -441,6 +447,39 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         self.parameters[name] = made
         return made
 
+    def output(self, name: str, what: str | Sequence[Any]) -> Output:
+        """Add an output: a name for something that solutions, `gearmbs.Simulator.get` and plants tell.
+
+        Parameters
+        ----------
+        name : str
+        what : str or sequence
+            An expression in the function language, accelerations included; or what is asked for, of what, and which
+            component: ``("reaction", "pin", "fz")``, ``("angular_velocity", "disc", "z")``, ``("joint_angle", "pin")``,
+            ``("transmission_error", "mesh")``. A component is "x", "y" or "z" of vectors, "fx" .. "tz" of
+            reactions and loads; without one all of them are told.
+
+        Raises
+        ------
+        ModelError
+            For a name that is in use, and an expression that cannot be read.
+
+        Examples
+        --------
+        >>> from gearmbs.mechanism import Mechanism
+        >>> m = Mechanism("disc")
+        >>> disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0), angular_velocity=(0, 0, 3.0))
+        >>> pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+        >>> m.output("speed", ("angular_velocity", "disc", "z"))
+        Output('speed', ('angular_velocity', 'disc', 'z'))
+        >>> float(m.simulate(1.0).output("speed")[-1])
+        3.0
+        """
+        made = make_output(name, what)
+        self._check_number(name, "output")
+        self.outputs[name] = made
+        return made
+
     def variable(self, name: str, expression: Expression) -> None:
         """Name an expression; others use it as VARVAL(name)."""
         self.variables[name] = str(expression)
@@ -554,7 +593,8 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
             raise ModelError(f"body '{name}': the name is in use; choose another")
 
     def _check_number(self, name: str, what: str) -> None:
-        for title, table in (("input", self.inputs), ("parameter", self.parameters)):
+        tables: dict[str, Mapping[str, Any]] = {"input": self.inputs, "parameter": self.parameters}
+        for title, table in {**tables, "output": self.outputs}.items():
             if name.upper() in map(str.upper, table):
                 raise ModelError(f"{what} {name!r}: one of its {title}s has the name; choose another")
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import gearmbs as gm
 from gearmbs.mechanism import Mechanism, ModelError
 from tests.says import says
 
@@ -94,3 +95,16 @@ def test_what_is_wrong_is_said_in_a_line(call, words):
     with pytest.raises(ModelError, match=says(*words)) as error:
         call(m, pin)
     assert "\n" not in str(error.value)
+
+
+def test_a_deck_has_inputs_as_variables(tmp_path):
+    """With their present values, so that the deck moves as the mechanism does."""
+    m, body, pin = disc()
+    m.torque("drive", body, m.input("load", "N m", 4.0))
+    m.parameter("drag", "N m s/rad", 1.0)
+    m.axis_torque("brake", pin.i, pin.j, "0.5*load - DRAG*WZ(pin.I, pin.J)")
+    gm.write_deck(m, tmp_path / "disc.adm", output=False, requests={"speed": "WZ(pin.I, pin.J)"})
+    assert "FUNCTION = 4" in (tmp_path / "disc.adm").read_text()
+    result = gm.run_deck(gm.read_deck(tmp_path / "disc.adm"), end=1.0, steps=10)
+    speed = m.simulate(1.0).angular_velocity("disc")[-1, 2]
+    assert np.abs(result.request(1)[-1] - speed).min() == pytest.approx(0.0, abs=1e-3 * speed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -136,7 +136,8 @@ class DeckNames:
         self.elements: dict[tuple[str, str], int] = {}
         self.kept = kept(mechanism)
         self.hidden = hidden(mechanism)
-        self.variables = self._numbered(mechanism.variables)
+        self.numbers = {upper(k): made for k, made in {**mechanism.inputs, **mechanism.parameters}.items()}
+        self.variables = self._numbered({**mechanism.variables, **self.numbers})
         self.all_states = states_of(mechanism)
         self.states = self._numbered(self.all_states)
         self.splines = {upper(k): n for n, k in enumerate(mechanism.splines, 1)}
@@ -187,7 +188,19 @@ class DeckNames:
             call = replace(call, args=tuple(self._argument(call, k, a) for k, a in enumerate(call.args)))
             return self._element_call(call) if call.name in ELEMENT_FORCES else call
 
-        return unparse(parse(text), rename)
+        return unparse(self._with_variables(parse(text)), rename)
+
+    def _with_variables(self, node: Any) -> Any:
+        """Let the names of inputs and parameters be the values of variables that stand for them."""
+        if isinstance(node, Name) and node.text in self.numbers and node.text not in self.marker_names:
+            return Call("VARVAL", (node,), node.at)
+        if isinstance(node, Call) and node.name == "VARVAL":
+            return node
+        if isinstance(node, tuple):
+            return tuple(self._with_variables(part) for part in node)
+        if isinstance(node, Node):
+            return replace(node, **{f.name: self._with_variables(getattr(node, f.name)) for f in fields(node)})
+        return node
 
     def _argument(self, call: Call, position: int, arg: Node) -> Node:
         """Replace the name of a marker or data element by its id."""

@@ -29,6 +29,7 @@ from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import AXIS_FORCE, AXIS_TORQUE, LINE, ForceElement, Load, State
 from gearmbs.mechanism.parts.elements import COMPONENTS as COMPONENT_MODE
 from gearmbs.mechanism.parts.functions import function_text
+from gearmbs.mechanism.parts.inputs import unit_factor
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.parts.modal import ModalBody, ShapedMarker
 
@@ -55,6 +56,9 @@ def data_statements(w: WriterContext) -> None:
             continue
         n = w.variables[upper(key)]
         w.statement(f"VARIABLE/{n}", [f"FUNCTION = {w.expression(text)}"], str(key))
+    for made in w.numbers.values():
+        value = made.start / unit_factor(w.units, made.unit)
+        w.statement(f"VARIABLE/{w.variables[upper(made.name)]}", [f"FUNCTION = {number(value)}"], made.name)
     for key, state in w.all_states.items():
         if upper(key) in w.hidden:
             continue

@@ -93,6 +93,8 @@ class WriterContext(Protocol):
     all_states : dict of str to State
     variables, states, splines, arrays, plants : dict
         Ids by name.
+    numbers : dict
+        Inputs and parameters, for which variables stand, by name in capitals.
     gears : {"expressions", "solids"}
         How contacts of wheels are written.
     """
@@ -107,6 +109,7 @@ class WriterContext(Protocol):
     hidden: set[str]
     all_states: dict[str, State]
     variables: dict[Any, int]
+    numbers: dict[Any, Any]
     states: dict[Any, int]
     splines: dict[Any, int]
     arrays: dict[Any, int]

@@ -534,6 +534,16 @@ class Solution(Shown):
         """
         return self._measures().expression(expression)
 
+    def output(self, name: str) -> Any:
+        """Return an output of the mechanism by its name over time, see `gearmbs.mechanism.Mechanism.output`.
+
+        Raises
+        ------
+        KeyError
+            For a name that is not there.
+        """
+        return self._measures().output(name)
+
     def state_at(self, t: float) -> State:
         """Return the state at a time, s, to start another run from; it has no history of the integrator.
 

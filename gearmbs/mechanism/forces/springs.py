@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gearmbs.mechanism.parts.attributes import Reader
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.units import shown
 
@@ -27,6 +27,11 @@ def readers(dimensions: Mapping[str, str]) -> dict[str, Reader]:
         return lambda value, field: quantity(value, unit, field)
 
     return {name: reader(SI_UNITS[dimension]) for name, dimension in dimensions.items()}
+
+
+def _settings(units: Mapping[str, str]) -> dict[str, Setting]:
+    """Return the reals of a spring by their names, as they stand there."""
+    return {name: Setting(k, unit) for k, (name, unit) in enumerate(units.items())}
 
 
 @dataclass(eq=False, repr=False)
@@ -56,7 +61,9 @@ class LineSpring(ForceElement):
     def compiled(self) -> Compiled:
         from gearmbs.mechanism.forces.spring_kernel import line_spring
 
-        return Compiled(line_spring, reals=(self.stiffness, self.damping, self.length, self.preload), scratch=6)
+        reals = (self.stiffness, self.damping, self.length, self.preload)
+        units = {"stiffness": "N/m", "damping": "N*s/m", "length": "m", "preload": "N"}
+        return Compiled(line_spring, reals=reals, scratch=6, settings=_settings(units))
 
     def __repr__(self) -> str:
         return (
@@ -95,7 +102,8 @@ class AxisSpring(ForceElement):
         from gearmbs.mechanism.forces.spring_kernel import axis_spring
 
         reals = (self.stiffness, self.damping, self.angle, self.preload)
-        return Compiled(axis_spring, reals=reals, angles=((2, self.i, self.j),), scratch=9)
+        units = {"stiffness": "N*m/rad", "damping": "N*m*s/rad", "angle": "rad", "preload": "N*m"}
+        return Compiled(axis_spring, reals=reals, angles=((2, self.i, self.j),), scratch=9, settings=_settings(units))
 
     def __repr__(self) -> str:
         return (

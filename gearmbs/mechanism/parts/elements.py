@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,14 @@ from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.language.syntax import Units
+
+
+class Setting(NamedTuple):
+    """A number of an element that can be changed: its place among the reals, its unit, and what stands there for 1."""
+
+    at: int
+    unit: str
+    factor: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,10 @@ class Compiled:
     angles : tuple of (int, Marker, Marker)
         Counted angles AX, AY, AZ (0, 1, 2) of one marker about another, whose references are the last inputs.
     scratch : int
+    settings : mapping of str to Setting
+        Numbers among ``reals`` that can be changed while a simulation goes on, by the name of what they are.
+    given : mapping of str to int
+        Which of ``times`` can be changed so, N m; of a STEP what it ends at.
     """
 
     kernel: Any
@@ -51,6 +63,8 @@ class Compiled:
     times: tuple[TimeFunction, ...] = ()
     angles: tuple[tuple[int, Marker, Marker], ...] = ()
     scratch: int = 0
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+    given: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -153,7 +167,7 @@ class Torque(ForceElement):
 
     def compiled(self) -> Compiled:
 
-        return Compiled(axis_torque, sees=(self.axis,), times=(self.function,))
+        return Compiled(axis_torque, sees=(self.axis,), times=(self.function,), given={"torque": 0})
 
     def __repr__(self) -> str:
         return f"Torque({self.name!r}, {self.function} N m on {self.i.body.name!r} about z of {self.axis.name!r})"

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.loads import time_functions as tf
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.language.syntax import DIMENSIONS as LANGUAGE
-from gearmbs.mechanism.language.syntax import Units
+from gearmbs.mechanism.language.syntax import Units, parse
 from gearmbs.mechanism.parts.functions import TimeFunction
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.units import DIMENSIONS, powers_of
@@ -66,6 +69,83 @@ class Parameter:
     unit: str
     start: float
     """Value until it is set."""
+
+
+AXES = ("x", "y", "z")
+WRENCHES = ("fx", "fy", "fz", "tx", "ty", "tz")
+
+
+@dataclass(frozen=True)
+class Output:
+    """A name for something that a solution tells, see `gearmbs.mechanism.Mechanism.output`.
+
+    Attributes
+    ----------
+    name : str
+    what : str or tuple
+        An expression, or a method of solutions, what it is asked for, and a component.
+    """
+
+    name: str
+    what: str | tuple[Any, ...]
+
+    @property
+    def asked(self) -> tuple[Any, ...]:
+        """Method of solutions, and what it is asked for."""
+        if isinstance(self.what, str):
+            return ("evaluate", self.what)
+        return self.what if self.component is None else self.what[:-1]
+
+    @property
+    def component(self) -> str | None:
+        """Component of it that is told, None for all."""
+        last = self.what[-1]
+        return last if len(self.what) > 2 and not isinstance(self.what, str) and last in AXES + WRENCHES else None
+
+    def of(self, told: Any) -> Any:
+        """Return the component of what has been told, over time or at an instant.
+
+        Raises
+        ------
+        ModelError
+            If it has none of this name.
+        """
+        name = self.component
+        if name is None:
+            return told
+        pair, single = isinstance(told, tuple), isinstance(told, np.ndarray) and told.shape[-1:] == (3,)
+        if pair and name in WRENCHES:
+            place = WRENCHES.index(name)
+            return told[place // 3][..., place % 3]
+        if single and name in AXES:
+            return told[..., AXES.index(name)]
+        known = ", ".join(WRENCHES if pair else AXES) if pair or single else "no components"
+        raise ModelError(f"output {self.name!r}: {self.what[0]} has no component {name!r}; it has {known}")
+
+    def __repr__(self) -> str:
+        return f"Output({self.name!r}, {self.what!r})"
+
+
+def make_output(name: str, what: Any) -> Output:
+    """Return an output.
+
+    Raises
+    ------
+    ModelError
+        For a name that means something else, and what is neither an expression nor a sequence that begins with a text.
+    """
+    checked_name(name, "output")
+    if isinstance(what, str):
+        try:
+            parse(what)
+        except ExpressionError as error:
+            raise ModelError(f"output '{name}': {error}") from None
+        return Output(name, what)
+    if not isinstance(what, Sequence) or not what or not isinstance(what[0], str):
+        raise ModelError(
+            f"output '{name}': {what!r} is no output; give an expression or ('angular_velocity', 'disc', 'z')"
+        )
+    return Output(name, tuple(getattr(part, "name", part) for part in what))
 
 
 def make_input(name: str, unit: str, value: Any) -> Input:
@@ -132,4 +212,4 @@ def _piece(coefficients: Sequence[float]) -> tuple[float, ...]:
     return (1.0, 0.0, *coefficients, *([0.0] * (COEFFICIENTS - len(coefficients))))
 
 
-__all__ = ["Input", "Parameter", "make_input", "make_parameter"]
+__all__ = ["Input", "Output", "Parameter", "make_input", "make_output", "make_parameter"]

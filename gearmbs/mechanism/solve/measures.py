@@ -15,6 +15,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, warn_of_doubtful_turns
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import State
+from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.units import shown
@@ -131,6 +132,43 @@ class Measures:
             )
         known = [m.name for body in bodies for m in body.markers]
         raise KeyError(f"marker {name!r}; the markers are {', '.join(known) or 'none'}")
+
+    # --- meshes and outputs -------------------------------------------------------------------------
+
+    def transmission_error(self, mesh: Any) -> np.ndarray:
+        """Return r_b1 phi_1 + s r_b2 phi_2, s = 1 for external and -1 for internal pairs, shape (m,), m.
+
+        The angles of the wheels about their axes count from the mechanism's initial position. They are known up to full
+        turns, so up to base pitches: what is told is nearest to zero.
+        """
+        from gearmbs.mechanism.solve.plant_names import levers, pair_of
+
+        name = getattr(mesh, "name", mesh)
+        meshes = {n: e for n, e in self.mechanism.elements.items() if pair_of(e) is not None}
+        if name not in meshes:
+            raise KeyError(f"mesh {name!r}; the gear contacts are {', '.join(meshes) or 'none'}")
+        element, total = meshes[name], np.zeros(self.solution.t.size)
+        *both, pitch = levers(element)
+        for marker, lever in zip((element.i, element.j), both, strict=True):
+            first, now = marker.global_orientation(), self._axes(marker)
+            total += lever * np.arctan2(now[:, :, 0] @ first[:, 1], now[:, :, 0] @ first[:, 0])
+        return total - pitch * np.round(total / pitch)
+
+    def output(self, name: str) -> Any:
+        """Return an output of the mechanism by its name over time."""
+        made = self.named_output(name)
+        what, *names = made.asked
+        found = getattr(self if what == "transmission_error" else self.solution, what, None)
+        if found is None:
+            raise ModelError(f"output {name!r}: a solution tells of no {what!r}; see the methods of Solution")
+        return made.of(found(*names) if callable(found) else found)
+
+    def named_output(self, name: str) -> Output:
+        """Return what an output of the mechanism is by its name."""
+        outputs = self.mechanism.outputs
+        if name not in outputs:
+            raise KeyError(f"output {name!r}; the outputs are {', '.join(outputs) or 'none'}")
+        return outputs[name]
 
     # --- states and expressions ---------------------------------------------------------------------
 

@@ -209,7 +209,7 @@ class PlantNames:
         element = self._mesh(mesh)
         one = Given(
             "transmission_error", f"transmission_error {element.name}", "m", _one_of("level", level, LEVELS), "m",
-            element=element, lever=_levers(element)[1],
+            element=element, lever=levers(element)[1],
         )  # fmt: skip
         return _at_level(one)
 
@@ -377,7 +377,7 @@ class PlantNames:
     def _error(self, mesh: Any) -> list[Told]:
         element = self._mesh(mesh)
         parts = []
-        for marker, lever in zip((element.i, element.j), _levers(element), strict=True):
+        for marker, lever in zip((element.i, element.j), levers(element)[:2], strict=True):
             ground = self.mechanism.ground
             where = marker.global_position(), marker.global_orientation()
             at = own_marker(ground, f"{marker.name} plant ground", ground.marker_at, *where)
@@ -403,7 +403,7 @@ class PlantNames:
 
     def _mesh(self, mesh: Any) -> Any:
         name = getattr(mesh, "name", mesh)
-        meshes = {n: e for n, e in self.mechanism.elements.items() if _pair(e) is not None}
+        meshes = {n: e for n, e in self.mechanism.elements.items() if pair_of(e) is not None}
         if name not in meshes:
             raise ModelError(f"there is no gear contact {name!r}; {_there(name, list(meshes))}")
         return meshes[name]
@@ -466,16 +466,16 @@ def _there(name: Any, names: list[str]) -> str:
     return did_you_mean(str(name), names, shown=repr, otherwise=f"there are {', '.join(names) or 'none'}")
 
 
-def _pair(element: Any) -> Any:
+def pair_of(element: Any) -> Any:
     """Return the two wheels of a gear contact or an ideal mesh, None of other elements."""
     return getattr(element, "pair", None) or getattr(getattr(element, "mesh", None), "pair", None)
 
 
-def _levers(element: Any) -> tuple[float, float]:
-    """Return r_b1 and s r_b2 of a mesh, s = 1 for external and -1 for internal pairs."""
-    pair = _pair(element)
+def levers(element: Any) -> tuple[float, float, float]:
+    """Return r_b1 and s r_b2 of a mesh, s = 1 for external and -1 for internal pairs, and its base pitch."""
+    pair = pair_of(element)
     one, two = pair.driver, pair.driven
-    return float(one.base_radius), float(two.sign * two.base_radius)
+    return float(one.base_radius), float(two.sign * two.base_radius), float(one.base_pitch)
 
 
 def _first_call(text: str, beginnings: Collection[str]) -> tuple[int, int, str] | None:

@@ -155,6 +155,7 @@ def simulate(
     stops: Sequence[StopAt] = (),
     continued: bool = False,
     initial: State | None = None,
+    inputs: Mapping[str, Any] | None = None,
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -206,6 +207,10 @@ def simulate(
     initial : State, optional
         Start from a state of this mechanism, at its time; see `Solution.state_at` and `gearmbs.Simulator`. With the
         history of the same integrator the run goes on as if it had never stopped, otherwise it starts afresh.
+    inputs : mapping, optional
+        Of names of inputs and parameters: a value, ``(times, values)`` that hold from each time on, ``(times, values,
+        1)`` for straight lines between them, or ``(function, sample_time)`` for a function of t that is asked at its
+        sample times. Not with ``every_step``, ``stops`` and other integrators than WSTIFF and GSTIFF.
     **options
         Handed to the integrator.
 
@@ -225,6 +230,15 @@ def simulate(
         raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
     t_start = start_time(quantity(t_start, "time", "t_start"), initial)
     t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
+    if inputs:
+        from gearmbs.mechanism.solve.led import simulate_led
+
+        if every_step or stops or consumer is not None:
+            raise ModelError("inputs: a run with inputs has no every_step, consumer or stops; give rate or t_eval")
+        return simulate_led(
+            mechanism, t_eval, inputs, integrator=integrator, formulation=formulation, tol=tol, rate_scale=rate_scale,
+            lump=lump, initial=initial, advice=advice, **options,
+        )  # fmt: skip
     name = checked(integrator, tol, options)
     # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
     INTEGRATORS[name].load()
@@ -411,4 +425,5 @@ SETTINGS = (
     "stops",
     "continued",
     "initial",
+    "inputs",
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,7 +16,7 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.numbers import INPUT, Number, cells_of
-from gearmbs.dae.problem import ModelError
+from gearmbs.dae.problem import EPS, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State, equations_of
@@ -31,9 +31,11 @@ AT_AN_INSTANT = (
     "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
     "reaction", "reaction_force", "load", "diagnostics", "contact", "modal_coordinates", "modal_velocities",
     "joint_displacement", "marker_position", "marker_velocity", "deflection", "state", "multipliers", "kinetic_energy",
-    "constraint_violation",
+    "constraint_violation", "transmission_error",
 )  # fmt: skip
 """What `Solution` tells of one instant alone."""
+ON_LINE = 8.0 * EPS
+"""Part of its value by which an input may leave a line by rounding alone."""
 COUNTED = ("joint_angle", "evaluate")
 """What it tells with full turns counted from the first point on."""
 COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
@@ -91,6 +93,8 @@ class Simulator(OwnAttributes):
         As of `simulate`.
     initial : State, optional
         Start from this state, at its time.
+    advice : mapping, optional
+        As of `simulate`.
     records : bool
         Whether all points are kept for :meth:`solution`.
     **options
@@ -138,6 +142,7 @@ class Simulator(OwnAttributes):
         lump: bool | None = None,
         initial: State | None = None,
         records: bool = True,
+        advice: Mapping[Status, str] | None = None,
         **options: Any,
     ) -> None:
         t_start = start_time(quantity(t_start, "time", "t_start"), initial)
@@ -156,7 +161,7 @@ class Simulator(OwnAttributes):
         self._system, self._base, self._members, self._remark = prepared(
             mechanism, t_model, lump, formulation, rate_scale, initial is not None
         )
-        self._base.advice = ADVICE
+        self._base.advice = {**ADVICE, **(advice or {})}
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []
@@ -204,8 +209,8 @@ class Simulator(OwnAttributes):
 
     # --- going on -----------------------------------------------------------------------------------
 
-    def advance(self, t: float) -> None:
-        """Go on to time ``t``, s.
+    def advance(self, t: float, *, record: bool = True) -> None:
+        """Go on to time ``t``, s; with ``record`` it becomes a point of the :meth:`solution`.
 
         Raises
         ------
@@ -220,7 +225,7 @@ class Simulator(OwnAttributes):
             end = self._sample(t) if self._controls else t
             if self._own:
                 self._apply(end)
-            self._go_to(end, end == t)
+            self._go_to(end, record and end == t)
 
     def _time(self, t: Any) -> float:
         """Return a time to go on to, s; raise a ModelError for any other."""
@@ -259,6 +264,11 @@ class Simulator(OwnAttributes):
                 raise ModelError(found)
 
     @property
+    def failed(self) -> bool:
+        """Whether the integration has failed."""
+        return self._failed is not None
+
+    @property
     def real_time_factor(self) -> float:
         """Seconds simulated in a second of the clock, in all calls of :meth:`advance`; 0 before the first."""
         simulated, took = self._clock
@@ -287,7 +297,7 @@ class Simulator(OwnAttributes):
             For a name that is not there, a value that is no number in its unit, and an input that would let a body
             jump: the position of a motion with ``hold=0``.
         """
-        number = self._number(name)
+        number = self.number(name)
         if isinstance(hold, bool) or hold not in (0, 1):
             raise ModelError(f"set: hold = {hold!r} of {name!r}; 0 holds the value, 1 goes there evenly")
         if hold == 1 and number.kind != INPUT:
@@ -301,11 +311,34 @@ class Simulator(OwnAttributes):
                     f"set: {name!r} is the position of {row!r}, which cannot jump; give hold=1, or let it be the speed "
                     "of the motion (level='velocity')"
                 )
-        self._set[name] = float(given), int(hold)
+        self._set[number.name] = float(given), int(hold)
 
-    def _number(self, name: str) -> Number:
+    def take_effect(self) -> None:
+        """Let values that have been set take effect now, and not with the next :meth:`advance`.
+
+        Raises
+        ------
+        ModelError
+            For a value that an input is led to: its way begins with the next advance.
+        """
+        led = [name for name, (_, hold) in self._set.items() if hold]
+        if led:
+            raise ModelError(f"state: {led[0]!r} is on its way from the next advance on; take the state before set")
+        if self._set:
+            self._apply(self.t)
+
+    def number(self, name: str) -> Number:
+        """Return what :meth:`set` changes under a name; raise a ModelError if there is nothing."""
+        name = self._mechanism.aliases.get(name, name)
         if name not in self.numbers:
-            known = list(self.numbers)
+            element, _, field = str(name).partition(".")
+            part = self._mechanism.elements.get(element) or self._mechanism.bodies.get(element)
+            if hasattr(part, field):
+                raise ModelError(
+                    f"{name!r} cannot be changed while a simulation goes on: other numbers follow from it; make "
+                    "another mechanism with it and go on there from the state (initial=)"
+                )
+            known = [*self._mechanism.aliases, *self.numbers]
             hint = did_you_mean(name, known)
             listed = f"there are {', '.join(known)}" if known else "the mechanism has none; add one with m.input(...)"
             raise ModelError(f"there is no input or parameter {name!r}{': ' + hint if hint else ''}; {listed}")
@@ -313,7 +346,8 @@ class Simulator(OwnAttributes):
 
     def _value(self, name: str) -> float:
         """Return the present value of an input or a parameter, the one that was set last."""
-        value, hold = self._set.get(self._number(name).name, (0.0, 1))
+        name = self.number(name).name
+        value, hold = self._set.get(name, (0.0, 1))
         return self._own[name].value(self._run.state.rdata[self._cells], self.t) if hold == 1 else value
 
     def control(self, name: str, function: Callable[[float, Simulator], Any], sample_time: float) -> None:
@@ -335,7 +369,7 @@ class Simulator(OwnAttributes):
         ModelError
             For a name that is not there or has a controller, and a sample time that is not positive.
         """
-        self._number(name)
+        self.number(name)
         if not callable(function):
             raise ModelError(f"control: {function!r} for {name!r} cannot be called; give a function of t and simulator")
         if name in (control.name for control in self._controls):
@@ -366,6 +400,9 @@ class Simulator(OwnAttributes):
             now, slope_before = own.value(before, t), own.slope(before)
             value, hold = self._set.get(name, (now, 0))
             slope = (value - now) / (end - t) if hold else 0.0
+            if hold and abs(slope - slope_before) * (end - t) <= ON_LINE * max(abs(now), abs(value)):
+                # the line goes on
+                slope = slope_before
             if slope != slope_before or (not hold and value != now):
                 own.write(after, t, now if hold else value, slope)
                 changed.append((self.numbers[name], slope - slope_before))
@@ -421,14 +458,19 @@ class Simulator(OwnAttributes):
         """
         if what == "input":
             return self._value(*names)
+        if what == "output":
+            made = self._mechanism.measures(self._now()).named_output(*names)
+            return made.of(self.get(*made.asked))
         if what not in AT_AN_INSTANT + COUNTED:
-            known = [*AT_AN_INSTANT, *COUNTED, "input"]
+            known = [*AT_AN_INSTANT, *COUNTED, "input", "output"]
             hint = did_you_mean(what, known)
             raise ModelError(f"get: there is no {what!r}{': ' + hint if hint else ''}; there are {', '.join(known)}")
         if what == "joint_angle":
             return self._joint_angle(*names)
         if what == "evaluate" and COUNTED_FUNCTION.search(str(names[:1])):
             return float(self.solution().evaluate(*names)[-1])
+        if what == "transmission_error":
+            return _last(self._mechanism.measures(self._now()).transmission_error(*names))
         found = getattr(self._now(), what)
         return _last(found(*names) if callable(found) else found)
 
@@ -490,11 +532,7 @@ class Simulator(OwnAttributes):
         """Return the present state with the integrator's history: what follows from it is the same, bit for bit."""
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
-        led = [name for name, (_, hold) in self._set.items() if hold]
-        if led:
-            raise ModelError(f"state: {led[0]!r} is on its way from the next advance on; take the state before set")
-        if self._set:
-            self._apply(self.t)
+        self.take_effect()
         t, y, yp, idata, _ = self._point
         run = self._run
         history = replace(run.history(), equations=equations_of(self._base)) if run.started else None
