@@ -182,7 +182,7 @@ def kaiser_taps(
     """
     count, beta = kaiser_order(attenuation, width / (0.5 * rate))
     taps = windowed_sinc(count | 1, cutoffs, kind, rate, beta)
-    taps.flags.writeable = False
+    taps.setflags(write=False)
     return taps
 
 

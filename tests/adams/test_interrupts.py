@@ -45,7 +45,8 @@ def signal_at(monkeypatch, time, number, analysis=1):
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["Ctrl-C", "kill"])
-def test_an_interrupted_deck_says_where_and_keeps_what_was_computed(tmp_path, monkeypatch, keep_handlers, number, code):
+@pytest.mark.usefixtures("keep_handlers")
+def test_an_interrupted_deck_says_where_and_keeps_what_was_computed(tmp_path, monkeypatch, number, code):
     deck = tmp_path / "pendulum.adm"
     deck.write_text(PENDULUM)
     whole = tmp_path / "pendulum.res"
@@ -70,7 +71,8 @@ def test_an_interrupted_deck_says_where_and_keeps_what_was_computed(tmp_path, mo
     assert read_results(tmp_path / "pendulum.partial.res")
 
 
-def test_an_interrupted_second_solution_ends_the_script_after_the_first(monkeypatch, keep_handlers):
+@pytest.mark.usefixtures("keep_handlers")
+def test_an_interrupted_second_solution_ends_the_script_after_the_first(monkeypatch):
     signal_at(monkeypatch, 0.1, signal.SIGINT, analysis=2)
     script = parse_script("a\nb\nSIM/DYN, END=5, STEPS=20\nSIM/DYN, END=6, STEPS=20\n")
     with pytest.raises(KeyboardInterrupt) as caught:
@@ -83,7 +85,8 @@ def test_an_interrupted_second_solution_ends_the_script_after_the_first(monkeypa
     assert not result.success
 
 
-def test_an_interruption_before_the_first_output_writes_the_message_file_alone(tmp_path, monkeypatch, keep_handlers):
+@pytest.mark.usefixtures("keep_handlers")
+def test_an_interruption_before_the_first_output_writes_the_message_file_alone(tmp_path, monkeypatch):
     def interrupted(*_args, **_options):
         raise KeyboardInterrupt
 

@@ -165,7 +165,7 @@ def test_callbacks_agree_with_the_compiled_functions():
     problem = reference_problems()["slider crank"].make("SI1")
     calls = base.Callbacks(problem)
     y, yp = problem.y0 + 0.01, problem.yp0 + 0.02
-    y.flags.writeable = False
+    y.setflags(write=False)
     matrices = [calls.dense(0.1, y, yp, cj) for cj in (0.0, 1.0, 5.0)]
     np.testing.assert_allclose(matrices[2], matrices[0] + 5.0 * (matrices[1] - matrices[0]), atol=1e-12)
     d = 1e-6

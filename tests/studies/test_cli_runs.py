@@ -45,7 +45,8 @@ def signalled_after(fraction, number):
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "kill"])
-def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypatch, keep_handlers, integrator, number):
+@pytest.mark.usefixtures("keep_handlers")
+def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypatch, integrator, number):
     path = tmp_path / "long.toml"
     path.write_text(CASE + f"[solver]\nintegrator = '{integrator}'\n")
     monkeypatch.setattr(commands, "case_bars", signalled_after(0.3, number))
@@ -62,7 +63,8 @@ def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypat
 
 
 @pytest.mark.slow
-def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch, keep_handlers):
+@pytest.mark.usefixtures("keep_handlers")
+def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch):
     path = tmp_path / "soft.toml"
     path.write_text(CASE)
     monkeypatch.setattr("gearmbs.studies.run.simulation.slip", lambda *a: "the wheels slipped")
@@ -73,7 +75,8 @@ def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch, keep_handle
 
 
 @pytest.mark.slow
-def test_a_failed_case_of_the_study_is_kept(tmp_path, monkeypatch, keep_handlers):
+@pytest.mark.usefixtures("keep_handlers")
+def test_a_failed_case_of_the_study_is_kept(tmp_path, monkeypatch):
     """The case that failed and those finished before it are files, the study is not."""
     monkeypatch.setattr(
         "gearmbs.studies.run.simulation.slip",
@@ -99,7 +102,8 @@ def test_a_failed_case_of_the_study_is_kept(tmp_path, monkeypatch, keep_handlers
         (["--angle", "1 mm"], "--angle: '1 mm' is in"),
     ],
 )
-def test_wrong_options_leave_no_files(tmp_path, options, words, keep_handlers):
+@pytest.mark.usefixtures("keep_handlers")
+def test_wrong_options_leave_no_files(tmp_path, options, words):
     result = CliRunner().invoke(cli.app, ["paper", "--out", str(tmp_path / "out"), *options])
     assert result.exit_code == 1
     assert words in result.output
@@ -107,7 +111,8 @@ def test_wrong_options_leave_no_files(tmp_path, options, words, keep_handlers):
 
 
 @pytest.mark.slow
-def test_remarks_on_an_unusual_case(tmp_path, keep_handlers):
+@pytest.mark.usefixtures("keep_handlers")
+def test_remarks_on_an_unusual_case(tmp_path):
     path = tmp_path / "apart.toml"
     path.write_text("[operation]\nrun_up = '30 ms'\nduration = '60 ms'\n[fault]\ncentre_distance_error = '3 mm'\n")
     result = CliRunner().invoke(cli.app, ["run", str(path)])
