@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from benchmarks.problems.lagrange import TERMS_SIG, LagrangeSystem, compiled
+from benchmarks.problems.lagrange import TERMS_SIG, LagrangeSystem
 
 M1, M2, M3, M4, M5, M6, M7 = 0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498
 I1, I2, I3, I4, I5, I6, I7 = 2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5
@@ -192,6 +192,4 @@ def andrews() -> LagrangeSystem:
         ]
     )
     rates = np.array([1e3, 1e3, 1e2, 1e2, 1e2, 1e2, 1e2])
-    return LagrangeSystem(
-        *compiled(andrews_terms), andrews_terms, 7, 6, np.zeros(1), q0, np.zeros(7), np.ones(7), rates, 100.0
-    )
+    return LagrangeSystem(andrews_terms, 7, 6, np.zeros(1), q0, np.zeros(7), np.ones(7), rates, 100.0)

@@ -140,8 +140,6 @@ class LagrangeSystem:
 
     Attributes
     ----------
-    residual, jacobian : compiled functions
-        Of the signatures of `gearmbs.dae.problem`.
     terms : compiled function
         ``terms(t, y, yp, want_jacobian, rdata, blocks)``.
     nq, ng : int
@@ -156,8 +154,6 @@ class LagrangeSystem:
         Magnitude of the multipliers.
     """
 
-    residual: Callable
-    jacobian: Callable
     terms: Callable
     nq: int
     ng: int
@@ -210,10 +206,11 @@ class LagrangeSystem:
         idata = np.concatenate(([form, nq, ng, len(rows)], rows * n + cols)).astype(np.int64)
         indptr = np.concatenate(([0], np.cumsum(np.bincount(cols, minlength=n)))).astype(np.int64)
         names = [f"{kind}{i + 1}" for kind, m in (("q", nq), ("v", nq), ("lambda", ng)) for i in range(m)]
+        residual, jacobian = compiled(self.terms)
         return DAEProblem(
             n=n,
-            residual=self.residual,
-            jacobian=self.jacobian,
+            residual=residual,
+            jacobian=jacobian,
             indptr=indptr,
             indices=rows.astype(np.int64),
             idata=idata,
@@ -235,10 +232,11 @@ class LagrangeSystem:
         everywhere = np.arange(n * n)
         idata = np.concatenate(([form, self.nq, self.ng, n * n], everywhere)).astype(np.int64)
         mask = np.zeros((n, n), dtype=bool)
+        jacobian = compiled(self.terms)[1]
         for _ in range(4):
             vals = np.zeros(n * n)
             y, yp = rng.normal(size=n), rng.normal(size=n)
-            self.jacobian(rng.uniform(0.1, 1.0), y, yp, 1.37, vals, idata, self.rdata, np.zeros(end + n * n))
+            jacobian(rng.uniform(0.1, 1.0), y, yp, 1.37, vals, idata, self.rdata, np.zeros(end + n * n))
             mask |= vals.reshape(n, n) != 0.0
         cols, rows = np.nonzero(mask.T)
         return rows, cols

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from benchmarks.problems.lagrange import TERMS_SIG, LagrangeSystem, compiled
+from benchmarks.problems.lagrange import TERMS_SIG, LagrangeSystem
 
 GRAVITY = 9.81
 
@@ -157,7 +157,7 @@ def heavy_top_terms(t, y, yp, want, p, b):
 def pendulum() -> LagrangeSystem:
     """Return the pendulum released at the height of its pivot."""
     return LagrangeSystem(
-        *compiled(pendulum_terms), pendulum_terms, 2, 1, np.array([GRAVITY]), np.array([1.0, 0.0]), np.zeros(2),
+        pendulum_terms, 2, 1, np.array([GRAVITY]), np.array([1.0, 0.0]), np.zeros(2),
         np.ones(2), np.full(2, np.sqrt(2.0 * GRAVITY)), 3.0 * GRAVITY,
     )  # fmt: skip
 
@@ -166,7 +166,7 @@ def slider_crank() -> LagrangeSystem:
     """Return the slider crank with a = 1/2, J1 = m2 = k = c = l0 = F = 1, J2 = 2, at rest with the crank upright."""
     r = np.arcsin(-0.5)
     return LagrangeSystem(
-        *compiled(slider_crank_terms), slider_crank_terms, 3, 2, np.array([0.5, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0, 1.0]),
+        slider_crank_terms, 3, 2, np.array([0.5, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0, 1.0]),
         np.array([0.5 * np.pi, np.cos(r), r]), np.zeros(3), np.ones(3), np.ones(3), 1.0,
     )  # fmt: skip
 
@@ -174,7 +174,7 @@ def slider_crank() -> LagrangeSystem:
 def car_axis() -> LagrangeSystem:
     """Return the car axis with the test set's parameters."""
     return LagrangeSystem(
-        *compiled(car_axis_terms), car_axis_terms, 4, 2, np.array([0.01, 10.0, 1.0, 0.5, 0.1, 10.0, 1.0]),
+        car_axis_terms, 4, 2, np.array([0.01, 10.0, 1.0, 0.5, 0.1, 10.0, 1.0]),
         np.array([0.0, 0.5, 1.0, 0.5]), np.array([-0.5, 0.0, -0.5, 0.0]), np.ones(4), np.ones(4), 1e-3,
     )  # fmt: skip
 
@@ -188,7 +188,7 @@ def heavy_top() -> LagrangeSystem:
     rates = np.cross(omega, axes)
     spin = np.linalg.norm(omega)
     return LagrangeSystem(
-        *compiled(heavy_top_terms), heavy_top_terms, 12, 9, np.array([15.0, *moments, GRAVITY]),
+        heavy_top_terms, 12, 9, np.array([15.0, *moments, GRAVITY]),
         np.concatenate((axes[1], axes.ravel())), np.concatenate((rates[1], rates.ravel())), np.ones(12),
         np.full(12, spin), 1e4,
     )  # fmt: skip

@@ -461,8 +461,10 @@ def driven_jacobian(t, y, yp, cj, vals, idata, rdata, work):
     """The first column is full, the others have all rows but the first."""
     n = y.size
     vals[0] = cj
-    vals[1:n] = -1.0
-    vals[n:] = rdata
+    for i in range(1, n):
+        vals[i] = -1.0
+    for k in range(rdata.size):
+        vals[n + k] = rdata[k]
 
 
 @pytest.mark.parametrize("stiff", [True, False])
