@@ -16,6 +16,7 @@ from gearmbs.dae.equations.loads.expressions import value
 from gearmbs.dae.integrators.events import STOP
 from gearmbs.dae.integrators.options import Options, beside
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
+from gearmbs.dae.model.brief import brief_changes
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
@@ -256,6 +257,8 @@ def simulate(
             raise ModelError(f"stops: they need the integrator {able}, and lump=False")
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
         options.update(stop_options(stops))
+    t_model = t_start if initial is None else initial.t_model
+    options |= with_brief_changes(system, t_model, float(t_eval[-1]), options)
     problem.advice = {**ADVICE, **(advice or {})}
     held, lumping = locking_remark(mechanism, system), lumping if asked else ""
     remark = " ".join(text for text in (held, lumping) if text)
@@ -283,6 +286,15 @@ def simulate(
     warn_of_spin(mechanism.bodies, solution)
     warn_of_lost_torques(mechanism.elements, solution)
     return solution
+
+
+def with_brief_changes(system: System, start: float, end: float, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the breakpoints of a run with those added between which tables of the model change briefly, if any do.
+
+    A run that goes on from a state has those of the run that the state is from, which began at ``start``.
+    """
+    found = brief_changes(system.model, start, end)
+    return {"breakpoints": [*options.get("breakpoints", ()), *found]} if found else {}
 
 
 def start_time(t_start: float, initial: State | None) -> float:

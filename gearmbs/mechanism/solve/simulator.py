@@ -24,7 +24,7 @@ from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.quantities import quantity
-from gearmbs.mechanism.solve.simulate import ADVICE, checked, just_inside, prepared, start_time
+from gearmbs.mechanism.solve.simulate import ADVICE, checked, just_inside, prepared, start_time, with_brief_changes
 from gearmbs.wording import any_of, did_you_mean
 
 AT_AN_INSTANT = (
@@ -162,6 +162,7 @@ class Simulator(OwnAttributes):
             mechanism, t_model, lump, formulation, rate_scale, initial is not None
         )
         self._base.advice = {**ADVICE, **(advice or {})}
+        options |= with_brief_changes(self._system, t_model, self.t_end, options)
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []

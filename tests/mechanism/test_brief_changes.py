@@ -1,0 +1,103 @@
+"""Bumps in tables, and pulses of steps, that are narrower than the steps of a run: none is passed unseen."""
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.dae.model.brief import brief_changes
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.parts import functions
+from tests.generators import cases, seed
+
+KINDS = ("CUBSPL", "AKISPL", "curve", "polyline", "STEP", "IF")
+KNOTS = 10_000
+SPAN = 10.0
+
+
+def disc(kind, at, height=1.0):
+    """A disc of 2 kg m^2 under a slow torque with a bump 3 points wide of 1 N m s; return its last speed, too.
+
+    That is half of the integral of chords, from which those of splines differ by some per cent of the bump.
+    """
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    times = np.linspace(0.0, SPAN, KNOTS)
+    torque, first, apart = 0.1 * np.sin(0.7 * times), int(at / SPAN * KNOTS), times[1]
+    torque[first : first + 3] += height * np.array([0.5, 1.0, 0.5]) / (2.0 * apart)
+    speed = np.trapezoid(torque, times) / 2.0
+    width = 2.0 * apart
+    pulses = {
+        "STEP": f"{height}*(STEP(TIME, {at}, 0, {at + width}, {1.0 / width})"
+        f" - STEP(TIME, {at + width}, 0, {at + 2.0 * width}, {1.0 / width}))",
+        "IF": f"IF(TIME - {at}: 0, 0, IF(TIME - {at + width}: {height / width}, 0, 0))",
+    }
+    if kind in pulses:
+        m.torque("drive", body, pulses[kind])
+        return m, 0.5 * height
+    if kind in ("curve", "polyline"):
+        m.torque("drive", body, getattr(functions, kind)(times, torque))
+        return m, speed
+    m.spline("table", times, torque)
+    m.torque("drive", body, f"{kind}(TIME, 0, table)")
+    return m, speed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bump_is_seen(kind, integrator):
+    rng = np.random.default_rng(seed())
+    for at in rng.uniform(0.5, 9.5, cases(2)):
+        m, speed = disc(kind, float(at))
+        solution = m.simulate(SPAN, tol=1e-6, rate=1.0, integrator=integrator)
+        assert solution.success, solution.message
+        assert solution.angular_velocity("disc")[-1, 2] == pytest.approx(speed, abs=0.02)
+
+
+def test_steps_of_ones_own_see_it_too():
+    """With the same steps; and from a state before it on."""
+    m, _ = disc("AKISPL", 7.0)
+    times = np.linspace(0.0, SPAN, 41)
+    one = m.simulate(SPAN, t_eval=times)
+    sim = gm.Simulator(m, SPAN)
+    for t in times[1:]:
+        sim.advance(t)
+        if t == times[20]:
+            state = sim.state()
+    np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
+    later = m.simulate(SPAN, t_eval=times[20:], initial=state)
+    np.testing.assert_array_equal(later.result.y, one.result.y[20:])
+
+
+@pytest.mark.parametrize("kind", KINDS[:4])
+def test_tables_without_one_are_left_alone(kind):
+    m, _ = disc(kind, 5.0, height=0.0)
+    assert brief_changes(m.compile().model, 0.0, SPAN) == []
+
+
+def test_rough_tables_corners_and_lone_steps_are_left_alone():
+    """They are seen by any step: noise is everywhere, what is beyond a corner or a step stays."""
+    times = np.linspace(0.0, SPAN, KNOTS)
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    m.spline("noise", times, np.random.default_rng(seed()).normal(size=KNOTS))
+    m.spline("corner", times, np.abs(times - 4.0))
+    m.torque("a", body, "AKISPL(TIME, 0, noise)")
+    m.torque("b", body, "AKISPL(TIME, 0, corner)")
+    m.torque("c", body, "IF(TIME - 3: 0, 1, 1) + STEP(TIME, 5, 0, 6, 1)")
+    assert brief_changes(m.compile().model, 0.0, SPAN) == []
+
+
+def test_times_are_those_of_the_argument():
+    """Of a table over 2 (TIME - 1): its bump at 8 is met at 5."""
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    x = np.linspace(-2.0, 18.0, 20_001)
+    m.spline("table", x, np.exp(-(((x - 8.0) / 0.002) ** 2)))
+    m.torque("drive", body, "CUBSPL(2*(TIME - 1), 0, table)")
+    first, top, last = brief_changes(m.compile().model, 0.0, SPAN)
+    assert 4.995 < first < 5.0 < last < 5.005
+    assert top == pytest.approx(5.0, abs=1e-6)
