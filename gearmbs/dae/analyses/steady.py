@@ -192,6 +192,9 @@ def turning_basis(
                 change = chain.change(whole, seen, z, forces=bool(w.any()))
                 if change < least:
                     least, kept = change, (w, whole, seen, z)
+                # the first that serves: which of several has less rounding would differ between machines
+                if least <= 1.0:
+                    break
             if least <= 1.0:
                 break
         if least > 1.0:
@@ -223,7 +226,11 @@ class _Chain:
     def choices(self, turn: np.ndarray) -> Iterator[np.ndarray]:
         """Yield Z: components of the same vectors in axes at rest, then all that turns with the chain."""
         own = self.basis[self.anchors].diagonal()
-        yield turn[np.ix_(self.anchors, self.anchors)] * own / own[:, None]
+        components = turn[np.ix_(self.anchors, self.anchors)] * own / own[:, None]
+        # of vectors that are whole: which components of others are independent is an accident of pivots
+        whole = not np.delete(turn[self.anchors], self.anchors, axis=1).any()
+        if whole:
+            yield components
         if turn.any():
             # a body that joints to others leave free, as a carrier on springs
             for first in range(0, min(FREE_BODIES, self.bodies.max(initial=-1) + 1)):
@@ -231,6 +238,9 @@ class _Chain:
                 part = self.basis[rows] * self.weight[rows, None]
                 if rows.size == 6 and np.linalg.matrix_rank(part) == 6:
                     yield np.linalg.pinv(part) @ turn[np.ix_(rows, rows)] @ part
+        if not whole:
+            yield components
+        if turn.any():
             yield np.zeros((own.size, own.size))
 
     def change(self, turn: np.ndarray, seen: np.ndarray, back: np.ndarray, forces: bool) -> float:
