@@ -334,3 +334,35 @@ def test_the_frequency_response_is_what_sines_leave_behind():
         angle = solution.evaluate('AZ("load bearing.I", "load bearing.J")')[1:]
         found = 2.0 / 64 * np.sum(angle * np.exp(-2j * np.pi * f * last)) / 0.2 / -1j
         assert found == pytest.approx(plant.frequency_response(f)[0, 0, 0], rel=1e-2)
+
+
+def test_a_slider_crank_that_turns_is_linearised_about_its_motion():
+    """The derivatives of a'' = f(a, a') at a speed that is not steady, and the poles that the modes have there."""
+    angle, speed = 0.9, 7.0
+    m = slider_crank(angle, speed)
+    shown = ["WZ(main.I)", ("com_velocity", "slider", "x"), ("com_acceleration", "slider", "x")]
+    with pytest.warns(UserWarning, match=says("crank", "slider", "vary with time")):
+        plant = m.linearize([("torque", "main"), ("force", "slider", "x")], shown)
+    h, g = 1e-3, 1e-30
+
+    def rate(a, w, torque=0.0, force=0.0):
+        return _crank_acceleration(a, w, torque, force)
+
+    by_angle = (8 * (rate(angle + h, speed) - rate(angle - h, speed))
+                - (rate(angle + 2 * h, speed) - rate(angle - 2 * h, speed))) / (12 * h)  # fmt: skip
+    by_speed = (rate(angle, speed + h) - rate(angle, speed - h)) / (2 * h)
+    by_torque, by_force = rate(angle, speed, 1.0) - rate(angle, speed), rate(angle, speed, 0, 1.0) - rate(angle, speed)
+    assert plant.states[0] == "crank: rotation about z"
+    assert plant.A[1] == pytest.approx([by_angle, by_speed], rel=1e-8)
+    assert plant.B[1] == pytest.approx([by_torque, by_force], rel=1e-9)
+    slope, bend = _slide(angle)[1], np.imag(_slide(angle + 1j * g)[1]) / g
+    # x' = x_a w, x'' = x_a a'' + x_aa w^2
+    assert plant.C[1] == pytest.approx([bend * speed, slope], rel=1e-8)
+    assert plant.D[2] == pytest.approx([slope * by_torque, slope * by_force], rel=1e-9)
+    third = (np.imag(_slide(angle + h + 1j * g)[1]) - np.imag(_slide(angle - h + 1j * g)[1])) / g / (2 * h)
+    now = rate(angle, speed)
+    by_place = bend * now + slope * by_angle + third * speed**2
+    assert plant.C[2] == pytest.approx([by_place, slope * by_speed + 2 * bend * speed], rel=1e-5)
+    with pytest.warns(UserWarning, match=says("crank", "slider")):
+        modes = m.linear_modes().eigenvalues
+    assert np.sort(plant.poles.real) == pytest.approx(np.sort(modes.real), rel=1e-9)

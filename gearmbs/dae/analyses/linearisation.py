@@ -180,7 +180,7 @@ def reduce(instant: Instant, inputs: Inputs | None = None) -> Reduced:
         lin.transform is not None,
         Driven(tuple(force), tuple(rates[4:]), place) if force else None,
     )
-    if found.axes.any():
+    if first.any() or second.any():
         # x' = T z' + T' z and x'' = T z'' + 2 T' z' + T'' z
         sizes = absolute.T @ np.abs(lin.mass), absolute.T @ lin.damping_terms
         reduced.stiffness += damping @ first + mass @ second
@@ -204,6 +204,9 @@ def _driven(
         now[dependent] = np.linalg.lstsq(lin.constraint[:, dependent], -lin.inputs.place, rcond=None)[0]
     first = found.turn @ now
     second = found.turn @ first
+    if found.along is not None:
+        more = found.along.rates(now)
+        first, second = first + more[0], second + more[1]
     value, rate = lin.inputs.force
     pushed = [
         value + lin.stiffness @ now + lin.damping @ first + lin.mass @ second,

@@ -115,6 +115,8 @@ class Basis:
         Bodies of each chain whose coefficients are constant in no axes.
     turn : ndarray, shape (n, n)
         W.
+    along : Along or None
+        How J changes along a motion that is not steady.
     """
 
     now: np.ndarray
@@ -123,6 +125,39 @@ class Basis:
     axes: np.ndarray
     varying: list[list[str]]
     turn: np.ndarray
+    along: Along | None = None
+
+
+@dataclass(frozen=True)
+class Along:
+    """Rates of the constraints along a motion, for bases whose independent coordinates stay what they are.
+
+    From J T = 0 at all times J T' = -J' T and J T'' = -J'' T - 2 J' T', and so for T_u, for J T_u is constant.
+
+    Attributes
+    ----------
+    constraint, first, second : ndarray, shape (rows, n)
+        J, J' and J''.
+    anchors : ndarray of int
+        Independent coordinates.
+    rows : ndarray of bool, shape (n,)
+        Coordinates of the bodies whose motion is not steady.
+    """
+
+    constraint: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    anchors: np.ndarray
+    rows: np.ndarray
+
+    def rates(self, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first and second rates of columns such as T, those of other bodies zero."""
+        dependent = np.setdiff1d(np.arange(self.constraint.shape[1]), self.anchors)
+        inverse = np.linalg.pinv(self.constraint[:, dependent])
+        first, second = np.zeros_like(now), np.zeros_like(now)
+        first[dependent] = -inverse @ (self.first @ now)
+        second[dependent] = -inverse @ (self.second @ now + 2.0 * self.first @ first)
+        return first * self.rows[:, None], second * self.rows[:, None]
 
 
 def weights(instant: Instant) -> np.ndarray:
@@ -174,6 +209,7 @@ def turning_basis(
         return replace(none, varying=[list(instant.system.body_names)])
     generators, weight = _generators(instant), weights(instant)
     turn, back, varying = np.zeros((len(basis),) * 2), np.zeros((basis.shape[1],) * 2), []
+    changing = np.zeros(len(velocity), dtype=bool)
     seen_turn = np.zeros_like(turn)
     for k, own in enumerate(rates):
         rows = np.flatnonzero(label[owner] == k)
@@ -199,7 +235,8 @@ def turning_basis(
                 break
         if least > 1.0:
             varying.append([instant.system.body_names[b] for b in np.flatnonzero(label == k)])
-        if kept is not None:
+            changing |= label == k
+        elif kept is not None:
             within = np.ix_(rows, rows)
             axes[label == k], turn[within], seen_turn[within], back[np.ix_(columns, columns)] = kept
     if axes.any() and not varying and len(chains) > 1:
@@ -208,7 +245,45 @@ def turning_basis(
         if not every.change(turn, seen_turn, back, forces=True) <= 1.0:
             varying.append([instant.system.body_names[b] for b in np.flatnonzero(axes.any(axis=1))])
     first = turn @ basis - basis @ back
-    return Basis(basis, first, turn @ first - first @ back, axes, varying, turn)
+    second = turn @ first - first @ back
+    along = _along(instant, here, anchors, changing[owner]) if changing.any() else None
+    if along is not None:
+        more = along.rates(basis)
+        first, second = first + more[0], second + more[1]
+    return Basis(basis, first, second, axes, varying, turn, along)
+
+
+STENCIL = np.array([[4 / 5, -1 / 5, 4 / 105, -1 / 280], [8 / 5, -1 / 5, 8 / 315, -1 / 560]])
+"""Weights of central differences of eighth order, of J(h) - J(-h) for J' and of J(h) + J(-h) for J'', at h to 4 h."""
+SPREAD = 0.04
+"""Angle, rad, by which bodies turn in h: what is left out of J'' is 1e-13 of it, and rounding, 1e-16/h^2, as much."""
+
+
+def _along(instant: Instant, here: Linearised, anchors: np.ndarray, rows: np.ndarray) -> Along | None:
+    """Return the rates of the constraints along the motion; None where modes of deformation are among the coordinates.
+
+    J depends on positions and time alone, so that the path with the same velocities and accelerations has its rates.
+    """
+    if here.transform is None or instant.at["q_f"] < instant.at["lambda"]:
+        return None
+    system, now, t = instant.system, instant.configuration(), instant.t
+    speeds, changes = now.velocities, accelerations(system, now, t)[0]
+    size = max(float(np.abs(speeds).max()), float(np.sqrt(np.abs(changes).max())), SLOWEST)
+    h = SPREAD / size
+    turning = system.model.counts.turning
+    moves = (6 * np.arange(now.bodies)[:, None] + np.arange(3)).ravel()
+    turns = (6 * turning[:, None] + np.arange(3, 6)).ravel()
+
+    def constraint(time: float) -> np.ndarray:
+        there = now.displaced(time * speeds + 0.5 * time**2 * changes)
+        return system.constraint_jacobian(there, t + time)[0].toarray()[:, np.concatenate([moves, turns])]
+
+    ahead = [constraint(k * h) for k in range(1, 5)]
+    behind = [constraint(-k * h) for k in range(1, 5)]
+    middle = constraint(0.0)
+    first = sum(w * (a - b) for w, a, b in zip(STENCIL[0], ahead, behind, strict=True)) / h
+    second = sum(w * (a + b - 2.0 * middle) for w, a, b in zip(STENCIL[1], ahead, behind, strict=True)) / h**2
+    return Along(here.constraint, first, second, anchors, rows)
 
 
 @dataclass

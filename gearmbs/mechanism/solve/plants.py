@@ -436,6 +436,11 @@ def _coordinates(instant: Instant, reduced: Reduced) -> tuple[np.ndarray, list[s
     rows = np.concatenate([moved.reshape(-1, n), turned.reshape(-1, n), modal])
     weight = np.concatenate([np.ones(3 * len(bodies)), np.full(3 * len(bodies), arm), arm / model.modal_sizes[:, 0]])
     order = qr((weight[:, None] * rows).T, mode="r", pivoting=True)[1][:n]
+    along = reduced.motion.along
+    if along is not None:
+        # what varies with time depends on the coordinates: those of the modes
+        first, own = 3 * len(bodies), 3 * model.counts.turning[:, None] + np.arange(3)
+        order = np.concatenate([np.arange(first), first + own.ravel()])[along.anchors]
     order = np.sort(order)
     places = [(name, c) for name in bodies for c in "xyz"]
     titles = [f"{name}: {c}" for name, c in places] + [f"{name}: rotation about {c}" for name, c in places]
