@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from gearmbs._display import html_table, readable, settings_of
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, step
+from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.schema.described import Described
 from gearmbs.units import to_si
 
@@ -129,7 +130,7 @@ def fixed_value(value: Any, unit: str) -> float | None:
 
 
 def over_time(value: Any, unit: str, label: str, at: Attached) -> TimeFunction:
-    """Return a function of time: a number is reached by a STEP over the run-up.
+    """Return a function of time: a number is reached by a STEP over the run-up, an input becomes one of the mechanism.
 
     Raises
     ------
@@ -139,6 +140,8 @@ def over_time(value: Any, unit: str, label: str, at: Attached) -> TimeFunction:
     number = fixed_value(value, unit)
     if number is None:
         try:
+            if isinstance(value, Input):
+                at.mechanism.inputs.setdefault(value.name, value)
             return as_function(value, unit, label)
         except ValueError as error:
             raise DrivetrainError(str(error)) from None

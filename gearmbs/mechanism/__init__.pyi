@@ -24,6 +24,7 @@ from .parts.functions import polyline_integral as polyline_integral
 from .parts.functions import polynomial as polynomial
 from .parts.functions import ramp as ramp
 from .parts.functions import step as step
+from .parts.inputs import make_input as make_input
 from .parts.joints import Joint as Joint
 from .parts.modal import ModalBody as ModalBody
 from .parts.modal import Mode as Mode

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
-from gearmbs.mechanism import Mechanism, ModelError, polyline
+from gearmbs.drivetrain import TorqueLoad
+from gearmbs.mechanism import Mechanism, ModelError, make_input, polyline
 from gearmbs.studies.run.simulation import case_mechanism
+from tests.drivetrain.support import stage
 from tests.mechanism.test_setting import two_discs
 from tests.says import says
 
@@ -162,3 +164,27 @@ def test_outputs_that_are_not_there():
         solution.output("odd")
     with pytest.raises(KeyError, match=says("lod", "load")):
         solution.input("lod")
+
+
+def test_the_torque_of_a_case_is_set_by_its_own_name():
+    sim = gm.Simulator(case_mechanism(gm.Case()), 0.07, lump=True, **PAIR)
+    sim.advance(0.06)
+    before = sim.get("input", "operation.torque")
+    sim.set("operation.torque", "60 N m")
+    sim.advance(0.061)
+    # the torque of the load about its shaft
+    moment = float(np.linalg.norm(sim.get("load", "load")[1]))
+    assert (before, moment, sim.get("input", "load.torque")) == pytest.approx((100.0, 60.0, 60.0))
+
+
+def test_loads_of_a_drivetrain_are_inputs():
+    """A number has the name of its load; an input has its own, and is one of the mechanism that is built."""
+    assert "brake.torque" in stage().build().compile().problem().numbers
+    load = TorqueLoad(name="brake", shaft="out", torque=make_input("braking", "N m", "0.3 kN m"))
+    m = stage(loads=[load]).build()
+    assert m.inputs["braking"].start == 300.0
+    sim = gm.Simulator(m, 0.02)
+    sim.advance(0.001)
+    sim.set("braking", 120.0)
+    sim.advance(0.002)
+    assert np.linalg.norm(sim.get("load", "brake")[1]) == pytest.approx(120.0)

@@ -338,3 +338,13 @@ def test_planetary_set():
     np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
     run = m.simulate(0.02, t_eval=times[20:], tol=1e-5, initial=state)
     np.testing.assert_array_equal(run.result.y, one.result.y[20:])
+
+
+@pytest.mark.slow
+def test_the_environment_balances_its_pole(capsys):
+    """The page's policy, made of the linear plant, keeps the pole up for whole episodes; without it the pole falls."""
+    page = (Path(__file__).parents[2] / "docs" / "notebooks" / "environment.md").read_text()
+    exec("\n".join(re.findall(r"```\{code-cell\} ipython3\n(.*?)```", page, re.DOTALL)), {})
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split()[-1] for line in told[:3]] == ["balanced"] * 3
+    assert told[4].startswith("fallen")

@@ -148,8 +148,10 @@ def make_output(name: str, what: Any) -> Output:
     return Output(name, tuple(getattr(part, "name", part) for part in what))
 
 
-def make_input(name: str, unit: str, value: Any) -> Input:
-    """Return an input.
+def make_input(name: str, unit: str, value: Any = 0.0) -> Input:
+    """Return an input for a part that becomes one of a mechanism later, as a load of a drivetrain.
+
+    For what its arguments are see `gearmbs.mechanism.Mechanism.input`.
 
     Raises
     ------

@@ -192,6 +192,9 @@ class Simulator(OwnAttributes):
         nothing = np.empty((0, problem.n))
         held = (self._cells, np.empty((0, self._cells.size)))
         empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "", held=held)
+        now = self._run.state.rdata[self._cells]
+        self._led = {name for name, own in self._own.items() if own.slope(now) != 0.0}
+        """Inputs on a line."""
         self._row = Solution(self._system, problem, empty, self._members)
         self._row.inside = just_inside(np.array([problem.t0, self.t_end]))
         self._row.share(1)
@@ -224,8 +227,7 @@ class Simulator(OwnAttributes):
         t = float(t)
         while self.t < t:
             end = self._sample(t) if self._controls else t
-            if self._own:
-                self._apply(end)
+            self._apply(end)
             self._go_to(end, record and end == t)
 
     def _time(self, t: Any) -> float:
@@ -390,11 +392,11 @@ class Simulator(OwnAttributes):
 
     def _apply(self, end: float) -> None:
         """Let what has been set take effect at the present time; lines that were set end at ``end``."""
+        if not self._set and not self._led:
+            return
         t, y, yp, *_ = self._point
         before = self._run.state.rdata[self._cells]
-        led = [n for n, own in self._own.items() if n not in self._set and own.slope(before) != 0.0]
-        if not self._set and not led:
-            return
+        led = [name for name in self._led if name not in self._set]
         after, changed = before.copy(), []
         for name in (*self._set, *led):
             own = self._own[name]
@@ -407,6 +409,7 @@ class Simulator(OwnAttributes):
             if slope != slope_before or (not hold and value != now):
                 own.write(after, t, now if hold else value, slope)
                 changed.append((self.numbers[name], slope - slope_before))
+            (self._led.add if slope else self._led.discard)(name)
         self._set.clear()
         if not changed:
             return
@@ -415,7 +418,7 @@ class Simulator(OwnAttributes):
             return
         started = time.perf_counter()
         loads = all(number.kind == INPUT for number, _ in changed)
-        with raised_errors(self._functions):
+        with raised_errors(self._functions) if self._functions else NOTHING:
             self._run.change(t, y, yp, self._cells, after, loads, any(slope for _, slope in changed))
         self._clock[1] += time.perf_counter() - started
 

@@ -106,6 +106,7 @@ def gear_rig(
         if k == 0:
             rig.rotation(DRIVE, bearing, angle)
     rig.torque(LOAD, rig.bodies[SHAFTS[1]], load, axis=place.axes_2[:, 2])
+    rig.aliases["operation.torque"] = f"{LOAD}.torque"
     rig.gear_contact(MESH, rig.bodies[GEARS[0]], rig.bodies[GEARS[1]], pair)
     return rig
 
@@ -358,5 +359,6 @@ def flexible_rig(
             rig.rotation(DRIVE, bearing, ramp(speed, over=run_up))
         else:
             rig.torque(LOAD, last, step(0.0, 0.0, run_up, torque), axis=axes[:, 2])
+            rig.aliases["operation.torque"] = f"{LOAD}.torque"
     rig.gear_contact(MESH, wheels[0], wheels[1], pair)
     return rig
