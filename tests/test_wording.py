@@ -33,8 +33,8 @@ def test_one_function_asks_what_was_meant():
     assert sources(r"did you mean ") - {"wording.py"} <= others
 
 
-def test_one_function_makes_values_plain():
-    assert sources(r"def _?plain\(") == {"files.py"}
+def test_one_function_makes_values_for_json():
+    assert sources(r"def _?(plain|json_value)\(") == {"files.py"}
     assert sources(r"\.item\(\) if isinstance\(\w+, np\.generic\)") == {"files.py"}
 
 

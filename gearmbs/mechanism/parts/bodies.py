@@ -189,14 +189,14 @@ class Body(OwnAttributes):
         label = self._marker_label(name)
         place = vector(point, f"body '{self.name}': marker position", "length")
         axes = rotation_matrix(self.orientation.T @ matrix, f"marker '{label}': orientation")
-        return self._with_marker(Marker(label, self, self.orientation.T @ (place - self.position), axes))
+        marker = Marker(label, self, self.orientation.T @ (place - self.position), axes)
+        self.markers.append(marker)
+        return marker
 
     def placed_marker(self, point: np.ndarray, axes: np.ndarray, name: str) -> Marker:
         """Add a marker as `marker_at` does, of a position in m and a rotation matrix that have been checked."""
         place = self.orientation.T @ (point - self.position)
-        return self._with_marker(Marker(self._marker_label(name), self, place, self.orientation.T @ axes))
-
-    def _with_marker(self, marker: Marker) -> Marker:
+        marker = Marker(self._marker_label(name), self, place, self.orientation.T @ axes)
         self.markers.append(marker)
         return marker
 
