@@ -297,17 +297,27 @@ def test_springs_between_what_turns_and_what_rests_are_looked_at(coupled):
         assert oscillating(m) == pytest.approx([np.sqrt(600.0), *[100.0] * 3], rel=1e-8)
 
 
-def test_a_carrier_of_three_planets_whirls_as_a_disc():
-    """In axes at rest, by the angular momentum of all: J s^2 - i H s + k = 0."""
+@pytest.mark.parametrize("phase", np.linspace(0.0, 2.0, 6))
+@pytest.mark.parametrize("carrier_first", [True, False])
+def test_a_carrier_of_three_planets_whirls_as_a_disc(phase, carrier_first):
+    """In axes at rest, by the angular momentum of all: J s^2 - i H s + k = 0, whatever is independent by pivots."""
     spin, k = 100.0, 1e4
     m = Mechanism("carrier", gravity=(0, 0, 0))
-    carrier = m.body("carrier", 3.0, (0.1, 0.1, 0.2), angular_velocity=(0, 0, spin))
-    m.bushing("s", carrier.marker(), m.ground.marker(), stiffness=(1e6,) * 3, torsional_stiffness=(k, k, 0))
-    for n in range(3):
-        place = 0.1 * np.array([np.cos(2 * np.pi * n / 3), np.sin(2 * np.pi * n / 3), 0])
-        planet = m.body(f"p{n}", 0.5, (1e-3, 1e-3, 1.5e-3), position=place, velocity=np.cross([0, 0, spin], place),
-                        angular_velocity=(0, 0, -3 * spin))  # fmt: skip
-        m.revolute(f"pin {n}", planet, carrier, at=place, axis=(0, 0, 1))
+
+    def carrier_on_springs():
+        carrier = m.body("carrier", 3.0, (0.1, 0.1, 0.2), angular_velocity=(0, 0, spin))
+        m.bushing("s", carrier.marker(), m.ground.marker(), stiffness=(1e6,) * 3, torsional_stiffness=(k, k, 0))
+
+    if carrier_first:
+        carrier_on_springs()
+    places = [0.1 * np.array([np.cos(phase + turn), np.sin(phase + turn), 0]) for turn in 2 * np.pi / 3 * np.arange(3)]
+    for n, place in enumerate(places):
+        m.body(f"p{n}", 0.5, (1e-3, 1e-3, 1.5e-3), position=place, velocity=np.cross([0, 0, spin], place),
+               angular_velocity=(0, 0, -3 * spin))  # fmt: skip
+    if not carrier_first:
+        carrier_on_springs()
+    for n, place in enumerate(places):
+        m.revolute(f"pin {n}", m.bodies[f"p{n}"], m.bodies["carrier"], at=place, axis=(0, 0, 1))
     across, momentum = 0.1 + 3e-3 + 1.5 * 0.5 * 0.01, (0.2 + 3 * 0.5 * 0.01 - 9 * 1.5e-3) * spin
     whirls = np.abs(np.roots([across, -momentum, -k]))
     exact = np.sort([*whirls, *[np.sqrt(1e6 / 4.5)] * 3])
