@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
+from gearmbs.drivetrain import Housing, HousingMode, IdealBearing, Mount, RollingContactBearing, Wheel
 from gearmbs.gears import GearSpec, PlanetarySet, planetary_mechanism
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.parts import functions
+from gearmbs.studies import flexible_rig
 from gearmbs.studies.run.simulation import case_mechanism
+from tests.drivetrain.support import stage
+from tests.drivetrain.test_kinds_of_wheels import QUIET
 from tests.says import says
 
 PAIR = {"tol": 1e-7, "rate_scale": 3000.0}
@@ -348,3 +352,77 @@ def test_the_environment_balances_its_pole(capsys):
     told = capsys.readouterr().out.splitlines()
     assert [line.split()[-1] for line in told[:3]] == ["balanced"] * 3
     assert told[4].startswith("fallen")
+
+
+def rolling_train():
+    """A stage with ball bearings at the seats of one shaft and a housing with a mode of its own on mounts."""
+    mode = HousingMode(
+        name="panel", mass=5.0, stiffness=5.0 * (2 * np.pi * 700) ** 2, damping_ratio=0.01, shape={"a": (0.0, 0.0, 0.1)}
+    )
+    mounts = [Mount(name=f"mount {x}", at=(x, 0.0, -0.1), stiffness=(1e7, 1e7, 2e7)) for x in (-0.2, 0.2)]
+    bearings = [IdealBearing(name="a", shaft="in")] + [
+        RollingContactBearing(name=name, shaft="out", station=station, rolling="6206", settings={})
+        for name, station in (("left", 0.02), ("right", 0.08))
+    ]
+    wheels = [
+        Wheel(name="pinion", shaft="in", station=0.035, gear=GearSpec(20, "3 mm", name="pinion")),
+        Wheel(name="gear", shaft="out", station=0.035, gear=GearSpec(60, "3 mm", name="gear")),
+    ]
+    housing = Housing(name="box", mass=40.0, inertia=(0.6, 0.8, 1.0), at=(0.1, 0.0, 0.0), mounts=mounts, modes=[mode])
+    train = stage(wheels=wheels, bearings=bearings, housings=[housing], run_up=0.01, running=True)
+    return train.changed("mesh", settings=QUIET).build(), {"tol": 1e-7, "rate_scale": train.rate_scale}
+
+
+def flexible_pair():
+    """The pair of the paper on flexible shafts."""
+    return flexible_rig(gm.Case().pair(), speed="300 rpm", modes=1), {"tol": 1e-6, "rate_scale": 3000.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", [rolling_train, flexible_pair])
+def test_drivetrains_go_on_as_one_run(model):
+    """Outputs of 200 points, and those that follow a state half-way; every quantity of the last point."""
+    m, options = model()
+    end = 0.004
+    times = np.linspace(0.0, end, 201)
+    one = m.simulate(end, t_eval=times, **options)
+    sim = gm.Simulator(m, end, **options)
+    for t in times[1:101]:
+        sim.advance(t)
+    state = sim.state()
+    for restored in (False, True):
+        if restored:
+            sim.restore(state)
+        for t in times[101:]:
+            sim.advance(t)
+        np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
+    asked = [(what, body) for what in BODY_QUANTITIES for body in one.system.body_names]
+    asked += [("reaction", joint) for joint in m.joints] + [("load", name) for name in one.system.model.names.forces]
+    asked += [("diagnostics", name) for name in one.system.model.names.forces]
+    for what, name in asked:
+        series, now = getattr(one, what)(name), sim.get(what, name)
+        _assert_same(now, series)
+    for what in ("kinetic_energy", "multipliers"):
+        series = getattr(one, what)
+        _assert_same(sim.get(what), series() if callable(series) else series)
+
+
+BODY_QUANTITIES = (
+    "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
+)  # fmt: skip
+
+
+def _assert_same(now, series):
+    """Compare a value of an instant with the last one of a series, to a millionth of the largest.
+
+    A configuration is moved onto its constraints with the factors of the row before, where there is one.
+    """
+    if isinstance(series, dict):
+        for key, values in series.items():
+            _assert_same(now[key], values)
+    elif isinstance(series, tuple):
+        for part, values in zip(now, series, strict=True):
+            _assert_same(part, values)
+    else:
+        size = np.abs(series).max(initial=0.0)
+        np.testing.assert_allclose(now, series[-1], rtol=0.0, atol=1e-6 * size)
