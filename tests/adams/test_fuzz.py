@@ -87,6 +87,7 @@ def test_random_text(text):
     outcome(parse_script, text)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_random_bytes(data):

@@ -41,6 +41,7 @@ def test_an_equation_and_a_force_of_statics_alone():
     np.testing.assert_allclose(moving[:, 2], middle + (0.25 - middle) * np.cos(10.0 * t), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "mode"), [("STAT, END=1, STEPS=2", 6.0), ("KIN, END=1, STEPS=2", 1.0)])
 def test_sequences(command, mode):
     driven = DECK.replace("END\n", "MOTION/1, TRANSLATION, JOINT=1, FUNCTION=0.1*TIME\nEND\n").replace("DIFF/1,", "!")

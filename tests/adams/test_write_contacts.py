@@ -247,6 +247,7 @@ def planets(driving="sun", loaded="carrier", **changes):
     return planetary_mechanism(gears, speeds={driving: 50.0}, torques={loaded: -85.0}, run_up=0.002, **changes)
 
 
+@pytest.mark.slow
 def test_planets_as_expressions_are_seen_from_their_carrier():
     m = planets()
     a, b = (x.simulate(0.003, rate=2000, tol=1e-7, rate_scale=2000.0) for x in (m, written(m)))

@@ -185,6 +185,7 @@ def test_condition_map(tmp_path):
     assert "Response surface of degree 2" in page
 
 
+@pytest.mark.slow
 def test_exports(tmp_path):
     campaign = small(tmp_path / "c", n=16)
     campaign.run(workers=0)
@@ -302,6 +303,7 @@ def test_bounds_of_random_points_are_in_order_and_hold(function, truth, monkeypa
     assert np.mean(held) >= 0.95 - 1.0 / len(held)
 
 
+@pytest.mark.slow
 def test_bounds_of_noise_are_all_there_is(monkeypatch):
     pytest.importorskip("sklearn")
     from sklearn.gaussian_process.kernels import Matern, WhiteKernel

@@ -285,6 +285,7 @@ def test_closed_cycle_does_no_work(name):
     assert abs(work) < 1e-8 * max(energies)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_random_poses_are_finite_and_never_pull(name):
     contact = Contact(PAIRS[name].with_changes(slices=min(PAIRS[name].face_slices, 11)))

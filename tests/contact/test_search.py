@@ -149,6 +149,7 @@ def test_no_pair_is_overlooked(name):
     assert close >= 2
 
 
+@pytest.mark.slow
 def test_lean_beyond_a_degree_costs_its_square():
     # gap in the section against distance in space: gap A^2 / 2 with the lean A of the axes along the normal
     pair = GearPair.paper(backlash="1.9 mm")

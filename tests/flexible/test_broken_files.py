@@ -94,6 +94,7 @@ KINDS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [KINDS[0], *(pytest.param(k, marks=pytest.mark.slow) for k in KINDS[1:-1]), KINDS[-1]])
 def test_a_broken_file_is_refused_or_read_whole(files, kind):
     path, read = files[kind]

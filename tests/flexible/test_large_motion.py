@@ -136,6 +136,7 @@ def princeton(force, angle, elements, torsion):
     return np.abs([moved @ [0, s, c], moved @ [0, c, -s]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", range(7))
 @pytest.mark.parametrize("force", PRINCETON)
 def test_princeton_beam(force, row):

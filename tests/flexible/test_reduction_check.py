@@ -34,6 +34,7 @@ def kinds(moved, turned):
     return ["bta"[k] for k in np.argmax(sizes, axis=0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [4, 8, 12, 15])
 def test_modes_of_a_round_shaft_are_paired_with_their_own_kind(modes):
     shaft = round_shaft()
@@ -55,6 +56,7 @@ def test_modes_of_a_round_shaft_are_paired_with_their_own_kind(modes):
     assert report.similarity.min() > 0.9
 
 
+@pytest.mark.slow
 def test_pairs_do_not_depend_on_how_a_common_space_is_spanned():
     shaft = round_shaft()
     model, reduced = shaft.model(), shaft.modal_model().slowest(8)

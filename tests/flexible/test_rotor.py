@@ -174,6 +174,7 @@ def test_wrong_settings_are_named(make, message):
         make()
 
 
+@pytest.mark.slow
 def test_an_unbalance_between_stations_is_one_with_a_station_there():
     """Anywhere on a stepped shaft, against the same shaft with a seat there; so is what is read off between."""
     rng = np.random.default_rng(seed())

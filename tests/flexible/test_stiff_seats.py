@@ -59,6 +59,7 @@ def test_a_wheel_on_a_seat_that_lost_its_flexibility_is_remarked():
         assert any(share == pytest.approx(100 * x, abs=0.51) for x in lost)
 
 
+@pytest.mark.slow
 def test_the_remark_is_about_what_the_modes_do():
     """Eight modes hold the wheel so that its frequencies are wrong by more than five per cent."""
     found = {}

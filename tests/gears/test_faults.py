@@ -224,6 +224,7 @@ def test_cumulative_pitch_error_is_a_wave_of_displaced_teeth(rotation):
         pair.with_faults(CumulativePitchError(order=20)).contact_tables()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wheel", ["driver", "driven"])
 def test_waviness_is_a_line_of_its_own_order(wheel):
     """All pairs that touch are displaced by the same wave, so that the transmission error is that wave.

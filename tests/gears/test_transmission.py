@@ -169,6 +169,7 @@ def test_jammed_teeth_are_remarked_on():
             analyse(free, points=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("helix", [0.0, 15.0])
 @pytest.mark.parametrize("ring", [False, True])
 def test_flanks_touch_where_faults_leave_most(helix, ring):
@@ -214,6 +215,7 @@ def test_an_axial_shift_of_helical_wheels_is_no_error(ring, rotation, hand, shif
     assert opposite < loaded_transmission_error(pair, points=12).mean < 20 / 12 * opposite
 
 
+@pytest.mark.slow
 def test_light_loads_on_tilted_wheels_are_found_where_the_teeth_are():
     """The search starts far from where an edge bears, and ends where its correction is rounding."""
     wheels = (GearSpec(20, "2 mm", face_width="20 mm"), GearSpec(60, "2 mm", face_width="20 mm"))

@@ -67,6 +67,7 @@ def test_backlash_of_a_healthy_pair_cannot_be_told(measured):
         identify(table, cases, ["friction.dynamic", "fault.backlash"], way="orders")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [run_stored, pytest.param(None, marks=pytest.mark.slow, id="simulated")])
 def test_friction_is_found_again(measured, run, monkeypatch):
     """From numbers with a gain of three that the fit does not know."""

@@ -73,6 +73,7 @@ def test_a_box_gains_no_energy_around_a_loop(floor, tilt):
     assert abs(total) < 1e-6 * leg
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("solid", "floor"),
     [

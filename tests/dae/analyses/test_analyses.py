@@ -195,6 +195,7 @@ def wound(axes: np.ndarray, torque: float, kind: str) -> Mechanism:
     return m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["bushing", "load"])
 @pytest.mark.parametrize("torque", [10.0, 20.0, 20.0 + 10.0 * np.pi], ids=["no turn", "past half", "one turn more"])
 def test_modes_at_an_equilibrium_keep_its_counted_turns(torque, kind):

@@ -215,6 +215,7 @@ class Chain:
         return m
 
 
+@pytest.mark.slow
 def test_chains_of_hinges_that_turn_steadily_have_the_modes_of_their_lagrangian():
     rng = np.random.default_rng(seed())
     done = 0

@@ -174,6 +174,7 @@ def test_free_flight_conserves_momentum_angular_momentum_and_energy(formulation,
     np.testing.assert_allclose(solution.energy_balance().elastic, strain, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "tolerances", "factor"),
     [("WSTIFF", (1e-9, 1e-10), 100), pytest.param("IDA", (1e-7, 1e-8), 4000, marks=pytest.mark.slow)],

@@ -269,6 +269,7 @@ def pushed(t, y, yp, out, p):
     out[1] = yp[1] + y[0] - push
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
 @pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8])
 def test_a_jump_some_digits_beside_its_breakpoint_costs_what_one_at_it_does(tol, method):

@@ -13,6 +13,7 @@ from tests.dae.integrators.problems import pendulum
 SPAN = (0.0, 1e11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 @pytest.mark.parametrize("tol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10])
 def test_robertson_over_eleven_decades(tol, method):

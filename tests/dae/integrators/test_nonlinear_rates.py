@@ -118,6 +118,7 @@ def _posed(problem: Implicit, rng: np.random.Generator) -> tuple[Callable, float
     return residual, end, unit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", NAMES)
 def test_each_solution_satisfies_the_equations(name, method):

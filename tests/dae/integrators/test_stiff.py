@@ -85,6 +85,7 @@ def oregonator(t, y, yp, out):
     out[2] = yp[2] - 0.161 * (y[0] - y[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [1.0, 1e-2, 1e-4])
 @pytest.mark.parametrize("tol", [1e-8, 1e-10])
 def test_a_relaxation_loses_no_digit_over_thousands_of_steps(tol, part):
