@@ -10,8 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+
+Table = Any
+"""An array of numbers, or a list of them, which Python reads and writes one by one in a third of the time."""
 
 INPUT = "input"
 """A number that is set while a run goes on, held or led along a line."""
@@ -43,11 +47,11 @@ class Place:
     factor: float = 1.0
     table: int = -1
 
-    def polynomial(self, table: np.ndarray, t: float) -> tuple[float, ...]:
+    def polynomial(self, table: Table, t: float) -> tuple[float, ...]:
         """Return the value at a time and all derivatives."""
         if self.size == 0:
             return (float(table[self.at]) / self.factor,)
-        c = table[self.at + 1 : self.at + 1 + self.size].tolist()
+        c = list(map(float, table[self.at + 1 : self.at + 1 + self.size]))
         x = t - float(table[self.at])
         found = []
         for order in range(self.size):
@@ -57,16 +61,18 @@ class Place:
             found.append(value)
         return tuple(found)
 
-    def write(self, table: np.ndarray, t: float, value: float, slope: float) -> None:
+    def write(self, table: Table, t: float, value: float, slope: float) -> None:
         """Let the number be ``value + slope (t' - t)`` from ``t`` on; its integrals go on from where they are."""
         if self.order == 0:
             # the coefficients behind stay zero
-            table[self.at : self.at + 1 + min(self.size, 2)] = (t, value, slope) if self.size else self.factor * value
+            table[self.at : self.at + 1 + min(self.size, 2)] = (
+                (t, value, slope) if self.size else (self.factor * value,)
+            )
             return
         known = self.polynomial(table, t)[: self.order]
         derivatives = [*known, value, slope]
         table[self.at] = t
-        table[self.at + 1 : self.at + 1 + self.size] = 0.0
+        table[self.at + 1 : self.at + 1 + self.size] = [0.0] * self.size
         for k, derivative in enumerate(derivatives):
             table[self.at + 1 + k] = derivative / math.factorial(k)
 
@@ -93,7 +99,7 @@ class Number:
     places: tuple[Place, ...]
     prescribes: tuple[tuple[str, int], ...] = ()
 
-    def value(self, table: np.ndarray, t: float) -> float:
+    def value(self, table: Table, t: float) -> float:
         """Return the value at a time."""
         place = self.places[0]
         at = place.at
@@ -101,11 +107,11 @@ class Number:
             return float(table[at + 1] + table[at + 2] * (t - table[at]))
         return float(table[at]) / place.factor
 
-    def slope(self, table: np.ndarray) -> float:
+    def slope(self, table: Table) -> float:
         """Return the rate, zero of what is held."""
         return float(table[self.places[0].at + 2]) if self.kind == INPUT else 0.0
 
-    def write(self, table: np.ndarray, t: float, value: float, slope: float = 0.0) -> None:
+    def write(self, table: Table, t: float, value: float, slope: float = 0.0) -> None:
         """Let it be ``value + slope (t' - t)`` from ``t`` on, in all its places."""
         for place in self.places:
             place.write(table, t, value, slope)

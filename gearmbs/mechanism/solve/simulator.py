@@ -395,7 +395,7 @@ class Simulator(OwnAttributes):
         if not self._set and not self._led:
             return
         t, y, yp, *_ = self._point
-        before = self._run.state.rdata[self._cells]
+        before = self._run.state.rdata[self._cells].tolist()
         led = [name for name in self._led if name not in self._set]
         after, changed = before.copy(), []
         for name in (*self._set, *led):
@@ -414,12 +414,12 @@ class Simulator(OwnAttributes):
         if not changed:
             return
         if any(number.prescribes for number, _ in changed) or not self._run.state.steps:
-            self._start_with(after)
+            self._start_with(np.array(after))
             return
         started = time.perf_counter()
         loads = all(number.kind == INPUT for number, _ in changed)
         with raised_errors(self._functions) if self._functions else NOTHING:
-            self._run.change(t, y, yp, self._cells, after, loads, any(slope for _, slope in changed))
+            self._run.change(t, y, yp, self._cells, np.array(after), loads, any(slope for _, slope in changed))
         self._clock[1] += time.perf_counter() - started
 
     def _start_with(self, values: np.ndarray) -> None:

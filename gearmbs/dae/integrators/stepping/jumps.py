@@ -35,8 +35,10 @@ from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
 from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
 from gearmbs.kernels.jit import njit
 
-TERMS = 6
-"""Terms of the series at most: one for each power that a step of the highest order resolves."""
+TERMS = 4
+"""Terms of the series at most: with six a pair of gears takes the same steps beyond its jumps."""
+SPARE = 3
+"""Points behind more than the order that the past keeps: two for a rise of the order."""
 CLOSE = 0.05
 """Part of the step before below which the point of a jump replaces the one behind it: differences over a shorter
 distance would amplify what the polynomial through both is off by."""
@@ -86,6 +88,8 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, leads, follows,
             copy(rows[j + 1], rows[j])
         st.n_past -= 1
     terms = min(max(st.order, 1), TERMS)
+    # points further back serve no step to come
+    st.n_past = min(st.n_past, st.order + SPARE)
     first, later, d = g[TERMS], g[TERMS + 1], g[TERMS + 2]
     theta = st.h
     if follows:
@@ -96,9 +100,12 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, leads, follows,
         st.rdata[cells[k]] = values[k]
     if follows:
         functions.residual(t, y, yp, st.res, st.idata, st.rdata, st.work)
+        jumps = False
         for i in range(n):
             first[i] = st.res[i] - first[i]
-        _follow(st, plan, factors, t, first, d, g, terms, False)
+            jumps |= first[i] != 0.0
+        if jumps:
+            _follow(st, plan, factors, t, first, d, g, terms, False)
         if leads:
             functions.residual(t + theta, y, yp, st.res, st.idata, st.rdata, st.work)
             for i in range(n):
