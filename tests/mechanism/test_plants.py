@@ -366,3 +366,34 @@ def test_a_slider_crank_that_turns_is_linearised_about_its_motion():
     with pytest.warns(UserWarning, match=says("crank", "slider")):
         modes = m.linear_modes().eigenvalues
     assert np.sort(plant.poles.real) == pytest.approx(np.sort(modes.real), rel=1e-9)
+
+
+def test_a_slider_crank_that_is_let_go_is_linearised_with_its_acceleration():
+    angle, torque, h = 0.9, 3.0, 1e-3
+    m = slider_crank(angle)
+    m.torque("push", m.bodies["crank"], torque)
+    plant = m.linearize([("torque", "main")], ["WZ(main.I)"])
+    ends = [_crank_acceleration(angle + k * h, 0.0, torque, 0.0) for k in (1, -1, 2, -2)]
+    by_angle = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
+    assert plant.A[1] == pytest.approx([by_angle, 0.0], rel=1e-8)
+    # the poles are s^2 = by_angle: the modes have them, too
+    assert m.linear_modes().eigenvalues[0].imag == pytest.approx(np.sqrt(-by_angle), rel=1e-8)
+
+
+def test_a_four_bar_linkage_of_parallel_cranks():
+    """(2 J + m r^2) a'' + m g r sin a = T: the coupler does not turn, cranks J are balanced about their pivots."""
+    r, inertia, mass = 0.3, 0.02, 1.5
+    m = gm.Mechanism("parallelogram", gravity=(0, 0, -GRAVITY))
+    coupler = m.body("coupler", mass, (0.1, 0.1, 0.1), position=(0.25, 0, -r))
+    for name, x in (("left", 0.0), ("right", 0.5)):
+        crank = m.body(name, 0.5, (inertia,) * 3, position=(x, 0, 0))
+        m.revolute(f"{name} pivot", crank, m.ground, at=(x, 0, 0), axis=(0, 1, 0))
+        m.revolute(f"{name} pin", coupler, crank, at=(x, 0, -r), axis=(0, 1, 0))
+    plant = m.linearize(
+        [("torque", "left pivot")], ['AZ("right pivot.I", "right pivot.J")', ("com_acceleration", "coupler", "x")]
+    )
+    whole = 2.0 * inertia + mass * r**2
+    s = 1.5 + 4.0j
+    turned = 1.0 / (whole * s**2 + mass * GRAVITY * r)
+    # about y a positive turn swings what hangs to negative x
+    assert plant.transfer(s)[:, 0] == pytest.approx([turned, -r * s**2 * turned], rel=1e-9)

@@ -46,6 +46,8 @@ class Instant:
         self.at = system.model.layouts[int(self.idata[T.H_FORMULATION])]
         self.y = self.problem.y0.copy()
         self.differential = system.model.differential_states
+        self.released = False
+        """Whether it is an instant of a motion, in which what is not in balance accelerates."""
 
     def block(self, first: str, end: str) -> np.ndarray:
         """Return the indices from the start of one block of y to the start of another."""

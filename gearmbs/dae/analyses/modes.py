@@ -143,7 +143,11 @@ def linear_modes(place: System | Instant) -> Modes:
         with modal coordinates spins that is not alike about this axis, while other axes serve the rest: they turn
         with it, so that its own modes are not those of its whirl.
     """
-    instant = place if isinstance(place, Instant) else Instant(place, "I3")
+    if isinstance(place, Instant):
+        instant = place
+    else:
+        instant = Instant(place, "I3")
+        instant.released = True
     instant.y = instant.settle(instant.y)
     reduced = reduce(instant)
     warn_of_varying(reduced, stacklevel=4)

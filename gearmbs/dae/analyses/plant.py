@@ -498,6 +498,7 @@ def linear_plant(
         If a motion left free by the constraints has no inertia.
     """
     instant = Instant(system, "I3")
+    instant.released = True
     instant.y = instant.settle(instant.y)
     reduced = reduce(instant)
     warn_of_varying(reduced, stacklevel=3)

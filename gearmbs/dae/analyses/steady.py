@@ -29,7 +29,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from gearmbs.dae.analyses.kinematics import Instant
-from gearmbs.dae.analyses.turning import skew, spinning_modes
+from gearmbs.dae.analyses.turning import leaves_rest, skew, spinning_modes
 from gearmbs.dae.equations.rotation import POSE_V, POSE_W
 from gearmbs.dae.model.system import accelerations
 from gearmbs.dae.problem import ModelError
@@ -188,8 +188,12 @@ def turning_basis(
     velocity = instant.configuration().pose[:, POSE_V:]
     axes = np.zeros((len(velocity), 3))
     none = Basis(basis, np.zeros_like(basis), np.zeros_like(basis), axes, [], np.zeros((len(basis),) * 2))
-    if not basis.shape[1] or not velocity.any():
+    if not basis.shape[1]:
         return none
+    if not velocity.any():
+        owner = _owners(instant)
+        along = _along(instant, here, anchors, np.ones(len(owner), dtype=bool)) if leaves_rest(instant) else None
+        return none if along is None else replace(none, second=along.rates(basis)[1], along=along)
     acceleration = instant.system.accelerations(instant.configuration(), instant.t)[0]
     owner = _owners(instant)
     label = _chains(here.constraint, owner, len(velocity))

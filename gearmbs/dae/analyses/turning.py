@@ -57,6 +57,9 @@ from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, POSE_A, POSE_V, P
 EQUAL = 1e-6
 """Relative distance of squared frequencies, and of damping, of modes that may turn into each other."""
 
+UNBALANCED = 1e-6
+"""Rate of a momentum, N and N m, and acceleration, m/s^2, up to which a mechanism at rest is in balance."""
+
 ALIKE = 1e-5
 """Largest part of the integrals that may change when a body is turned that counts as alike all round."""
 
@@ -181,9 +184,9 @@ class Turning:
 
 
 def turning(instant: Instant) -> Turning | None:
-    """Return the transformation at an instant; None where no body turns."""
+    """Return the transformation at an instant; None where no body turns, or begins to by joints."""
     velocities = angular_velocities(instant)
-    if not velocities.any():
+    if not velocities.any() and not leaves_rest(instant):
         return None
     y, eps = instant.y.copy(), instant.block("eps", "v_f")
     mass, place = _momenta(instant, y)
@@ -233,6 +236,14 @@ def turning(instant: Instant) -> Turning | None:
         (-to.T, own, to, turned.T),
     )
     return Turning(to, rate, mass, damping, stiffness, rate_terms, damping_terms, stiffness_terms)
+
+
+def leaves_rest(instant: Instant) -> bool:
+    """Return whether nothing moves yet in a motion that constraints guide."""
+    if not instant.released or instant.y[: instant.at["R"]].any() or instant.at["lambda"] == instant.at["F"]:
+        return False
+    rates = instant.problem.yp0[instant.block("u", "eps")]
+    return bool(np.abs(rates).max(initial=0.0) > UNBALANCED)
 
 
 def _added(*products: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -156,7 +156,7 @@ def instant_at(mechanism: Mechanism, point: Point) -> Instant:
     """Return the unknowns of a mechanism at a point; it may have more states than that which the point was made of."""
     system = mechanism.compile(point.t)
     if point.configuration is None:
-        return _settled(Instant(system, "I3"))
+        return _settled(Instant(system, "I3"), True)
     system.configuration = point.configuration
     known = point.states or {}
     system.state_start = np.array(
@@ -177,11 +177,12 @@ def instant_at(mechanism: Mechanism, point: Point) -> Instant:
         instant.y = np.array(
             [point.unknowns.get(name, value) for name, value in zip(instant.problem.names, instant.y, strict=True)]
         )
-    return _settled(instant)
+    return _settled(instant, point.unknowns is None)
 
 
-def _settled(instant: Instant) -> Instant:
+def _settled(instant: Instant, released: bool) -> Instant:
     instant.y = instant.settle(instant.y)
+    instant.released = released
     return instant
 
 
