@@ -168,6 +168,8 @@ class Simulator(OwnAttributes):
         self._controls: list[Control] = []
         self._options = Options.gather(name, None, {"corrector": "modified", "tol": tol, **options})
         self._records = records
+        self._equations = ""
+        """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
         self.numbers = self._base.numbers
         self._cells = cells_of(self.numbers)
         # the same numbers where these cells alone are a table
@@ -539,7 +541,9 @@ class Simulator(OwnAttributes):
         self.take_effect()
         t, y, yp, idata, _ = self._point
         run = self._run
-        history = replace(run.history(), equations=equations_of(self._base)) if run.started else None
+        if not self._equations:
+            self._equations = equations_of(self._base)
+        history = replace(run.history(), equations=self._equations) if run.started else None
         return State.of(self._base, t, y, yp, (idata, run.state.rdata), history)
 
     def restore(self, state: State) -> None:
