@@ -36,7 +36,7 @@ from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
 from gearmbs.kernels.jit import njit
 
 TERMS = 4
-"""Terms of the series at most: with six a pair of gears takes the same steps beyond its jumps."""
+"""Terms of the series at most: with six a stiff contact takes the same steps beyond its jumps."""
 SPARE = 3
 """Points behind more than the order that the past keeps: two for a rise of the order."""
 CLOSE = 0.05
