@@ -92,5 +92,5 @@ def test_a_written_drivetrain_moves_as_it_does(drive, load, clutch):
 
 def test_what_has_no_form_says_what_has_one():
     turned = TableLoad(**MILL, over="angle", places=(0.0, 2.0, 4.0, 2 * np.pi), torques=(1.0, 2.0, 1.5, 1.0))
-    with pytest.raises(ModelError, match=says("'mill'", "table over the angle", "speed or time", "expression")):
+    with pytest.raises(ModelError, match=says("'mill'", "angle", "speed", "time")):
         write_deck(train(TORQUE, turned).build())
