@@ -101,3 +101,16 @@ def test_times_are_those_of_the_argument():
     first, top, last = brief_changes(m.compile().model, 0.0, SPAN)
     assert 4.995 < first < 5.0 < last < 5.005
     assert top == pytest.approx(5.0, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+def test_a_pulse_that_ends_with_the_run_is_seen(integrator):
+    """A torque of 100 N m over the last millisecond of 1.001 s, on 2 kg m^2, without breakpoints and with them."""
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    m.torque("drive", body, "IF(TIME - 1: 0, 100, IF(TIME - 1.001: 100, 0, 0))")
+    for options in ({}, {"breakpoints": [1.0, 1.001]}):
+        solution = m.simulate(1.001, rate=10.0, integrator=integrator, **options)
+        assert solution.angular_velocity("disc")[-1, 2] == pytest.approx(0.05, rel=1e-6)

@@ -420,7 +420,7 @@ class _Run:
         settled.t_first = self.t if self.t in self.stops else settled.t_start
         settled.t_last = self.stop
         self.calls.first = self.t + first if self.t in self.stops else -np.inf
-        self.calls.last = self.stop - last if self.stop < self.end else np.inf
+        self.calls.last = self.stop - last if self.stop in self.stops else np.inf
         settings = {
             "max_order": o.highest_order if o.max_order is None else o.max_order,
             "max_step": 0.0 if o.max_step is None or np.isinf(o.max_step) else o.max_step,

@@ -66,7 +66,8 @@ class Options:
         outputs, or one and a breakpoint, are nearer than `CROWDED` of their mean distance, all are interpolated.
     breakpoints : sequence of float
         Possible discontinuities: the run lands on each, and starts afresh if the step beyond shows that it is one; IDA
-        starts afresh at each. The jump itself may be `BESIDE` it.
+        starts afresh at each. The jump itself may be `BESIDE` it. At one that is the end of the run the equations are
+        those before it.
     event_direction, event_action : sequence of int, optional
         For each event function: crossings that count (-1 falling, 1 rising, 0 both), and what they do (0 record,
         1 stop, 2 land on the crossing as on a breakpoint).
@@ -151,11 +152,19 @@ class Options:
         return bool(distances.min() < CROWDED * distances.mean())
 
     def stops(self, t0: float, t_end: float) -> list[float]:
-        """Return the breakpoints within a run, in order; of several within the shortest step the first."""
+        """Return the breakpoints of a run, in order; of several within the shortest step the first.
+
+        One at the end of the run, or within the shortest step of it, is the end: there, too, the equations are those
+        before it.
+        """
         found: list[float] = []
-        for b in sorted(float(b) for b in self.breakpoints if t0 < b < t_end):
+        for b in sorted(float(b) for b in self.breakpoints if b > t0):
             least = ROUNDED_STEP * abs(b)
-            if b - (found[-1] if found else t0) > least and t_end - b > least:
+            if b - t_end > least:
+                break
+            if t_end - b <= least:
+                b = t_end
+            if b - (found[-1] if found else t0) > least:
                 found.append(b)
         return found
 

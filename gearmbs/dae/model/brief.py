@@ -57,7 +57,7 @@ def brief_changes(model: Model, start: float, end: float) -> list[float]:
             edges += times.tolist() if times[1] - times[0] < width else []
         else:
             found += _bumps(times, values, start, end, width)
-    edges = sorted({t for t in edges if start < t < end})
+    edges = sorted({t for t in edges if start < t <= end})
     near = np.diff(edges) < width
     paired = np.append(near, False) | np.append(False, near) if edges else ()
     largest = sorted(found, reverse=True)[:MOST]
@@ -79,7 +79,7 @@ def _bumps(
     usual = np.max([np.roll(usual, -1), usual, np.roll(usual, 1)], axis=0)
     bend = np.zeros(len(times))
     bend[1:-1] = np.abs(np.diff(np.diff(values) / np.diff(times)))
-    inside = np.flatnonzero((times > start) & (times < end))
+    inside = np.flatnonzero((times > start) & (times <= end))
     at, bend, distance = times[inside], bend[inside], off(times[inside])
     block = np.minimum((BLOCKS * (at - start) / (end - start)).astype(int), BLOCKS - 1)
     unusual = np.flatnonzero(distance > UNUSUAL * usual[block] + ROUNDED * np.abs(values).max(initial=0.0))

@@ -294,6 +294,22 @@ def test_a_jump_some_digits_beside_its_breakpoint_costs_what_one_at_it_does(tol,
     assert max(errors) < 1.5 * errors[0] + 10.0 * tol
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("beside", [-1, 0, 1])
+def test_a_pulse_up_to_the_end_of_the_run_is_seen(beside, method):
+    """Its end is a breakpoint at the end of the run, or a digit beside it as one that is computed in another way."""
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - (1.0 if 1.0 <= t < 1.0001 else 0.0)
+
+    marks = [1.0, 1.0001 + beside * np.spacing(1.0001)]
+    found = solve_dae(residual, (0.0, 1.0001), [0.0], breakpoints=marks, rtol=1e-8, atol=1e-12, method=method)
+    assert found.success, found.message
+    assert found.t[-1] == 1.0001
+    assert found.y[-1, 0] == pytest.approx(1e-4, rel=1e-6)
+
+
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF", "IDA"])
 @pytest.mark.parametrize("beyond", [False, True])
 def test_an_algebraic_unknown_jumps_at_a_breakpoint_with_outputs_next_to_it(beyond, method):

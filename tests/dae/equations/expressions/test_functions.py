@@ -194,6 +194,8 @@ def test_arrays_and_plants():
         ("POLY(TIME,0,1,2,3)", lambda t: t + t**2 + t**3),
         ("EXP(-TIME)*TIME", lambda t: 1 - (1 + t) * np.exp(-t)),
         ("7", lambda t: 7 * t),
+        ("IF(TIME-0.33:0,0,1)", lambda t: t - 0.33),
+        ("ABS(TIME-0.3377)", lambda t: 0.5 * (0.3377**2 + (t - 0.3377) ** 2)),
     ],
 )
 def test_integrals_over_time(text, exact):
@@ -206,6 +208,11 @@ def test_integrals_over_time(text, exact):
         if integrand.constant is None:
             g, g1, _ = time_series(integrand, t)
             assert (f1, f2) == pytest.approx((2 * g, 2 * g1), rel=1e-13, abs=1e-13)
+
+
+def test_the_integral_of_a_pulse_of_a_thousandth_of_the_span():
+    tape = compile_expression("INTEGRAL(IF(TIME-0.33:0,1,IF(TIME-0.331:1,0,0)),0,1)", Scope())
+    assert time_series(tape, 0.5)[0] == pytest.approx(1e-3, abs=2e-6)
 
 
 def test_integral_starts_where_told_and_refuses_what_is_not_time():
