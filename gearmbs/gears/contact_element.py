@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gearmbs.contact import layout as L
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.dae.problem import ModelError
 from gearmbs.gears.mesh import Mesh
-from gearmbs.gears.tables import law_settings, pack
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, StartOverlap
+from gearmbs.gears.tables import law_factors, pack
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting, StartOverlap
 from gearmbs.units import shown
 
 DEEP = 0.02
@@ -26,6 +28,18 @@ def contact_kernels() -> tuple[Any, tuple[Any, Any]]:
     from gearmbs.contact.kernel import contact_force
 
     return contact_force, (gear_contact, GEAR_CONTACT_SIG)
+
+
+def law_settings(pair: Mesh) -> dict[str, Setting]:
+    """Return stiffness and damping of a pair's contact law as what can be changed while a simulation goes on."""
+    geometry, law = pair.geometry, pair.contact_model.law
+    cosine = math.cos(geometry.wheels[0].base_helix_angle)
+    stiff, damped = law_factors(pair.contact_model, geometry.narrower_face_width, cosine)
+    unit = "s/m" if law.kind == "hunt-crossley" else "N*s/m"
+    return {
+        "stiffness": Setting(L.place(L.PAIR, "stiffness"), f"N/m^{law.exponent:g}", stiff),
+        "damping": Setting(L.place(L.PAIR, "damping"), unit, damped),
+    }
 
 
 @dataclass(eq=False, repr=False)

@@ -20,7 +20,6 @@ from gearmbs.gears.mesh import ContactModel, Mesh
 from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, Fault, ToothDeviations
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
-from gearmbs.mechanism.parts.elements import Setting
 
 LAWS = {
     "impact": L.LAW_IMPACT,
@@ -165,7 +164,7 @@ def _pack_laws(model: ContactModel, width: float, cosine: float, reals: np.void)
     ``1 / cosine`` times theirs in the section, while the contact line is ``1 / cosine`` times the width.
     """
     law, friction = model.law, model.friction
-    stiff, damped = _law_factors(model, width, cosine)
+    stiff, damped = law_factors(model, width, cosine)
     reals["stiffness"] = law.stiffness * stiff
     reals["exponent"] = law.exponent
     reals["damping"] = law.damping * damped
@@ -177,22 +176,10 @@ def _pack_laws(model: ContactModel, width: float, cosine: float, reals: np.void)
     reals["dynamic_speed"] = friction.dynamic_speed
 
 
-def _law_factors(model: ContactModel, width: float, cosine: float) -> tuple[float, float]:
+def law_factors(model: ContactModel, width: float, cosine: float) -> tuple[float, float]:
     """Return what stands in the table for a unit of the law's stiffness and damping."""
     law = model.law
     return cosine**law.exponent / width, cosine if law.kind == "hunt-crossley" else cosine / width
-
-
-def law_settings(pair: Mesh) -> dict[str, Setting]:
-    """Return stiffness and damping of a pair's contact law as what can be changed while a simulation goes on."""
-    geometry, law = pair.geometry, pair.contact_model.law
-    cosine = math.cos(geometry.wheels[0].base_helix_angle)
-    stiff, damped = _law_factors(pair.contact_model, geometry.narrower_face_width, cosine)
-    unit = "s/m" if law.kind == "hunt-crossley" else "N*s/m"
-    return {
-        "stiffness": Setting(L.place(L.PAIR, "stiffness"), f"N/m^{law.exponent:g}", stiff),
-        "damping": Setting(L.place(L.PAIR, "damping"), unit, damped),
-    }
 
 
 SPARE_PAIRS = 4

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.inputs import takes_data
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import check_rate, like, rate_of
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from gearmbs.progress import staged, waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import bandpass
 from gearmbs.signals.rotation.phase import analytic
-from gearmbs.signals.signal.inputs import takes_data
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import like, rate_of, units_of
 
 Scaling = Literal["amplitude", "rms", "power", "density"]

@@ -14,8 +14,8 @@ import xarray as xr
 from gearmbs.progress import waiting
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.shaft import REMEDY, shaft_phase
+from gearmbs.signals.signal.arguments import as_given, in_si, takes_data
 from gearmbs.signals.signal.given import STEADY, speed_curve
-from gearmbs.signals.signal.inputs import as_given, in_si, takes_data
 from gearmbs.signals.signal.signal import common_unit, rate_of
 from gearmbs.signals.spectra import SCALINGS, spectral_unit, spectrum
 

@@ -300,6 +300,19 @@ def test_inputs_of_the_mechanism_by_their_names():
         m.linearize(["curent"], [])
 
 
+def test_outputs_of_the_mechanism_by_their_names():
+    m = two_masses()
+    turned = m.output("twist", "AZ(shaft.I, shaft.J)")
+    m.output("speed", ("angular_velocity", "load", "z"))
+    named = m.linearize([("torque", "motor bearing")], [turned, "speed"])
+    asked = m.linearize([("torque", "motor bearing")], ["AZ(shaft.I, shaft.J)", ("angular_velocity", "load", "z")])
+    assert named.outputs == ["twist", "speed"]
+    assert named.output_units == asked.output_units
+    np.testing.assert_array_equal(named.C, asked.C)
+    with pytest.raises(ModelError, match=says("sped", "speed")):
+        m.linearize([("torque", "motor bearing")], ["sped"])
+
+
 def test_an_input_that_is_the_speed_of_a_motion():
     m = two_masses()
     m.rotation("drive", m.joints["motor bearing"], m.input("speed", "rad/s", 20.0), level="velocity")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
-from gearmbs.mechanism.parts.inputs import Input
+from gearmbs.mechanism.parts.inputs import Input, Output
 from gearmbs.mechanism.parts.joints import JOINTS, Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.wording import any_of, did_you_mean
@@ -223,7 +223,21 @@ class PlantNames:
         ModelError
             One line with what is there.
         """
+        named = self.mechanism.outputs.get(item) if isinstance(item, str) else item
+        if isinstance(named, Output):
+            parts = [self._expression(named.what)] if isinstance(named.what, str) else self.outputs(named.what)
+            return [replace(parts[0], name=named.name)] if len(parts) == 1 else parts
         if isinstance(item, str):
+            from gearmbs.mechanism.language.library import CONSTANTS
+
+            m = self.mechanism
+            if (
+                item.isidentifier()
+                and item.upper() not in {"TIME", *CONSTANTS}
+                and item not in {**m.inputs, **m.parameters}
+            ):
+                remedy = _there(item, list(m.outputs)) if m.outputs else "add one with Mechanism.output"
+                raise ModelError(f"output {item!r}: the mechanism has no output of this name; {remedy}")
             return [self._expression(item)]
         if isinstance(item, Told):
             one = self._expression(item.expression)

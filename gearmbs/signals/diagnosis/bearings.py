@@ -30,7 +30,7 @@ from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.separation import level_lines, prewhiten
 from gearmbs.signals.rotation.shaft import shaft_phase
-from gearmbs.signals.signal.inputs import takes_data
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, units_of
 from gearmbs.signals.spectra import kurtogram
 from gearmbs.units import to_si

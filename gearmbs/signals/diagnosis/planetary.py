@@ -35,8 +35,8 @@ from gearmbs.signals.diagnosis.planetary_averages import PLANET, RING, SUN, Plan
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.given import given_speed
-from gearmbs.signals.signal.inputs import takes_data
 from gearmbs.signals.signal.signal import rate_of
 
 # What was found of a planetary set in a record, as data, tables and words.

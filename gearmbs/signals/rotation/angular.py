@@ -15,7 +15,7 @@ import xarray as xr
 from gearmbs.progress import staged, waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import apply_zero_phase, decimation_taps, kaiser_taps
-from gearmbs.signals.signal.inputs import takes_data
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import check_teeth, common_unit, rate_of, require, units_of
 from gearmbs.signals.spectra import periodograms, spectral_unit
 

@@ -16,7 +16,7 @@ from gearmbs.progress import waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.shaft import shaft_phase
-from gearmbs.signals.signal.inputs import takes_data
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import common_unit, rate_of
 from gearmbs.signals.spectra import SCALINGS, spectral_unit
 

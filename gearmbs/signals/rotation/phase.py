@@ -17,8 +17,8 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.given import speed_curve
-from gearmbs.signals.signal.inputs import takes_data
 from gearmbs.signals.signal.signal import rate_of
 
 LINE_ATTENUATION_DB = 60.0

@@ -30,7 +30,7 @@ import xarray as xr
 from gearmbs.progress import waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.angular import time_synchronous_average
-from gearmbs.signals.signal.inputs import takes_data
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import like, rate_of
 
 FLOOR = 1e-12

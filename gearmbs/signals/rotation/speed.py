@@ -14,7 +14,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.phase import phase_from_line
-from gearmbs.signals.signal.inputs import takes_data
+from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import rate_of, require
 from gearmbs.signals.spectra import periodograms
 

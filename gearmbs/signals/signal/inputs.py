@@ -1,12 +1,10 @@
-"""The one way in for data of any shape: arrays, tables, files, simulated records, signals; functions that take it."""
+"""The one way in for data of any shape: arrays, tables, files, simulated records, signals."""
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,7 +14,6 @@ from gearmbs.signals.files.simulated import holds_ring, read_any, record_signal,
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.record import without_gaps
 from gearmbs.signals.signal.signal import as_signal, check_units, make_signal, with_metadata
-from gearmbs.units import to_si
 
 Units = str | Sequence[str] | Mapping[str, str]
 Given = float | str
@@ -173,74 +170,3 @@ def _picked(signal: xr.DataArray, channels: Sequence[str]) -> xr.DataArray:
     if missing:
         raise SignalError(f"channels: there is no {missing}, only {names}")
     return signal.isel(channel=[names.index(c) for c in channels])
-
-
-GIVEN = ("rate", "units", "channels", "gaps")
-"""Keywords of `to_signal` that such functions have in addition to their own."""
-
-F = TypeVar("F", bound=Callable)
-
-
-def takes_data(**dimensions: str) -> Callable[[F], F]:
-    """Let a function's first argument be whatever `to_signal` makes a signal of.
-
-    The function gets the keywords ``rate``, ``units``, ``channels`` and ``gaps`` of `to_signal`.
-
-    Parameters
-    ----------
-    **dimensions
-        Arguments that may be texts with a unit, or pairs of these, and the dimension of each: ``band="frequency"``.
-    """
-
-    def wider(function: F) -> F:
-        own = inspect.signature(function)
-        places = list(own.parameters)
-        extra = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in GIVEN]
-        shown = [p for p in own.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
-        rest = [p for p in own.parameters.values() if p.kind is inspect.Parameter.VAR_KEYWORD]
-
-        @functools.wraps(function)
-        def called(*args: Any, **settings: Any) -> Any:
-            given = {name: settings.pop(name, None) for name in GIVEN}
-            found = list(args)
-            for k, value in enumerate(found[: len(places)]):
-                if places[k] in dimensions:
-                    found[k] = in_si(value, dimensions[places[k]], places[k])
-            for name in dimensions.keys() & settings.keys():
-                settings[name] = in_si(settings[name], dimensions[name], name)
-            if found:
-                found[0] = as_given(found[0], given)
-            elif places[0] in settings:
-                settings[places[0]] = as_given(settings[places[0]], given)
-            return function(*found, **settings)
-
-        # what help and documentation show
-        vars(called)["__signature__"] = own.replace(parameters=[*shown, *extra, *rest])
-        return cast(F, called)
-
-    return wider
-
-
-def as_given(data: Any, given: dict[str, Any]) -> xr.DataArray:
-    """Return data as a signal; a signal is left as it is."""
-    import xarray as xr
-
-    known = {name: value for name, value in given.items() if value is not None}
-    if not known and isinstance(data, xr.DataArray) and "sampling_rate" in data.attrs:
-        return data
-    # readers of files are not loaded for signals
-    from gearmbs.signals.signal.inputs import to_signal
-
-    return to_signal(data, **known)
-
-
-def in_si(value: Any, dimension: str, name: str) -> Any:
-    """Return a text with a unit, or a pair of these, in SI; numbers as they are."""
-    if isinstance(value, str):
-        try:
-            return to_si(value, dimension, name)
-        except (TypeError, ValueError) as error:
-            raise SignalError(str(error)) from None
-    if isinstance(value, Sequence) and any(isinstance(part, str) for part in value):
-        return tuple(in_si(part, dimension, name) for part in value)
-    return value

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from gearmbs.dae.results.solution import Solution
 from gearmbs.flexible import Campbell, ModalModel, StressModes
 from gearmbs.signals import campbell
-from gearmbs.signals.signal.inputs import in_si
+from gearmbs.signals.signal.arguments import in_si
 from gearmbs.view.figures.changing_speed import (
     RANGE_DB,
     RPM,

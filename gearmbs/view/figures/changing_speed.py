@@ -15,7 +15,7 @@ from scipy.signal import find_peaks
 
 from gearmbs.progress import waiting
 from gearmbs.signals import order_map, order_track, spectrogram, waterfall
-from gearmbs.signals.signal.inputs import in_si
+from gearmbs.signals.signal.arguments import in_si
 from gearmbs.view.figures.style import BLACK, COLOURS, VERMILLION, drawing, label, scaling_name
 
 # What figures over time, speed, frequency and order share: maps in decibels, stacked lines, marks of orders.
