@@ -14,7 +14,7 @@ import numpy as np
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import TOLD, ShaftTorque, slopes
+from gearmbs.drivetrain.torque_element import TOLD, ShaftTorque, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term
@@ -341,7 +341,8 @@ class CurveMotor(Drive):
 
     def starting_torque(self) -> float | None:
         # beyond its first point the curve is a tangent
-        return float(np.interp(0.0, self.speeds, self.torques)) if self.speeds[0] <= 0.0 else None
+        points = slopes(self.label, self.speeds, self.torques)
+        return on_curve(points, 0.0) if self.speeds[0] <= 0.0 else None
 
     def add(self, at: Attached) -> None:
         on = share_of(at)

@@ -308,12 +308,14 @@ class Drivetrain:
         Warns
         -----
         UserWarning
-            Of drives that cannot carry the loads, of torques on shafts whose speed is prescribed, and of shafts that
-            are counted twice in wheels without a bore.
+            Of drives that cannot carry the loads, of loads by points whose curve leaves them by far or is asked beyond
+            them, of torques on shafts whose speed is prescribed, and of shafts that are counted twice in wheels without
+            a bore.
         """
         from gearmbs.drivetrain.build import build
-        from gearmbs.drivetrain.kinematics import warn_of_lost_torques, warn_of_weak_drives
+        from gearmbs.drivetrain.kinematics import warn_of_lost_torques, warn_of_tables, warn_of_weak_drives
 
+        warn_of_tables(self)
         warn_of_weak_drives(self)
         warn_of_lost_torques(self)
         return build(self)

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
-from gearmbs.drivetrain.loads import Drag, Load
+from gearmbs.drivetrain.loads import RPM, Drag, Load, TableLoad
 from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh, Shaft
 from gearmbs.units import Quantity, to_si
@@ -248,8 +248,6 @@ class KinematicTable:
 # Speeds of all shafts from the drives, torques of meshes and couplings from the loads, who pushes, and weak drives.
 
 
-RPM = 9.549296585513721
-"""Revolutions a minute in 1 rad/s, 30/pi."""
 SAME_SPEED = 1e-9
 """Relative difference of speeds that are one."""
 BALANCED = 0.99
@@ -488,6 +486,20 @@ def _never_starts(train: Drivetrain, drives: list[Drive], reached: set[str]) -> 
         f"{first.label}: its torque at standstill is {torque:.5g} N m, but the loads need {needed:.5g} N m on shaft "
         f"'{first.shaft}': it will not start; give running=True, a stronger drive, or a load that grows with the speed"
     )
+
+
+def warn_of_tables(train: Drivetrain, stacklevel: int = 3) -> None:
+    """Warn of loads by points whose curve leaves its points by far, or is asked beyond them at the operating speed.
+
+    Warns
+    -----
+    UserWarning
+        With the load, the torque there and the remedy.
+    """
+    for load in train.loads:
+        if isinstance(load, TableLoad):
+            for words in load.doubts(abs(train.speeds[load.shaft])):
+                warnings.warn(words, stacklevel=stacklevel)
 
 
 def warn_of_lost_torques(train: Drivetrain, stacklevel: int = 3) -> None:

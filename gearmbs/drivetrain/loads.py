@@ -10,9 +10,10 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gearmbs.dae.equations.expressions.splines import SplineData, cubic_slopes
 from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
-from gearmbs.drivetrain.part import Attached, Part, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import LOST, TOLD, ShaftTorque, slopes
+from gearmbs.drivetrain.part import Attached, Part, errors_named, fixed_value, over_time, require, share_of
+from gearmbs.drivetrain.torque_element import LOST, TOLD, ShaftTorque, mean_of_curve, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.schema.quantities import Measure, OneOf, OverTime
@@ -274,8 +275,15 @@ def _resist(
     )  # fmt: skip
 
 
+TURN = 2.0 * math.pi
+RPM = 30.0 / math.pi
+"""Revolutions per minute in a rad/s."""
 PLACES = {"speed": "angular speed", "angle": "angle", "time": "time"}
 """What a table of torques may be over."""
+
+FAR = 0.4
+"""Part of the range of a table's torques by which a curve may leave it: that through three points of a cosine, one at
+its top, leaves theirs by a third, rightly."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,7 +293,8 @@ class TableLoad(Load):
     Parameters
     ----------
     over : {"speed", "angle", "time"}
-        Speed: a monotone cubic; angle: the periodic spline over one turn; time: ADAMS's CUBSPL.
+        Speed: a monotone cubic, beyond its ends its tangents; angle: the periodic spline over one turn; time: ADAMS's
+        CUBSPL. At the operating point the torque is that of the curve at the speed, or its mean over the table.
     places : sequence of float or str
         rad/s, rad or s; increasing.
     torques : sequence of float or str
@@ -309,9 +318,37 @@ class TableLoad(Load):
         )
 
     def nominal(self, speed: float) -> float:
-        if self.over == "speed":
-            return float(np.interp(speed, self.places, self.torques))
-        return float(np.mean(self.torques))
+        return on_curve(self._curve(), speed) if self.over == "speed" else mean_of_curve(self._curve())
+
+    def doubts(self, speed: float) -> list[str]:
+        """Return what is to be said of the curve through the points, at an operating speed (rad/s, not negative)."""
+        x, y, _ = points = self._curve()
+        found = []
+        if self.over == "speed" and not x[0] <= speed <= x[-1]:
+            end = x[-1] if speed > x[-1] else x[0]
+            found.append(
+                f"{self.label}: its table ends at {end * RPM:.5g} rpm, and its shaft turns at {speed * RPM:.5g} rpm, "
+                f"where the tangent has come to {on_curve(points, speed):.5g} N m; give points up to that speed"
+            )
+        low, high = float(y.min()), float(y.max())
+        along = np.array([on_curve(points, v) for v in np.interp(np.arange(0.0, x.size - 1.0, 0.05), range(x.size), x)])
+        furthest = along[np.argmax(np.maximum(low - along, along - high))]
+        if max(low - furthest, furthest - high) > FAR * (high - low):
+            found.append(
+                f"{self.label}: the curve through its torques from {low:.5g} to {high:.5g} N m reaches {furthest:.5g} "
+                f"N m between them, and has a mean of {mean_of_curve(points):.5g} N m; give more points beside those "
+                f"where the torque changes quickly over the {self.over}"
+            )
+        return found
+
+    def _curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return places, torques and slopes of the curve that a run has."""
+        if self.over == "time":
+            with errors_named(self.label):
+                SplineData(self.places, self.torques)
+            x, y = np.array(self.places, dtype=float), np.array(self.torques, dtype=float)
+            return x, y, cubic_slopes(x, y)
+        return slopes(self.label, self.places, self.torques, TURN if self.over == "angle" else 0.0)
 
     def add(self, at: Attached) -> None:
         if self.over == "time":
@@ -320,9 +357,8 @@ class TableLoad(Load):
             parameters: Any = (at.sense, 0.0, 2.0, 0.0, 1.0, -1.0, -1.0, 0.0, 0.0)
             times = (given,)
         else:
-            period = 2.0 * math.pi if self.over == "angle" else 0.0
-            x, y, m = slopes(self.label, self.places, self.torques, period)
-            parameters = np.concatenate([[at.sense, period, x.size], x, -y, -m])
+            x, y, m = self._curve()
+            parameters = np.concatenate([[at.sense, TURN if self.over == "angle" else 0.0, x.size], x, -y, -m])
             times = (share_of(at),)
         at.mechanism.add(
             ShaftTorque(

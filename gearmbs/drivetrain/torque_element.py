@@ -440,3 +440,15 @@ def slopes(
         b[-1] = b[0]
         return a, b, CubicSpline(a, b, bc_type="periodic")(a, 1)
     return a, b, PchipInterpolator(a, b)(a, 1) if a.size > 2 else np.full(2, (b[1] - b[0]) / (a[1] - a[0]))
+
+
+def on_curve(points: tuple[np.ndarray, np.ndarray, np.ndarray], x: float) -> float:
+    """Return the value at x of the curve of `slopes`, as the table's kernel has it: beyond its ends on its tangents."""
+    return float(hermite(np.concatenate(points), 0, points[0].size, x)[0])
+
+
+def mean_of_curve(points: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
+    """Return the mean of a piecewise cubic by points and slopes from its first point to its last."""
+    x, y, m = points
+    h = np.diff(x)
+    return float(np.sum(h * (y[1:] + y[:-1]) / 2.0 - h**2 * np.diff(m) / 12.0) / (x[-1] - x[0]))

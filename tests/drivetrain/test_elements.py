@@ -1,5 +1,7 @@
 """Motors, couplings and loads against closed forms."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -229,6 +231,50 @@ def test_resistances():
     turn = np.linspace(0, 2 * np.pi, 33)
     over_angle = TableLoad(name="t", shaft="r", over="angle", places=turn, torques=3 + np.sin(turn))
     assert torque_at(over_angle, 1.0, (1.0, 1.2), angle=1.2)[0] == pytest.approx(-(3 + np.sin(1.2)), abs=1e-4)
+
+
+TABLES = [
+    ("angle", ("0 deg", "180 deg", "360 deg"), (0.0, 20.0, 0.0), 10.0),
+    ("speed", ("0 rpm", "200 rpm", "300 rpm"), (0.0, 2.0, 10.0), None),
+    ("speed", ("0 rpm", "1000 rpm", "1100 rpm"), (0.0, 1.0, 100.0), None),
+    ("time", (0.0, 0.1, 0.2, 1.0), (0.0, 10.0, 12.0, 10.0), None),
+]
+
+
+@pytest.mark.parametrize(("over", "places", "torques", "exact"), TABLES)
+def test_the_torque_of_a_table_at_the_operating_point_is_that_of_its_run(over, places, torques, exact):
+    """Over speed what the kernel writes there, inside and beyond; else the mean of what it writes."""
+    load = TableLoad(name="t", shaft="r", over=over, places=places, torques=torques)
+    speed = 600 * np.pi / 30
+    nominal = load.nominal(speed)
+    if over == "speed":
+        assert nominal == pytest.approx(-torque_at(load, speed)[0], rel=1e-13)
+        return
+    at = np.linspace(0.0, load.places[-1], 2001)
+    if over == "angle":
+        run = [-torque_at(load, 1.0, (1.0, angle), angle=angle)[0] for angle in at[::20]]
+        assert nominal == pytest.approx(np.trapezoid(run, at[::20]) / at[-1], rel=1e-3)
+    else:
+        m, pin = rotor(0.5)
+        turning(m, pin, load, 1.0)
+        solution = m.simulate(1.0, rate=10, tol=1e-9)
+        assert nominal == pytest.approx(-0.5 * solution.angular_velocity("rotor")[-1, 2], rel=1e-6)
+    assert exact is None or nominal == pytest.approx(exact, rel=1e-13)
+
+
+def test_curves_that_leave_their_points_and_speeds_beyond_them_are_doubted():
+    def doubts(over, places, torques, rpm=600.0):
+        return TableLoad(name="t", shaft="r", over=over, places=places, torques=torques).doubts(rpm * np.pi / 30)
+
+    (beyond,) = doubts("speed", ("0 rpm", "200 rpm", "300 rpm"), (0.0, 2.0, 10.0))
+    assert re.search(says("load 't'", "300 rpm", "600 rpm", "41 N m", "give points up to"), beyond)
+    assert doubts("speed", ("0 rpm", "200 rpm", "300 rpm"), (0.0, 2.0, 10.0), 290.0) == []
+    (swings,) = doubts("angle", ("0 deg", "10 deg", "20 deg", "360 deg"), (-5.0, 300.0, -5.0, -5.0))
+    assert re.search(says("load 't'", "-5 to 300 N m", "mean", "-2407.4 N m", "give more points"), swings)
+    (swings,) = doubts("time", (0.0, 0.1, 0.2, 1.0), (0.0, 100.0, 10.0, 10.0))
+    assert re.search(says("load 't'", "0 to 100 N m", "give more points"), swings)
+    third = 2.0 * np.pi / 3.0 * np.arange(4)
+    assert doubts("angle", third, np.cos(third)) == []
 
 
 def test_load_over_time_from_a_table():
