@@ -345,7 +345,7 @@ class TableLoad(Load):
         """Return places, torques and slopes of the curve that a run has."""
         if self.over == "time":
             with errors_named(self.label):
-                SplineData(self.places, self.torques)
+                SplineData(tuple(self.places), tuple(self.torques))
             x, y = np.array(self.places, dtype=float), np.array(self.torques, dtype=float)
             return x, y, cubic_slopes(x, y)
         return slopes(self.label, self.places, self.torques, TURN if self.over == "angle" else 0.0)
