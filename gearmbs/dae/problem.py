@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -56,6 +56,39 @@ KEPT, HISTORY_CHANGED, MATRIX_OUTDATED = range(3)
 """What a hook tells the integrator."""
 HOOK_SIG = types.int64(F8, MAT, I8, IVEC, VEC, VEC)
 EVENTS_SIG = types.void(F8, VEC, VEC, VEC, IVEC, VEC, VEC)
+
+
+SURE = 0.5
+"""Angle (rad) by which none has moved, nor its rate would move it, where turns are counted from one output to the next:
+an error of half a turn is five times as far."""
+
+
+class Counted(NamedTuple):
+    """Angles that are counted through full turns, and where the table of numbers has them.
+
+    Attributes
+    ----------
+    angles : list of (str, str, str)
+        Function AX, AY or AZ and names of the markers I and J.
+    places : ndarray of int, shape (1 + 2 a,)
+        In ``rdata``: of the time they were last counted at, of their values then (rad) and of their rates (rad/s).
+    """
+
+    angles: list[tuple[str, str, str]]
+    places: np.ndarray
+
+    def values(self, t: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        """Return the angles to expect at times by what stood in the places then, shape (m, a), rad."""
+        a = len(self.angles)
+        return kept[:, 1 : 1 + a] + (t - kept[:, 0])[:, None] * kept[:, 1 + a :]
+
+    def jumps(self, t: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        """Return at which times the angles cannot be counted from those at the time before, the first among them."""
+        found = np.ones(t.size, dtype=bool)
+        moved = np.abs(np.diff(self.values(t, kept), axis=0))
+        led = np.abs(kept[:-1, 1 + len(self.angles) :] * np.diff(t)[:, None])
+        found[1:] = (np.maximum(moved, led) > SURE).any(axis=1)
+        return found
 
 
 @dataclass
@@ -117,6 +150,8 @@ class DAEProblem:
         What has to live as long as the addresses in ``idata``.
     numbers : mapping of str to Number
         Inputs and other numbers that can be changed by their names, with their places in ``rdata``.
+    counted : Counted, optional
+        Angles whose full turns ``hook`` counts; runs keep what is in its places at their outputs.
     """
 
     n: int
@@ -150,3 +185,4 @@ class DAEProblem:
     advice: Mapping[Any, str] = field(default_factory=dict)
     callbacks: Sequence[Any] = ()
     numbers: Mapping[str, Number] = field(default_factory=dict)
+    counted: Counted | None = None

@@ -383,6 +383,8 @@ class DAEResult:
     held : (ndarray of int, ndarray) or None
         Places in the table of numbers ``rdata`` that were changed on the way, and what stands there up to each output,
         shape (m, places).
+    counted : ndarray, shape (m, p), or None
+        What stood at each output in the places of the problem's `Counted`; None where outputs are steps.
     t_last : float
         Time the integration reached, which may lie beyond the last output.
     checkpoint : object or None
@@ -400,6 +402,7 @@ class DAEResult:
     y_events: list[np.ndarray] = field(default_factory=list)
     epochs: list[tuple[int, np.ndarray]] = field(default_factory=list)
     held: tuple[np.ndarray, np.ndarray] | None = None
+    counted: np.ndarray | None = None
     t_last: float = float("nan")
     checkpoint: Any = None
 

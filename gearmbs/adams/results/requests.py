@@ -15,7 +15,7 @@ from gearmbs.dae.equations.expressions import eval_gradient
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_R, ExpressionError
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.equations.kinematics import AXES as ANGLE_NAMES
-from gearmbs.dae.results.frames import frame_motion
+from gearmbs.dae.results.frames import frame_motion, known_turns
 from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.compile import starting_angles
@@ -142,9 +142,11 @@ class RequestEvaluator:
         tape = tape.bind(tape.algebraic.index)
         self._note(tape)
         starts = starting_angles(tape, self._turns, self._marker_named)
+        named = [(function, self._marker_named(i), self._marker_named(j)) for function, i, j in tape.angles]
+        known = [known_turns(self.solution, *names) for names in named]
         with raised_errors(self.model.mechanism.functions.values()):
             return expression_values(
-                tape, starts, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
+                tape, starts, known, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
                 self._marker_named,
             )  # fmt: skip
 

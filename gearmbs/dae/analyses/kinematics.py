@@ -175,11 +175,15 @@ def kinematic(system: System, t_eval: np.ndarray) -> Solution:
     y = np.zeros((t_eval.size, walk.instant.y.size))
     yp = np.zeros_like(y)
     epochs = [(0, walk.instant.idata.copy())]
+    angles = walk.instant.problem.counted
+    counted = None if angles is None else np.zeros((t_eval.size, len(angles.places)))
     for k, t in enumerate(t_eval):
         walk.to(float(t))
         if not np.array_equal(walk.instant.idata, epochs[-1][1]):
             epochs.append((k, walk.instant.idata.copy()))
         y[k] = walk.instant.y
+        if angles is not None and counted is not None:
+            counted[k] = walk.instant.rdata[angles.places]
         yp[k, walk.q] = walk.instant.y[walk.v]
     result = DAEResult(
         t=t_eval,
@@ -189,6 +193,7 @@ def kinematic(system: System, t_eval: np.ndarray) -> Solution:
         message="positions, velocities and accelerations were solved at every time",
         stats=SolverStats(steps=walk.steps, residuals=walk.iterations, jacobians=walk.iterations),
         epochs=epochs,
+        counted=counted,
         t_last=float(t_eval[-1]),
     )
     return Solution(system, replace(walk.instant.problem), result)

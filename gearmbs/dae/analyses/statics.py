@@ -209,7 +209,7 @@ class Snapshot:
     @staticmethod
     def result(message: str, iterations: int, rows: Sequence[Snapshot]) -> DAEResult:
         """Return snapshots as what an integrator would have stored."""
-        y = np.array([row.y for row in rows])
+        y, counted = np.array([row.y for row in rows]), rows[0].problem.counted
         return DAEResult(
             t=np.array([row.t for row in rows]),
             y=y,
@@ -218,6 +218,7 @@ class Snapshot:
             message=message,
             stats=SolverStats(steps=iterations),
             epochs=[(k, row.idata) for k, row in enumerate(rows)],
+            counted=np.array([row.rdata[counted.places] for row in rows]) if counted is not None else None,
             t_last=rows[-1].t,
         )
 

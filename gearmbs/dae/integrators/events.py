@@ -53,6 +53,8 @@ def write_outputs(functions, st, part, t):
         else:
             interpolate(functions, st, part, st.outputs[row], st.y_out[row], st.yp_out[row])
             note_moves(part, st.outputs[row], st.y_out[row], st.step, st.rdata)
+        for c in range(st.kept.shape[0]):
+            st.kept_out[row, c] = st.rdata[st.kept[c]]
         st.next_output = row + 1
 
 

@@ -268,7 +268,7 @@ class _Run:
         own = np.zeros(problem.n, dtype=bool) if problem.index_one is None else problem.index_one
         self.atol = np.where(problem.error_mask | own, options.tol * problem.atol_scale, UNCONTROLLED)
         self.branch = IdaBranch(problem, self.calls, self.idata, self.rdata, self.atol, options.rtol, float(times[0]))
-        self.rows = _Rows(times, problem, every_step)
+        self.rows = _Rows(times, problem, every_step, self.rdata)
         self.t, self.end = ends = float(times[0]), float(times[-1])
         rtol = max(options.rtol, SMALLEST_RTOL)
         self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, rtol, ends)
@@ -308,6 +308,7 @@ class _Run:
             message=f"{message} {remark}" if remark else message,
             stats=stats,
             epochs=self.epochs,
+            counted=None if self.every_step or rows.kept is None else rows.kept[: rows.done],
             t_last=self.t,
         )
         if not self.every_step:
@@ -628,12 +629,15 @@ class IdaBranch:
 class _Rows:
     """Output rows, at given times or at every step."""
 
-    def __init__(self, times: np.ndarray, problem: DAEProblem, every_step: bool) -> None:
+    def __init__(self, times: np.ndarray, problem: DAEProblem, every_step: bool, rdata: np.ndarray) -> None:
         self.every_step = every_step
         self.end = float(times[-1])
         self.t = np.zeros(4096) if every_step else times
         self.y, self.yp = np.zeros((self.t.size, problem.n)), np.zeros((self.t.size, problem.n))
         self.t[0], self.y[0], self.yp[0] = times[0], problem.y0, problem.yp0
+        self.counted, self.rdata, self.kept = problem.counted, rdata, None
+        if problem.counted is not None:
+            self.kept = np.tile(rdata[problem.counted.places], (self.t.size, 1))
         self.done = 1
         self.told = float(times[0])
         self.span = (self.end - self.told) / 200.0
@@ -652,6 +656,8 @@ class _Rows:
             self.t = np.concatenate([self.t, np.zeros(more)])
             self.y, self.yp = (np.concatenate([a, np.zeros((more, a.shape[1]))]) for a in (self.y, self.yp))
         self.t[self.done], self.y[self.done], self.yp[self.done] = t, y, yp
+        if self.kept is not None and self.counted is not None and not self.every_step:
+            self.kept[self.done] = self.rdata[self.counted.places]
         self.done += 1
         if t < self.told + self.span:
             return False

@@ -173,6 +173,7 @@ def _empty_state(
     problem: DAEProblem, outputs: np.ndarray, stops: list[float], n_events: int, records: int, keep: bool
 ) -> RunState:
     n = problem.n
+    kept = np.empty(0, dtype=np.int64) if problem.counted is None else problem.counted.places
     sizes = Sizes(
         n=n,
         nnz=len(problem.indices),
@@ -189,6 +190,8 @@ def _empty_state(
         outputs=outputs,
         y_out=np.empty((len(outputs), n)),
         yp_out=np.empty((len(outputs), n)),
+        kept=kept,
+        kept_out=np.tile(problem.rdata[kept], (len(outputs), 1)),
         record_y=np.empty((records if keep else 1, n)),
     )
 

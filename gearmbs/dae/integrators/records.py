@@ -206,6 +206,7 @@ class Records:
             t_events=[np.array([hit[0] for hit in hits]) for hits in by_event],
             y_events=[np.array([hit[2] for hit in hits]).reshape(-1, n) for hits in by_event],
             epochs=[(0 if consumed else first, table.copy()) for first, table in self.epochs[-1 if consumed else 0 :]],
+            counted=st.kept_out[: len(t_out)].copy() if len(st.kept) and not (consumed or self.every_step) else None,
             t_last=st.t,
         )
         remark_on_unresolved(self.algebraic, result)

@@ -95,6 +95,8 @@ class RunState(Struct):
         Output times.
     y_out, yp_out : ndarray, shape (m, n)
         Outputs.
+    kept, kept_out : ndarray, shapes (p,) and (m, p)
+        Places in ``rdata`` of counted turns, and what stood there at each output.
     record_t, record_h, record_order, record_y : ndarray
         End, size, order and result of accepted steps since the last call; rows of order 0 are history alone.
     g_old, g_new : ndarray
@@ -259,6 +261,8 @@ class RunState(Struct):
     outputs: Vector
     y_out: Matrix
     yp_out: Matrix
+    kept: IntVector
+    kept_out: Matrix
     record_t: Vector
     record_h: Vector
     record_order: IntVector

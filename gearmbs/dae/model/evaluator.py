@@ -179,7 +179,7 @@ def _evaluate(
         solution = vector_at(records.solution, size * k, size)
         update_tables(t[k], at, tab, True)
         if counts_turns and not only_assemble:
-            track(t[k], at, tab, False)
+            track(t[k], at, tab, True)
         # steps of an integrator that keeps both positions and velocities on the constraints need no projection
         projected = rows == 0 or only_assemble or trusted
         passes = 0

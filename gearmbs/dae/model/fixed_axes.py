@@ -43,7 +43,7 @@ from gearmbs.dae.model.members import (
     move_member,
 )
 from gearmbs.dae.model.records import RECORDS_TYPE, Records
-from gearmbs.dae.model.system import turns_of_one
+from gearmbs.dae.model.system import counted_angles, turns_of_one
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
@@ -178,6 +178,7 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
         hook=fx.axes_hook if counted else None,
         hook_interval=_hook_interval(omega, model, axes, (idata, rdata, size)) if counted else None,
         numbers=model.numbers_in(idata),
+        counted=counted_angles(system, idata),
     )
 
 
@@ -427,7 +428,7 @@ def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turn
         moment = matrix_at(records.moment, 3 * rows * k, rows, 3)
         update_axes(t[k], at, axes, markers, turns, tab)
         if counts_turns:
-            track(t[k], at, tab, False)
+            track(t[k], at, tab, True)
         for c in range(own.size):
             own[c] = 0.0
         apply_loads(t[k], at, own, loads, idata, tab)

@@ -5,6 +5,7 @@ The functions find consistent initial values: accelerations, multipliers, loads,
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,14 +15,14 @@ from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.body import turning_rates
 from gearmbs.dae.equations.constraints.terms import ANGLE
-from gearmbs.dae.equations.kinematics import hook
+from gearmbs.dae.equations.kinematics import AXES, hook
 from gearmbs.dae.equations.loads.reactions import reactions_from
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Unknown, multipliers_are_rates
 from gearmbs.dae.model import diagnosis, initial
 from gearmbs.dae.model.base_system import BaseSystem
 from gearmbs.dae.model.diagnosis import conflict
 from gearmbs.dae.model.model import Configuration
-from gearmbs.dae.problem import AssemblyError, DAEProblem, ModelError, SingularModelError
+from gearmbs.dae.problem import AssemblyError, Counted, DAEProblem, ModelError, SingularModelError
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.evaluator import Assembled
@@ -212,7 +213,32 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
         solved_at_outputs=unknowns.plain_states(at, model.controlled_states),
         solved_if_needed=unknowns.loads(at),
         numbers=model.numbers_in(idata),
+        counted=counted_angles(system, idata),
     )
+
+
+def counted_angles(system: BaseSystem, idata: np.ndarray) -> Counted | None:
+    """Return the angles that the equations of a system count, and their places in its table of numbers, if any."""
+    model, extra, winding = system.model, int(idata[T.H_R_EXTRA]), int(idata[T.H_R_REFERENCE]) + len(system.model.terms)
+    found = []
+    for k, term in enumerate(model.terms):
+        if term[T.TERM_TYPE] == ANGLE:
+            at = winding + 1 + k
+            found.append((AXES[2], int(term[T.TERM_I]), int(term[T.TERM_J]), at, at + len(model.terms)))
+    for tape, row in zip(model.tapes, model.tape_rows, strict=True):
+        first = extra + int(row[T.TAPE_REFERENCE]) + tape.n_angles
+        found += [(*key, first + k, first + tape.n_angles + k) for k, key in enumerate(tape.angles)]
+    found += [(AXES[axis], i, j, extra + at + 1, extra + at + 2) for axis, i, j, at in model.angles.tolist()]
+    if not found:
+        return None
+    bodies = () if system.mechanism is None else (system.mechanism.ground, *system.mechanism.bodies.values())
+    markers = [(system.marker_index.get(id(marker), -1), marker.name) for body in bodies for marker in body.markers]
+    often = Counter(name for _, name in markers)
+    # a name that two markers have says nothing
+    names = {-1: ""} | {index: name for index, name in markers if index >= 0 and often[name] == 1}
+    angles = [(function, names.get(i, f"marker {i}"), names.get(j, f"marker {j}")) for function, i, j, *_ in found]
+    places = [winding, *(at for *_, at, _ in found), *(at for *_, at in found)]
+    return Counted(angles, np.array(places, dtype=np.int64))
 
 
 def _hook_interval(model: Model, at: dict[str, int]):

@@ -221,6 +221,23 @@ def _counted(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray, row: i
     return rdata
 
 
+def known_turns(solution: Computed, function: str, i: str, j: str) -> np.ndarray:
+    """Return an angle less than half a turn off, by names of its markers, shape (m,), rad; NaN where nothing counts it.
+
+    That is as the run has counted it at its outputs, or where it starts if they are none of its own.
+    """
+    result, angles = solution.result, solution.problem.counted
+    found = np.full(len(result.t), np.nan)
+    if angles is None or (function, i, j) not in angles.angles or not len(found):
+        return found
+    k = angles.angles.index((function, i, j))
+    if result.counted is not None:
+        return angles.values(result.t, result.counted)[:, k]
+    if result.t[0] == solution.problem.t0:
+        found[0] = angles.values(result.t[:1], solution.problem.rdata[angles.places][None, :])[0, k]
+    return found
+
+
 SPLINE_POINTS = 4
 """Outputs from which a cubic spline says more about a speed than its mean between two of them."""
 
@@ -228,7 +245,12 @@ SPLINE_POINTS = 4
 def warn_of_doubtful_turns(t: np.ndarray, angle: np.ndarray, speed: np.ndarray, label: str) -> None:
     """Warn where a spline through the speeds makes another number of turns between two outputs than was counted."""
     steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
-    doubtful = np.flatnonzero(np.round((np.diff(angle) - _finer_steps(t, speed, steps)) / (2 * np.pi)))
+    if t.size < SPLINE_POINTS:
+        # speeds between those at both ends lead so far off their mean
+        off = 0.5 * np.abs(np.diff(speed)) * np.diff(t)
+    else:
+        off = np.abs(np.diff(angle) - _finer_steps(t, speed, steps))
+    doubtful = np.flatnonzero(off > np.pi)
     if doubtful.size:
         k = int(doubtful[0])
         warnings.warn(
@@ -241,7 +263,7 @@ def warn_of_doubtful_turns(t: np.ndarray, angle: np.ndarray, speed: np.ndarray, 
 
 def _finer_steps(t: np.ndarray, speed: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return the angles (rad) from output to output by a spline through the speeds, where turns could be miscounted."""
-    if t.size < SPLINE_POINTS or abs(steps).max() < np.pi or np.diff(t).min() <= 0.0:
+    if abs(steps).max() < np.pi or np.diff(t).min() <= 0.0:
         return steps
     from scipy.interpolate import CubicSpline
 

@@ -214,39 +214,58 @@ class Solution(Shown):
         if self.result.held is not None:
             cells, values = self.result.held
             evaluator.rdata[cells] = values[row]
+        if self.result.counted is not None and self.problem.counted is not None:
+            evaluator.rdata[self.problem.counted.places] = self.result.counted[row]
         evaluator.fill(np.array([t]), y, [(0, self.result.epoch_of(row))], record)
         return record
 
     def _fill_held(self, evaluator: Fills, records: outputs.Records) -> None:
-        """Fill ``records`` with the numbers of the equations as they were at each output time."""
-        result = self.result
-        if result.held is None:
+        """Fill ``records`` with the numbers of the equations as they were at each output time.
+
+        Turns are taken from the run where they cannot be counted from one output to the next, and go on from there.
+        """
+        result, angles = self.result, self.problem.counted
+        if result.held is None and (result.counted is None or angles is None):
             evaluator.fill(self.t, result.y, result.epochs, records)
             return
-        cells, values = result.held
-        changed = np.flatnonzero((values[1:] != values[:-1]).any(axis=1)) + 1
-        for first, last in pairwise([0, *changed.tolist(), self.t.size]):
+        given: list[tuple[np.ndarray, np.ndarray]] = []
+        anew = np.zeros(self.t.size, dtype=bool)
+        if result.held is not None:
+            given.append(result.held)
+            anew[1:] = (result.held[1][1:] != result.held[1][:-1]).any(axis=1)
+        if result.counted is not None and angles is not None:
+            given.append((angles.places, result.counted))
+            anew |= angles.jumps(self.t, result.counted)
+        for first, last in pairwise([0, *(1 + np.flatnonzero(anew[1:])).tolist(), self.t.size]):
             if last == first:
                 continue
-            evaluator.rdata[cells] = values[first]
+            for cells, values in given:
+                evaluator.rdata[cells] = values[first]
             epochs = [(max(row - first, 0), table) for row, table in result.epochs if row < last]
             own = [k for k, (row, _) in enumerate(epochs) if row == 0]
             part = outputs.Records(*(column[first:last] for column in records))
             evaluator.fill(self.t[first:last], result.y[first:last], epochs[own[-1] :], part)
 
     def over(
-        self, t: np.ndarray, y: np.ndarray, epochs: list[tuple[int, np.ndarray]], held: np.ndarray | None = None
+        self,
+        t: np.ndarray,
+        y: np.ndarray,
+        epochs: list[tuple[int, np.ndarray]],
+        held: np.ndarray | None = None,
+        counted: np.ndarray | None = None,
     ) -> Solution:
         """Return a solution of the same equations over other times, with unknowns ``y`` and their ``epochs``.
 
-        ``held`` is what stands in the places of the result's ``held``, a row for each time.
+        ``held`` and ``counted`` are what stands in the places of those of the result, a row for each time.
         """
         part = copy.copy(self)
         for name in ("_records", "kinetic_energy"):
             part.__dict__.pop(name, None)
         part.t = t
         kept = None if held is None or self.result.held is None else (self.result.held[0], held)
-        part.result = replace(self.result, t=t, y=y, yp=np.empty((0, y.shape[1])), epochs=epochs, held=kept)
+        part.result = replace(
+            self.result, t=t, y=y, yp=np.empty((0, y.shape[1])), epochs=epochs, held=kept, counted=counted
+        )
         return part
 
     def _evaluator(self) -> Fills:
@@ -321,7 +340,8 @@ class Solution(Shown):
             places = [int(np.searchsorted(wanted, row)) for row, _ in self.result.epochs]
             epochs = [(place, table) for place, (_, table) in zip(places, self.result.epochs)]
             held = None if self.result.held is None else self.result.held[1][wanted]
-            part = self.over(self.t[wanted], self.result.y[wanted], epochs, held)
+            counted = None if self.result.counted is None else self.result.counted[wanted]
+            part = self.over(self.t[wanted], self.result.y[wanted], epochs, held, counted)
             if len(self.result.yp):
                 part.result.yp = self.result.yp[wanted]
             if evaluator is not None and room is not None:

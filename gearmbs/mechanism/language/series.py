@@ -14,14 +14,15 @@ from gearmbs.kernels.jit import njit
 
 @njit(
     "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
-    " float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[::1], float64[::1], float64[::1])",
+    " float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
     cache=True,
     nogil=True,
 )
-def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, angles, grad, work, out):
+def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, angles, known, grad, work, out):
     """Evaluate a tape at every time.
 
-    Counted angles go on by the mean of their rates at both ends of an output step, to the nearest turn.
+    Counted angles are those nearest to what is known of them; others go on by the mean of their rates at both ends of
+    an output step, to the nearest turn.
 
     Parameters
     ----------
@@ -43,6 +44,8 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
         Unknowns.
     angles : ndarray, shape (2, times, counted angles)
         Receives the counted angles and their rates; in its first row, the first angle comes near the given one.
+    known : ndarray, shape (counted angles, times)
+        Counted angles less than half a turn off, as the run has counted them; NaN where it has not.
     grad : ndarray
         Scratch of the size of the gradient.
     work : ndarray
@@ -58,6 +61,9 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
         if k > 0:
             for a in range(ref.size):
                 ref[a] += 0.5 * (rates[a] + angles[1, k - 1, a]) * (t[k] - t[k - 1])
+        for a in range(known.shape[0]):
+            if not np.isnan(known[a, k]):
+                ref[a] = known[a, k]
         update_angles(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, work)
         out[k] = eval_request(ints, floats, t[k], kin[k], acc[k], marker_body, marker_frame, y[k], ref, work)
 
@@ -65,6 +71,7 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
 def expression_values(
     tape: Tape,
     starts: Sequence[float],
+    known: Sequence[np.ndarray],
     t: np.ndarray,
     kin: np.ndarray,
     acc: np.ndarray,
@@ -80,6 +87,8 @@ def expression_values(
     tape : Tape
     starts : sequence of float
         Near which its counted angles start, rad.
+    known : sequence of ndarray, shape (times,)
+        What the run has counted of each, see `gearmbs.dae.results.frames.known_turns`.
     t, kin, acc, marker_body, marker_frame, y : ndarray
         As of `evaluate_series`.
     marker_named : callable
@@ -91,12 +100,15 @@ def expression_values(
     """
     angles = np.zeros((2, t.size, max(1, tape.n_angles)))
     angles[0, :1, : tape.n_angles] = starts
-    out = np.zeros(t.size)
+    told, out = np.array(known).reshape(len(known), t.size), np.zeros(t.size)
     evaluate_series(
-        tape.ints, tape.floats, t, kin, acc, marker_body, marker_frame, y, angles, np.zeros(max(1, tape.gradient_size)),
+        tape.ints, tape.floats, t, kin, acc, marker_body, marker_frame, y, angles, told,
+        np.zeros(max(1, tape.gradient_size)),
         np.zeros(tape.work_size), out,
     )  # fmt: skip
     for k, (function, i, j) in enumerate(tape.angles):
+        if not np.isnan(told[k]).any():
+            continue
         label = f"{function}({marker_named(i)}, {marker_named(j)})"
         warn_of_doubtful_turns(t, angles[0, :, k], angles[1, :, k], label)
     return out

@@ -12,7 +12,7 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
-from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, warn_of_doubtful_turns
+from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, known_turns, warn_of_doubtful_turns
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.inputs import Output
@@ -46,10 +46,14 @@ class Measures:
         wanted = np.arctan2(_dot(ai[:, :, 0], aj[:, :, 1]), _dot(ai[:, :, 0], aj[:, :, 0]))
         speed = _dot(self._spin(found.i) - self._spin(found.j), aj[:, :, 2])
         steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
+        known = known_turns(self.solution, "AZ", found.i.name, found.j.name)
+        if not np.isnan(known).any():
+            return wanted + 2 * np.pi * np.round((known - wanted) / (2 * np.pi))
         # each step is the one nearest to what the speeds make of it
         rest = np.diff(wanted) - steps
         turns = np.round(rest / (2 * np.pi))
-        angle = wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
+        start = wanted[0] + 2 * np.pi * np.round((np.nan_to_num(known[0], nan=wanted[0]) - wanted[0]) / (2 * np.pi))
+        angle = start + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
         warn_of_doubtful_turns(t, angle, speed, f"joint '{found.name}'")
         return angle
 
@@ -201,7 +205,8 @@ class Measures:
         frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
         kin, acc = frame_motion(self.solution.evaluated, builder.build(Names()))
         starts = starting_angles(tape, self.mechanism.turns, marker_named)
-        return expression_values(tape, starts, t, kin, acc, bodies, frames, y, marker_named)
+        known = [known_turns(self.solution, f, marker_named(i), marker_named(j)) for f, i, j in tape.angles]
+        return expression_values(tape, starts, known, t, kin, acc, bodies, frames, y, marker_named)
 
     def _unknown(self, key: tuple) -> np.ndarray:
         if key[0] in ("diff", "variable"):

@@ -47,8 +47,8 @@ REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_actio
 """Options of integrators that are about outputs and events of a run that is told its end."""
 
 
-Point = tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Time, y, y', the table of integers, and what stands in the cells of named numbers up to there."""
+Point = tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Time, y, y', the table of integers, and what stands in the cells of named numbers and counted turns up to there."""
 
 
 @dataclass
@@ -207,7 +207,8 @@ class Simulator(OwnAttributes):
         self._stand_at(float(problem.t0), problem.y0, problem.yp0, problem.idata)
 
     def _stand_at(self, t: float, y: np.ndarray, yp: np.ndarray, idata: np.ndarray, record: bool = True) -> None:
-        point = t, y, yp, idata, self._run.state.rdata[self._cells] if self._cells.size else NO_NUMBERS
+        rdata = self._run.state.rdata
+        point = t, y, yp, idata, rdata[self._cells] if self._cells.size else NO_NUMBERS, rdata[self._run.state.kept]
         # past the look at names that are assigned, which takes as long as all the rest
         vars(self).update(t=t, _point=point, _present=None)
         if record and self._records:
@@ -426,7 +427,7 @@ class Simulator(OwnAttributes):
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""
-        t, y, yp, idata, _ = point = self._point
+        t, y, yp, idata, *_ = point = self._point
         rdata = self._run.state.rdata.copy()
         rdata[self._cells] = values
         first, points, started = (self._problem, self._origin), self._points, self._run.started
@@ -448,7 +449,8 @@ class Simulator(OwnAttributes):
             "load", "diagnostics", "marker_position", "joint_angle", "state", "evaluate" and others.
         *names
             What the method takes: the name of a body, joint, element, marker or state, or an expression. "joint_angle"
-            and expressions with AX, AY or AZ count full turns from the first point on, which needs ``records``.
+            and expressions with AX, AY or AZ count full turns from the first point on, which needs ``records``; what a
+            state has counted goes on.
 
         Returns
         -------
@@ -483,7 +485,7 @@ class Simulator(OwnAttributes):
     def _now(self) -> Solution:
         """Return the solution at the present time alone, valid until the next."""
         if self._present is None:
-            t, y, _, idata, held = self._point
+            t, y, _, idata, held, _ = self._point
             self._present = self._row.over(np.array([t]), y[None, :], [(0, idata)], held[None, :])
             # turns as the run counts them at every step
             evaluator: Any = self._row._shared
@@ -516,7 +518,7 @@ class Simulator(OwnAttributes):
 
     def _over(self, first: int) -> Solution:
         """Return the solution over the points from one on."""
-        t, y, yp, tables, held = zip(*self._points[first:], strict=True)
+        t, y, yp, tables, held, counted = zip(*self._points[first:], strict=True)
         epochs: list[tuple[int, np.ndarray]] = []
         for row, table in enumerate(tables):
             if not epochs or not (table is epochs[-1][1] or np.array_equal(table, epochs[-1][1])):
@@ -526,6 +528,7 @@ class Simulator(OwnAttributes):
         result = DAEResult(
             np.array(t), np.array(y), np.array(yp), told, self._failed or f"Advanced to t = {self.t:.9g} s.", stats,
             epochs=epochs, t_last=self.t, held=(self._cells, np.array(held)) if self._cells.size else None,
+            counted=np.array(counted),
         )  # fmt: skip
         solution = Solution(self._system, self._problem, result, self._members, self._remark)
         solution.initial = self._origin
@@ -539,7 +542,7 @@ class Simulator(OwnAttributes):
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
         self.take_effect()
-        t, y, yp, idata, _ = self._point
+        t, y, yp, idata, *_ = self._point
         run = self._run
         if not self._equations:
             self._equations = equations_of(self._base)

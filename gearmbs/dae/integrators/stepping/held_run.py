@@ -88,6 +88,7 @@ class HeldRun(Run):
         self.options = options
         st = self.state
         st.outputs, st.y_out, st.yp_out = np.empty(1), np.empty((1, problem.n)), np.empty((1, problem.n))
+        st.kept_out = np.empty((1, len(st.kept)))
         st.next_output = 1
         self._at, self._y, self._yp = st.outputs, st.y_out[0], st.yp_out[0]
         self._looked = 0

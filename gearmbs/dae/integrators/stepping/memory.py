@@ -34,8 +34,8 @@ ASKED = {
 SCALARS = tuple(name for name in RunState.scalar_members if name not in ASKED)
 OWN = {
     "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one", "entry_row", "entry_col", "idata",
-    "rdata", "stops", "outputs", "y_out", "yp_out", "record_t", "record_h", "record_order", "record_y", "g_new",
-    "g_between", "event_direction", "event_action", "crossing_t", "crossing_event", "crossing_y",
+    "rdata", "stops", "outputs", "y_out", "yp_out", "kept", "kept_out", "record_t", "record_h", "record_order",
+    "record_y", "g_new", "g_between", "event_direction", "event_action", "crossing_t", "crossing_event", "crossing_y",
 }  # fmt: skip
 """Arrays of a run that are its own, or scratch, or follow from the state."""
 ARRAYS = tuple(name for name in RunState.array_members if name not in OWN)

@@ -1,0 +1,147 @@
+"""Angles count their turns as the run has counted them: at outputs however far apart, and from a state on."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.mechanism import Mechanism
+from tests.generators import cases, seed
+from tests.says import says
+
+INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
+
+
+def oscillator():
+    """30 sin t: almost five turns to either side."""
+    m = Mechanism("oscillator")
+    body = m.body("wheel", mass=1.0, inertia=(1.0, 1.0, 1.0), angular_velocity=(0.0, 0.0, 30.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    m.torsion_spring("coil", m.joints["pin"].i, m.joints["pin"].j, stiffness=1.0)
+    return m
+
+
+def winding(rng):
+    """A driven wheel and a free one behind a spring; a load by an expression, one by a variable, another frame each."""
+    m = Mechanism("winding")
+    speed, depth = rng.uniform(5.0, 60.0) * rng.choice([-1, 1]), rng.uniform(0.0, 20.0)
+    first = m.body("first", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    second = m.body("second", mass=1.0, inertia=(0.2, 0.2, 0.2), position=(0, 0, 0.1), angular_velocity=(0, 0, speed))
+    m.revolute("a", first, m.ground, axis=(0, 0, 1))
+    m.revolute("b", second, m.ground, at=(0, 0, 0.1), axis=(0, 0, 1))
+    pin = m.joints["a"], m.joints["b"]
+    m.rotation("drive", m.joints["a"], f"{depth!r}*(1 - COS({rng.uniform(1.0, 4.0)!r}*TIME))")
+    m.torsion_spring("coil", pin[0].i, pin[0].j, stiffness=rng.uniform(0.5, 2.0))
+    m.torsion_spring("soft", pin[1].i, pin[1].j, stiffness=rng.uniform(0.0, 0.5), damping=rng.uniform(0.0, 0.05))
+    m.algebraic_state("wound", "AZ(b.I, b.J)")
+    m.load("by_angle", pin[1].i, pin[1].j, tz=f"{-rng.uniform(0.0, 0.2)!r}*AZ(b.I, b.J)")
+    m.load("by_state", pin[1].i, pin[1].j, tz="-0.1*VARVAL(wound)")
+    return m
+
+
+def told(solution):
+    """What hangs on turns."""
+    return {
+        **{name: solution.load(name)[1][:, 2] for name in ("coil", "soft", "by_angle", "by_state")},
+        **{f"angle {name}": solution.joint_angle(name) for name in ("a", "b")},
+        "AZ": solution.evaluate("AZ(b.I, b.J)"),
+        "drive": solution.reaction("drive")[1][:, 2],
+        "load_torque": solution.to_dataset().load_torque.values[:, :, 2],
+    }
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.slow
+def test_random_windings_are_the_same_at_coarse_and_fine_outputs(integrator):
+    rng = np.random.default_rng(seed())
+    fine = np.linspace(0.0, 3.0, 601)
+    most = 0.0
+    for _ in range(cases(20)):
+        m = winding(rng)
+        some = np.unique(np.concatenate([[0, 600], rng.choice(601, rng.integers(1, 9))]))
+        lump = bool(rng.integers(2))
+        options = {"tol": 1e-7, "integrator": integrator, "lump": lump}
+        exact = told(m.simulate(3.0, t_eval=fine, **options))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = told(m.simulate(3.0, t_eval=fine[some], **options))
+        for name, values in found.items():
+            np.testing.assert_allclose(values, exact[name][some], atol=1e-3, rtol=1e-4, err_msg=name)
+        most = max(most, np.abs(np.diff(found["angle b"])).max())
+    assert most > 4.0 * np.pi
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("outputs", [9, 2])
+def test_a_spring_that_winds_and_unwinds(integrator, outputs):
+    t = np.linspace(0.0, 5.0, outputs)
+    s = oscillator().simulate(5.0, t_eval=t, tol=1e-8, integrator=integrator)
+    for angle in (-s.load("coil")[1][:, 2], s.joint_angle("pin"), s.evaluate("AZ(pin.I, pin.J)")):
+        np.testing.assert_allclose(angle, 30.0 * np.sin(t), atol=1e-4)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.25, 1.0])
+def test_a_constant_speed_over_whole_turns(step):
+    m = Mechanism("steady")
+    body = m.body("wheel", mass=1.0, inertia=(1.0, 1.0, 1.0), angular_velocity=(0.0, 0.0, 30.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    m.torsion_spring("coil", m.joints["pin"].i, m.joints["pin"].j, stiffness=1e-9)
+    t = np.arange(0.0, 4.0 + step / 2, step)
+    s = m.simulate(4.0, t_eval=t)
+    np.testing.assert_allclose(s.load("coil")[1][:, 2], -30e-9 * t, rtol=1e-5, atol=1e-15)
+    steps = m.simulate(4.0, every_step=True)
+    np.testing.assert_allclose(steps.load("coil")[1][:, 2], -30e-9 * steps.t, rtol=1e-5, atol=1e-15)
+    parts = np.concatenate([part.load("coil")[1][:, 2] for part in s.parts(size=2)])
+    np.testing.assert_allclose(parts, -30e-9 * t, rtol=1e-5, atol=1e-15)
+
+
+def test_measures_begin_at_the_turns_of_a_state():
+    """In another simulator, in a run of its own and in one that was put back."""
+    m, t = oscillator(), np.linspace(1.0, 3.0, 5)
+    sim = gm.Simulator(m, t_end=3.0, tol=1e-8)
+    sim.advance(1.0)
+    state = sim.state()
+    again = gm.Simulator(m, t_end=3.0, tol=1e-8, initial=state)
+    assert again.get("joint_angle", "pin") == pytest.approx(30.0 * np.sin(1.0), abs=1e-4)
+    assert again.get("evaluate", "AZ(pin.I, pin.J)") == pytest.approx(30.0 * np.sin(1.0), abs=1e-4)
+    sim.advance(2.5)
+    sim.restore(state)
+    for one in (sim, again):
+        one.advance(3.0)
+        assert one.get("joint_angle", "pin") == pytest.approx(30.0 * np.sin(3.0), abs=1e-4)
+        found = one.solution()
+        np.testing.assert_allclose(-found.load("coil")[1][:, 2], 30.0 * np.sin(found.t), atol=1e-4)
+    for options in ({"t_eval": t}, {"every_step": True}):
+        run = m.simulate(3.0, initial=state, tol=1e-8, **options)
+        for angle in (run.joint_angle("pin"), run.evaluate("AZ(pin.I, pin.J)"), -run.load("coil")[1][:, 2]):
+            np.testing.assert_allclose(angle, 30.0 * np.sin(run.t), atol=1e-4)
+
+
+def test_markers_of_one_name_are_not_taken_for_each_other():
+    """Two wheels with a marker 'rim' each, of which an element counts the turns of one."""
+    m = Mechanism("twins")
+    for name, speed in (("slow", 2.0), ("fast", 20.0)):
+        body = m.body(name, mass=1.0, inertia=(1.0, 1.0, 1.0), angular_velocity=(0.0, 0.0, speed))
+        m.revolute(f"pin_{name}", body, m.ground, axis=(0, 0, 1))
+        body.marker((0.1, 0, 0), name="rim")
+    rims = [marker for body in m.bodies.values() for marker in body.markers if marker.name == "rim"]
+    m.torsion_spring("coil", rims[1], m.joints["pin_fast"].j, stiffness=1e-9)
+    s = m.simulate(3.0, t_eval=[0.0, 1.0, 2.0, 3.0])
+    np.testing.assert_allclose(s.joint_angle("pin_slow"), 2.0 * s.t, atol=1e-5)
+    np.testing.assert_allclose(s.joint_angle("pin_fast"), 20.0 * s.t, atol=1e-5)
+    np.testing.assert_allclose(s.load("coil")[1][:, 2], -20e-9 * s.t, atol=1e-12)
+
+
+def test_two_outputs_cannot_tell_turns_that_nothing_counts():
+    """Unless the speed is the same at both, which leaves nothing to doubt."""
+    m = oscillator()
+    del m.elements["coil"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert m.simulate(5.0, t_eval=[0.0, 5.0]).joint_angle("pin")[-1] == pytest.approx(150.0, abs=1e-4)
+    pin = m.joints["pin"]
+    m.load("brake", pin.i, pin.j, tz="-6*SIN(2*TIME)")
+    sparse = m.simulate(5.0, t_eval=[0.0, 4.5])
+    with pytest.warns(UserWarning, match=says("joint 'pin'", "4.5", "higher rate")):
+        sparse.joint_angle("pin")
