@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 BRIEF = 1e-3
 """Part of the run below which a change is brief: runs take hundreds of steps and more."""
+LONG = 0.5
+"""The same of steps, jumps and tables of few points: what is at rest takes steps of a fifth of the run."""
+FEW = 16
+"""Points of such a table: landing on each costs no more steps than a run takes anyway."""
 BLOCKS, SAMPLES = 40, 100
 """Blocks of the run, in each of which the usual distance from chords is the median over so many times. A block is 25
 chords long, so that a brief change is the lesser part of one."""
@@ -49,16 +53,17 @@ def brief_changes(model: Model, start: float, end: float) -> list[float]:
     """
     width = BRIEF * (end - start)
     found: list[tuple[float, float, float, float]] = []
-    edges: list[float] = []
+    changes: list[np.ndarray] = []
     for times, values in _tables(model):
-        if len(times) == 1:
-            edges.append(float(times[0]))
-        elif len(times) == 2:
-            edges += times.tolist() if times[1] - times[0] < width else []
+        if len(times) <= FEW:
+            changes.append(times)
         else:
             found += _bumps(times, values, start, end, width)
-    edges = sorted({t for t in edges if start < t <= end})
-    near = np.diff(edges) < width
+    within = [times[(times > start) & (times <= end)] for times in changes]
+    # one step or jump alone stays, and is seen
+    alone = sum(len(times) > 0 for times in within) == 1 and max(map(len, within)) <= 2
+    edges = sorted({float(t) for times in within for t in times})
+    near = np.diff(edges) < (BRIEF if alone else LONG) * (end - start)
     paired = np.append(near, False) | np.append(False, near) if edges else ()
     largest = sorted(found, reverse=True)[:MOST]
     return sorted({*(t for t, pair in zip(edges, paired) if pair), *(t for _, *ends in largest for t in ends)})
