@@ -77,6 +77,15 @@ def test_a_plant_is_what_control_programs_take():
     assert answer == pytest.approx(plant.step(t)[:, 0], abs=1e-9)
 
 
+def test_outputs_may_share_the_acceleration_of_a_marker():
+    """A free body, whatever outputs stand beside each other: m a = F."""
+    m = gm.Mechanism("free")
+    m.body("b", 2.0, (0.1, 0.1, 0.1))
+    outputs = [("com_acceleration", "b"), ("com_acceleration", "b", "x")]
+    plant = m.linearize([("force", "b", axis) for axis in "xyz"], outputs)
+    assert plant.D == pytest.approx(0.5 * np.eye(3)[[0, 1, 2, 0]], abs=1e-12)
+
+
 def pendulum(angle: float = 0.0) -> gm.Mechanism:
     m = gm.Mechanism("pendulum", gravity=(0, 0, -GRAVITY))
     turned = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])

@@ -338,17 +338,18 @@ def _plant(
     kinds = instant.system.model.differential_states
     names = [name for name, differential in zip(instant.system.state_names, kinds, strict=True) if differential]
     outputs = [names.index(TOLD.format(k)) for k in range(len(told))]
-    held = [
-        (names.index(label), one, c)
+    # outputs share what stands for the acceleration of a marker
+    held = {
+        names.index(label): (one, c)
         for item in told
         for one in item.accelerations
         for c, label in enumerate(one.labels)
-    ]
-    own = np.array([k for k in range(len(names)) if k not in outputs and k not in {h[0] for h in held}], dtype=int)
+    }
+    own = np.array([k for k in range(len(names)) if k not in outputs and k not in held], dtype=int)
     found = realised(reduced, own, np.array(outputs, dtype=int), np.zeros(0, dtype=int))
     if held:
-        rows = np.array([_acceleration(instant, reduced, found, one)[c] for _, one, c in held])
-        found.outputs = found.outputs + reduced.state_state[np.ix_(outputs, [k for k, _, _ in held])] @ rows
+        rows = np.array([_acceleration(instant, reduced, found, one)[c] for one, c in held.values()])
+        found.outputs = found.outputs + reduced.state_state[np.ix_(outputs, list(held))] @ rows
     asked = [Asked(one.name, one.unit, one.level, remedy=one.remedy) for one in given]
     labels = [one.name for one in told]
     a, b, c, d = lowered(found, asked, labels)
