@@ -281,6 +281,10 @@ def test_a_state_of_a_simulation_is_an_operating_point():
         ([], [("state", "heat")], {}, says("'heat'", "none")),
         ([], ["WZ(motr.I)"], {}, says("MOTR.I", "WZ")),
         ([], ["WZ(shaft.I"], {}, says("WZ(shaft.I", "column")),
+        ([], ["2*ACCX(shft.I)"], {}, says("2*ACCX(shft.I)", "SHFT.I", "did you mean SHAFT.I")),
+        ([], ["WDTY(shaft.I, 0, load)"], {}, says("WDTY", "MARKER LOAD")),
+        ([], ["ACCM()"], {}, says("ACCM", "1 to 3")),
+        ([], ["ACCX(2*3)"], {}, says("2*3", "id or name")),
         ([], [("transmission_error", "shaft")], {}, says("'shaft'", "none")),
         ([], ["1"], {"at": "rest"}, says("'rest'", "'equilibrium'")),
     ],
@@ -292,6 +296,14 @@ def test_what_is_wrong_is_named_in_one_line(inputs, outputs, options, message):
         m.linearize(inputs, outputs, **options)
     assert "\n" not in str(told.value)
     assert [one.name for body in m.bodies.values() for one in body.markers] == markers
+
+
+def test_accelerations_of_the_ground_and_from_it_are_outputs():
+    m = two_masses()
+    m.ground.marker(name="wall")
+    shown = ["WDTZ(shaft.I)", "WDTZ(shaft.I, 0, 0)", 'WDTZ("shaft.i", wall, wall)', "WDTZ(wall)", "WDTZ(0, shaft.I)"]
+    plant = m.linearize([("torque", "load", "z")], shown)
+    assert plant.D[:, 0] == pytest.approx(np.array([1, 1, 1, 0, -1]) / LOAD, rel=1e-9)
 
 
 def test_inputs_of_the_mechanism_by_their_names():

@@ -191,7 +191,8 @@ class Lowering:
         if ref == 0:
             return op.GLOBAL
         if ref not in self.scope.markers:
-            self.fail(f"there is no MARKER {ref}", node.at)
+            known = [name for name in self.scope.markers if isinstance(name, str)]
+            self.fail(f"there is no MARKER {ref}{did_you_mean(ref, known, before='; ')}", node.at)
         return int(self.scope.markers[ref])
 
     def literal(self, call: Call, position: int, low: int, high: int, default: int | None = None) -> int:

@@ -259,6 +259,8 @@ class PlantNames:
 
     def _expression(self, text: str) -> Told:
         """Return an expression in which states stand for the accelerations of markers."""
+        from gearmbs.mechanism.compile import scope_of
+        from gearmbs.mechanism.language.library import compile_expression
         from gearmbs.mechanism.language.syntax import Call, parse
 
         try:
@@ -272,6 +274,11 @@ class PlantNames:
             if found is None:
                 break
             start, end, name = found
+            try:
+                # the states that take its place would hide a marker that is not there
+                compile_expression(rest[start:end], scope_of(self.mechanism)[0], accelerations=True)
+            except ExpressionError as error:
+                raise ModelError(f"output {text!r}: {error}") from None
             call = parse(rest[start:end])
             assert isinstance(call, Call)
             out += rest[:start] + self._substitute(text, name, call, asked)
