@@ -142,3 +142,15 @@ def test_a_longer_pulse_on_what_is_at_rest_is_seen(kind, integrator):
         m.torque("drive", body, given)
         solution = m.simulate(SPAN, tol=1e-6, rate=1.0, integrator=integrator)
         assert solution.angular_velocity("disc")[-1, 2] == pytest.approx(0.5 * length, rel=0.02)
+
+
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("speed", [100.0, -150.0])
+def test_a_prescribed_angle_whose_speed_jumps_gains_no_turns(integrator, speed):
+    """Behind the last jump the angle stands still; by the speed before it a long step would be 16 turns and more."""
+    m = Mechanism("disc")
+    disc = m.body("disc", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    m.rotation("drive", pin, f"INTEGRAL(IF(TIME-1: 0, {speed}, IF(TIME-1.002: {speed}, 0, 0)), 0, 2)")
+    angle = m.simulate(2.0, rate=50, integrator=integrator, breakpoints=(1.0, 1.002)).joint_angle("pin")
+    np.testing.assert_allclose(angle[52:], 0.002 * speed, rtol=1e-5)

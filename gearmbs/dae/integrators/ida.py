@@ -535,7 +535,7 @@ class IdaBranch:
         if self.tries >= TRIES_AT_A_JUMP:
             return ""
         h = self._shortest(t, end)
-        found = self._step(t, y, yp, h)
+        found = self._step(t, y, y + np.where(self.problem.differential, h * yp, 0.0), h)
         if isinstance(found, str):
             return found
         return index_changes(t, t) if self.index_changed(t + h, *found) else (t + h, *found)
@@ -556,11 +556,15 @@ class IdaBranch:
         moving = self.problem.differential
         weight = 1.0 / (self.atol + self.rtol * np.abs(y))
         h, least, most = FIRST_OF_PIECE * (stop - t), self._shortest(t, end), 0.25 * (stop - t)
+        if self.problem.hook_interval is not None:
+            h = max(2.0 * least, min(h, self.problem.hook_interval(t, y, yp)))
         best = y, yp, 0.0
+        # rates before the breakpoint say nothing of longer steps: angles would be found full turns away
+        foreseen, speed, at = y, np.where(moving, yp, 0.0), 0.0
         for _ in range(FIRST_TRIALS):
             if not 2.0 * least <= h <= most:
                 break
-            whole, half = (self._step(t, y, yp, part) for part in (h, 0.5 * h))
+            whole, half = (self._step(t, y, foreseen + (part - at) * speed, part) for part in (h, 0.5 * h))
             if isinstance(whole, str) or isinstance(half, str):
                 h *= FIRST_SHRINK
                 continue
@@ -570,6 +574,7 @@ class IdaBranch:
             if not np.isfinite(error):
                 break
             slope = (whole[0] - half[0]) / (0.5 * h)
+            foreseen, speed, at = whole[0], np.where(moving, slope, 0.0), h
             if error <= 1.0:
                 best = np.where(moving, y, 2.0 * half[0] - whole[0]), np.where(moving, 2.0 * near - far, slope), h
                 if error >= FIRST_ERROR / 10.0:
@@ -579,15 +584,14 @@ class IdaBranch:
             h = min(h * min(max(np.sqrt(FIRST_ERROR / max(error, 1e-30)), FIRST_SHRINK), 1.0 / FIRST_SHRINK), most)
         return best
 
-    def _step(self, t: float, y: np.ndarray, yp: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray] | str:
-        """Take a step of implicit Euler; return unknowns and rates at its end, or why there are none."""
+    def _step(self, t: float, y: np.ndarray, new: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray] | str:
+        """Take a step of implicit Euler, ``new`` foreseen; return unknowns and rates at its end, or why not."""
         # takes longer to load than many a run, which does not need it
         from scipy.sparse.linalg import splu
 
         problem, own = self.problem, self.own
         gamma, after = 1.0 / h, t + h
         moving = problem.differential
-        new = y + np.where(moving, h * yp, 0.0)
         weight = 1.0 / (self.atol + self.rtol * np.abs(y))
         rates = np.where(moving, gamma * (new - y), 0.0)
         held, row, violation = False, -1, 0.0
