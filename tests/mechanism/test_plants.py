@@ -321,6 +321,23 @@ def test_inputs_of_the_mechanism_by_their_names():
         m.linearize(["curent"], [])
 
 
+def test_outputs_take_inputs_and_parameters_as_they_are_at_the_operating_point():
+    m = two_masses()
+    m.torque("motor", m.bodies["motor"], m.input("pull", "N m", 1.0))
+    m.parameter("drag", "N m s/rad", 0.3)
+    simulator = gm.Simulator(m, 1.0)
+    simulator.set("pull", 2.0)
+    simulator.set("drag", 0.7)
+    simulator.advance(0.1)
+    state, outputs = simulator.state(), ["pull", "pull*WZ(shaft.J)", "drag*WZ(shaft.J)"]
+    plant = m.linearize(["pull"], outputs, at=state)
+    speed = simulator.get("angular_velocity", "motor")[2]
+    assert plant.point.outputs == pytest.approx([2.0, 2.0 * speed, 0.7 * speed], rel=1e-9)
+    assert plant.C[:, 2] == pytest.approx([0.0, 2.0, 0.7], rel=1e-9)
+    assert plant.D[:, 0] == pytest.approx([1.0, speed, 0.0], rel=1e-9)
+    assert plant.point.inputs.tolist() == [2.0]
+
+
 def test_outputs_of_the_mechanism_by_their_names():
     m = two_masses()
     turned = m.output("twist", "AZ(shaft.I, shaft.J)")

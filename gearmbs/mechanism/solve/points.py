@@ -143,12 +143,20 @@ def _numbers(known: Mapping[str, Number], rdata: np.ndarray) -> dict[str, list[n
     return {name: [rdata[p.at : p.at + 1 + p.size].copy() for p in one.places] for name, one in known.items()}
 
 
-def _with_numbers(model: Model, numbers: Mapping[str, list[np.ndarray]]) -> Model:
-    """Return a model whose inputs and parameters have the values of another one of the same mechanism."""
+def _with_numbers(model: Model, numbers: Mapping[str, list[np.ndarray]], t: float) -> Model:
+    """Return a model whose inputs and parameters have the values of another one at a time.
+
+    It has the other's places, and behind them those in expressions of its own.
+    """
     tables = {T.H_R_EXTRA: model.extra_r.copy(), T.H_R_FUNCTION: model.function_r.copy()}
     for name, number in model.numbers.items():
-        for place, values in zip(number.places, numbers.get(name, ()), strict=False):
+        if (known := numbers.get(name)) is None:
+            continue
+        for place, values in zip(number.places, known, strict=False):
             tables[place.table][place.at : place.at + values.size] = values
+        first = tables[number.places[0].table]
+        for place in number.places[len(known) :]:
+            place.write(tables[place.table], t, number.value(first, t), number.slope(first))
     return replace(model, extra_r=tables[T.H_R_EXTRA], function_r=tables[T.H_R_FUNCTION])
 
 
@@ -167,7 +175,7 @@ def instant_at(mechanism: Mechanism, point: Point) -> Instant:
         system.keep_rows(np.array([names.index(name) for name in point.system.row_names], dtype=np.int64))
         system.model = _counted(system.model, point.system.model, point.idata, point.rdata, point.t)
     if point.numbers:
-        system.model = _with_numbers(system.model, point.numbers)
+        system.model = _with_numbers(system.model, point.numbers, point.t)
     system.assembler = type(system.assembler)(system.model)
     instant = Instant(system, "I3")
     if point.unknowns is not None and point.idata is not None:
