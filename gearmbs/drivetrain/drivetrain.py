@@ -328,7 +328,8 @@ class Drivetrain:
         Parameters
         ----------
         inputs : sequence
-            As of `gearmbs.mechanism.linearize`, and ``("torque", shaft)`` about the shaft's own axis.
+            As of `gearmbs.mechanism.linearize`, and ``("torque", shaft)`` about the shaft's own axis. Of the inputs
+            in drives and loads, "loaded" keeps those that are their torque.
         outputs : sequence
             As of `gearmbs.mechanism.linearize`, the names of sensors, and ``("speed", shaft)``, ``("angle", shaft)``
             about its own axis. Directions of sensors are those of the operating point.

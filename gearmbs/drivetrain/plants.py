@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.drivetrain.drives import SpeedDrive
-from gearmbs.drivetrain.loads import TorqueLoad
+from gearmbs.drivetrain.drives import Drive, SpeedDrive, TorqueDrive
+from gearmbs.drivetrain.loads import Load, TorqueLoad
 from gearmbs.drivetrain.part import DrivetrainError
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, Shaft, SpeedSensor, TorqueSensor
 from gearmbs.mechanism.parts.functions import constant
+from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.solve.analyses import static_equilibrium
 from gearmbs.mechanism.solve.plant_names import Given, Told, own_marker
 from gearmbs.mechanism.solve.plants import linearize as linear_plant
@@ -34,7 +36,7 @@ def resting(train: Drivetrain) -> Drivetrain:
     ]  # fmt: skip
     loads = [
         TorqueLoad(name=load.name, shaft=load.shaft, station=load.station, on=load.on,
-                   torque=load.nominal(abs(train.speeds[load.shaft])))
+                   torque=_own_input(load) or load.nominal(abs(train.speeds[load.shaft])))
         for load in train.loads
     ]  # fmt: skip
     # flanks that rest on each other would stick
@@ -42,11 +44,17 @@ def resting(train: Drivetrain) -> Drivetrain:
     return replace(train, drives=drives, loads=loads, meshes=meshes, running=False)
 
 
+def _own_input(part: Drive | Load) -> Input | None:
+    """Return the input that is the torque of a drive or load, None of others."""
+    torque = part.torque if isinstance(part, TorqueDrive | TorqueLoad) else None
+    return torque if isinstance(torque, Input) else None
+
+
 def loaded(train: Drivetrain) -> tuple[Mechanism, float]:
     """Return the mechanism of a drivetrain at rest under the torques of its operating point, and a time at which.
 
     Shafts of prescribed speed are held; other drives hold the train while it comes to rest, and then give way to the
-    torque they held it with.
+    torque they held it with. Torques that are inputs stay inputs, at the values they have until they are set.
 
     Raises
     ------
@@ -61,7 +69,14 @@ def loaded(train: Drivetrain) -> tuple[Mechanism, float]:
         if not isinstance(drive, SpeedDrive):
             held = m.joints.pop(drive.name)
             torque = float(rest.solution.reaction(drive.name)[1][-1] @ held.j.global_orientation()[:, 2])
-            m.axis_torque(drive.name, held.i, held.j, torque)
+            if (own := _own_input(drive)) is None:
+                m.axis_torque(drive.name, held.i, held.j, torque)
+            else:
+                # the torque held is that at the input's value; it acts about the sense of rotation
+                m.inputs.setdefault(own.name, own)
+                sense = math.copysign(1.0, drive.speed)
+                text = f'({torque!r}) + ({sense!r})*("{own.name}" - ({own.start!r}))'
+                m.axis_torque(drive.name, held.i, held.j, text)
     return m, after
 
 

@@ -21,6 +21,7 @@ from gearmbs.drivetrain import (
 )
 from gearmbs.drivetrain.drives import Drive
 from gearmbs.gears import GearSpec
+from gearmbs.mechanism import make_input
 from gearmbs.studies import train_modes
 from tests.says import says
 
@@ -71,6 +72,22 @@ def test_two_shafts_and_a_mesh_move_as_two_masses_on_a_spring():
     # at rest a transmission error is what it says
     assert plant.dc_gain[2, 1] == pytest.approx(1.0, rel=1e-9)
     assert plant.output_units == ["rad/s", "rad", "m"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sense", [1, -1])
+def test_torques_that_are_inputs_keep_their_names_under_load(sense):
+    """The plant under 300 N m is that of a load of 300 N m; a load acts against the sense of rotation, a drive with."""
+    turning = stage().changed("motor", speed=f"{1500 * sense} rpm")
+    shown = ["tacho", ("angle", "in")]
+    a, b, c, d = turning.linearize([("torque", "out"), ("torque", "in")], shown)
+    train = turning.changed("brake", torque=make_input("braking", "N m", 300.0))
+    train = train.changed("motor", torque=make_input("driving", "N m", 90.0))
+    plant = train.linearize(["braking", "driving"], shown)
+    # the driven shaft turns the other way round
+    for found, exact in zip(plant, (a, sense * b, c, d), strict=True):
+        np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-9 * np.abs(exact).max(initial=1e-300))
+    assert plant.point.inputs.tolist() == [300.0, 90.0]
 
 
 @pytest.mark.slow
