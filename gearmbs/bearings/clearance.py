@@ -43,7 +43,7 @@ class ClearanceForce(ForceElement):
             "stiffness": Setting(STIFFNESS, f"N/m^{self.reals[EXPONENT]:g}"),
             "damping": Setting(DAMPING, "N*s/m"),
         }
-        settings["clearance"] = Setting(CLEARANCE, "m", 0.5)
+        settings["clearance"] = Setting(CLEARANCE, "m")
         return Compiled(clearance_bearing, reals=self.reals, scratch=WORK, settings=settings)
 
     def __repr__(self) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
-from gearmbs.drivetrain import TorqueLoad
+from gearmbs.drivetrain import ClearanceBearing, TorqueLoad
 from gearmbs.mechanism import Mechanism, ModelError, make_input, polyline
 from gearmbs.studies.run.simulation import case_mechanism
 from tests.drivetrain.support import stage
@@ -188,3 +188,18 @@ def test_loads_of_a_drivetrain_are_inputs():
     sim.set("braking", 120.0)
     sim.advance(0.002)
     assert np.linalg.norm(sim.get("load", "brake")[1]) == pytest.approx(120.0)
+
+
+def test_a_clearance_that_is_set_is_that_of_the_part():
+    """Radial in both: what stands in the tables is what a part made with it has there."""
+
+    def problem(clearance):
+        whole = stage()
+        bearing = ClearanceBearing(name="loose", shaft=whole.bearings[0].shaft, clearance=clearance)
+        return replace(whole, bearings=[*whole.bearings, bearing]).build().compile().problem()
+
+    small, large = problem("20 um"), problem("80 um")
+    number, table = small.numbers["loose.clearance"], small.rdata.copy()
+    assert number.value(table, 0.0) == pytest.approx(20e-6)
+    number.write(table, 0.0, 80e-6)
+    np.testing.assert_allclose(table, large.rdata, rtol=1e-14)
