@@ -190,7 +190,7 @@ def _longest(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray) -> flo
 
 
 def _counted(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray, row: int) -> np.ndarray:
-    """Return the table of numbers with turns counted from output to output up to a time.
+    """Return the table of numbers with inputs, and turns counted from output to output, up to a time.
 
     Raises
     ------
@@ -199,7 +199,9 @@ def _counted(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray, row: i
     """
     result, problem = solution.result, solution.problem
     rdata, work = problem.rdata.copy(), np.zeros(problem.work_size)
+    cells, held = result.held if result.held is not None else (np.empty(0, dtype=np.int64), np.empty((row + 1, 0)))
     if problem.hook is None:
+        rdata[cells] = held[row]
         return rdata
     points = [(float(result.t[k]), result.y[k], result.epoch_of(k)) for k in range(row)]
     points.append((t, y, result.epoch_of(row)))
@@ -207,7 +209,8 @@ def _counted(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray, row: i
     if not len(result.yp) and result.sol is not None:
         known = result.sol.derivative(result.t[:row])
     before = problem.t0
-    for (now, values, table), rate in zip(points, [*known, yp], strict=True):
+    for (now, values, table), rate, given in zip(points, [*known, yp], held[: row + 1], strict=True):
+        rdata[cells] = given
         kept = rdata.copy()
         # the hook may turn its point into other coordinates, which the state is not in
         problem.hook(now, values[None, :].copy(), 1, table.copy(), rdata, work)

@@ -567,6 +567,8 @@ class Solution(Shown):
     def state_at(self, t: float) -> State:
         """Return the state at a time, s, to start another run from; it has no history of the integrator.
 
+        Inputs and parameters are those up to that time, as `input` tells them; one on a line is held from there on.
+
         Parameters
         ----------
         t : float
