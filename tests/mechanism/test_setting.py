@@ -227,3 +227,92 @@ def test_what_is_wrong_is_said_in_a_line(call, words):
     assert "\n" not in str(error.value)
     sim.set("load", "3 N m")
     sim.advance(0.01)
+
+
+def disc():
+    """2 w' = u."""
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    m.torque("drive", body, m.input("u", "N m"))
+    m.input("v", "N m")
+    return m
+
+
+def spin(found):
+    return found.angular_velocity("disc")[-1, 2]
+
+
+@pytest.mark.parametrize("points", [2, 11])
+def test_a_line_does_not_depend_on_samples_of_others(points):
+    """2 w' = 10 t, w(1) = 2.5, whatever is asked for and whoever samples."""
+    inputs = {"u": ([0.0, 1.0], [0.0, 10.0], 1), "v": (lambda t: 0.0, "10 ms")}
+    found = disc().simulate(1.0, t_eval=np.linspace(0.0, 1.0, points), inputs=inputs, tol=1e-9)
+    assert spin(found) == pytest.approx(2.5, abs=1e-6)
+    np.testing.assert_allclose(found.input("u"), 10.0 * found.t, atol=1e-9)
+
+
+def test_a_line_ends_with_its_advance():
+    """Another input that jumps on the way, as the speed of a motion too, leaves it alone; so does no state."""
+    m = disc()
+    other = m.body("other", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    m.rotation("turn", m.revolute("axle", other, m.ground), m.input("rate", "rad/s"), level="velocity")
+    sim = gm.Simulator(m, 2.0, tol=1e-9)
+    sim.control("v", lambda t, s: t, 0.03)
+    sim.control("rate", lambda t, s: t, 0.07)
+    sim.set("u", 10.0, hold=1)
+    sim.advance(0.5)
+    assert sim.get("angular_velocity", "disc")[2] == pytest.approx(1.25, abs=1e-6)
+    sim.advance(1.0)
+    assert sim.get("angular_velocity", "disc")[2] == pytest.approx(3.75, abs=1e-6)
+    sim = gm.Simulator(disc(), 2.0)
+    sim.control("v", lambda t, s: s.state().t, 0.03)
+    sim.set("u", 10.0, hold=1)
+    with pytest.raises(ModelError, match=says("u", "on its way", "advance")):
+        sim.advance(0.5)
+
+
+def test_a_state_of_a_solution_has_the_inputs_of_its_time():
+    sim = gm.Simulator(disc(), 3.0, tol=1e-9)
+    sim.advance(0.5)
+    sim.set("u", 4.0)
+    sim.advance(1.0)
+    state = sim.solution().state_at(1.0)
+    on = disc().simulate(2.0, t_eval=[1.0, 2.0], initial=state, tol=1e-9)
+    np.testing.assert_allclose(on.angular_velocity("disc")[:, 2], [1.0, 3.0], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(on.input("u"), [4.0, 4.0])
+    assert gm.Simulator(disc(), 3.0, initial=state).get("input", "u") == 4.0
+    led = disc().simulate(0.5, t_eval=[0.0, 0.2, 0.4, 0.5], inputs={"u": ([0.0, 0.3], [2.0, 5.0])}, tol=1e-9)
+    for t, value in ((0.2, 2.0), (0.4, 5.0)):
+        on = disc().simulate(0.6, t_eval=[t, 0.6], initial=led.state_at(t))
+        np.testing.assert_array_equal(on.input("u"), [value, value])
+        assert disc().linearize(["u"], [("angular_velocity", "disc", "z")], at=led, t=t).point.inputs == [value]
+
+
+def test_a_line_ends_where_a_state_was_taken(tmp_path):
+    """Held at 10 from 0.5 s on in each continuation: w(1) = 1.25 + 2.5."""
+    sim = gm.Simulator(disc(), 2.0, tol=1e-9)
+    sim.set("u", 10.0, hold=1)
+    sim.advance(0.5)
+    state = sim.state()
+    other = gm.Simulator(disc(), 2.0, tol=1e-9, initial=gm.State.load(state.save(tmp_path / "s.npz")))
+    ends = [disc().simulate(1.0, t_eval=[0.5, 1.0], initial=state, tol=1e-9)]
+    for one in (sim, other):
+        one.advance(1.0)
+        ends.append(one.solution())
+    ends.append(disc().simulate(1.0, t_eval=[0.5, 1.0], initial=sim.solution().state_at(0.5), tol=1e-9))
+    sim.restore(state)
+    sim.advance(1.0)
+    for end in [*ends, sim.solution()]:
+        assert end.input("u")[-1] == pytest.approx(10.0, abs=1e-12)
+        assert spin(end) == pytest.approx(3.75, abs=1e-6)
+
+
+def test_an_angle_that_was_led_stays_where_a_state_was_taken():
+    sim = gm.Simulator(driven("displacement"), 1.0, tol=1e-8)
+    sim.set("given", 0.5, hold=1)
+    sim.advance(0.1)
+    on = driven("displacement").simulate(0.2, t_eval=[0.1, 0.2], initial=sim.state(), tol=1e-8)
+    assert on.success
+    assert on.joint_angle("pin a")[-1] == pytest.approx(0.5, abs=1e-7)
+    assert on.angular_velocity("a")[-1, 2] == pytest.approx(0.0, abs=1e-6)

@@ -251,6 +251,14 @@ def simulate(
     if initial is not None:
         options |= {"history": history} if (history := initial.history_for(problem, name)) else {}
         problem = initial.problem(problem)
+        # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there
+        led = {name: number for name, number in problem.numbers.items() if number.slope(problem.rdata) != 0.0}
+        for number in led.values():
+            number.write(problem.rdata, initial.t, number.value(problem.rdata, initial.t))
+        if led:
+            options.pop("history", None)
+        if any(number.prescribes for number in led.values()):
+            options["check_start"] = False
     if stops:
         if lump or not INTEGRATORS[name].can("event_action"):
             able = any_of(those_that("event_action"))

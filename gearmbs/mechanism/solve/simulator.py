@@ -195,8 +195,8 @@ class Simulator(OwnAttributes):
         held = (self._cells, np.empty((0, self._cells.size)))
         empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "", held=held)
         now = self._run.state.rdata[self._cells]
-        self._led = {name for name, own in self._own.items() if own.slope(now) != 0.0}
-        """Inputs on a line."""
+        self._led = {name: problem.t0 for name, own in self._own.items() if own.slope(now) != 0.0}
+        """Inputs on a line, and when it ends: of a state where the state is."""
         self._row = Solution(self._system, problem, empty, self._members)
         self._row.inside = just_inside(np.array([problem.t0, self.t_end]))
         self._row.share(1)
@@ -230,7 +230,7 @@ class Simulator(OwnAttributes):
         t = float(t)
         while self.t < t:
             end = self._sample(t) if self._controls else t
-            self._apply(end)
+            self._apply(t)
             self._go_to(end, record and end == t)
 
     def _time(self, t: Any) -> float:
@@ -328,8 +328,9 @@ class Simulator(OwnAttributes):
             For a value that an input is led to: its way begins with the next advance.
         """
         led = [name for name, (_, hold) in self._set.items() if hold]
+        led += [name for name, end in self._led.items() if end > self.t and name not in self._set]
         if led:
-            raise ModelError(f"state: {led[0]!r} is on its way from the next advance on; take the state before set")
+            raise ModelError(f"state: {led[0]!r} is on its way to a value; take the state before set, or after advance")
         if self._set:
             self._apply(self.t)
 
@@ -399,7 +400,7 @@ class Simulator(OwnAttributes):
             return
         t, y, yp, *_ = self._point
         before = self._run.state.rdata[self._cells].tolist()
-        led = [name for name in self._led if name not in self._set]
+        led = [name for name, last in self._led.items() if name not in self._set and last <= t]
         after, changed = before.copy(), []
         for name in (*self._set, *led):
             own = self._own[name]
@@ -412,7 +413,9 @@ class Simulator(OwnAttributes):
             if slope != slope_before or (not hold and value != now):
                 own.write(after, t, now if hold else value, slope)
                 changed.append((self.numbers[name], slope - slope_before))
-            (self._led.add if slope else self._led.discard)(name)
+            self._led.pop(name, None)
+            if slope:
+                self._led[name] = end
         self._set.clear()
         if not changed:
             return
@@ -430,8 +433,9 @@ class Simulator(OwnAttributes):
         t, y, yp, idata, *_ = point = self._point
         rdata = self._run.state.rdata.copy()
         rdata[self._cells] = values
-        first, points, started = (self._problem, self._origin), self._points, self._run.started
+        first, points, started, led = (self._problem, self._origin), self._points, self._run.started, self._led
         self._begin(State.of(self._base, t, y, yp, (idata, rdata)), repair=True)
+        self._led = led
         if started:
             self._problem, self._origin = first
             self._points = points
