@@ -433,7 +433,7 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         >>> disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
         >>> pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
         >>> m.torque("drive", disc, m.input("load", "N m", 4.0))
-        Torque('drive', load N m on 'disc' about z of 'drive.J')
+        Torque('drive', Input('load', 4 N m) N m on 'disc' about z of 'drive.J')
         """
         made = make_input(name, unit, value)
         self._check_number(name, "input")
@@ -472,7 +472,7 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         >>> pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
         >>> m.output("speed", ("angular_velocity", "disc", "z"))
         Output('speed', ('angular_velocity', 'disc', 'z'))
-        >>> float(m.simulate(1.0).output("speed")[-1])
+        >>> round(float(m.simulate(1.0).output("speed")[-1]), 6)
         3.0
         """
         made = make_output(name, what)

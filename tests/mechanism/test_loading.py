@@ -31,7 +31,7 @@ def loaded(more: str = "") -> set[str]:
 
 def families(names: set[str]) -> set[str]:
     """Return the modules with kernels of force elements, contacts and expressions."""
-    evaluated = {"gearmbs.dae.equations.expressions.evaluate", "gearmbs.dae.equations.expressions.splines"}
+    evaluated = {"gearmbs.dae.equations.expressions.evaluate", "gearmbs.dae.equations.expressions.spline_value"}
     return {n for n in names if n.endswith("_kernel") or n.startswith(("gearmbs.contact", "gearmbs.gears"))} | (
         names & evaluated
     )
@@ -49,5 +49,5 @@ def test_a_mechanism_loads_what_it_has():
     load = 'm.load("l", rod.marker(), m.ground.marker(name="base"), fx="TIME")'
     assert families(loaded(load)) == {
         "gearmbs.dae.equations.expressions.evaluate",
-        "gearmbs.dae.equations.expressions.splines",
+        "gearmbs.dae.equations.expressions.spline_value",
     }

@@ -552,6 +552,13 @@ def follow(functions, orders, nodes, rows, seen, last, idata, rdata, work):
 
     What it keeps in ``rdata``, as turns that are counted, is then as it was in the run. The other parameters are those
     of `settle_on_steps`, the integer table that of these steps.
+
+    Parameters
+    ----------
+    orders, nodes, rows
+        Order, time and unknowns of each stored step, shapes (m,), (m,) and (m, n).
+    seen, last : int
+        Rows the hook has looked at, and is to look at.
     """
     point, table = np.empty((1, rows.shape[1])), np.empty_like(idata)
     for r in range(seen + 1, last + 1):

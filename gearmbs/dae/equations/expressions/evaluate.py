@@ -26,7 +26,7 @@ from gearmbs.dae.equations.expressions.measures import (
 )
 from gearmbs.dae.equations.expressions.opcodes import KIN_V, KIN_W
 from gearmbs.dae.equations.expressions.scalar import binary, unary, unwrap_angle
-from gearmbs.dae.equations.expressions.splines import spline_value
+from gearmbs.dae.equations.expressions.spline_value import spline_value
 from gearmbs.kernels.jit import njit
 
 TABLES = "int64[::1], float64[::1]"

@@ -13,7 +13,7 @@ import numpy as np
 
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.scalar import binary, unary
-from gearmbs.dae.equations.expressions.splines import spline_value
+from gearmbs.dae.equations.expressions.spline_value import spline_value
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import call_address
 

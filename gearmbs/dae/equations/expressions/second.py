@@ -14,7 +14,7 @@ from gearmbs.dae.equations.expressions.integrals import external, integral
 from gearmbs.dae.equations.expressions.measure_hessians import leaf_gradient, leaf_hessian, leaf_jacobians
 from gearmbs.dae.equations.expressions.measures import LEAF_WORK
 from gearmbs.dae.equations.expressions.scalar import binary, unary
-from gearmbs.dae.equations.expressions.splines import spline_value
+from gearmbs.dae.equations.expressions.spline_value import spline_value
 from gearmbs.kernels.jit import njit
 
 JACOBIAN_AT = LEAF_WORK + 6

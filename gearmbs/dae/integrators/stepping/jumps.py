@@ -124,7 +124,21 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, leads, follows,
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _follow(st, plan, factors, t, b, d, g, terms, integrated):
-    """Add the answer to a jump ``b`` of the equations, or to one of its rate, to the past and the point at ``t``."""
+    """Add the answer to a jump ``b`` of the equations, or to one of its rate, to the past and the point at ``t``.
+
+    Parameters
+    ----------
+    st, plan, factors
+        State of the run, and plan and factors of its matrix.
+    b : ndarray, shape (n,)
+        The jump of the residual.
+    d, g : ndarray, shapes (n,) and (terms, n)
+        Scratch: the answer, and the terms of its series.
+    terms : int
+        Terms of the Laguerre series.
+    integrated : int
+        Whether the jump is one of the rate.
+    """
     n = st.y.shape[0]
     gamma = st.gamma_factored
     times, rows = times_from(st, 0), rows_from(st, 0)

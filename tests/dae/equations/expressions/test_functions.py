@@ -9,7 +9,8 @@ import pytest
 from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from gearmbs.dae.equations.expressions import ExpressionError, SplineData
-from gearmbs.dae.equations.expressions.splines import spline_table, spline_value
+from gearmbs.dae.equations.expressions.spline_value import spline_value
+from gearmbs.dae.equations.expressions.splines import spline_table
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Scope, Units
 from tests.says import says
