@@ -82,7 +82,7 @@ def run_deck(
     if script.unsupported and not allow_unsupported:
         raise DeckError(script.unsupported)
     result = AdamsResult(deck, script)
-    session = Session.of(deck)
+    session = Session.of(deck, routines)
     session.redundancy, session.check = redundancy, check
     session.tol, session.allow_unsupported, session.progress = tol, allow_unsupported, progress
     with _errors_recorded(result, session, out):
@@ -128,7 +128,7 @@ def _errors_recorded(result: AdamsResult, session: Session, out: str | Path | No
 def _without_unasked(result: AdamsResult, session: Session) -> None:
     """Check the script before anything is run; leave out the REQUESTs of what is left out."""
     deck = result.deck
-    unasked = check_script(deck, result.script, session.allow_unsupported)
+    unasked = check_script(deck, result.script, session.allow_unsupported, session.routines)
     if unasked:
         requests = {n: request for n, request in deck.of(st.Request).items() if n not in unasked}
         result.deck = replace(deck, items={**deck.items, st.Request: requests})

@@ -7,7 +7,7 @@ script without computing anything.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.flexible import SHARE, modal_ratios
 from gearmbs.adams.builders.mechanism import build_model
+from gearmbs.adams.builders.routines import bound, calls_routine
 from gearmbs.adams.builders.scopes import IN_DYNAMICS, BodyState, deck_scope, markers_of, translated
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -80,6 +81,8 @@ class Session:
         Whether somebody interrupted such a second solution: the run is to end where the first has.
     unasked : set of int
         REQUESTs that are left out with what they ask for, by id.
+    routines : mapping or None
+        For USER(...) in commands, as in :func:`gearmbs.adams.run_deck`.
     """
 
     deck: Deck
@@ -98,11 +101,12 @@ class Session:
     check: bool | None = None
     interrupted: bool = False
     unasked: set[int] = field(default_factory=set)
+    routines: Mapping[str, Any] | None = None
 
     @classmethod
-    def of(cls, deck: Deck) -> Session:
+    def of(cls, deck: Deck, routines: Mapping[str, Any] | None = None) -> Session:
         """Return the start of a session; what it changes leaves ``deck`` as it is."""
-        return cls(replace(deck, items={kind: dict(group) for kind, group in deck.items.items()}))
+        return cls(replace(deck, items={kind: dict(group) for kind, group in deck.items.items()}), routines=routines)
 
 
 def active_sensors(session: Session) -> list[st.Sensor]:
@@ -151,13 +155,11 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
     assert new is not None
     if (new.keyword, new.id) in session.deck.left_out:
         return
-    functions = [message for _, message in refused_functions(new, tuple(new.given))]
-    if functions and not allow_unsupported:
-        raise DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line) for message in functions])
-    if functions:
-        for message in functions:
-            _remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
-        return
+    called = calls_routine(new)
+    if not called:
+        functions = [message for _, message in refused_functions(new, tuple(new.given))]
+        if _left_out(session, command, functions, allow_unsupported):
+            return
     late = {name for name in new.given if specs_of(type(new))[name].start}
     if late and session.state is not None and not allow_unsupported:
         what = ", ".join(sorted(name.upper() for name in late))
@@ -165,7 +167,7 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
             command,
             f"{new.label()}: {what} after the first analysis; the mechanism goes on from where it is",
         )
-    refused = refused_arguments(new)
+    refused = [] if called else refused_arguments(new)
     if refused and not allow_unsupported:
         raise unsupported(command, f"{new.label()}: {', '.join(refused).upper()} is not supported")
     group = session.deck.items.setdefault(type(new), {})
@@ -180,15 +182,35 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
     session.deck.__dict__.pop("units", None)
     trial = replace(session.deck, diagnostics=[])
     wrong = check(trial)
-    if wrong:
+    missing: list[str] = []
+    if called and not wrong:
+        try:
+            made = bound(replace(trial, diagnostics=[]), session.routines)
+            session.deck.functions = made.functions
+            group[new.id] = made.of(type(new))[new.id]
+        except DeckError as error:
+            wrong = [d for d in error.diagnostics if d.severity == ERROR]
+            missing = [d.message for d in error.diagnostics if d.severity == UNSUPPORTED]
+    if wrong or missing:
         # the deck stays as it was
         if old is None:
             del group[new.id]
         else:
             group[new.id] = old
         session.deck.__dict__.pop("units", None)
+        if _left_out(session, command, missing, allow_unsupported) and not wrong:
+            return
         raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
     session.places.update({(type(new), new.id, name): (command.file, line) for name, line in new.given.items()})
+
+
+def _left_out(session: Session, command: Change, messages: list[str], allow_unsupported: bool) -> bool:
+    """Remark that a command is left out if there is a reason, or refuse it; return whether it is left out."""
+    if messages and not allow_unsupported:
+        raise DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line) for message in messages])
+    for message in messages:
+        _remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
+    return bool(messages)
 
 
 def _remark(session: Session, remark: Diagnostic) -> None:
@@ -346,7 +368,9 @@ def _misplaced(statement: st.Statement, text: str, tape: Tape) -> str:
     return ""
 
 
-def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) -> set[int]:
+def check_script(
+    deck: Deck, script: Script, allow_unsupported: bool = False, routines: Mapping[str, Any] | None = None
+) -> set[int]:
     """Check everything about a script that is known before it is run.
 
     The elements it switches and changes must be there, its times must go on, the mechanism of the first analysis must
@@ -359,6 +383,8 @@ def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) ->
     script : Script
     allow_unsupported : bool
         Whether what is not supported is left out.
+    routines : mapping, optional
+        For USER(...) in commands.
 
     Returns
     -------
@@ -372,7 +398,7 @@ def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) ->
     """
     unasked: set[int] = set()
     for model_errors in (_errors_of_expressions, _errors_of_model):
-        session = Session.of(deck)
+        session = Session.of(deck, routines)
         errors = _gone_through(session, script, allow_unsupported, model_errors)
         if not allow_unsupported:
             errors += deck.unsupported

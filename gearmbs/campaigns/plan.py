@@ -143,21 +143,7 @@ class Plan:
             return 0.5 + 0.5 * designs.box_behnken(d, int(o.get("centre", 1)))
         if self.design == "list":
             return np.zeros((len(o["rows"]), 0))
-        return self._dealt(designs.sequence(self.design, n, d, self.seed))
-
-    def _dealt(self, u: np.ndarray) -> np.ndarray:
-        """Return the points with specimens dealt out in rounds, so that each of them is met once a round.
-
-        A coordinate of a sequence meets some of few specimens several times and others never.
-        """
-        at = 0
-        for factor in self.factors:
-            if isinstance(factor, Specimens):
-                rounds = range(-(-len(u) // factor.draws))
-                order = [np.random.default_rng([factor.seed, self.seed, k]).permutation(factor.draws) for k in rounds]
-                u[:, at] = (np.concatenate(order)[: len(u)] + 0.5) / factor.draws
-            at += factor.width
-        return u
+        return designs.sequence(self.design, n, d, self.seed)
 
     def count(self, factor: AnyFactor) -> int:
         """Return how many values of a factor a grid takes."""

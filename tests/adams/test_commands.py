@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from typer.testing import CliRunner
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Simulate, Stop, Switch, apply_change
+from gearmbs.cli import app
 from tests.says import says
 
 from .decks import PENDULUM, SCRIPT
@@ -61,3 +63,40 @@ def test_messages(text, message):
 def test_unsupported_commands_are_named():
     script = parse_script("m\no\nsave/file=x\nstop")
     assert [str(d) for d in script.unsupported] == ["<script>:3: unsupported: SAVE is not supported"]
+
+
+OUTSIDE = ["../x", "a/../../x", "/elsewhere/x", "C:\\temp\\x", "..\\x", ".", "..", "link/x"]
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+@pytest.mark.parametrize("text", ["m\n{}\nstop", "m\no\nfile/output_prefix={}\nstop"])
+def test_a_script_writes_outside_the_folder_of_the_deck_only_if_told(tmp_path, name, text):
+    """Also through a link; what lies inside or below, in either system's spelling, is written."""
+    folder = tmp_path / "deck"
+    folder.mkdir()
+    (folder / "link").symlink_to(tmp_path)
+    with pytest.raises(DeckError, match=says(name, "model.adm", "--out")) as caught:
+        parse_script(text.format(name)).output(folder / "model.adm")
+    assert caught.value.diagnostics[0].line in (2, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "place"), [("x", "x"), ("below\\x", "below/x"), ("a/../x", "a/../x"), ("..x", "..x"), ("", "model")]
+)
+def test_a_script_names_results_beside_the_deck_and_below(tmp_path, name, place):
+    assert parse_script(f"m\n{name}\nstop").output(tmp_path / "model.adm") == tmp_path / place
+
+
+@pytest.mark.slow
+def test_nothing_is_run_or_written_elsewhere_on_the_command_line(tmp_path):
+    folder = tmp_path / "deck"
+    folder.mkdir()
+    (folder / "model.adm").write_text(PENDULUM)
+    (folder / "model.acf").write_text("model\n../../x\nsimulate/dynamics, end=0.01, steps=1\nstop\n")
+    arguments = ["adams", str(folder / "model.adm"), str(folder / "model.acf")]
+    refused = CliRunner().invoke(app, arguments)
+    assert refused.exit_code
+    assert "--out" in refused.output
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["deck", "model.acf", "model.adm"]
+    assert not CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "x")]).exit_code
+    assert (tmp_path / "x.req").exists()

@@ -50,6 +50,7 @@ EXPECTED = PULLED.format(WRITTEN)
         ("USER(0.3, 0.01, 2)", "sfosub"),
         ("USER(0.3, 0.01, 2)", "SFORCE/1"),
         ("USER(0.3, 1E-2, 2)\\ROUTINE=library::PULL", "pull"),
+        ("USER(0.3, 1E-2, 2)\\ROUTINE=..\\bin\\library::PULL", "pull"),
     ],
 )
 def test_a_force_by_a_routine_is_that_of_the_expression(force, name):
@@ -301,3 +302,33 @@ END
     assert run.success
     acceleration = 1.0 / 1.25
     assert run.segments[1].solution.com_velocity("PART_2")[-1, 2] == pytest.approx(0.1 * acceleration, rel=1e-6)
+
+
+TWO = "m\no\nSIM/DYN, END=0.5, STEPS=5\nSFORCE/1, FUNCTION={}\nREQUEST/2, FUNCTION=USER({})\nSIM/DYN, END=1, STEPS=5\n"
+
+
+def asked(call):
+    return [call.parameters[0] * call.sysfnc("DX", 20, 1)] + [0.0] * 7
+
+
+def test_a_command_gives_a_routine_other_parameters():
+    """The first analysis is not to be seen with those of the second: commands are gone through before the run."""
+    force = PULLED + "\nREQUEST/2, FUNCTION=USER(1)"
+    routines = {"sfosub": pull, "reqsub": asked}
+    found = run(force.format("USER(0.3, 0.01, 2)"), routines, TWO.format("USER(0.6, 0.02, 3)", 3))
+    doubled = "-0.6*DX(20,1,1) - 0.02*VX(20,1,1) + 3*SIN(5*TIME)"
+    expected = run(force.format(WRITTEN), routines, TWO.format(doubled, 3))
+    np.testing.assert_allclose(found.request(1)[:, 1:3], expected.request(1)[:, 1:3], atol=2e-6)
+    factors = found.request(2)[:, 0] / found.request(1)[:, 1]
+    np.testing.assert_allclose(factors, [1.0] * 6 + [3.0] * 6, rtol=1e-12)
+
+
+def test_a_command_whose_routine_is_missing_is_refused_or_left_out():
+    force, script = PULLED.format(WRITTEN), TWO.format("USER(1)", 1).replace("REQUEST/2, FUNCTION=USER(1)\n", "")
+    with pytest.raises(DeckError, match=says("SFORCE/1", "routine", "SFOSUB")) as caught:
+        run(force, None, script)
+    assert caught.value.diagnostics[0].line == 4
+    found = run(force, None, script, allow_unsupported=True)
+    assert found.success
+    assert any("SFOSUB" in str(m) and "left out" in str(m) for m in found.messages)
+    np.testing.assert_allclose(found.request(1)[-1, 1:3], run(force).request(1)[-1, 1:3], atol=2e-6)

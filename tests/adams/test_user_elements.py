@@ -9,6 +9,7 @@ import pytest
 from numba import njit
 
 from gearmbs.adams import DeckError, load_routines, parse_deck, parse_script, run_deck
+from gearmbs.adams.parse.statements import String
 from tests.says import says
 
 HEAD = "routines\nUNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND\nPART/1, GROUND\nMARKER/1, PART=1\n"
@@ -275,6 +276,15 @@ def test_arrays_and_texts_are_handed_to_routines():
     found = run(text.format("USER(1)"), {"sfosub": force}).request(1)
     expected = run(text.format("-30*(DX(20,1)-0.05)")).request(1)
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text", ["..\\wind\\Test14_AD.ipt", "C:\\a b\\PLANAR\\", "", "ES10.3E2, a = b, ROUTINE=c", "'quoted'", "x: (1, 2"]
+)
+def test_a_string_holds_all_that_follows(text):
+    """Paths with backslashes, commas and signs of equality, and nothing at all."""
+    deck = parse_deck(f"{HEAD}{CART}STRING/4, STRING = {text}\nSTRING/5, STRING=next\nEND\n")
+    assert [deck.items[String][n].text for n in (4, 5)] == [text.strip("'"), "next"]
 
 
 MANY = CART + LOOP + GSE + (

@@ -296,6 +296,11 @@ def _uses(s: st.Statement) -> Iterator[_Use]:
             yield _Use(s, call, EVALUATED, ("evaluate",), s.evaluate_routine)
 
 
+def calls_routine(statement: st.Statement) -> bool:
+    """Whether a statement, or a command that changes one, calls a routine of the user."""
+    return any(True for _ in _uses(statement))
+
+
 def _user_call(text: str | None) -> Call | None:
     if not isinstance(text, str):
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -133,13 +133,16 @@ class Script:
     model : str
         Name of the deck in the first line or in FILE, "" when there is none.
     prefix : str
-        Name of the output files.
+        Name of the output files, relative to the folder of the deck.
+    prefix_line : int
+        Where the script gives it.
     commands : list of Command
     diagnostics : list of Diagnostic
     """
 
     model: str = ""
     prefix: str = ""
+    prefix_line: int = 0
     file: str = "<script>"
     commands: list[Command] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
@@ -148,9 +151,24 @@ class Script:
         return iter(self.commands)
 
     def output(self, model: str | Path) -> Path:
-        """Return the prefix of the output files: the script's own beside the model, else the model's name."""
+        """Return the prefix of the output files: the script's own in the model's folder, else the model's name.
+
+        Raises
+        ------
+        DeckError
+            If the script's own is not inside that folder: a file from elsewhere is not to choose what it overwrites.
+        """
         model = Path(model)
-        return model.parent / self.prefix if self.prefix else model.with_suffix("")
+        if not self.prefix:
+            return model.with_suffix("")
+        path = model.parent / self.prefix.replace("\\", "/")
+        if PureWindowsPath(self.prefix).drive or model.parent.resolve() not in path.resolve().parents:
+            message = (
+                f"results would go to {self.prefix[:80]!r}, which is not in the folder of {model.name}; if that is "
+                f"meant, say so with --out {self.prefix[:80]}"
+            )
+            raise DeckError([Diagnostic(ERROR, message, self.file, self.prefix_line)])
+        return path
 
     @property
     def unsupported(self) -> list[Diagnostic]:
@@ -191,7 +209,7 @@ def parse_script(text: str, file: str = "<script>", depth: int = 0) -> Script:
         if body and skip == 0:
             script.model = body
         elif body:
-            script.prefix = body
+            script.prefix, script.prefix_line = body, 2
         skip += 1
     for raw in statements(text, skip=skip):
         command = _read(script, raw, errors)
@@ -202,7 +220,8 @@ def parse_script(text: str, file: str = "<script>", depth: int = 0) -> Script:
                     message = "FILE: USERS has no effect here: there are no compiled subroutines to load"
                     script.diagnostics.append(Diagnostic(IGNORED, message, script.file, command.line))
                 script.model = command.model or script.model
-                script.prefix = command.output_prefix or script.prefix
+                if command.output_prefix:
+                    script.prefix, script.prefix_line = command.output_prefix, command.line
                 if command.command is not None:
                     _include(script, command, errors, depth)
             if any(isinstance(c, Stop) for c in script.commands[-1:]):

@@ -12,6 +12,7 @@ from gearmbs.adams.parse.grammar import (
     ID,
     IDS,
     INT,
+    LINE,
     PATH,
     REAL,
     REALS,
@@ -380,7 +381,7 @@ class Sensor(Statement, read_by="SENVAL", subroutine="SENSUB", switch="acts"):
 class String(Statement):
     """STRING: a text, which routines of a user may ask for."""
 
-    text: str | None = arg("STRING", TEXT)
+    text: str | None = arg("STRING", LINE)
 
 
 # Statements of a deck as typed records: flexible bodies.

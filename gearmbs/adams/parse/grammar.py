@@ -20,8 +20,8 @@ from gearmbs.wording import did_you_mean
 
 CONTINUED = "\x01"
 
-REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE, PATH = range(14)
-"""Kinds of arguments; a PATH is a text in which a backslash is part of the name."""
+REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE, PATH, LINE = range(15)
+"""Kinds of arguments; a PATH is a text in which a backslash is part of the name, a LINE all of the statement's rest."""
 
 _KEY = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*(=)?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?\Z")
@@ -344,6 +344,9 @@ class ArgumentReader:
         start, depth = self.at, 0
         quote = ""
         at = start
+        if spec.kind == LINE:
+            self.at = n
+            return text[start:]
         nested = spec.kind not in (TEXT, STRINGS, PATH)
         while at < n:
             ch = text[at]
@@ -356,7 +359,8 @@ class ArgumentReader:
             elif nested and ch == ")":
                 depth -= 1
             elif depth <= 0 and ch == "\\" and spec.kind != PATH:
-                break
+                if spec.kind != TEXT or self._argument_follows(at + 1):
+                    break
             elif depth <= 0 and ch in _SEPARATORS and self._argument_follows(at + 1):
                 break
             at += 1
@@ -381,7 +385,7 @@ class ArgumentReader:
         return not rest or rest[0] in _SEPARATORS + "\\"
 
     def _store(self, name: str, spec: Spec, raw: str, start: int, value_at: int) -> None:
-        if not raw.strip(" " + _SEPARATORS):
+        if spec.kind != LINE and not raw.strip(" " + _SEPARATORS):
             raise StatementError(f"{spec.keyword} has no value", start)
         try:
             value = convert(spec, raw)
@@ -444,22 +448,18 @@ def joined_expression(raw: str) -> str:
     Inside brackets a continuation comma stands for a comma only where two operands would otherwise
     meet; everywhere else it just marks the new line.
     """
-    out = ""
+    out: list[str] = []
     depth = 0
-    for part in re.split(f"({CONTINUED})", raw):
-        if part != CONTINUED:
-            depth += part.count("(") - part.count(")")
-            if out and out[-1] == CONTINUED:
-                left, right = out[:-1].rstrip(), part.lstrip()
-                before = "".join(left[-1:])
-                meets = bool(re.match(r"[A-Za-z0-9_.)]", before)) and bool(re.match(r"[A-Za-z0-9_.(]", right))
-                inside = depth - part.count("(") + part.count(")") > 0
-                out = left + (", " if meets and inside else " ") + right
-            else:
-                out += part
-        elif not out.endswith(CONTINUED):
-            out += part
-    return " ".join(out.replace(CONTINUED, " ").split())
+    for line in raw.split(CONTINUED):
+        line = line.strip()
+        if not line:
+            continue
+        if out:
+            meets = re.match(r"[A-Za-z0-9_.)]", out[-1][-1]) and re.match(r"[A-Za-z0-9_.(]", line)
+            out.append(", " if meets and depth > 0 else " ")
+        out.append(line)
+        depth += line.count("(") - line.count(")")
+    return " ".join("".join(out).split())
 
 
 def _unquoted(text: str) -> str:
@@ -495,7 +495,7 @@ def convert(spec: Spec, raw: str) -> Any:
         text = joined_expression(raw)
         parse(text)
         return text
-    if kind in (TEXT, PATH):
+    if kind in (TEXT, PATH, LINE):
         return _unquoted(" ".join(raw.replace(CONTINUED, ",").split()))
     if kind == STRINGS:
         return tuple(_unquoted(p) for p in _outside_quotes(" ".join(raw.replace(CONTINUED, ",").split())))

@@ -460,7 +460,7 @@ class Matrix(Statement, changeable=False):
     rows: int | None = arg("ROWS", INT, required=True)
     columns: int | None = arg("COLUMNS", INT, required=True)
     values: Vector = arg("VALUES", REALS, (), count=(1, 1000000), required=True)
-    data_file: str | None = arg("FILE", TEXT)
+    data_file: str | None = arg("FILE", PATH)
     matrix_name: str | None = arg("NAME", TEXT)
 
 

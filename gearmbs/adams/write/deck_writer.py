@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,7 +32,19 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.contacts import SolidContact
 from gearmbs.mechanism.language.library import ELEMENT_FORCES
-from gearmbs.mechanism.language.syntax import Call, Name, Node, Number, parse, shown, unparse
+from gearmbs.mechanism.language.syntax import (
+    Call,
+    Name,
+    Node,
+    Number,
+    Steps,
+    children,
+    parse,
+    shown,
+    unparse,
+    unrolled,
+    with_children,
+)
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.parts.point_mass import PointMass
@@ -188,19 +200,18 @@ class DeckNames:
             call = replace(call, args=tuple(self._argument(call, k, a) for k, a in enumerate(call.args)))
             return self._element_call(call) if call.name in ELEMENT_FORCES else call
 
-        return unparse(self._with_variables(parse(text)), rename)
+        return unparse(unrolled(self._with_variables(parse(text))), rename)
 
-    def _with_variables(self, node: Any) -> Any:
+    def _with_variables(self, node: Node) -> Steps[Node]:
         """Let the names of inputs and parameters be the values of variables that stand for them."""
         if isinstance(node, Name) and node.text in self.numbers and node.text not in self.marker_names:
             return Call("VARVAL", (node,), node.at)
         if isinstance(node, Call) and node.name == "VARVAL":
             return node
-        if isinstance(node, tuple):
-            return tuple(self._with_variables(part) for part in node)
-        if isinstance(node, Node):
-            return replace(node, **{f.name: self._with_variables(getattr(node, f.name)) for f in fields(node)})
-        return node
+        parts = []
+        for part in children(node):
+            parts.append((yield self._with_variables(part)))
+        return with_children(node, parts)
 
     def _argument(self, call: Call, position: int, arg: Node) -> Node:
         """Replace the name of a marker or data element by its id."""

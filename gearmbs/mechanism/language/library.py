@@ -21,6 +21,7 @@ from gearmbs.mechanism.language.syntax import (
     Power,
     Ref,
     Scope,
+    innermost_first,
     parse,
     shown,
 )
@@ -75,6 +76,7 @@ class Lowering:
         self.functions = functions
         self._open: list[tuple[str, Ref]] = []
         self._inlined: dict[tuple[str, Ref], int] = {}
+        self._made: dict[int, int] = {}
 
     def fail(self, message: str, at: int) -> NoReturn:
         """Raise an ExpressionError that shows the place."""
@@ -82,8 +84,21 @@ class Lowering:
 
     # syntax tree -> registers
 
+    def whole(self, root: Node) -> int:
+        """Return the register of a whole tree: its functions and operations from the innermost out, in a loop."""
+        outer, self._made = self._made, {}
+        for part in innermost_first(root):
+            if not isinstance(part, (Number, Name)):
+                self._made[id(part)] = self._written(part)
+        register = self.node(root)
+        self._made = outer
+        return register
+
     def node(self, node: Node) -> int:
-        """Return the register of a subtree."""
+        """Return the register of a node, the parts of which have theirs."""
+        return self._made[id(node)] if id(node) in self._made else self._written(node)
+
+    def _written(self, node: Node) -> int:
         if isinstance(node, Number):
             return self.builder.constant(node.value)
         if isinstance(node, Name):
@@ -221,7 +236,7 @@ class Lowering:
             self.fail(f"{kind.upper()} expressions refer to each other more than 50 deep", at)
         self._open.append(key)
         outer, self.text = self.text, text
-        self._inlined[key] = self.node(parse(text))
+        self._inlined[key] = self.whole(parse(text))
         self.text = outer
         self._open.pop()
         return self._inlined[key]
@@ -686,7 +701,7 @@ def compile_expression(
     """
     builder = TapeBuilder(scope.marker_body, outline)
     lowering = Lowering(builder, scope, text, FUNCTIONS)
-    result = lowering.node(parse(text))
+    result = lowering.whole(parse(text))
     result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)
     tape = builder.finish(result, text)
     if tape.level == op.LEVEL_ACCELERATION and not accelerations:

@@ -8,15 +8,13 @@ ninety degrees.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any, TypeVar
 
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError
 from gearmbs.dae.equations.expressions.splines import SplineData
-
-MAX_DEPTH = 100
-"""Deepest nesting of brackets, functions and signs."""
 
 Ref = int | str
 """An ADAMS id or a name."""
@@ -208,6 +206,26 @@ _EXPONENT = re.compile(r"[+-]\d+(?![\d.A-Za-z_])")
 """What may be an exponent behind a D: a signed integer that does not go on as a number or name."""
 
 
+T = TypeVar("T")
+Steps = Generator["Steps[T]", T, T]
+"""What yields others of its kind, is sent what they return, and returns as much itself."""
+Rule = Steps[Node]
+
+
+def unrolled(steps: Steps[T]) -> T:
+    """Return what nested steps return: a recursion as a loop, as deep as memory allows."""
+    open_ones = [steps]
+    found: Any = None
+    while open_ones:
+        try:
+            open_ones.append(open_ones[-1].send(found))
+            found = None
+        except StopIteration as end:
+            open_ones.pop()
+            found = end.value
+    return found
+
+
 class _Parser:
     def __init__(self, text: str) -> None:
         self.text = text
@@ -233,7 +251,6 @@ class _Parser:
             at = match.end()
         self.tokens.append(("end", "", len(text), False))
         self.next = 0
-        self.depth = 0
 
     def error(self, message: str, at: int) -> ExpressionError:
         return ExpressionError(f"{message} at column {at + 1} of {shown(self.text)}")
@@ -251,53 +268,43 @@ class _Parser:
             found = "the end" if kind == "end" else repr(value)
             raise self.error(f"expected {symbol!r} {where}, found {found}", at)
 
-    def enter(self, at: int) -> None:
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise self.error(f"nested deeper than {MAX_DEPTH}", at)
-
     def whole(self) -> Node:
-        node = self.sum()
+        node = unrolled(self.sum())
         kind, value, at, _ = self.tokens[self.next]
         if kind != "end":
             raise self.error(f"unexpected {value!r} after the expression", at)
         return node
 
-    def sum(self) -> Node:
+    # each rule yields the rules within it and is sent their nodes, see `unrolled`
+
+    def sum(self) -> Rule:
         return self.chain(("+", "-"), self.product)
 
-    def product(self) -> Node:
+    def product(self) -> Rule:
         return self.chain(("*", "/"), self.signed)
 
-    def chain(self, symbols: tuple[str, ...], operand) -> Node:
+    def chain(self, symbols: tuple[str, ...], operand: Callable[[], Rule]) -> Rule:
         at = self.tokens[self.next][2]
-        first = operand()
+        first = yield operand()
         rest = []
         while symbol := self.accept(*symbols):
-            rest.append((symbol, operand()))
+            rest.append((symbol, (yield operand())))
         return Chain(first, tuple(rest), at) if rest else first
 
-    def signed(self) -> Node:
+    def signed(self) -> Rule:
         at = self.tokens[self.next][2]
         sign = self.accept("+", "-")
-        if sign is None:
-            return self.power()
-        self.enter(at)
-        operand = self.signed()
-        self.depth -= 1
+        operand = yield (self.signed() if sign else self.power())
         return Negative(operand, at) if sign == "-" else operand
 
-    def power(self) -> Node:
-        base = self.atom()
+    def power(self) -> Rule:
+        base = yield self.atom()
         at = self.tokens[self.next][2]
         if self.accept("**") is None:
             return base
-        self.enter(at)
-        exponent = self.signed()
-        self.depth -= 1
-        return Power(base, exponent, at)
+        return Power(base, (yield self.signed()), at)
 
-    def atom(self) -> Node:
+    def atom(self) -> Rule:
         kind, value, at, degree = self.tokens[self.next]
         if kind == "number":
             self.next += 1
@@ -305,12 +312,10 @@ class _Parser:
         if kind == "name":
             self.next += 1
             if value[0] not in "\"'" and self.accept("(") is not None:
-                return self.call(value.upper(), at)
+                return (yield self.call(value.upper(), at))
             return Name(value.strip("\"'").upper(), at)
         if self.accept("(") is not None:
-            self.enter(at)
-            node = self.sum()
-            self.depth -= 1
+            node = yield self.sum()
             self.expect(")", "to close the bracket")
             return node
         found = "the end" if kind == "end" else repr(value)
@@ -324,15 +329,13 @@ class _Parser:
             return Number(value * 0.017453292519943295, at)
         return Number(value, at, int(text) if text.isdigit() and len(text) < 19 else None)
 
-    def call(self, name: str, at: int) -> Node:
-        self.enter(at)
+    def call(self, name: str, at: int) -> Rule:
         args: list[Node] = []
         if self.accept(")") is None:
-            args.append(self.sum())
+            args.append((yield self.sum()))
             while self.accept(",", ":") is not None:
-                args.append(self.sum())
+                args.append((yield self.sum()))
             self.expect(")", f"to close {name}")
-        self.depth -= 1
         return Call(name, tuple(args), at)
 
 
@@ -342,6 +345,7 @@ def shown(text: str) -> str:
     return repr(flat if len(flat) <= 90 else flat[:87] + "...")
 
 
+@lru_cache(maxsize=1024)
 def parse(text: str) -> Node:
     """Read a function expression into its syntax tree.
 
@@ -372,37 +376,79 @@ def unparse(node: Node, rename: Callable[[Call], Node] = lambda call: call) -> s
     rename : callable
         Given every function call before it is written; returns what to write instead.
     """
-    if isinstance(node, Number):
-        return str(node.integer) if node.integer is not None else repr(node.value)
-    if isinstance(node, Name):
-        return node.text if re.fullmatch(r"[A-Z_.$][A-Z0-9_.$]*", node.text) else f'"{node.text}"'
+    out: list[str] = []
+    unrolled(_written(node, rename, out))
+    return "".join(out)
+
+
+def _written(node: Node, rename: Callable[[Call], Node], out: list[str]) -> Steps[None]:
+    """Append the pieces of a node's text."""
+    if isinstance(node, Call):
+        call = rename(node)
+        if not isinstance(call, Call):
+            yield _written(call, rename, out)
+            return
+        node = call
+        before, between, after = f"{node.name}(", [", "] * len(node.args), ")"
+    elif isinstance(node, Negative):
+        before, between, after = "(-", [], ")"
+    elif isinstance(node, Power):
+        before, between, after = "(", [")**("], ")"
+    elif isinstance(node, Chain):
+        before, between, after = "(", [f" {symbol} " for symbol, _ in node.rest], ")"
+    elif isinstance(node, Number):
+        out.append(str(node.integer) if node.integer is not None else repr(node.value))
+        return
+    else:
+        out.append(node.text if re.fullmatch(r"[A-Z_.$][A-Z0-9_.$]*", node.text) else f'"{node.text}"')
+        return
+    out.append(before)
+    for k, child in enumerate(children(node)):
+        if k:
+            out.append(between[k - 1])
+        yield _written(child, rename, out)
+    out.append(after)
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """Return the nodes right below a node."""
     if isinstance(node, Negative):
-        return f"(-{unparse(node.operand, rename)})"
+        return (node.operand,)
     if isinstance(node, Power):
-        return f"({unparse(node.base, rename)})**({unparse(node.exponent, rename)})"
+        return (node.base, node.exponent)
     if isinstance(node, Chain):
-        rest = "".join(f" {symbol} {unparse(operand, rename)}" for symbol, operand in node.rest)
-        return f"({unparse(node.first, rename)}{rest})"
-    call = rename(node)
-    if not isinstance(call, Call):
-        return unparse(call, rename)
-    return f"{call.name}({', '.join(unparse(a, rename) for a in call.args)})"
+        return (node.first, *(operand for _, operand in node.rest))
+    return node.args if isinstance(node, Call) else ()
+
+
+def with_children(node: Node, new: Sequence[Node]) -> Node:
+    """Return a node with others in place of those right below it."""
+    if isinstance(node, Negative):
+        return replace(node, operand=new[0])
+    if isinstance(node, Power):
+        return replace(node, base=new[0], exponent=new[1])
+    if isinstance(node, Chain):
+        return replace(node, first=new[0], rest=tuple((symbol, one) for (symbol, _), one in zip(node.rest, new[1:])))
+    return replace(node, args=tuple(new)) if isinstance(node, Call) else node
 
 
 def walk(node: Node) -> Iterator[Node]:
     """Yield a syntax tree's nodes, parents first."""
-    yield node
-    children: Sequence[Node] = ()
-    if isinstance(node, Negative):
-        children = (node.operand,)
-    elif isinstance(node, Power):
-        children = (node.base, node.exponent)
-    elif isinstance(node, Chain):
-        children = (node.first, *(operand for _, operand in node.rest))
-    elif isinstance(node, Call):
-        children = node.args
-    for child in children:
-        yield from walk(child)
+    waiting = [node]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting.extend(reversed(children(node)))
+
+
+def innermost_first(node: Node) -> Iterator[Node]:
+    """Yield a syntax tree's nodes, parents last, from left to right."""
+    waiting, found = [node], []
+    while waiting:
+        node = waiting.pop()
+        found.append(node)
+        waiting.extend(children(node))
+    return reversed(found)
 
 
 __all__ = ["ExpressionError", "Scope", "SplineData", "Units", "parse", "unparse", "walk"]
