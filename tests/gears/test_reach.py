@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from gearmbs.contact.probe import KIND, ROLL_1, ROLL_2
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error
 from gearmbs.gears.tables import corner_reach
 from gearmbs.gears.transmission import GAP, SIDE, StaticMesh
@@ -17,7 +18,6 @@ from tests.generators import cases, seed
 POSITIONS = 200  # over a mesh cycle
 HALVINGS = 10  # of the spacing where the force changes most: a smooth one then changes by 2e-4 of its largest value
 STEP = 1e-3
-KIND = 5
 
 
 def pressed(mesh, angle, depth):
@@ -190,6 +190,21 @@ def test_touching_against_sampled_flanks(name):
     mesh = StaticMesh(pair)
     for phase in np.random.default_rng(seed()).uniform(0, 1, 8):
         angle = phase * 2 * math.pi / pair.driver.teeth
-        off = (mesh.touching_angle(angle) - first_touch(pair, angle)) * pair.driven.base_radius
+        touching = mesh.touching_angle(angle)
+        closer = pair.sign * (first_touch(pair, angle) - touching) * pair.driven.base_radius
+        label = f"{name} at {phase} of a pitch: {closer:.2e} m"
         # chords of the samples are off by 1e-10 m
-        assert abs(off) < 5e-9, f"{name} at {phase} of a pitch: {off:.2e} m"
+        if on_both_corners(mesh, angle, touching):
+            # sharp corners let go of each other at once, rounded edges (docs/theory/contact.md) somewhat later
+            assert -5e-9 < closer < 10e-6, label
+        else:
+            assert abs(closer) < 5e-9, label
+
+
+def on_both_corners(mesh, driver_angle, driven_angle):
+    """Whether a wheel's tip corner touches the mate behind the mate's own tip."""
+    gaps = mesh.gaps(driver_angle, driven_angle)
+    touching = gaps[abs(gaps[:, GAP]) < 1e-9]
+    tips = [gear.sign * gear.tip_roll_length for gear in (mesh.geometry.driver, mesh.geometry.driven)]
+    beyond = [touching[:, (ROLL_1, ROLL_2)[k]] > tips[k] + 1e-12 for k in range(2)]
+    return bool(np.any((touching[:, KIND] == 1) & beyond[1] | (touching[:, KIND] == 2) & beyond[0]))
