@@ -78,12 +78,12 @@ RUN = """
 class Package:
     """A small package of two modules with kernels, and a way to call them in a process of its own."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, home: Path | str | None = None) -> None:
         self.folder = folder / "smallpackage"
-        self.folder.mkdir()
+        self.folder.mkdir(parents=True)
         self.environment = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
         self.environment["PYTHONPATH"] = os.pathsep.join([str(folder), *sys.path])
-        self.environment["HOME"] = str(folder / "home")
+        self.environment["HOME"] = str(home or folder / "home")
         for name, text in (
             ("__init__", ""),
             ("numbers", "FACTOR = 2.0\nOTHER = 5.0\n"),
@@ -91,6 +91,16 @@ class Package:
             ("callers", CALLERS),
         ):
             self.write(name, textwrap.dedent(text))
+
+    @property
+    def kernels(self) -> Path:
+        """Where its kernels are kept."""
+        return self.folder.parent / "home" / ".cache" / "gearmbs" / "smallpackage"
+
+    @property
+    def beside(self) -> Path:
+        """Where they are kept if that cannot be written."""
+        return self.folder / "__pycache__" / "kernels"
 
     def write(self, name: str, text: str) -> None:
         """Write a module."""
@@ -186,7 +196,7 @@ def test_two_processes(package):
     answers = [package.answer(process) for process in together]
     assert [value for value, _ in answers] == [7.0] * 3
     assert sorted(name for _, made in answers for name in made) == ["caller", "scaled"]
-    left = {path.suffix for path in (package.folder / "__pycache__" / "kernels").iterdir()}
+    left = {path.suffix for path in package.kernels.iterdir()}
     assert left == {".entry", ".part"}
 
 
@@ -196,31 +206,40 @@ def test_named_folder(package, tmp_path):
     assert package.call() == [7.0, ["caller", "scaled"]]
     assert package.call() == [7.0, []]
     assert len(list((tmp_path / "elsewhere").rglob("*.entry"))) == 1
-    assert not (package.folder / "__pycache__" / "kernels").exists()
+    assert not package.kernels.exists()
+    assert not package.beside.exists()
 
 
 @pytest.mark.slow
-def test_folders_that_cannot_be_written(package, tmp_path):
-    """What is there is used; what is not goes to the user's folder, or is compiled for the process alone."""
+def test_two_checkouts_share_their_kernels(package, tmp_path):
+    """What one installation has compiled another one finds, whatever folder it stands in."""
     assert package.call() == [7.0, ["caller", "scaled"]]
-    kernels = package.folder / "__pycache__" / "kernels"
-    before = {path.name: path.stat().st_mtime_ns for path in kernels.iterdir()}
-    # a file in the place of a folder stands for one that is read-only, which root could write
-    package.environment["GEARMBS_READ_ONLY"] = "1"
-    package.edit("callees", "from typing", "from gearmbs.kernels import cache\nfrom typing")
-    package.edit(
-        "callees",
-        "class Pair",
-        "_can = cache._writable\n"
-        "cache._writable = lambda f: 'smallpackage/__pycache__' not in str(f) and _can(f)\n"
-        "class Pair",
-    )
+    other = Package(tmp_path / "other", home=package.environment["HOME"])
+    assert other.call() == [7.0, []]
+    assert not package.beside.exists()
+    assert not other.beside.exists()
+
+
+@pytest.mark.slow
+def test_folders_that_cannot_be_written(package):
+    """What the user's folder cannot take goes beside the package, or is compiled for the process alone."""
+    home = package.environment["HOME"]
+    package.environment["XDG_CACHE_HOME"] = "/dev/null/none"
+    assert package.call() == [7.0, ["caller", "scaled"]]
+    before = {path.name: path.stat().st_mtime_ns for path in package.beside.iterdir()}
+    # what lies beside the package, as shipped with it, is found where the user's folder can be written too
+    del package.environment["XDG_CACHE_HOME"]
     assert package.call() == [7.0, []]
     package.edit("numbers", "FACTOR = 2.0", "FACTOR = 3.0")
     assert package.call() == [10.0, ["caller", "scaled"]]
     assert package.call() == [10.0, []]
-    assert {path.name: path.stat().st_mtime_ns for path in kernels.iterdir()} == before
+    assert {path.name: path.stat().st_mtime_ns for path in package.beside.iterdir()} == before
+    assert Path(home, ".cache").is_dir()
     package.environment["XDG_CACHE_HOME"] = "/dev/null/none"
+    # a file in the place of a folder stands for one that is read-only, which root could write
+    shutil.rmtree(package.beside)
+    package.beside.write_text("")
+    assert package.call() == [10.0, ["caller", "scaled"]]
     assert package.call() == [10.0, ["caller", "scaled"]]
 
 
@@ -229,7 +248,7 @@ def test_damaged_files(package):
     """A file that was cut short, or holds what nothing can be rebuilt from, is compiled anew."""
     package.call()
     strange = pickle.dumps(("what", "is", "this"))
-    for path in (package.folder / "__pycache__" / "kernels").iterdir():
+    for path in package.kernels.iterdir():
         if path.suffix == ".part":
             path.write_bytes(path.read_bytes()[:-7])
         else:
@@ -326,7 +345,8 @@ def test_importing_looks_at_no_files(package):
     """Nothing is compiled, loaded or looked for before a kernel is called."""
     package.write("__init__", "")
     assert package.call("0") == [0, []]
-    assert not (package.folder / "__pycache__" / "kernels").exists()
+    assert not package.kernels.exists()
+    assert not package.beside.exists()
 
 
 @pytest.mark.slow

@@ -6,9 +6,10 @@ compile and keep kernels. So an edit never finds stale code, a comment or docstr
 nothing on disk is ever changed or deleted but a file that cannot be read: processes, checkouts and users may share a
 folder. Looking costs no file work before the first kernel is called.
 
-The folder is ``$NUMBA_CACHE_DIR`` if that is set; else ``__pycache__/kernels`` of the package that the kernel belongs
-to; or, where that cannot be written, ``gearmbs`` in the user's cache folder. Where nothing can be written, kernels
-are compiled for the process alone.
+The folder is ``$NUMBA_CACHE_DIR`` if that is set; else ``gearmbs`` in the user's cache folder, which all environments
+and checkouts of a user share; or, where that cannot be written, ``__pycache__/kernels`` of the package that the kernel
+belongs to. What lies there is found in any case. Where nothing can be written, kernels are compiled for the process
+alone.
 """
 
 from __future__ import annotations
@@ -215,7 +216,7 @@ def folders(package: str) -> tuple[Path, ...]:
     if home is None:
         return (user,)
     beside = Path(home).parent / "__pycache__" / "kernels"
-    return (beside,) if _writable(beside) else (beside, user)
+    return (beside, user) if _writable(user) else (user, beside)
 
 
 def _writable(folder: Path) -> bool:

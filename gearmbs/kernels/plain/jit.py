@@ -196,7 +196,7 @@ _say_once = functools.cache(_say)
 def folder(package: str) -> Path:
     """Return where numba keeps the kernels of a package, a new place after each edit of it.
 
-    It is in `CHOSEN`; without that, beside the package, or in the user's cache folder.
+    It is in `CHOSEN`; without that, in the user's cache folder, or, where that cannot be written, beside the package.
     """
     file = getattr(sys.modules.get(package), "__file__", None)
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
@@ -207,9 +207,14 @@ def folder(package: str) -> Path:
     name = f"plain-{digest.hexdigest()[:16]}"
     if CHOSEN:
         return Path(CHOSEN) / package / name
-    if root is not None and os.access(root, os.W_OK):
-        return root / "__pycache__" / name
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearmbs" / package / name
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearmbs" / package
+    try:
+        user.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        written = False
+    else:
+        written = os.access(user, os.W_OK)
+    return user / name if written or root is None else root / "__pycache__" / name
 
 
 # C functions
