@@ -248,11 +248,17 @@ def slurm(
 
 @app.command()
 def dataset(
-    out: Annotated[Path, typer.Argument(help="Folder of the data set; its campaign is beside it.")],
-    signals: Annotated[int, typer.Option(help="At least so many signals.")] = 20_000,
-    specimens: Annotated[int, typer.Option(help="Individuals with manufacturing errors of their own.")] = 200,
-    duration: Annotated[str, typer.Option(help="Length of a record.")] = "0.5 s",
-    sensors: Annotated[int, typer.Option(help="Signals of each simulated record, at places on the housing.")] = 4,
+    out: Annotated[Path, typer.Argument(help="Folder of the data set; the campaigns of its gearboxes are beside it.")],
+    signals: Annotated[int, typer.Option(help="At least so many.")] = 20_000,
+    gearbox: Annotated[
+        list[str] | None, typer.Option(help='"one stage" or "two stages"; repeat; default: both.')
+    ] = None,
+    specimens: Annotated[int, typer.Option(help="Individuals of each gearbox, with errors of their own.")] = 100,
+    duration: Annotated[str, typer.Option(help="Length of a record.")] = "0.25 s",
+    noise_from: Annotated[
+        list[Path] | None, typer.Option(help="Recording whose random part becomes the sensors' noise; repeat.")
+    ] = None,
+    rate: Annotated[str | None, typer.Option(help="Sampling rate of the recordings, where they do not say.")] = None,
     seed: Annotated[int, typer.Option(help="Of design, specimens and sensors.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores.")] = None,
     dask: Annotated[str | None, typer.Option(help='Address of a Dask scheduler, or "local".')] = None,
@@ -262,59 +268,76 @@ def dataset(
     """Make a labelled data set of gear faults: simulate, put sensors on, split by specimen, write card and metadata."""
     with guarded():
         from gearmbs.campaigns import Campaign, dask_client
-        from gearmbs.campaigns.datasets import SensorLayers, data_set_plan, write_data_set
+        from gearmbs.campaigns.datasets import GEARBOXES, SensorLayers, data_set_plan, identify_noise, write_data_set
+        from gearmbs.signals.files.simulated import read_any
         from gearmbs.units import to_si
 
+        boxes = gearbox or list(GEARBOXES)
+        given = _given_rate(rate)
+        noises = [noise for file in noise_from or () for noise in identify_noise(read_any(file, **given))]
+        layers = SensorLayers(noises=tuple(noises), seed=seed)
         seconds = to_si(duration, "time", "--duration")
-        plan = data_set_plan(signals, specimens=specimens, duration=seconds, sensors=sensors, seed=seed)
-        campaign = Campaign(out.with_name(out.name + ".campaign"), plan)
-        if dask is not None:
-            with dask_client(dask, workers) as client:
-                status = campaign.run(client=client, progress=True)
-        else:
-            status = campaign.run(workers, progress=True)
-        typer.echo(str(status))
-        layers = SensorLayers(sensors=sensors, seed=seed)
-        for path in write_data_set(campaign, out, layers=layers, seed=seed, url=url, published=published):
+        campaigns = []
+        for box in boxes:
+            plan = data_set_plan(
+                -(-signals // len(boxes)), gearbox=box, specimens=specimens, duration=seconds, layers=layers, seed=seed
+            )
+            campaigns.append(Campaign(out.with_name(f"{out.name}-{box.replace(' ', '-')}.campaign"), plan))
+        for campaign in campaigns:
+            if dask is not None:
+                with dask_client(dask, workers) as client:
+                    status = campaign.run(client=client, progress=True)
+            else:
+                status = campaign.run(workers, progress=True)
+            typer.echo(f"{campaign.path.name}: {status}")
+        for path in write_data_set(campaigns, out, layers=layers, seed=seed, url=url, published=published):
             typer.echo(f"wrote {path}")
 
 
 @app.command()
 def baseline(
-    folder: Annotated[Path, typer.Argument(help="Folder of a data set's campaign.")],
+    folder: Annotated[Path, typer.Argument(help="Folder of a data set.")],
     recording: Annotated[
         list[str] | None, typer.Option(help="Real recording with its state, as healthy=h.csv; repeat.")
     ] = None,
     teeth: Annotated[int, typer.Option(help="Teeth of the driver in the recordings.")] = 0,
     rate: Annotated[str | None, typer.Option(help="Sampling rate of the recordings, where they do not say.")] = None,
     window: Annotated[float, typer.Option(help="Length of a window, s.")] = 0.25,
-    sensors: Annotated[int, typer.Option(help="Signals of each simulated record.")] = 4,
 ) -> None:
-    """Train the baseline on a data set's campaign: with and without a leak, and tested on real recordings."""
+    """Train the baseline on a data set: on artefacts alone, with and without a leak, and tested on real recordings."""
     with guarded():
-        from gearmbs.campaigns import Campaign
         from gearmbs.campaigns.datasets import (
-            SensorLayers,
+            artefact_leaks,
             feature_table,
+            from_recordings_to_recordings,
             from_simulation_to_recordings,
             leak_and_no_leak,
             one_state_a_group,
+            read_data_set,
         )
 
-        campaign = Campaign(folder)
-        # the sensors that the data set was made with
-        layers = SensorLayers(sensors=sensors, seed=campaign.plan.seed)
-        x, labels, specimens, _ = feature_table(campaign, layers, window=window)
+        rows = read_data_set(folder)
+        for name, found in artefact_leaks(rows).items():
+            typer.echo(f"artefacts alone, {name}: {found}")
+        x, labels, specimens, _ = feature_table(rows, window=window)
         single = one_state_a_group(labels, specimens)
-        for what, rows in (("all states of each specimen", slice(None)), ("one state of each specimen", single)):
-            for name, found in leak_and_no_leak(x[rows], labels[rows], specimens[rows]).items():
+        for what, kept in (("all states of each specimen", slice(None)), ("one state of each specimen", single)):
+            for name, found in leak_and_no_leak(x[kept], labels[kept], specimens[kept]).items():
                 typer.echo(f"{what}, {name}: {found}")
         if recording:
             real = _recordings(recording, teeth, rate, window)
             found, alone = from_simulation_to_recordings(x, labels, *real)
-            typer.echo(f"real recordings: {found}")
+            typer.echo(f"from simulation to real recordings: {found}")
+            typer.echo(f"from real recordings to others: {from_recordings_to_recordings(*real)}")
             for name, value in sorted(alone.items(), key=lambda item: -abs(item[1] - 0.5)):
                 typer.echo(f"    {name} alone, in the direction of the simulation: AUROC {value:.3f}")
+
+
+def _given_rate(rate: str | None) -> dict[str, Any]:
+    """Return the sampling rate that an option gives, Hz, as a keyword of readers."""
+    from gearmbs.units import to_si
+
+    return {} if rate is None else {"rate": to_si(f"{rate} Hz" if rate.isdigit() else rate, "frequency", "--rate")}
 
 
 def _recordings(items: list[str], teeth: int, rate: str | None, window: float) -> tuple[Any, Any, Any]:
@@ -325,13 +348,10 @@ def _recordings(items: list[str], teeth: int, rate: str | None, window: float) -
     from gearmbs.campaigns.datasets import recording_features
     from gearmbs.signals import estimate_speed
     from gearmbs.signals.files.simulated import read_any
-    from gearmbs.units import to_si
 
     if teeth < 1:
         fail("--recording needs --teeth, the number of teeth of its driver")
-    given: dict[str, Any] = (
-        {} if rate is None else {"rate": to_si(rate if not rate.isdigit() else f"{rate} Hz", "frequency", "--rate")}
-    )
+    given = _given_rate(rate)
     rows, states, numbers = [], [], []
     for number, item in enumerate(items):
         state, equals, file = item.partition("=")

@@ -213,7 +213,7 @@ def _parquet(campaign: Campaign, target: Path, split: np.ndarray | None, add: Ma
 
 def _split_by(campaign: Campaign, column: str, test: float) -> np.ndarray:
     """Return the split of each row, all rows of equal value in a column being in the same."""
-    from gearmbs.campaigns.datasets.layers import split_by_group
+    from gearmbs.campaigns.datasets.splits import split_by_group
 
     table = campaign.table
     if column not in table.columns:
@@ -224,7 +224,7 @@ def _split_by(campaign: Campaign, column: str, test: float) -> np.ndarray:
 
 def _held_out(campaign: Campaign, ranges: Mapping[str, Sequence[float]], split: np.ndarray | None) -> np.ndarray:
     """Return the split with training rows of some ranges withheld."""
-    from gearmbs.campaigns.datasets.layers import withhold
+    from gearmbs.campaigns.datasets.splits import withhold
 
     table = campaign.table
     found = np.full(len(table), "train") if split is None else np.asarray(split)

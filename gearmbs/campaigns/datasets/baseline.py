@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.datasets.layers import random_split, split_by_group
+from gearmbs.campaigns.datasets.splits import random_split, split_by_group
 from gearmbs.campaigns.settings import CampaignError
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 # Features of vibration windows that any record offers: classical indicators, and the spectrum about the mesh
@@ -127,6 +128,29 @@ def recording_features(signal: xr.DataArray, *, shaft: float, teeth: int, window
     return np.array([features(part, rate, shaft, teeth) for part in parts])
 
 
+def feature_table(rows: pd.DataFrame, *, window: float = 0.25) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return features of the windows of a data set's signals, their states, specimens and severities.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        Of `read_data_set`.
+    window : float
+        s.
+    """
+    found, owner = [], []
+    for name in (name for name in rows.columns if name.startswith("signal.")):
+        for k, x in enumerate(rows[name]):
+            if x is None:
+                continue
+            rate, shaft = rows["sampling_rate"][k], float(np.mean(rows["speed"][k])) / (2.0 * np.pi)
+            for part in windows(np.asarray(x, dtype=float), int(window * rate + 0.5)):
+                found.append(features(part, rate, shaft, rows["teeth"][k][0]))
+                owner.append(k)
+    labels = rows.iloc[owner]
+    return np.array(found), *(labels[name].to_numpy() for name in ("state", "specimen", "severity"))
+
+
 TREES = 200
 RESAMPLES = 200
 
@@ -178,19 +202,23 @@ def classifier(seed: int = 0) -> Any:
 
 def score(model: Any, x: np.ndarray, labels: np.ndarray, groups: np.ndarray, seed: int = 0) -> Score:
     """Return how well a fitted classifier does on rows, with an interval by resampling groups."""
-    p = model.predict_proba(x)
-    guess = np.asarray(model.classes_)[p.argmax(axis=1)]
+    return scored(model.predict_proba(x), model.classes_, labels, groups, seed)
+
+
+def scored(p: np.ndarray, classes: np.ndarray, labels: np.ndarray, groups: np.ndarray, seed: int = 0) -> Score:
+    """Return how good probabilities of classes are, shape (n, classes), with an interval by resampling groups."""
+    guess = np.asarray(classes)[p.argmax(axis=1)]
     names = np.unique(groups)
     generator = np.random.default_rng(seed)
     drawn = []
     for _ in range(RESAMPLES):
         rows = np.concatenate([np.flatnonzero(groups == g) for g in generator.choice(names, names.size)])
-        drawn.append(macro_auroc(labels[rows], p[rows], model.classes_))
+        drawn.append(macro_auroc(labels[rows], p[rows], classes))
     drawn = [value for value in drawn if np.isfinite(value)]
     low, high = np.quantile(drawn, [0.025, 0.975]) if names.size > 1 and drawn else (np.nan, np.nan)
     counts = np.unique(labels, return_counts=True)[1]
     return Score(
-        macro_auroc(labels, p, model.classes_),
+        macro_auroc(labels, p, classes),
         float(low),
         float(high),
         float(np.mean(guess == labels)),
@@ -240,6 +268,41 @@ def leak_and_no_leak(
         model = classifier(seed).fit(x[train], labels[train])
         found[name] = score(model, x[held], labels[held], groups[held], seed)
     return found
+
+
+def from_recordings_to_recordings(real: np.ndarray, labels: np.ndarray, groups: np.ndarray, *, seed: int = 0) -> Score:
+    """Train the baseline on recordings and score it on others: the first of each state is held out, then the second.
+
+    Parameters
+    ----------
+    real, labels, groups : ndarray
+        Features of windows of recordings, their states, and the number of the recording each is of. Where the
+        recordings of each state are in the same order of operating points, an operating point is held out at a time.
+
+    Raises
+    ------
+    CampaignError
+        If a state has one recording only, so that nothing is left to train on.
+    """
+    fold = np.zeros(len(labels), dtype=int)
+    for state in np.unique(labels):
+        numbers = np.unique(groups[labels == state])
+        if numbers.size < 2:
+            raise CampaignError(
+                f"recordings: {state} has one only; give two or more to train on some and test on others"
+            )
+        fold[labels == state] = np.searchsorted(numbers, groups[labels == state])
+    return held_out(real, labels, fold, groups, seed)
+
+
+def held_out(x: np.ndarray, labels: np.ndarray, fold: np.ndarray, groups: np.ndarray, seed: int = 0) -> Score:
+    """Return how well the baseline does on the rows of each fold, trained on those of all others."""
+    classes = np.unique(labels)
+    p = np.zeros((len(labels), classes.size))
+    for k in np.unique(fold):
+        model = classifier(seed).fit(x[fold != k], labels[fold != k])
+        p[np.ix_(fold == k, np.searchsorted(classes, model.classes_))] = model.predict_proba(x[fold == k])
+    return scored(p, classes, labels, groups, seed)
 
 
 def from_simulation_to_recordings(

@@ -1,21 +1,70 @@
-"""What lies between the force at a gear's seat and a stored sample, as layers of their own, so that the clean signal
-stays.
+"""What lies between a simulated vibration and a stored sample, as layers of their own, so that the clean signal stays.
 
-Transfer path, noise, clipping and quantisation use `gearmbs.signals`. What varies from specimen to specimen (modes of
-the housing and where its sensors sit) is drawn from the specimen's number, what varies from record to record (drift,
-noise) from the record's.
+In their order: drift of the speed, transfer path, anti-alias filter, noise, converter. What varies from specimen to
+specimen (modes of the path, noise of its sensors) is drawn from the specimen's number, what varies from record to
+record (drift, the noise's samples) from the record's. None knows the state of the teeth.
+
+Records are simulated with margins before and after, which the filters use up: what is stored has no edges.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from gearmbs.campaigns.settings import CampaignError
-from gearmbs.signals import ModalPath, Mode, add_noise, make_signal, quantise
+from gearmbs.signals import ModalPath, Mode, accelerometer, make_signal, quantise
+from gearmbs.signals.filters import apply_zero_phase, kaiser_taps
+from gearmbs.signals.rotation.angular import MARGIN, interpolate
+
+PASS, STOP = 0.4, 0.46
+"""Band of the anti-alias filter as parts of the sampling rate: flat to the first, as converters with a ratio of 2.5
+are, and down by `ATTENUATION` from the second on, above which a record holds noise alone."""
+
+ATTENUATION = 100.0
+"""dB, about the dynamic range of a converter of 16 bits."""
+
+DRIFT_TERMS = 3
+"""Cosines of the drift of the speed, of half, one and one and a half periods a record: slow against a turn."""
+
+LARGEST_DRAW = 2.5
+"""Standard deviations at which the drift's amplitudes are cut off, so that it stays within the margin."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The random part of a recording, as `identify_noise` finds it.
+
+    Attributes
+    ----------
+    frequency : tuple of float
+        As parts of the sampling rate, from 0 to 0.5.
+    density : tuple of float
+        Amplitude density at these, of any scale.
+    level : float
+        RMS over that of the part that repeats.
+    """
+
+    frequency: tuple[float, ...]
+    density: tuple[float, ...]
+    level: float
+
+    def drawn(self, count: int, generator: np.random.Generator) -> np.ndarray:
+        """Return samples of Gaussian noise of this density and an RMS of 1, shape (count,).
+
+        They are cut out of a longer period, so that the end does not join the beginning.
+        """
+        length = 1 << (2 * count - 1).bit_length()
+        gain = np.interp(np.fft.rfftfreq(length), self.frequency, self.density)
+        x = np.fft.irfft(np.fft.rfft(generator.standard_normal(length)) * gain, length)
+        power = np.r_[gain**2, gain[1:-1] ** 2].mean()
+        return x[length // 4 : length // 4 + count] / math.sqrt(power)
+
+
+WHITE = Noise((0.0, 0.5), (1.0, 1.0), 1.0)
 
 
 @dataclass(frozen=True)
@@ -24,35 +73,40 @@ class SensorLayers:
 
     Attributes
     ----------
-    sensors : int
-        Places on the housing: each sees the same modes with other weights, and has noise of its own.
     modes : int
-        Modes of the housing between seat and sensor.
+        Modes of a transfer path with random frequencies, dampings and weights; 0 where the simulated housing is the
+        path.
     lowest, highest : float
         Range of their frequencies, Hz, drawn evenly in the logarithm.
     damping : tuple of float
         Range of their damping ratios.
     noise : tuple of float
-        Range of the noise's RMS as a part of the signal's.
+        Range of the noise's RMS as a part of the level of the operating point, which is that of all states together.
+    noises : tuple of Noise
+        Random parts identified from recordings, of which each sensor gets one with its spectrum and its level; empty:
+        white noise of the range above.
     wander : float
         Standard deviation of the speed within a record as a part of it, slow against a revolution.
     bits : int
-        Of the converter, whose range is four times the RMS of a healthy record; beyond it clips.
+        Of the converter.
+    headroom : float
+        Range of the converter over the largest sample of all states; below 1 it clips.
     seed : int
     """
 
-    sensors: int = 4
-    modes: int = 6
+    modes: int = 0
     lowest: float = 400.0
     highest: float = 5500.0
     damping: tuple[float, float] = (0.02, 0.08)
     noise: tuple[float, float] = (0.02, 0.2)
+    noises: tuple[Noise, ...] = ()
     wander: float = 0.002
     bits: int = 16
+    headroom: float = 1.25
     seed: int = 0
 
     def path(self, specimen: int, sensor: int = 0) -> ModalPath:
-        """Return the transfer path of a specimen to a sensor: modes with random frequencies, dampings, weights.
+        """Return the transfer path of a specimen to a sensor.
 
         Frequencies and dampings are the specimen's, signs and weights also the sensor's.
         """
@@ -66,116 +120,125 @@ class SensorLayers:
             modes.append(Mode(float(frequency), float(damping), 1.0 / weight))
         return ModalPath(tuple(modes))
 
-    def measured(
-        self, clean: np.ndarray, rate: float, specimen: int, record: int, full_scale: float, sensor: int = 0
+    def _settling(self, rate: float) -> int:
+        """Return the samples in which the slowest path that may be drawn forgets its start."""
+        if not self.modes:
+            return 0
+        return math.ceil(ModalPath((Mode(self.lowest, self.damping[0], 1.0),)).settling * rate)
+
+    def _lost(self, samples: float) -> int:
+        """Return the samples that drift, interpolation and filter take from either end of a record of so many."""
+        shifts = sum(2.0 / (math.pi * k) for k in range(1, DRIFT_TERMS + 1))
+        reach = self.wander * math.sqrt(2.0 / DRIFT_TERMS) * LARGEST_DRAW * shifts * samples
+        return math.ceil(reach) + MARGIN + _anti_alias(1.0).size // 2
+
+    def margins(self, duration: float, rate: float) -> tuple[int, int]:
+        """Return the samples that have to be simulated before and after a record of a duration, s."""
+        lost = self._lost(duration * rate)
+        # the path's response to the end of what is known must not reach the record either
+        return lost + self._settling(rate), lost + (MARGIN if self.modes else 0)
+
+    def longest(self, samples: int, rate: float) -> float:
+        """Return the longest record, s, that a simulation of so many samples has the margins of.
+
+        Raises
+        ------
+        CampaignError
+            If the margins alone are longer.
+        """
+        for count in range(samples, 0, -1):
+            if count + sum(self.margins(count / rate, rate)) <= samples:
+                return count / rate
+        raise CampaignError(f"layers: {samples} samples are fewer than the margins need; simulate longer records")
+
+    def heard(
+        self, clean: np.ndarray, rate: float, duration: float, specimen: int, record: int, sensor: int = 0
     ) -> np.ndarray:
-        """Return the measured samples of a clean signal, shape (n,).
+        """Return what arrives at a converter without noise, shape (duration * rate,).
 
         Parameters
         ----------
         clean : ndarray, shape (n,)
-            Force over the gear's mass, m/s^2.
+            With the `margins` of the duration, m/s^2.
         rate : float
             Hz.
+        duration : float
+            Of what is returned, s.
         specimen, record : int
-            Whose housing, and whose noise.
-        full_scale : float
-            Of the converter, in the unit of the measured signal.
+            Whose housing, and whose drift.
         sensor : int
             At which place, from 0.
+
+        Raises
+        ------
+        CampaignError
+            If the signal is too short.
         """
+        count = round(duration * rate)
+        before, after = self.margins(duration, rate)
+        if clean.size < before + count + after:
+            raise CampaignError(
+                f"layers: {clean.size} samples are too few for {count} with margins of {before} and {after}; simulate "
+                f"{(before + count + after) / rate:.4g} s"
+            )
+        x = clean[: before + count + after]
         # the machine drifts alike for all its sensors
-        x = self._wandering(clean, np.random.default_rng([self.seed, 2, record]))
-        x = self.through(x, rate, specimen, sensor)
-        generator = np.random.default_rng([self.seed, 4, record, sensor])
-        level = float(generator.uniform(*self.noise)) * float(np.std(x))
-        signal = make_signal(x[:, None], rate, units="m/s^2", channels=["sensor"])
-        noisy = add_noise(signal, seed=int(generator.integers(1 << 31)), rms=level)
-        return quantise(noisy, bits=self.bits, full_scale=full_scale).values[:, 0]
+        positions = before + self.times(rate, duration, record, (-before + MARGIN, count + after - MARGIN)) * rate
+        x = interpolate(x - x.mean(), np.clip(positions, 0.0, x.size - 1.0))
+        if self.modes:
+            path = self.path(specimen, sensor)
+            scale = math.sqrt(float(np.mean(np.abs(path.accelerance(np.linspace(0.0, 0.5 * rate, 2049))) ** 2)))
+            force = make_signal(x[:, None], rate, units="N", channels=["sensor"])
+            x = accelerometer(force, path, settle="keep").values[:, 0] / scale
+        x = apply_zero_phase(x[:, None], _anti_alias(rate), "trim")[0][:, 0]
+        first = before - MARGIN - _anti_alias(rate).size // 2
+        return x[first : first + count]
 
-    def through(self, x: np.ndarray, rate: float, specimen: int, sensor: int = 0) -> np.ndarray:
-        """Return a signal behind the transfer path, as it is when it has settled: by its spectrum over the record.
+    def times(self, rate: float, duration: float, record: int, span: tuple[int, int] | None = None) -> np.ndarray:
+        """Return when the machine of steady speed is where the drifting one is at each sample, s.
 
-        The path is scaled so that white noise keeps its RMS.
+        Parameters
+        ----------
+        rate, duration : float
+            Hz, s.
+        record : int
+        span : tuple of int, optional
+            First sample and the one after the last; default those of the record.
         """
-        frequency = np.fft.rfftfreq(x.size, 1.0 / rate)
-        response = self.path(specimen, sensor).accelerance(frequency)
-        response = response / np.sqrt(np.mean(np.abs(response) ** 2))
-        return np.fft.irfft(np.fft.rfft(x - x.mean()) * response, x.size)
+        first, stop = span or (0, round(duration * rate))
+        t = np.arange(first, stop) / rate
+        generator = np.random.default_rng([self.seed, 2, record])
+        shift = np.zeros(t.size)
+        for k in range(1, DRIFT_TERMS + 1):
+            size = float(np.clip(generator.standard_normal(), -LARGEST_DRAW, LARGEST_DRAW))
+            phase, w = generator.uniform(0.0, 2.0 * math.pi), math.pi * k / duration
+            # the speed's part size * cos(w t + phase) and its integral from the record's beginning
+            shift += self.wander * math.sqrt(2.0 / DRIFT_TERMS) * size * (np.sin(w * t + phase) - math.sin(phase)) / w
+        return t + shift
 
-    def _wandering(self, x: np.ndarray, generator: np.random.Generator) -> np.ndarray:
-        """Return the signal of a machine whose speed drifts a little: time runs unevenly, its ends stay."""
-        u = np.linspace(0.0, 1.0, x.size)
-        shift = np.zeros(x.size)
-        for k in (1, 2, 3):
-            # a sine of the record's order k: its derivative is the part by which the speed differs
-            shift += generator.standard_normal() * self.wander / (np.pi * k) * np.sin(np.pi * k * u) / np.sqrt(1.5)
-        return np.interp(u + shift, u, x)
+    def noise_of(self, specimen: int, sensor: int = 0) -> Noise:
+        """Return the noise of a specimen's sensor; its level is that over the operating point's."""
+        generator = np.random.default_rng([self.seed, 5, specimen, sensor])
+        if self.noises:
+            return self.noises[int(generator.integers(len(self.noises)))]
+        return Noise(WHITE.frequency, WHITE.density, float(generator.uniform(*self.noise)))
+
+    def noisy(self, heard: np.ndarray, level: float, specimen: int, record: int, sensor: int = 0) -> np.ndarray:
+        """Return a heard signal with the noise of its sensor; ``level`` is the operating point's, m/s^2."""
+        noise = self.noise_of(specimen, sensor)
+        generator = np.random.default_rng([self.seed, 4, record, sensor])
+        return heard + level * noise.level * noise.drawn(heard.size, generator)
+
+    def converted(self, x: np.ndarray, full_scale: float) -> tuple[np.ndarray, int]:
+        """Return samples behind the converter, and how many it has clipped."""
+        signal = make_signal(np.asarray(x, dtype=float)[:, None], 1.0, units="m/s^2", channels=["sensor"])
+        found = quantise(signal, bits=self.bits, full_scale=full_scale)
+        return found.values[:, 0], int(found.attrs["clipped"])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the settings for a data card."""
         return asdict(self)
 
 
-# Splits that do not leak: by physical individual, with severities withheld, and the leaking one for comparison.
-
-
-def split_by_group(
-    groups: Sequence[int] | np.ndarray, *, test: float = 0.2, validation: float = 0.1, seed: int = 0
-) -> np.ndarray:
-    """Return "train", "validation" or "test" for each row; all rows of a group are in the same split.
-
-    Parameters
-    ----------
-    groups : array_like of int, shape (n,)
-        Number of the specimen of each row.
-    test, validation : float
-        Parts of the groups, at least one each unless zero.
-
-    Raises
-    ------
-    CampaignError
-        If there are too few groups.
-    """
-    groups = np.asarray(groups)
-    names = np.unique(groups)
-    counts = [max(1, round(part * names.size)) if part > 0.0 else 0 for part in (test, validation)]
-    if sum(counts) >= names.size:
-        raise CampaignError(
-            f"split: {names.size} groups are too few for test = {test:g} and validation = {validation:g}"
-        )
-    order = np.random.default_rng(seed).permutation(names)
-    kind = dict.fromkeys(order[: counts[0]], "test") | dict.fromkeys(order[counts[0] : sum(counts)], "validation")
-    return np.array([kind.get(g, "train") for g in groups])
-
-
-def withhold(split: np.ndarray, severity: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Return a split in which training rows of a range of severities are "withheld": can a model interpolate?"""
-    inside = (np.asarray(severity) >= low) & (np.asarray(severity) <= high)
-    return np.where((split == "train") & inside, "withheld", split)
-
-
-def random_split(count: int, *, test: float = 0.2, seed: int = 0) -> np.ndarray:
-    """Return a split row by row, whatever they come from: it leaks if rows are windows of the same record or
-    specimen."""
-    return np.where(np.random.default_rng(seed).random(count) < test, "test", "train")
-
-
-def one_state_a_group(labels: np.ndarray, groups: np.ndarray, seed: int = 0) -> np.ndarray:
-    """Return which rows are left if every group shows one state only, as where each fault is a part of its own.
-
-    States are dealt out evenly. In such data an individual is known by its state, and a split row by row leaks it;
-    where every individual is in all states, its other rows have other labels, and such a split misleads instead.
-    """
-    names, states = np.unique(groups), np.unique(labels)
-    dealt = states[np.random.default_rng(seed).permutation(np.arange(names.size) % states.size)]
-    return np.asarray(labels) == dealt[np.searchsorted(names, groups)]
-
-
-def shared_groups(split: np.ndarray, groups: np.ndarray) -> dict[tuple[str, str], int]:
-    """Return how many groups each pair of splits shares: zero everywhere if nothing leaks ("withheld" belongs to
-    training)."""
-    split = np.where(np.asarray(split) == "withheld", "train", split)
-    inside = {name: set(np.asarray(groups)[split == name]) for name in np.unique(split)}
-    names = sorted(inside)
-    return {(a, b): len(inside[a] & inside[b]) for i, a in enumerate(names) for b in names[i + 1 :]}
+def _anti_alias(rate: float) -> np.ndarray:
+    return kaiser_taps(0.5 * (PASS + STOP) * rate, (STOP - PASS) * rate, rate, "lowpass", ATTENUATION)

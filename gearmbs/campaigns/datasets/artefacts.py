@@ -1,0 +1,111 @@
+"""Whether a data set's making tells the states: classifiers that see nothing but artefacts have to be at chance."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.campaigns.datasets.baseline import Score, held_out
+from gearmbs.campaigns.datasets.layers import STOP
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+EDGE = 24
+"""Samples at either end that are looked at: filters that begin at a record's edge show in fewer."""
+
+BANDS = 4
+"""Bands above the pass band of the anti-alias filter."""
+
+BLACKMAN_HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)
+"""Window with side lobes 92 dB down [1]_: what is below the band must not leak above it.
+
+.. [1] F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform,
+   Proc. IEEE 66, 1978.
+"""
+
+METADATA = (
+    "row", "point", "specimen", "operation.speed", "operation.torque", "sampling_rate", "teeth", "pulses", "length",
+)  # fmt: skip
+"""Columns that are neither signal nor label, and the row's number, its numbers of pulses and of samples."""
+
+
+def artefact_leaks(rows: pd.DataFrame, *, folds: int = 5, seed: int = 0) -> dict[str, Score]:
+    """Return how well classifiers do that see artefacts alone, split by specimen; 0.5 is chance.
+
+    ``clipping``, ``above the band`` and ``metadata`` try to tell the states, by numbers of clipped samples, by the
+    levels above the pass band, and by the columns that are neither signal nor label, with the row's number. ``edges``
+    tries to tell a record's end joined with its beginning from stretches within it: waveforms there depend on the
+    states, edges must not.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        Of `read_data_set`.
+    folds : int
+        Parts of the specimens, each of which is tested by classifiers trained on the others.
+    """
+    names = [name for name in rows.columns if name.startswith("signal.")]
+    signals = [(k, name) for name in names for k in range(len(rows)) if rows[name][k] is not None]
+    owner = np.array([k for k, _ in signals])
+    x = [np.asarray(rows[name][k], dtype=float) for k, name in signals]
+    clipped = np.array([rows[name.replace("signal.", "clipped.")][k] for k, name in signals], dtype=float)
+    states, groups = rows["state"].to_numpy(), rows["specimen"].to_numpy()
+    generator = np.random.default_rng(seed)
+    joined = np.array([piece for values in x for piece in _joined(values, generator)])
+    edge = np.tile(["edge", "inside"], len(x))
+    tests = {
+        "clipping": (clipped[:, None], states[owner], groups[owner]),
+        "above the band": (np.array([above_the_band(values) for values in x]), states[owner], groups[owner]),
+        "metadata": (_metadata(rows), states, groups),
+        "edges": (joined, edge, np.repeat(groups[owner], 2)),
+    }
+    individuals = np.unique(groups)
+    fold = np.random.default_rng(seed).permutation(individuals.size) % folds
+    return {
+        name: held_out(features, labels, fold[np.searchsorted(individuals, owners)], owners, seed)
+        for name, (features, labels, owners) in tests.items()
+    }
+
+
+def above_the_band(x: np.ndarray) -> np.ndarray:
+    """Return the levels of a signal in bands above the pass band, shape (BANDS + 1,): logarithms, and the kurtosis."""
+    phase = 2.0 * np.pi * (np.arange(x.size) + 0.5) / x.size
+    window = sum(a * np.cos(k * phase) for k, a in enumerate(BLACKMAN_HARRIS))
+    spectrum = np.fft.rfft((x - x.mean()) * window)
+    frequency = np.fft.rfftfreq(x.size)
+    edges = np.linspace(STOP, 0.5, BANDS + 1)
+    power = [np.mean(np.abs(spectrum[(frequency > a) & (frequency <= b)]) ** 2) for a, b in pairwise(edges)]
+    high = np.fft.irfft(np.where(frequency > STOP, spectrum, 0.0), x.size)
+    tiny = np.finfo(float).tiny
+    return np.log(np.array([*power, np.mean(high**4) / max(np.mean(high**2) ** 2, tiny)]) + tiny)
+
+
+def _joined(x: np.ndarray, generator: np.random.Generator) -> list[np.ndarray]:
+    """Return a record's end with its beginning, and two stretches from within it, both to the same scale."""
+    n = x.size
+    a, b = generator.integers(EDGE, n - 2 * EDGE, 2)
+    pairs = (x[-EDGE:], x[:EDGE]), (x[a : a + EDGE], x[b : b + EDGE])
+    scale = x.std() or 1.0
+    found = []
+    for end, beginning in pairs:
+        both = np.r_[end, beginning] / scale
+        # the step where they meet, against the steps about it
+        curvature = np.abs(np.diff(both, 2)).reshape(-1, 2).mean(axis=1)
+        found.append(np.r_[both, abs(beginning[0] - end[-1]) / scale, curvature])
+    return found
+
+
+def _metadata(rows: pd.DataFrame) -> np.ndarray:
+    """Return the columns that a careless reader might feed to a classifier, as numbers."""
+    first = next(name for name in rows.columns if name.startswith("signal."))
+    columns = {
+        "row": np.arange(len(rows)),
+        "length": rows[first].map(len),
+        "pulses": rows["tacho"].map(len),
+        "teeth": rows["teeth"].map(lambda teeth: teeth[0]),
+    }
+    given = [columns.get(name, rows.get(name)) for name in METADATA]
+    return np.array([np.asarray(column, dtype=float) for column in given if column is not None]).T

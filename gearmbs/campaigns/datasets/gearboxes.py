@@ -1,0 +1,220 @@
+"""The gearboxes of data sets: their files, what is drawn for each specimen, the states of their teeth, the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from gearmbs.campaigns.datasets.layers import SensorLayers
+from gearmbs.campaigns.factors import AnyFactor, Choice, Factor, Specimens
+from gearmbs.campaigns.plan import Plan, make_plan
+from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.subjects.tables import DrivetrainSubject
+from gearmbs.schema.described import chosen
+from gearmbs.units import to_si
+
+FOLDER = Path(__file__).parent
+
+SPREAD = {
+    "stiffness": (0.6, 1.6),
+    "damping_ratio": (0.6, 1.8),
+    "backlash": (0.6, 1.6),
+}
+"""From which to which part of the file's value a specimen's is drawn: frequencies of modes by a quarter down and up,
+and what varies most from one housing to the next, its damping, by a factor of three in all."""
+
+GRADE = 6
+"""ISO 1328 grade of the flanks, usual for ground industrial gears."""
+
+RUN_OUT = (0.0, 2e-5)
+"""Eccentricity of a wheel, m: run-out of grade 6 of wheels of this size is some 30 um."""
+
+
+@dataclass(frozen=True)
+class Gearbox:
+    """A gearbox of data sets: a drivetrain's file with what varies.
+
+    Attributes
+    ----------
+    name : str
+    file : Path
+        Drivetrain in TOML, with accelerometers and one speed sensor, at the shaft of the driver.
+    mesh : str
+        Whose driver has the faults.
+    drive, load : str
+        Which set the operating point.
+    speed, torque : tuple of str
+        Ranges of the drive's speed and of the load's torque.
+    """
+
+    name: str
+    file: Path
+    mesh: str
+    drive: str
+    load: str
+    speed: tuple[str, str]
+    torque: tuple[str, str]
+
+    @cached_property
+    def tables(self) -> dict[str, Any]:
+        """The file's tables.
+
+        Raises
+        ------
+        CampaignError
+            If there is no such mesh, drive or load.
+        """
+        tables = DrivetrainSubject.from_file(self.file).tables
+        for table, name in (("meshes", self.mesh), ("drives", self.drive), ("loads", self.load)):
+            chosen(tables.get(table, {}), name, f"gearbox {self.name}: ", CampaignError, table)
+        return tables
+
+    @property
+    def accelerometers(self) -> list[str]:
+        """Names of the accelerometers."""
+        return [name for name, table in self.tables["sensors"].items() if table.get("kind") == "accelerometer"]
+
+    @property
+    def speed_sensor(self) -> str:
+        """Name of the speed sensor."""
+        found = [name for name, table in self.tables["sensors"].items() if table.get("kind", "speed") == "speed"]
+        if len(found) != 1:
+            raise CampaignError(f"gearbox {self.name}: {len(found)} speed sensors; give the file one, for the tacho")
+        return found[0]
+
+    @property
+    def driver(self) -> Mapping[str, Any]:
+        """Table of the wheel that has the faults."""
+        return self.tables["wheels"][self.tables["meshes"][self.mesh]["driver"]]
+
+    @property
+    def teeth(self) -> tuple[int, int]:
+        """Teeth of the mesh with the faults, driver and driven."""
+        mesh, wheels = self.tables["meshes"][self.mesh], self.tables["wheels"]
+        return int(wheels[mesh["driver"]]["teeth"]), int(wheels[mesh["driven"]]["teeth"])
+
+    def states(self) -> dict[str, Any]:
+        """Return the states with the ranges of their sizes in SI, of which the first is the severity.
+
+        Heights and depths go by the module, lengths along the face by its width.
+        """
+        m, b = to_si(self.driver["module"], "length"), to_si(self.driver["face_width"], "length")
+        tooth = [0, self.teeth[0] - 1]
+        return {
+            "healthy": [],
+            "broken": {"kind": "broken tooth", "lost": [0.1, 0.9], "tooth": tooth},
+            "chipped": {"kind": "chipped corner", "height": [0.1 * m, 1.3 * m], "length": [0.1 * b, 0.5 * b],
+                        "tooth": tooth},
+            "cracked": {"kind": "root crack", "depth": [0.1 * m, 1.1 * m], "tooth": tooth},
+            "pitted": {"kind": "pitting", "depth": [1e-5, 2e-4], "height": [0.3 * m, m], "width": [0.2 * b, 0.75 * b],
+                       "tooth": tooth},
+            "worn": {"kind": "wear", "depth": [5e-6, 1e-4]},
+        }  # fmt: skip
+
+    def specimens(self, count: int, seed: int) -> Specimens:
+        """Return the individuals: flanks and run-out of all wheels, backlash, and the housing's modes."""
+        errors: dict[str, Any] = {}
+        for name, mesh in self.tables["meshes"].items():
+            errors |= _spread(mesh, f"meshes.{name}")
+        for name, housing in self.tables.get("housings", {}).items():
+            for mode, table in housing.get("modes", {}).items():
+                errors |= _spread(table, f"housings.{name}.modes.{mode}")
+        faults = []
+        for name in self.tables["meshes"]:
+            for wheel in ("driver", "driven"):
+                where = {"path": f"meshes.{name}.faults", "wheel": wheel}
+                faults.append({**where, "kind": "manufacturing grade", "grade": GRADE, "lead": False, "seed": "drawn"})
+                faults.append({**where, "kind": "eccentricity", "amount": RUN_OUT, "phase": (0.0, 6.283)})
+        return Specimens(count, errors, tuple(faults), seed=seed)
+
+
+def _spread(table: Mapping[str, Any], path: str) -> dict[str, tuple[float, float]]:
+    """Return the ranges of those entries of a table that vary from specimen to specimen, in SI."""
+    found = {}
+    for name, (low, high) in SPREAD.items():
+        if name in table:
+            value = float(to_si(table[name], "length" if name == "backlash" else "1"))
+            found[f"{path}.{name}"] = (low * value, high * value)
+    return found
+
+
+GEARBOXES = {
+    "one stage": Gearbox(
+        "one stage", FOLDER / "one_stage.toml", "stage", "drive", "brake", ("800 rpm", "1800 rpm"), ("20 N m", "80 N m")
+    ),
+    "two stages": Gearbox(
+        "two stages", FOLDER / "two_stages.toml", "stage 1", "drive", "brake",
+        ("900 rpm", "2100 rpm"), ("5 N m", "40 N m"),
+    ),
+}  # fmt: skip
+"""Gearboxes that come with the package."""
+
+SLICES = 11
+"""Slices along the face: enough for chipped corners and pits of the widths above, at a third of the time of the
+default."""
+
+
+def data_set_plan(
+    signals: int,
+    *,
+    gearbox: str | Gearbox = "two stages",
+    specimens: int = 200,
+    duration: float = 0.25,
+    layers: SensorLayers | None = None,
+    seed: int = 0,
+    unit: int = 24,
+) -> Plan:
+    """Return the plan of a gearbox's part of a data set: every specimen and operating point in all states.
+
+    Parameters
+    ----------
+    signals : int
+        At least so many, up to a multiple of the number of states, of sensors and of specimens.
+    gearbox : str or Gearbox
+        One of `GEARBOXES` or one of your own.
+    specimens : int
+        Individuals, all of which are drawn equally often.
+    duration : float
+        Of a record, s. What the layers need before and after it is simulated in addition.
+    layers : SensorLayers, optional
+        What will be put on the clean signals.
+
+    Raises
+    ------
+    CampaignError
+        If there are fewer points, each of which is simulated in all states, than specimens.
+    """
+    box = gearbox if isinstance(gearbox, Gearbox) else chosen(GEARBOXES, gearbox, "", CampaignError, "gearbox")
+    layers = layers or SensorLayers()
+    states = box.states()
+    each = len(states) * len(box.accelerometers)
+    points = -(-signals // each)
+    if points < specimens:
+        raise CampaignError(
+            f"data set: {signals} signals are {points} points of {len(states)} states and {len(box.accelerometers)} "
+            f"sensors, too few for {specimens} specimens; ask for {each * specimens} signals or fewer specimens"
+        )
+    tables = {**box.tables, "run": dict(box.tables.get("run", {}))}
+    rate = float(to_si(tables["run"].get("rate", 12800.0), "frequency"))
+    before, after = layers.margins(duration, rate)
+    tables["run"] |= {"rate": rate, "duration": duration + (before + after) / rate}
+    tables["meshes"] = {name: {**mesh, "slices": SLICES} for name, mesh in tables["meshes"].items()}
+    factors: list[AnyFactor] = [
+        Factor(f"drives.{box.drive}.speed", low=box.speed[0], high=box.speed[1], name="operation.speed"),
+        Factor(f"loads.{box.load}.torque", low=box.torque[0], high=box.torque[1], name="operation.torque"),
+        Choice(f"meshes.{box.mesh}.faults", states, crossed=True, name="state"),
+        box.specimens(specimens, seed),
+    ]
+    return make_plan(
+        DrivetrainSubject(tables),
+        factors,
+        "sobol",
+        n=-(-points // specimens) * specimens,
+        seed=seed,
+        keep=["forces", *(f"signal:{name}" for name in (*box.accelerometers, box.speed_sensor))],
+        unit=unit,
+        time_limit=300.0,
+    )

@@ -1,0 +1,70 @@
+"""Splits that do not leak: by physical individual, with severities withheld, and the leaking one for comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gearmbs.campaigns.settings import CampaignError
+
+
+def split_by_group(
+    groups: Sequence[int] | np.ndarray, *, test: float = 0.2, validation: float = 0.1, seed: int = 0
+) -> np.ndarray:
+    """Return "train", "validation" or "test" for each row; all rows of a group are in the same split.
+
+    Parameters
+    ----------
+    groups : array_like of int, shape (n,)
+        Number of the specimen of each row.
+    test, validation : float
+        Parts of the groups, at least one each unless zero.
+
+    Raises
+    ------
+    CampaignError
+        If there are too few groups.
+    """
+    groups = np.asarray(groups)
+    names = np.unique(groups)
+    counts = [max(1, round(part * names.size)) if part > 0.0 else 0 for part in (test, validation)]
+    if sum(counts) >= names.size:
+        raise CampaignError(
+            f"split: {names.size} groups are too few for test = {test:g} and validation = {validation:g}"
+        )
+    order = np.random.default_rng(seed).permutation(names)
+    kind = dict.fromkeys(order[: counts[0]], "test") | dict.fromkeys(order[counts[0] : sum(counts)], "validation")
+    return np.array([kind.get(g, "train") for g in groups])
+
+
+def withhold(split: np.ndarray, severity: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Return a split in which training rows of a range of severities are "withheld": can a model interpolate?"""
+    inside = (np.asarray(severity) >= low) & (np.asarray(severity) <= high)
+    return np.where((split == "train") & inside, "withheld", split)
+
+
+def random_split(count: int, *, test: float = 0.2, seed: int = 0) -> np.ndarray:
+    """Return a split row by row, whatever they come from: it leaks if rows are windows of the same record or
+    specimen."""
+    return np.where(np.random.default_rng(seed).random(count) < test, "test", "train")
+
+
+def one_state_a_group(labels: np.ndarray, groups: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Return which rows are left if every group shows one state only, as where each fault is a part of its own.
+
+    States are dealt out evenly. In such data an individual is known by its state, and a split row by row leaks it;
+    where every individual is in all states, its other rows have other labels, and such a split misleads instead.
+    """
+    names, states = np.unique(groups), np.unique(labels)
+    dealt = states[np.random.default_rng(seed).permutation(np.arange(names.size) % states.size)]
+    return np.asarray(labels) == dealt[np.searchsorted(names, groups)]
+
+
+def shared_groups(split: np.ndarray, groups: np.ndarray) -> dict[tuple[str, str], int]:
+    """Return how many groups each pair of splits shares: zero everywhere if nothing leaks ("withheld" belongs to
+    training)."""
+    split = np.where(np.asarray(split) == "withheld", "train", split)
+    inside = {name: set(np.asarray(groups)[split == name]) for name in np.unique(split)}
+    names = sorted(inside)
+    return {(a, b): len(inside[a] & inside[b]) for i, a in enumerate(names) for b in names[i + 1 :]}
