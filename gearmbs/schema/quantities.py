@@ -70,6 +70,8 @@ class Measure:
         Whether driver and driven may have values of their own, as a list of two.
     curve : bool
         Whether the value may be a curve, as a list of points (time, value); zero is possible there.
+    word : str
+        A text that may stand in place of a quantity, such as "auto".
     """
 
     dimension: str = "dimensionless"
@@ -83,6 +85,7 @@ class Measure:
     several: int | None = None
     each: bool = False
     curve: bool = False
+    word: str = ""
 
     @cached_property
     def unit(self) -> str:
@@ -146,8 +149,8 @@ class Measure:
         ValueError
             For a wrong unit or a value outside the limits.
         """
-        if value is None:
-            return None
+        if value is None or (self.word and isinstance(value, str) and value.strip().lower() == self.word):
+            return value if value is None else self.word
         if self.each and isinstance(value, Sequence) and not isinstance(value, str):
             return tuple(float(self._one(item)) for item in two(value))
         if self.curve and isinstance(value, Sequence) and not isinstance(value, str):

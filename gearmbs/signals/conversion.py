@@ -182,6 +182,19 @@ def force_components(
         raise SignalError(
             f"channels: need the names of three Cartesian channels, {missing or channels} not among {names}"
         )
+    vector = force.values[:, [names.index(c) for c in channels]]
+    result = component_values(vector, pressure_angle, centre_line, axis, sense)
+    return like(force, result, channels=COMPONENTS, units=common_unit(force), pressure_angle=pressure_angle)
+
+
+def component_values(
+    vectors: np.ndarray,
+    pressure_angle: float,
+    centre_line: Sequence[float] = (1.0, 0.0, 0.0),
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    sense: int = 1,
+) -> np.ndarray:
+    """Return the components of vectors, shape (m, 3), in the directions of the mesh, (m, 4); see `force_components`."""
     if sense not in (1, -1):
         raise SignalError(f"sense: must be 1 or -1, got {sense!r}")
     if not 0.0 <= pressure_angle < math.pi / 2:
@@ -191,9 +204,7 @@ def force_components(
     e_c = _unit(along - e_z * (along @ e_z), "centre_line")
     e_t = np.cross(e_z, e_c)
     e_a = sense * math.cos(pressure_angle) * e_t + math.sin(pressure_angle) * e_c
-    vector = force.values[:, [names.index(c) for c in channels]]
-    result = np.stack((vector @ e_c, vector @ e_t, vector @ e_a, np.linalg.norm(vector, axis=1)), axis=1)
-    return like(force, result, channels=COMPONENTS, units=common_unit(force), pressure_angle=pressure_angle)
+    return np.stack((vectors @ e_c, vectors @ e_t, vectors @ e_a, np.linalg.norm(vectors, axis=1)), axis=1)
 
 
 def force_to_acceleration(force: xr.DataArray, mass: float) -> xr.DataArray:

@@ -25,6 +25,9 @@ MARGIN = 64
 BLOCK = 4096
 """Samples that come out of the filter at a time, so that its input stays in the processor's cache."""
 
+GAIN_POINTS = 1 << 14
+"""Points at which the gain of the filter is known, thirty and more to its transition."""
+
 _VEC, _MAT = float64[::1], float64[:, ::1]
 
 
@@ -80,7 +83,7 @@ def even_signal(
         raise SignalError(f"t: has shape {t.shape}, values {values.shape}; give one row of values a time")
     if not np.all(np.diff(t) > 0.0):
         raise SignalError("t: the times do not increase; sort them and drop repeated ones")
-    factor = max(2, 2 * int(np.ceil(0.5 * fine_rate / rate)))
+    factor = _fine_factor(rate, fine_rate)
     first, last = int(np.ceil(start * rate - 1e-6)), int(np.floor(stop * rate + 1e-6))
     low, high = first - MARGIN, last + MARGIN
     low, high = max(low, int(np.ceil(t[0] * rate - 1e-6))), min(high, int(np.floor(t[-1] * rate + 1e-6)))
@@ -111,6 +114,18 @@ def even_signal(
         speed=speed,
         teeth=teeth,
     )
+
+
+def _fine_factor(rate: float, fine_rate: float) -> int:
+    """Return the least even multiple of a rate that is not below another one."""
+    return max(2, 2 * int(np.ceil(0.5 * fine_rate / rate)))
+
+
+def even_signal_gain(rate: float, frequencies: np.ndarray) -> np.ndarray:
+    """Return by how much `even_signal` multiplies lines at some frequencies, Hz, of what it samples at ``rate``."""
+    factor = _fine_factor(rate, FINE_RATE)
+    gain = np.abs(np.fft.rfft(decimation_taps(factor, factor * rate), GAIN_POINTS))
+    return np.interp(frequencies, np.linspace(0.0, 0.5 * factor * rate, gain.size), gain)
 
 
 def _fine(

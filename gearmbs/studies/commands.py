@@ -196,7 +196,7 @@ def paper(
         base = make_case(data, "options")
         low = base.operation.top_torque
         tilt = to_si(angle, "angle", "--angle")
-        check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
+        check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options", bands=True)
 
         from gearmbs.files import check_place, keep
         from gearmbs.studies.presets.paper import run_paper
@@ -260,10 +260,11 @@ def run(
         from gearmbs.studies.run.store import record_size
 
         target, operation = out or case_file.with_suffix(".nc"), case.operation
-        span = operation.run_up + operation.settling + operation.duration
+        span = operation.run_up + operation.settling + operation.longest
         data = simulated(case.name, span, target, partial(run_case, case), record_size(case))
         typer.echo(_level_table(data))
-        for remark in remarks(case):
+        told = data.attrs.get("record_length")
+        for remark in [*([f"record: {told}"] if told else []), *remarks(case)]:
             typer.echo(f"note: {remark}", err=True)
         speed, cycle = data.attrs["solver_real_time_factor"], 1e3 * data.attrs["solver_time_per_mesh_cycle"]
         typer.echo(f"solver: {speed:.3g} times real time, {cycle:.3g} ms a mesh cycle", err=True)
@@ -333,7 +334,9 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
 def _level_table(data: Any) -> str:
     """Return the levels of the mesh harmonics of a record as a table; of a run-up the highest, and where."""
     if "gmf_rms" in data:
-        levels = data["gmf_rms"].sel(way="band")
+        from gearmbs.studies.run.record import told_levels
+
+        levels = told_levels(data)
         lines = [f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2"]
         for component in levels.component.values:
             row = levels.sel(component=component).values

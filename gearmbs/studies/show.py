@@ -57,7 +57,7 @@ def case_plot(case: Case, *, title: str | None = None) -> Figure:
         figure = new_figure(9.6, 5.4)
         left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
         mesh_view(case.pair(), ax=left, title=title or f"{case.name}: the mesh under load")
-        t = np.linspace(0.0, start + operation.duration, 601)
+        t = np.linspace(0.0, start + operation.longest, 601)
         right.plot(t, _speed(case, t), color=BLUE, label="speed of the driver, rpm")
         right.set_ylabel("speed, rpm", color=BLUE)
         right.set_ylim(bottom=0.0)
@@ -67,10 +67,10 @@ def case_plot(case: Case, *, title: str | None = None) -> Figure:
         other.set_ylim(bottom=0.0)
         other.grid(False)
         other.spines["right"].set_visible(True)
-        right.axvspan(start, start + operation.duration, color="#EEF1F5", zorder=0)
+        right.axvspan(start, start + operation.longest, color="#EEF1F5", zorder=0)
         right.annotate(
             "record",
-            (start + 0.5 * operation.duration, 0.03),
+            (start + 0.5 * operation.longest, 0.03),
             xycoords=("data", "axes fraction"),
             ha="center",
             fontsize=9,

@@ -175,6 +175,6 @@ def test_a_plan_is_printed_as_what_it_does():
 
 def test_kinds_of_subjects_are_listed():
     assert {"pair", "drivetrain", "planetary", "bearing", "deck", "function"} <= set(subject_kinds())
-    assert make_subject("pair", {}).base() == Case().settings()
+    assert make_subject("pair", {}).base() == Case().as_one_of_many().settings()
     with pytest.raises(CampaignError, match=says("'wheel'", "pair", "choose")):
         make_subject("wheel", {})

@@ -170,7 +170,7 @@ def test_errors_can_be_kept(tmp_path, monkeypatch):
         "gearmbs.studies.run.simulation.slip", lambda case, *a: "the wheels slipped" if case.name == "slips" else None
     )
     cases = [
-        Case(name="short", operation={**SHORT, "duration": 0.01}),
+        Case(name="short", operation={**SHORT, "duration": 0.005}),
         Case(name="slips", operation=SHORT),
         Case(name="sound", operation=SHORT),
     ]

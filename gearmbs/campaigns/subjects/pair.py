@@ -25,6 +25,9 @@ from gearmbs.studies.case.case import Case, make_case, units_of_fields
 from gearmbs.units import to_si
 
 FIRST_ORDERS = 3
+PERIODIC = {"harmonics", "contact"}
+"""What a motion that repeats itself is known by. Signals of all cases have one length, indicators look at what is left
+beside the lines of the mesh, and nobody knows what a function of one's own looks at."""
 PLAIN = {"name", "title"}
 NEEDED = {
     "harmonics": ("gmf_rms",),
@@ -71,14 +74,15 @@ class PairSubject(Subject):
     Parameters
     ----------
     case : Case, optional
-        Holds everything that no factor changes.
+        Holds everything that no factor changes. Without a duration of its own records are as long as harmonics and
+        contact need ("auto"), and as long as a case's default where anything else is kept.
     """
 
     kind: ClassVar[str] = "pair"
     keeps: ClassVar[tuple[str, ...]] = ("harmonics", "indicators", "contact", "record")
 
     def __init__(self, case: Case | None = None) -> None:
-        self.case = case or Case()
+        self.case = (case or Case()).as_one_of_many()
 
     def settings(self) -> dict[str, Any]:
         """Return the base case."""
@@ -126,7 +130,9 @@ class PairSubject(Subject):
         from gearmbs.studies.run.simulation import run_case
 
         operation = thing.operation
-        span = operation.run_up + operation.settling + operation.duration
+        if thing.is_auto and not PERIODIC.issuperset(keep):
+            thing = thing.changed(operation={"duration": operation.longest})
+        span = operation.run_up + operation.settling + operation.longest
         return run_case(thing, lambda t: progress(t / span), variables=variables_for(keep))
 
     def reduce(self, thing: Case, record: Any, keep: Sequence[str]) -> Kept:
@@ -160,7 +166,7 @@ class PairSubject(Subject):
                     "give solver.signal_rate and solver.output_rate of the base case"
                 )
             rate = rates.pop()
-            longest = max(thing.operation.duration for thing in things)
+            longest = max(thing.operation.longest for thing in things)
             units = {"acceleration": "m/s^2", "transmission_error": "m"}.get(name, "N")
             specs.append(SignalSpec(name, channels, int(np.ceil(longest * rate - 1e-6)), rate, units))
         return specs
@@ -183,7 +189,7 @@ class PairSubject(Subject):
 
     def tightened(self, thing: Case) -> Case | None:
         """Return the case with a tenth of its tolerance."""
-        tolerance = 0.1 * thing.solver.used_tolerance
+        tolerance = 0.1 * thing.tolerance
         return thing.changed(solver={"tolerance": tolerance}) if tolerance >= 1e-12 else None
 
 
@@ -208,6 +214,7 @@ def canonical_case(case: Case) -> dict[str, Any]:
             if hasattr(type(holder), f"used_{name}"):
                 data[section][name] = getattr(holder, f"used_{name}")
     data["solver"] |= {"signal_rate": case.signal_rate, "output_rate": case.output_rate}
+    data["solver"] |= {"tolerance": case.tolerance, "lump": case.lump}
     wheels = case.pair().wheels
     gears = data["gears"]
     for name, value in gears.items():
@@ -254,7 +261,8 @@ def contact_numbers(case: Case, record: Any) -> dict[str, float]:
     """
     force, error = record["normal_force"].values, record["transmission_error"].values
     rate, gmf = case.output_rate, case.mesh_frequency
-    count = int(np.floor(error.size * gmf / rate) / gmf * rate)
+    # a record of whole periods may be a sample short of the last one
+    count = int(np.floor((error.size + 1) * gmf / rate) / gmf * rate)
     t = np.arange(count) / rate
     swing = error[:count] - error[:count].mean()
     amplitudes = {

@@ -237,6 +237,7 @@ class Run:
             if failure is not None:
                 return failure
             self.started = True
+            self._goes_on()
         chunk, st = FIRST_CHUNK, self.state
         while True:
             tic = time.perf_counter()
@@ -254,7 +255,7 @@ class Run:
                 return ending
             if code == s.RUNNING:
                 self._report()
-                if st.t >= st.t_pause:
+                if st.t >= st.t_pause and not self._goes_on():
                     return REACHED
                 if few < chunk:
                     continue
@@ -263,6 +264,16 @@ class Run:
                     chunk *= 8 if elapsed < CHUNK_SECONDS / 16 else 2
                 elif elapsed > 2.0 * CHUNK_SECONDS and chunk > 1:
                     chunk //= 2
+
+    def _goes_on(self) -> bool:
+        """Return whether the run is to go on beyond a pause, and until when."""
+        if self.options.pause is None:
+            return False
+        self.records.drain()
+        next_pause = self.options.pause(self.state.t)
+        if next_pause is not None:
+            self.state.t_pause = next_pause
+        return next_pause is not None
 
     def _stalled(self) -> tuple[Status, str] | None:
         """Return how the run has ended if it gets nowhere."""

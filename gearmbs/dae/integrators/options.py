@@ -32,6 +32,9 @@ BESIDE_OF_PIECE = 1e-9
 Consumer = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
 """Takes t, y of some accepted steps and the integer table valid there; the arrays are valid during the call only."""
 
+Pause = Callable[[float], float | None]
+"""Takes the time that a run has reached; returns when it is to be asked again, or None to end the run."""
+
 
 def beside(t: float, length: float) -> float:
     """Return how far beside a breakpoint equations that may switch there are looked at, in a piece of ``length``."""
@@ -85,6 +88,9 @@ class Options:
         With outputs at every step: called as ``consumer(t, y, idata)`` with some accepted steps at a time and the
         integer table valid there, instead of keeping them; the arrays are valid during the call only. The result then
         holds nothing but the last step.
+    pause : callable, optional
+        With a consumer: called as ``pause(t)`` at the start, and when the consumer has all steps up to the time that it
+        returned last; with None the run ends there, as at its end. Steps do not depend on it.
     errors : list of BaseException, optional
         Where callbacks in Python leave the exceptions they raise.
     history : History, optional
@@ -117,6 +123,7 @@ class Options:
     check_start: bool = True
     progress: Callable[[float], None] | None = None
     consumer: Consumer | None = None
+    pause: Pause | None = None
     errors: list[BaseException] | None = None
     history: History | None = None
 

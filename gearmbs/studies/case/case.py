@@ -55,6 +55,16 @@ KEPT_HARMONICS, ANALYSER = 5, 2.56
 
 WHEELS = ("driver", "driven")
 
+AUTO = "auto"
+"""Duration of a record that is as long as its question needs."""
+
+LONGEST = 1.0
+"""Seconds of a record whose length nobody gave: always of a single case, at most of one with the duration `AUTO`."""
+
+FINER = 0.1
+"""Tolerance of a record at `AUTO` over that of others: a mesh period of the paper's states and of three hundred random
+ones then repeats itself to 0.2 % of its harmonics, at the usual tolerance to 2 %, which long records average out."""
+
 
 def _both(value: Any) -> Any:
     """Return one value for both wheels as two."""
@@ -179,7 +189,8 @@ class Operation(Section):
     from the beginning of the record, ``[["0 s", "0 rpm"], ["2 s", "3000 rpm"]]``. Between the points run straight
     lines whose corners are rounded, see `gearmbs.mechanism.polyline`; before the first the first value is held, which
     ``run_up`` leads to from rest, and after the last the last. ``duration`` is up to the end of the curves unless it is
-    given.
+    given. ``"auto"`` is as long as the motion takes to repeat itself, with the settling that this needs, see
+    `gearmbs.studies.run.periodic`; with a curve it is that curve.
     """
 
     section: ClassVar[str] = "operation"
@@ -189,14 +200,19 @@ class Operation(Section):
     torque: q.TorqueValue = 100.0
     run_up: q.RunUp = 0.05
     settling: q.Settling = 0.05
-    duration: q.Duration = 1.0
+    duration: q.Duration = LONGEST
 
     @model_validator(mode="after")
     def _span(self) -> Operation:
         ends = [points[-1][0] for points in (self.speed_curve, self.torque_curve) if points]
-        if ends and "duration" not in self.model_fields_set:
+        if ends and ("duration" not in self.model_fields_set or self.duration == AUTO):
             self.__dict__["duration"] = max(ends)
         return self
+
+    @cached_property
+    def longest(self) -> float:
+        """Length of the record, s; at "auto" that which it has if the motion does not repeat itself before."""
+        return LONGEST if isinstance(self.duration, str) else self.duration
 
     def settings(self) -> dict[str, Any]:
         """Return all settings; a duration that follows from a curve goes with it."""
@@ -216,7 +232,7 @@ class Operation(Section):
         data = super().with_settings(changes)
         curves = [changes[key] for key in ("speed", "torque") if key in changes]
         if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
-            if "duration" in data and "duration" not in changes:
+            if self.duration != AUTO and "duration" in data and "duration" not in changes:
                 given = data.pop("duration")
                 warnings.warn(
                     f"operation.duration = {given!r}, given before, goes: the record lasts as long as the new curve; "
@@ -327,6 +343,10 @@ class FrictionSettings(Section):
         return FlankFriction(self.static, self.dynamic, self.static_speed, self.dynamic_speed)
 
 
+def _flag_or_none(value: Any) -> Any:
+    return None if value is None else flag(value)
+
+
 class Solver(Section):
     """Integrator, formulation, accuracy and output.
 
@@ -339,7 +359,9 @@ class Solver(Section):
     contact, a multiple of it. Where they are not given they follow the mesh frequency; see `Case.signal_rate`.
 
     ``lump`` integrates each gear and its shaft, which are fixed to each other, as one body, and of bodies that turn
-    about fixed axes the angles alone; the record is about all bodies as without it.
+    about fixed axes the angles alone; the record is about all bodies as without it. Where it is not given, a case whose
+    duration is "auto" is lumped, and so are those of sweeps, campaigns and identifications; others are integrated with
+    all bodies, as in the paper. At "auto" the tolerance, where it is not given, is a tenth of the integrator's default.
     """
 
     section: ClassVar[str] = "solver"
@@ -349,7 +371,7 @@ class Solver(Section):
     tolerance: float | None = None
     output_rate: q.SamplingRate = None
     signal_rate: q.SamplingRate = None
-    lump: Annotated[bool, BeforeValidator(flag)] = False
+    lump: Annotated[bool | None, BeforeValidator(_flag_or_none)] = None
 
     @cached_property
     def used_tolerance(self) -> float:
@@ -489,16 +511,46 @@ class Case(Section, Shown):
         return self.gears.teeth[0] * self.operation.top_speed / 6.283185307179586
 
     @property
+    def is_auto(self) -> bool:
+        """Whether the record is as long as its question needs."""
+        return self.operation.duration == AUTO
+
+    @property
+    def lump(self) -> bool:
+        """Whether bodies fixed to each other are integrated as one."""
+        return self.is_auto if self.solver.lump is None else self.solver.lump
+
+    @property
+    def tolerance(self) -> float:
+        """The integrator's tolerance."""
+        usual = self.solver.used_tolerance
+        return FINER * usual if self.is_auto and self.solver.tolerance is None else usual
+
+    def as_one_of_many(self) -> Case:
+        """Return the case as sweeps, campaigns and identifications run it where nothing else is said of it.
+
+        The duration is "auto" unless it is given or a curve's, and gear and shaft are one body.
+        """
+        operation = self.operation
+        changes: dict[str, Any] = {}
+        curves = operation.speed_curve is not None or operation.torque_curve is not None
+        if "duration" not in operation.model_fields_set and not curves:
+            changes["operation"] = {"duration": AUTO}
+        if self.solver.lump is None:
+            changes["solver"] = {"lump": True}
+        return self.changed(**changes) if changes else self
+
+    @property
     def angle_turned(self) -> float:
         """Angle that the driver turns during the record, rad."""
         operation = self.operation
         if operation.speed_curve is None:
-            return operation.top_speed * operation.duration
+            return operation.top_speed * operation.longest
         from gearmbs.studies.case.drive import drive_angle
 
         start = operation.run_up + operation.settling
         angle = drive_angle(operation.speed, operation.run_up, start)
-        return angle(start + operation.duration) - angle(start)
+        return angle(start + operation.longest) - angle(start)
 
     @cached_property
     def signal_rate(self) -> float:

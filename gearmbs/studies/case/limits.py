@@ -44,7 +44,7 @@ def _edge(rate: float, signal_rate: float) -> float:
     return max(EDGE, math.ceil(0.5 * taps + 1) / rate)
 
 
-def check_record(case: Case, source: str = "") -> None:
+def check_record(case: Case, source: str = "", *, bands: bool = False) -> None:
     """Refuse a case whose record could not be evaluated.
 
     Parameters
@@ -52,12 +52,14 @@ def check_record(case: Case, source: str = "") -> None:
     case : Case
     source : str
         Where it comes from, for messages; default its name.
+    bands : bool
+        Whether mesh harmonics are wanted by band-passes, too, and not by orders alone.
 
     Raises
     ------
     CaseError
-        If the bands of the mesh harmonics do not fit below half the signal rate, if the record is too short for the
-        filters, if it begins too early, or if the contact is too soft to carry the load.
+        If the bands of the mesh harmonics do not fit below half the signal rate, if the record is too short for their
+        lines, if it begins too early, or if the contact is too soft to carry the load.
     """
     source = source or f"case '{case.name}'"
     operation, gmf, rate = case.operation, case.mesh_frequency, case.signal_rate
@@ -73,7 +75,7 @@ def check_record(case: Case, source: str = "") -> None:
             "mesh frequency, or give a lower speed (a plain number is in rad/s; write '1000 rpm')"
         )
     if operation.speed_curve is None:
-        _check_length(case, source)
+        _check_length(case, source, bands)
     else:
         _check_curve(case, source)
     ahead = edge(case)
@@ -86,19 +88,33 @@ def check_record(case: Case, source: str = "") -> None:
     check_stiffness(case, source)
 
 
-def _check_length(case: Case, source: str) -> None:
-    """Refuse a record at constant speed that is too short for its filters."""
-    operation, gmf, rate = case.operation, case.mesh_frequency, case.signal_rate
-    bands = [((k - HALF_WIDTH) * gmf, (k + HALF_WIDTH) * gmf) for k in range(1, HARMONICS + 1)]
-    taps = [bandpass_taps(rate, low, high, TRANSITION * gmf, ATTENUATION_DB).size for low, high in bands]
-    need = max((max(taps) + 1) / rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / rate)
-    if operation.duration < need:
+def _check_length(case: Case, source: str, bands: bool) -> None:
+    """Refuse a record at constant speed that is too short for its mesh harmonics."""
+    gmf = case.mesh_frequency
+    need = least_for_bands(case) if bands else MIN_PERIODS / gmf + 1.0 / case.signal_rate
+    if case.operation.longest < need:
         least = math.ceil(1e4 * need) / 1e4
+        what = "the band-pass about" if bands else "the transform at"
+        remedy = "" if bands else ", or 'auto'"
         raise CaseError(
-            f"{source}: operation.duration = {operation.duration:g} s: the band-pass about the mesh frequency of "
+            f"{source}: operation.duration = {case.operation.longest:g} s: {what} the mesh frequency of "
             f"{gmf:.6g} Hz needs a record of at least {least:g} s, that is {math.ceil(need * gmf)} mesh periods; give "
-            "a longer duration"
+            f"a longer duration{remedy}"
         )
+
+
+def band_taps(case: Case) -> list[np.ndarray]:
+    """Return the band-pass filters about the mesh harmonics at the signal rate."""
+    gmf = case.mesh_frequency
+    bands = [((k - HALF_WIDTH) * gmf, (k + HALF_WIDTH) * gmf) for k in range(1, HARMONICS + 1)]
+    return [bandpass_taps(case.signal_rate, low, high, TRANSITION * gmf, ATTENUATION_DB) for low, high in bands]
+
+
+def least_for_bands(case: Case) -> float:
+    """Return the length of a record from which its mesh harmonics are evaluated by band-passes too, s."""
+    gmf, rate = case.mesh_frequency, case.signal_rate
+    longest = max(taps.size for taps in band_taps(case))
+    return max((longest + 1) / rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / rate)
 
 
 def _check_curve(case: Case, source: str) -> None:
@@ -107,7 +123,7 @@ def _check_curve(case: Case, source: str) -> None:
     if turned < LEAST_TURNS:
         raise CaseError(
             f"{source}: operation.speed: the driver makes {turned:.3g} revolutions in the record of "
-            f"{case.operation.duration:g} s, orders are tracked over {LEAST_TURNS:g} and more; give a longer curve or "
+            f"{case.operation.longest:g} s, orders are tracked over {LEAST_TURNS:g} and more; give a longer curve or "
             "higher speeds"
         )
 
@@ -170,7 +186,13 @@ def remarks(case: Case) -> list[str]:
                 f"gears.bore_radius is {1e3 * wheel.bore_radius:g} mm, shafts.radius {1e3 * shafts.radius:g} mm; "
                 "give a bore of the shaft's radius"
             )
-    solver = case.solver
+    operation, solver = case.operation, case.solver
+    if operation.speed_curve is None and operation.longest < least_for_bands(case):
+        periods, least = operation.longest * case.mesh_frequency, least_for_bands(case)
+        found.append(
+            f"operation.duration = {operation.longest:g} s is {periods:.3g} mesh periods: mesh harmonics are told by "
+            f"orders alone, their bands need {least:.3g} s"
+        )
     if solver.integrator == "IDA" and solver.used_tolerance > 2e-7:
         found.append(
             f"solver.tolerance = {solver.used_tolerance:g} with IDA: the paper's mesh harmonics are off by up to 12 % "

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import cache
 from numbers import Real
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
 
@@ -48,7 +48,7 @@ AngularSpeed = Annotated[float | Points, Measure("angular speed", 0.01, 1e6, "rp
 TorqueValue = Annotated[float | Points, Measure("torque", 1e-6, 1e8, curve=True)]
 RunUp = Annotated[float, Measure("time", 1e-5, 1000)]
 Settling = Annotated[float, Measure("time", 0, 1000)]
-Duration = Annotated[float, Measure("time", 1e-5, 10000)]
+Duration = Annotated[float | Literal["auto"], Measure("time", 1e-5, 10000, word="auto")]
 SamplingRate = Annotated[float | None, Measure("frequency", 1, 1e7)]
 SlidingSpeed = Annotated[float, Measure("speed", 1e-6, 1000)]
 

@@ -20,6 +20,7 @@ from gearmbs.schema.described import chosen
 from gearmbs.signals import COMPONENTS, rms_factor
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.studies.case.case import Case, CaseError, make_case
+from gearmbs.studies.case.limits import check_record
 from gearmbs.studies.presets.paper_cases import (
     DEFAULT_COMPONENT,
     LOAD_NAMES,
@@ -165,6 +166,8 @@ def run_paper(
     """
     chosen(COMPONENTS, component, "", CaseError, "component:")
     cases = paper_cases(base=base, torques=torques, misalignment=misalignment)
+    for case in cases:
+        check_record(case, bands=True)
     records = run_cases(cases, workers=workers, progress=progress, done=done, folder=folder)
     return PaperStudy(combine(cases, records, component), component, cases)
 

@@ -149,7 +149,7 @@ def _unseen(_name: str, _fraction: float) -> None:
 
 def _span(case: Case) -> float:
     """Simulated time of a case up to the end of its record, s."""
-    return case.operation.run_up + case.operation.settling + case.operation.duration
+    return case.operation.run_up + case.operation.settling + case.operation.longest
 
 
 def _cost(case: Case) -> float:

@@ -14,10 +14,12 @@ import numpy as np
 import gearmbs
 from gearmbs.dae.results.solution import Solution
 from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, gmf_rms, make_signal, trim
+from gearmbs.signals.analysis.bands import order_rms
+from gearmbs.signals.conversion import COMPONENTS
 from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.case import Case, CaseError, units_of_fields
 from gearmbs.studies.case.drive import drive_angle
-from gearmbs.studies.case.limits import HARMONICS, edge, remarks
+from gearmbs.studies.case.limits import HARMONICS, edge, least_for_bands, remarks
 from gearmbs.studies.run import rig
 
 if TYPE_CHECKING:
@@ -31,6 +33,13 @@ COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
 
 TURN_BEFORE = 0.02
 """Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
+
+
+class Span(NamedTuple):
+    """Start and end of a record, s."""
+
+    start: float
+    stop: float
 
 
 class Measured(NamedTuple):
@@ -68,38 +77,45 @@ def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> M
     return recorder.joined([recorder.columns(part) for part in solution.parts(rows)])
 
 
-def rows_of_record(case: Case, t: np.ndarray) -> np.ndarray:
+def rows_of_record(case: Case, t: np.ndarray, begin: float | None = None) -> np.ndarray:
     """Return the numbers of the output times a record is made from.
 
-    Before the span of its filters only a few are needed, to follow the turning wheels.
+    Before ``begin``, by default of the span of its filters, only a few are needed, to follow the turning wheels.
     """
-    first = int(np.searchsorted(t, span_begin(case)))
+    first = int(np.searchsorted(t, span_begin(case) if begin is None else begin))
     teeth = case.gears.teeth
     turn = 2.0 * np.pi / (case.operation.top_speed * max(1.0, teeth[0] / teeth[1]))
     interval = np.floor(t[: first + 1] / (TURN_BEFORE * turn))
     return np.concatenate([np.flatnonzero(np.diff(interval) > 0.0), np.arange(first, t.size)])
 
 
+def span_of(case: Case) -> Span:
+    """Return when the record of a case begins and ends, if it does not depend on the motion."""
+    operation = case.operation
+    start = operation.run_up + operation.settling
+    return Span(start, start + operation.longest)
+
+
 def span_begin(case: Case) -> float:
     """Return the time at which the span of a record's filters begins, s."""
-    operation = case.operation
-    return operation.run_up + operation.settling - edge(case) - (MARGIN + 1) / case.output_rate
+    return span_of(case).start - edge(case) - (MARGIN + 1) / case.output_rate
 
 
 class Recorder:
     """Collects what the record of a case needs from the parts of a solution, as a consumer of `simulate`.
 
-    Of the steps before the span of the record's filters the unknowns are kept, and evaluated only as far as needed.
+    Of the steps before ``begin``, by default of the span of the record's filters, the unknowns are kept, and evaluated
+    only as far as needed.
     """
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: Case, begin: float | None = None) -> None:
         self.case = case
         pair = case.pair()
         place = pair.placement(0.0)
         self._axes = (place.axes_1, place.axes_2)
         self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
         self._lag = pair.rotation * pair.wheels[1].base_radius
-        self._begin = span_begin(case)
+        self._begin = span_begin(case) if begin is None else begin
         self._early: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._columns: list[_Columns] = []
         self._model: Solution | None = None
@@ -119,12 +135,17 @@ class Recorder:
         self._early.append((part.t.copy(), part.result.y.copy(), part.result.epochs[0][1]))
         if part.t[-1] < self._begin:
             return
-        wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]))
+        wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]), self._begin)
         self._columns = [self.columns(piece) for piece in self._solution_over(wanted).parts()]
 
     def measured(self) -> Measured:
         """Return what the record is made from: all steps inside the span of its filters, some before."""
         return self.joined(self._columns)
+
+    def tail(self, after: float) -> _Columns:
+        """Return what was taken after a time, and a little before."""
+        first = next((k for k, c in enumerate(self._columns) if c.t[-1] > after), 0)
+        return _Columns(*(np.concatenate(c) for c in zip(*self._columns[first:], strict=True)))
 
     def everything(self) -> Measured:
         """Return the same at all steps from the start on, for a run that failed."""
@@ -194,7 +215,16 @@ def check_variables(variables: Collection[str] | None) -> None:
             raise CaseError(f"variables: {name!r} is unknown; choose of {', '.join(VARIABLES)}")
 
 
-def evaluate(case: Case, known: Measured, *, even: bool, variables: Collection[str] | None = None) -> xr.Dataset:
+def evaluate(
+    case: Case,
+    known: Measured,
+    *,
+    even: bool,
+    variables: Collection[str] | None = None,
+    span: Span | None = None,
+    signal_stop: float | None = None,
+    levels: np.ndarray | None = None,
+) -> xr.Dataset:
     """Return variables of a case's record, without attributes; see `gearmbs.studies.run_case`.
 
     Parameters
@@ -205,21 +235,30 @@ def evaluate(case: Case, known: Measured, *, even: bool, variables: Collection[s
         Which of the two.
     variables : collection of str, optional
         Of `VARIABLES`; default all.
+    span : Span, optional
+        Start and end of the record; default those of the case.
+    signal_stop : float, optional
+        End of the acceleration, s, where it is not the record's.
+    levels : ndarray, shape (2, harmonics, components), optional
+        RMS of the mesh harmonics by band and by orders, if they are known; default from the acceleration.
     """
     import xarray as xr
 
     level = LEVELS[0 if case.operation.speed_curve is None else 1]
     wanted = set(VARIABLES if variables is None else variables) - (set(LEVELS) - {level})
-    start = case.operation.run_up + case.operation.settling
-    stop = start + case.operation.duration
+    start, stop = span or span_of(case)
+    signal_stop = stop if signal_stop is None else signal_stop
     dataset = xr.Dataset()
-    forces = _even_forces(case, known, start, stop, wanted, even=even)
+    made = wanted - {"gmf_rms"} if levels is not None else wanted
+    forces = _even_forces(case, known, start, signal_stop if made & {"acceleration"} else stop, made, even=even)
     if wanted & set(SERIES):
         dataset = _series(case, known, forces, (start, stop), wanted, even=even)
-    if not wanted & {"acceleration", *LEVELS}:
+    if levels is not None and level in wanted:
+        dataset[level] = _levels(levels, np.array(COMPONENTS), case.mesh_frequency)
+    if not made & {"acceleration", *LEVELS}:
         return dataset
     assert forces is not None
-    acceleration = _acceleration(case, forces, start, stop)
+    acceleration = _acceleration(case, forces, start, signal_stop)
     plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
     dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
     dataset["acceleration"].attrs.update(
@@ -229,9 +268,9 @@ def evaluate(case: Case, known: Measured, *, even: bool, variables: Collection[s
     )
     if case.operation.speed_curve is not None:
         dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
-    if level in wanted:
+    if level in made:
         dataset[level] = (
-            _mesh_levels(acceleration) if level == "gmf_rms" else _tracked_levels(case, acceleration, dataset)
+            _mesh_levels(case, acceleration) if level == "gmf_rms" else _tracked_levels(case, acceleration, dataset)
         )
     if "acceleration" not in wanted:
         dataset = dataset.drop_vars(["acceleration", "signal_time", "speed", "angle"], errors="ignore")
@@ -324,20 +363,41 @@ def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -
     return trim(acceleration, start, stop)
 
 
-def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics by both ways."""
+WAYS = ("band", "orders")
+"""How the RMS of the mesh harmonics is found."""
+
+
+def told_levels(record: xr.Dataset) -> xr.DataArray:
+    """Return the RMS of the mesh harmonics of a record by bands, or by orders if it is too short for them."""
+    levels = record["gmf_rms"]
+    by_band = levels.sel(way=WAYS[0])
+    return by_band if np.isfinite(by_band.values).all() else levels.sel(way=WAYS[1])
+
+
+def _mesh_levels(case: Case, acceleration: xr.DataArray) -> xr.DataArray:
+    """Return the RMS of the mesh harmonics by both ways; NaN by bands of a record that is too short for them."""
+    if case.operation.longest >= least_for_bands(case):
+        found = gmf_rms(acceleration)
+        values = np.stack([found[way].values for way in WAYS])
+    else:
+        orders = order_rms(acceleration, case.mesh_frequency, list(range(1, HARMONICS + 1))).values
+        values = np.stack([np.full_like(orders, np.nan), orders])
+    return _levels(values, acceleration["channel"].values, case.mesh_frequency)
+
+
+def _levels(values: np.ndarray, components: np.ndarray, mesh_frequency: float) -> xr.DataArray:
+    """Return the RMS of the mesh harmonics, shape (ways, harmonics, components), with their names."""
     import xarray as xr
 
-    levels = gmf_rms(acceleration)
-    ways = ("band", "orders")
+    harmonics = np.arange(1, HARMONICS + 1)
     found = xr.DataArray(
-        np.stack([levels[way].values for way in ways]),
+        values,
         dims=("way", "harmonic", "component"),
         coords={
-            "harmonic": levels["harmonic"].variable,
-            "frequency": levels["frequency"].variable,
-            "component": levels["channel"].values,
-            "way": list(ways),
+            "harmonic": harmonics,
+            "frequency": ("harmonic", harmonics * mesh_frequency, {"units": "Hz"}),
+            "component": components,
+            "way": list(WAYS),
         },
     )
     found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
@@ -424,7 +484,7 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
                 out[name] = list(value) if isinstance(value, tuple) else value
                 if key in units and not isinstance(value, str):
                     out[f"{name}_units"] = units[key]
-    out["solver_tolerance"] = case.solver.used_tolerance
+    out["solver_tolerance"], out["solver_lump"] = case.tolerance, int(case.lump)
     for name, rate in (("signal_rate", case.signal_rate), ("output_rate", case.output_rate)):
         out[f"solver_{name}"], out[f"solver_{name}_units"] = rate, "Hz"
     pair = case.pair()

@@ -18,7 +18,9 @@ from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.studies.case.case import Case, CaseError, Operation, Solver
 from gearmbs.studies.case.limits import check_record, edge, slip
 from gearmbs.studies.run import rig
+from gearmbs.studies.run.periodic import PeriodicRecorder, reach, signal_stop
 from gearmbs.studies.run.record import (
+    VARIABLES,
     Measured,
     Recorder,
     attributes_of,
@@ -120,10 +122,10 @@ def simulate_case(
         Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
         without aliases; see its ``status``.
     """
-    _load_kernels(case.solver.integrator, case.solver.lump)
+    _load_kernels(case.solver.integrator, case.lump)
     mechanism = case_mechanism(case) if mechanism is None else mechanism
     operation, solver = case.operation, case.solver
-    t_end = operation.run_up + operation.settling + operation.duration + edge(case)
+    t_end = operation.run_up + operation.settling + operation.longest + edge(case)
     # up to a whole sample
     t_end = np.ceil(t_end * case.output_rate - 1e-6) / case.output_rate
     return simulate(
@@ -133,9 +135,9 @@ def simulate_case(
         every_step=every_step,
         integrator=solver.integrator,
         formulation=solver.formulation,
-        tol=solver.used_tolerance,
+        tol=case.tolerance,
         rate_scale=operation.top_speed * case.gears.teeth[0],
-        lump=solver.lump,
+        lump=case.lump,
         progress=progress,
         advice=ADVICE,
         **options,
@@ -238,19 +240,28 @@ def run_case(
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
-    _load_kernels(case.solver.integrator, case.solver.lump)
-    recorder = Recorder(case)
-    solution = simulate_case(case, progress, mechanism=mechanism, every_step=True, consumer=recorder.take)
+    _load_kernels(case.solver.integrator, case.lump)
+    periodic = PeriodicRecorder(case, mechanism is None) if case.is_auto else None
+    recorder = Recorder(case) if periodic is None else periodic.recorder
+    options: dict[str, Any] = {"every_step": True, "consumer": recorder.take}
+    if periodic is not None and INTEGRATORS[case.solver.integrator].can("pause"):
+        options["pause"] = periodic.pause
+    solution = simulate_case(case, progress, mechanism=mechanism, **options)
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
         known = _partial(case, solution, recorder, mechanism)
         raise kind(f"case '{case.name}': {solution.message}", solution, case, known)
     try:
-        dataset = _evaluated(case, solution, recorder.measured(), even=False, variables=variables)
+        if periodic is None or periodic.found is None:
+            dataset = _evaluated(case, solution, recorder.measured(), even=False, variables=variables)
+        else:
+            dataset = _evaluated_period(case, solution, periodic, variables)
     except SimulationFailed as failure:
         known = _partial(case, solution, recorder, mechanism)
         raise SimulationFailed(str(failure), solution, case, known) from None
     dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    if periodic is not None:
+        dataset.attrs |= periodic.attributes()
     return dataset
 
 
@@ -327,14 +338,39 @@ def _evaluated(
     case: Case, solution: Solution, known: Measured, *, even: bool, variables: Collection[str] | None = None
 ) -> xr.Dataset:
     """Return the record of what was measured, at even times or not; see `record`."""
-    slipped = slip(case, known.t, known.error)
-    if slipped is not None:
-        raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
+    _check_slip(case, solution, known)
     # the first one loads xarray and what xarray loads
     with uncollected():
         dataset = evaluate(case, known, even=even, variables=variables)
     dataset.attrs = attributes_of(case, solution)
     return dataset
+
+
+def _evaluated_period(
+    case: Case, solution: Solution, periodic: PeriodicRecorder, variables: Collection[str] | None
+) -> xr.Dataset:
+    """Return the record of a motion that repeats itself; its acceleration lasts for some turns of the driver."""
+    _check_slip(case, solution, periodic.recorder.measured())
+    span, wanted = periodic.span, VARIABLES if variables is None else variables
+    levels = periodic.levels() if "gmf_rms" in wanted else None
+    with uncollected():
+        dataset = evaluate(
+            case,
+            periodic.measured(reach(case, span)),
+            even=False,
+            variables=variables,
+            span=span,
+            signal_stop=signal_stop(case, span),
+            levels=levels,
+        )
+    dataset.attrs = attributes_of(case, solution)
+    return dataset
+
+
+def _check_slip(case: Case, solution: Solution, known: Measured) -> None:
+    slipped = slip(case, known.t, known.error)
+    if slipped is not None:
+        raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
 
 
 def _is_even(t: np.ndarray, rate: float) -> bool:

@@ -70,7 +70,7 @@ def keep_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
 def record_size(case: Case) -> float:
     """Return about how many bytes the record of a case takes as a file, rather less than more."""
     samples = COLUMNS * case.output_rate + 5.0 * case.signal_rate
-    return PACKED * BYTES * samples * case.operation.duration + 2e4
+    return PACKED * BYTES * samples * case.operation.longest + 2e4
 
 
 def file_stem(name: str) -> str:

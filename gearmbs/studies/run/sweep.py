@@ -19,6 +19,7 @@ from gearmbs.studies.case.case import Case, CaseError, readable
 from gearmbs.studies.case.section import Section, measures_of
 from gearmbs.studies.presets.paper_cases import DEFAULT_COMPONENT
 from gearmbs.studies.run.parallel import run_cases
+from gearmbs.studies.run.record import told_levels
 from gearmbs.studies.run.store import file_stem, save_study
 from gearmbs.wording import did_you_mean
 
@@ -90,7 +91,7 @@ class Sweep(Shown):
         for record in self.records:
             row = {"mesh frequency, Hz": record.attrs["mesh_frequency"]}
             if "gmf_rms" in record:
-                levels = record["gmf_rms"].sel(component=name, way="band")
+                levels = told_levels(record).sel(component=name)
                 row |= {f"{int(h)} x GMF": float(level) for h, level in zip(levels.harmonic, levels, strict=True)}
             row["ms a mesh cycle"] = 1e3 * record.attrs["solver_time_per_mesh_cycle"]
             rows.append(row)
@@ -141,7 +142,7 @@ def sweep(
     Parameters
     ----------
     case : Case
-        Everything else.
+        Everything else. Without a duration of its own records are as long as their harmonics need ("auto").
     field : str
         Section and setting, such as ``"operation.speed"`` or ``"fault.misalignment"``.
     values : sequence
@@ -178,6 +179,7 @@ def cases_of_sweep(case: Case, field: str, values: Sequence[Any]) -> list[Case]:
     """Return the cases of `sweep`; CaseError if there is no such setting, or a value is impossible."""
     section, _, name = field.partition(".")
     _check_field(case, field)
+    case = case.as_one_of_many()
     if isinstance(values, str) or not len(values):
         raise CaseError(f"values: {values!r}; give a sequence of values of {field}")
     cases = []

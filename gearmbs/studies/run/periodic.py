@@ -1,0 +1,292 @@
+"""Records as long as the question: how long a motion must be followed until it repeats itself, measured on the way.
+
+Wheels without faults of single teeth repeat their motion each mesh period, with such faults each turn of the faulty
+wheel, with faults on both when the same teeth meet again. That is what the geometry allows; whether the motion does it
+depends on damping, backlash and resonances. A record at ``duration = "auto"`` is therefore watched while it is made. Of
+each mesh period n the complex amplitudes c_n of the mesh harmonics of every component of the force are taken.
+
+* Periodic by mesh: two neighbouring stretches of h periods each, the later half of which comes after 2 h others, have
+  the same mean amplitudes. Long-lived oscillations and wheels that hop off their flanks shift the means; a motion that
+  repeats itself every second or third period is seen, too, once h is a multiple of that.
+* Periodic by p mesh periods: amplitudes of the last mesh periods are those of p, or 2 p, periods before, so that the
+  motion has come back to where it was.
+
+The largest difference, of the harmonics' own levels, is the record's *deviation*. An oscillation that has decayed to a
+part d of its beginning after the settling, and by a factor q in each mesh period, leaves of the stretches a difference
+of d (1 - q^h)^2 / (h (1 - q)), of their mean an error of d (1 - q^2h) / (2 h (1 - q)): half of it for fast ones, twice
+as much at q^h = 0.6.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.dae.results.solution import Solution
+from gearmbs.signals.analysis.bands import HALF_WIDTH
+from gearmbs.signals.conversion import component_values
+from gearmbs.signals.resampling import MARGIN, even_signal_gain, monotone_cubic
+from gearmbs.studies.case.case import Case
+from gearmbs.studies.case.limits import HARMONICS, band_taps, edge
+from gearmbs.studies.run.record import COUNTS, SMOOTH, Measured, Recorder, Span
+
+SAMPLES = 1024
+"""Samples of a mesh period, ten of a contact that lasts a hundredth of it; means over each lower the first harmonics by
+less than 2e-5."""
+
+HOLDS = 1e-3
+"""Deviation up to which a motion is said to repeat itself: the noise of a mean over four mesh periods, and a fifth of
+what a harmonic may be off, 0.5 %, which it is at q^h = 0.8 of the module's text."""
+
+LEAST_LEVEL = 0.01
+"""Levels below this part of the component's largest harmonic are judged as if they had it: they are differences of
+large numbers."""
+
+HALVES = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
+"""Lengths of a stretch that are tried, in mesh periods: multiples of two and of three."""
+
+OVERLAP = 6
+"""Mesh periods over which a motion must have come back to that of a turn before, and settles at least before it."""
+
+RETURNS = (1, 2)
+"""After how many of its periods a motion with faulty teeth is looked at for a return."""
+
+SIGNAL_TURNS = 5
+"""Turns of the driver over which the acceleration is told, by repetition: what is made of it, such as synchronous
+averages and lines between whole turns, takes four and the ends of its filters."""
+
+BEYOND = 0.02
+"""Part of a mesh period by which a run goes beyond the end of one before it is looked at: the interpolation needs a
+step there."""
+
+
+class Found(NamedTuple):
+    """How long a record turned out to be.
+
+    Attributes
+    ----------
+    start, periods : int
+        Its first mesh period, counted from the end of the run-up, and their number; no periods if the motion does not
+        repeat itself up to the longest record.
+    """
+
+    start: int
+    periods: int
+
+
+def geometric_period(case: Case) -> int:
+    """Return after how many mesh periods the same flanks meet as the faults of teeth tell them apart."""
+    if not case.fault.teeth:
+        return 1
+    from gearmbs.gears.tables import tooth_deviations
+
+    periods = []
+    for wheel in tooth_deviations(case.pair()):
+        teeth = wheel.gear.teeth
+        parts = [np.moveaxis(part, 1, 0) for part in (wheel.offset, wheel.shape, wheel.tip, wheel.compliance)]
+        steps = (step for step in range(1, teeth + 1) if teeth % step == 0)
+        periods.append(next(s for s in steps if all(np.array_equal(part, np.roll(part, s, 0)) for part in parts)))
+    return math.lcm(*periods)
+
+
+class PeriodicRecorder:
+    """Collects what the record of a case needs, and ends the run when its motion repeats itself.
+
+    Parameters
+    ----------
+    case : Case
+        At constant speed, with the duration "auto".
+    known_period : bool
+        Whether the wheels alone decide the period, as they do not where bearings have defects: else the record has its
+        longest length.
+    """
+
+    def __init__(self, case: Case, known_period: bool = True) -> None:
+        self.case = case
+        operation = case.operation
+        self.period = geometric_period(case) if known_period else 0
+        self._gmf, self._begin = case.mesh_frequency, operation.run_up
+        self._longest = int((operation.settling + operation.longest) * self._gmf)
+        self.recorder = Recorder(case, self._begin - (MARGIN + 1) / case.output_rate)
+        pair = case.pair()
+        self._components = partial(component_values, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
+        self._amplitudes = np.empty((0, HARMONICS, 4), dtype=complex)
+        self.found: Found | None = None
+        self.deviation = math.nan
+
+    def take(self, part: Solution) -> None:
+        """Take the next steps of a run."""
+        self.recorder.take(part)
+
+    def pause(self, t: float) -> float | None:
+        """Return when to look at the motion again, or None if it repeats itself; see `gearmbs.dae.Options`."""
+        whole = math.floor((t - self._begin) * self._gmf - 0.5 * BEYOND)
+        if whole > 0:
+            self._add(whole)
+            self.found = self._judged()
+            if self.found is not None:
+                return None
+        following = next((n for n in self._looks() if n > whole), 0)
+        return self._begin + (following + BEYOND) / self._gmf if 0 < following <= self._longest else math.inf
+
+    def _looks(self) -> Any:
+        """Yield the numbers of mesh periods after which the motion is looked at."""
+        if self.period == 1:
+            yield from (3 * half for half in HALVES)
+        elif self.period > 1:
+            n = self.period + 2 * OVERLAP
+            while n <= self._longest:
+                yield n
+                # a little longer each time, and where a second return is seen
+                n += max(OVERLAP, n // 8)
+
+    def _forces(self, first: int, stop: int) -> np.ndarray:
+        """Return the force on the driven gear over mesh periods, means over each sample, (periods SAMPLES, 3), N.
+
+        Values at equal places of all mesh periods would put a jump, as of friction at the pitch point, at the same
+        wrong place in each.
+        """
+        columns = self.recorder.tail(self._begin + (first - 1.0) / self._gmf)
+        t, forces = columns.t, np.ascontiguousarray(columns.forces[:, 3:])
+        edges = self._begin + (first + np.arange((stop - first) * SAMPLES + 1) / SAMPLES) / self._gmf
+        between = slice(*np.searchsorted(t, edges[[0, -1]]))
+        places = np.searchsorted(edges, t[between])
+        times = np.insert(edges, places, t[between])
+        values = np.insert(monotone_cubic(t, forces, edges), places, forces[between], axis=0)
+        pieces = 0.5 * np.diff(times)[:, None] * (values[1:] + values[:-1])
+        integral = np.concatenate([np.zeros((1, 3)), np.cumsum(pieces, axis=0)])
+        at_edges = integral[np.arange(edges.size) + np.searchsorted(t[between], edges)]
+        return np.diff(at_edges, axis=0) * (SAMPLES * self._gmf)
+
+    def _add(self, whole: int) -> None:
+        """Take the amplitudes of mesh periods that are complete."""
+        known = len(self._amplitudes)
+        if whole > known:
+            values = self._components(self._forces(known, whole))
+            lines = np.fft.rfft(values.reshape(whole - known, SAMPLES, 4), axis=1)[:, 1 : HARMONICS + 1]
+            self._amplitudes = np.concatenate([self._amplitudes, lines * (2.0 / SAMPLES)])
+
+    def _judged(self) -> Found | None:
+        """Return the record if the motion repeats itself."""
+        c, n, p = self._amplitudes, len(self._amplitudes), self.period
+        if p == 1:
+            half = max((h for h in HALVES if 3 * h <= n), default=0)
+            tried = [(2 * half, c[n - half :], c[n - 2 * half : n - half])] if half else []
+        else:
+            spans = [k * p for k in RETURNS if k * p + 2 * OVERLAP <= n]
+            tried = [(s, c[n - OVERLAP :], c[n - OVERLAP - s : n - s]) for s in spans]
+        for span, late, early in tried:
+            levels = np.abs(c[n - span :].mean(axis=0))
+            levels = np.maximum(levels, LEAST_LEVEL * levels.max(axis=0))
+            shift, noise = np.abs((late - early).mean(axis=0)), (late - early).std(axis=0) / math.sqrt(2.0)
+            # of a turn the record is off by what its beginning is, as part of it
+            weight = 1.0 if p == 1 else len(late) / span
+            shift, noise = weight * shift, noise / math.sqrt(span)
+            self.deviation = float((np.maximum(shift, noise) / levels).max())
+            if self.deviation <= HOLDS:
+                return Found(n - span, span)
+        return None
+
+    @property
+    def span(self) -> Span:
+        """Start and end of the record, s."""
+        operation = self.case.operation
+        if self.found is None:
+            start = operation.run_up + operation.settling
+            return Span(start, start + operation.longest)
+        start = self._begin + self.found.start / self._gmf
+        return Span(start, start + self.found.periods / self._gmf)
+
+    def measured(self, beyond: float) -> Measured:
+        """Return what the record is made from, repeated so that it reaches some seconds beyond both of its ends.
+
+        In its last mesh period it goes over to what was one record earlier, so that the repetition has no seams.
+        """
+        known = self.recorder.measured()
+        start, stop = self.span
+        inside = slice(*np.searchsorted(known.t, (start, stop)))
+        length = stop - start
+        number = math.ceil(beyond / length)
+        copies = np.arange(-number, number + 1)
+        t = known.t[inside]
+        last = int(np.searchsorted(t, stop - 1.0 / self._gmf))
+        share = 0.5 - 0.5 * np.cos(np.pi * ((t[last:] - stop) * self._gmf + 1.0))
+
+        def repeated(values: np.ndarray) -> np.ndarray:
+            piece = values[inside].copy()
+            earlier = monotone_cubic(known.t, np.ascontiguousarray(values), t[last:] - length)
+            piece[last:] += (share * (earlier - piece[last:]).T).T
+            return np.concatenate([piece] * copies.size)
+
+        contact = {name: repeated(known.contact[name]) for name in SMOOTH}
+        contact |= {name: np.concatenate([known.contact[name][inside]] * copies.size) for name in COUNTS}
+        return Measured((t + length * copies[:, None]).ravel(), repeated(known.forces), repeated(known.error), contact)
+
+    def levels(self) -> np.ndarray:
+        """Return the RMS of the mesh harmonics' acceleration, shape (2, harmonics, components): by band and by orders.
+
+        The band-passes of other records let through, of the lines of this one, what they would of a long repetition.
+        """
+        assert self.found is not None
+        first, periods = self.found
+        spacing, count = self._gmf / periods, periods * SAMPLES
+        # the components are those of forces at the output rate: a resultant is not that of forces with sharper edges
+        lines = np.fft.rfft(self._forces(first, first + periods), axis=0)
+        lines *= even_signal_gain(self.case.output_rate, spacing * np.arange(len(lines)))[:, None]
+        values = self._components(np.fft.irfft(lines, count, axis=0))
+        levels = np.abs(np.fft.rfft(values, axis=0)) * (math.sqrt(2.0) / count)
+        orders = levels[periods * np.arange(1, HARMONICS + 1)]
+        bands = [self._band(levels, spacing, taps, k) for k, taps in enumerate(band_taps(self.case), 1)]
+        return np.stack([np.stack(bands), orders]) / self.case.pair().wheels[1].mass
+
+    def _band(self, lines: np.ndarray, spacing: float, taps: np.ndarray, harmonic: int) -> np.ndarray:
+        """Return the RMS of what a band-pass lets through of lines at multiples of ``spacing``, Hz."""
+        # beyond twice the half width the pass is over, in the middle between two harmonics
+        low, high = ((harmonic + side * 2.0 * HALF_WIDTH) * self._gmf / spacing for side in (-1.0, 1.0))
+        numbers = np.arange(math.ceil(low), math.floor(high) + 1)
+        shift = np.arange(taps.size) - 0.5 * (taps.size - 1)
+        angles = (2.0 * np.pi * spacing / self.case.signal_rate) * np.outer(numbers, shift)
+        passed = np.cos(angles) @ taps
+        return np.sqrt(((passed[:, None] * lines[numbers]) ** 2).sum(axis=0))
+
+    def attributes(self) -> dict[str, Any]:
+        """Return what a record says of its length."""
+        start, stop = self.span
+        turn = {self.case.gears.teeth[k]: f"turn of the {name}" for k, name in ((1, "driven wheel"), (0, "driver"))}
+        names = {0: "unknown", 1: "mesh", **turn}
+        period = names.get(self.period, f"{self.period} mesh periods")
+        if self.found is None:
+            said = (
+                f"the motion does not repeat itself by {period} within {stop - start:g} s, the longest record: its "
+                "mesh harmonics depend on its length"
+            )
+            if self.period + 2 * OVERLAP > self._longest:
+                said = f"the record of {stop - start:g} s, the longest, is shorter than its period, {period}"
+            if self.period == 0:
+                said = f"the record has {stop - start:g} s, the longest: its mechanism has periods besides the mesh's"
+        else:
+            n, off = self.found.periods, self.deviation
+            said = f"{n} mesh periods, after which the motion repeats itself to {off:.1e} of its mesh harmonics"
+        return {
+            "operation_settling": start - self._begin,
+            "operation_duration": stop - start,
+            "record_status": "at the limit" if self.found is None else "periodic",
+            "record_period": period,
+            "record_mesh_periods": (stop - start) * self._gmf,
+            "record_deviation": self.deviation,
+            "record_length": said,
+        }
+
+
+def signal_stop(case: Case, span: Span) -> float:
+    """Return until when the acceleration of a record that repeats itself is told, s."""
+    turn = case.gears.teeth[0] / case.mesh_frequency
+    return span.start + max(SIGNAL_TURNS, math.ceil((span.stop - span.start) / turn - 1e-9)) * turn
+
+
+def reach(case: Case, span: Span) -> float:
+    """Return how far beyond its ends a record must be known for its filters and the whole acceleration, s."""
+    return signal_stop(case, span) - span.stop + edge(case) + (MARGIN + 4) / case.output_rate
