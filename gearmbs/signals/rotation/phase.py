@@ -133,36 +133,17 @@ def phase_from_tacho(
     """
     if faults not in ("mend", "refuse", "keep"):
         raise SignalError(f"faults: must be 'mend', 'refuse' or 'keep', got {faults!r}")
-    names = [str(c) for c in signal["channel"].values]
-    if channel is None and len(names) > 1:
-        raise SignalError(f"channel: name the tacho channel, one of {names}")
-    if channel is not None and channel not in names:
-        raise SignalError(f"channel: there is no {channel!r}, only {names}")
     if isinstance(pulses_per_rev, bool) or not (math.isfinite(pulses_per_rev) and pulses_per_rev > 0.0):
         raise SignalError(f"pulses_per_rev: must be positive, got {pulses_per_rev!r}")
-    pulses = signal.values[:, names.index(channel) if channel is not None else 0]
-    low, high = np.percentile(pulses, [1.0, 99.0])
-    if high <= low:
-        low, high = float(pulses.min()), float(pulses.max())
-    level = 0.5 * (low + high) if threshold is None else float(threshold)
-    crossings = np.flatnonzero((pulses[:-1] < level) & (pulses[1:] >= level))
-    floor = level - PULSE_HYSTERESIS * (high - low)
-    kept: list[int] = []
-    previous = 0
-    for index in crossings.tolist():
-        if not kept or pulses[previous : index + 1].min() < floor:
-            kept.append(index)
-            previous = index + 1
-    if len(kept) < 3:
+    edges, name, level = pulse_edges(signal, channel, threshold)
+    if edges.size < 3:
         raise SignalError(
-            f"channel: {len(kept)} pulses cross the threshold {level:g} in {channel or names[0]!r}, "
+            f"channel: {edges.size} pulses cross the threshold {level:g} in {name!r}, "
             "at least 3 are needed; check the channel or pass threshold=..."
         )
-    at = np.asarray(kept)
     times = signal["time"].values
-    edges = times[at] + (level - pulses[at]) / (pulses[at + 1] - pulses[at]) / rate_of(signal)
     places = [] if faults == "keep" else pulse_faults(edges, pulses_per_rev)
-    notes = [f"Tacho {channel or names[0]!r}: {words}" for words in described(edges, places)]
+    notes = [f"Tacho {name!r}: {words}" for words in described(edges, places)]
     if notes and faults == "refuse":
         raise SignalError(f"faults: {' '.join(notes)} Mend them with faults='mend', or take them with faults='keep'")
     for note in notes:
@@ -180,6 +161,40 @@ def phase_from_tacho(
     if notes:
         result.attrs["notes"] = notes
     return result
+
+
+def pulse_edges(
+    signal: xr.DataArray, channel: str | None = None, threshold: float | None = None
+) -> tuple[np.ndarray, str, float]:
+    """Return the times of a channel's rising edges (s) between its samples, the channel's name, and the threshold.
+
+    Raises
+    ------
+    SignalError
+        If the channel is unknown, or not named and one of several.
+    """
+    names = [str(c) for c in signal["channel"].values]
+    if channel is None and len(names) > 1:
+        raise SignalError(f"channel: name the tacho channel, one of {names}")
+    if channel is not None and channel not in names:
+        raise SignalError(f"channel: there is no {channel!r}, only {names}")
+    name = names[0] if channel is None else channel
+    pulses = signal.values[:, names.index(name)]
+    low, high = np.percentile(pulses, [1.0, 99.0])
+    if high <= low:
+        low, high = float(pulses.min()), float(pulses.max())
+    level = 0.5 * (low + high) if threshold is None else float(threshold)
+    crossings = np.flatnonzero((pulses[:-1] < level) & (pulses[1:] >= level))
+    floor = level - PULSE_HYSTERESIS * (high - low)
+    kept: list[int] = []
+    previous = 0
+    for index in crossings.tolist():
+        if not kept or pulses[previous : index + 1].min() < floor:
+            kept.append(index)
+            previous = index + 1
+    at = np.asarray(kept, dtype=int)
+    rise = (level - pulses[at]) / (pulses[at + 1] - pulses[at])
+    return signal["time"].values[at] + rise / rate_of(signal), name, float(level)
 
 
 @takes_data(frequency="frequency", half_bandwidth="frequency")

@@ -1,0 +1,1 @@
+"""Pulses of encoders and tachos: angle, torsional vibration, marks, transmission error of two shafts."""

@@ -1,0 +1,204 @@
+"""Two shafts over one angle: from numbered pulses to lines at orders, turn by turn for their scatter.
+
+The common angle phi is that of the first shaft, smoothed over one turn of it: the mean time of the pulses of a turn
+knows nothing of the marks. Each encoder gives, at its own pulses, how far its shaft is ahead of phi,
+
+    d(phi_n) = s (2 pi n/L - zero) - phi(t_n),     s = 1 for the first shaft, omega_1/omega_2 for the second,
+
+and lines are sums over the pulses where they came, with their distances as weights: nothing is interpolated between
+marks, so that an order just below half the lines is as right as a low one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+import scipy.interpolate
+
+from gearmbs.signals.encoders.pulses import TURN, PulseTrain
+from gearmbs.signals.errors import SignalError
+
+SAMPLED_TURN = 32
+"""Points of a turn at which the smooth angle is taken: it has nothing above a few orders."""
+SMOOTHINGS = 2
+"""Courses of means over a turn, the second upon the first; each takes half a turn at either end."""
+FEWEST_TURNS = 4
+"""Turns of the slower shaft within the smooth angle: a window of as many parts orders that lie one apart."""
+HANN_NOISE = 1.5
+"""Variance of a line with the Hann window by that without any, for noise."""
+WHOLE = 1e-9
+"""Difference from a whole number up to which an order is one: of ratios written as decimals."""
+
+
+class Course(NamedTuple):
+    """The common angle, rad, over time, and where it is known (s)."""
+
+    angle: scipy.interpolate.CubicSpline
+    begin: float
+    end: float
+
+
+def smooth_angle(train: PulseTrain) -> Course:
+    """Return the angle of a shaft without anything that recurs with its turn: means over one turn at a time.
+
+    The mean time of the marks of a turn belongs to their mean angle where the speed is constant; where it changes by
+    a, it is off by pi^2 a/(6 omega^2). The mean distance of the marks from the first course makes up for that.
+    """
+    numbers, times, _ = train.every()
+    angle = TURN / train.lines * numbers
+    mean, middle = _turn_means(train.lines, times), _turn_means(train.lines, angle)
+    for _ in range(SMOOTHINGS):
+        if mean.size < SAMPLED_TURN // 4:
+            raise SignalError(
+                f"times: {train.name!r} covers {train.turns:.3g} turns, of which the smooth angle takes two; record "
+                "longer"
+            )
+        course = Course(scipy.interpolate.CubicSpline(mean, middle), float(mean[0]), float(mean[-1]))
+        inside = (times >= course.begin) & (times <= course.end)
+        times, angle = times[inside], angle[inside]
+        mean = _turn_means(train.lines, times)
+        middle = course.angle(mean) + _turn_means(train.lines, angle - course.angle(times))
+    return course
+
+
+def _turn_means(count: int, values: np.ndarray) -> np.ndarray:
+    """Return means over `count` values, `SAMPLED_TURN` times a turn."""
+    sums = np.concatenate(([0.0], np.cumsum(values - values[0])))
+    first = np.arange(0, values.size - count + 1, max(1, count // SAMPLED_TURN))
+    return values[0] + (sums[first + count] - sums[first]) / count
+
+
+@dataclass(frozen=True, eq=False)
+class Deviations:
+    """What the pulses of one encoder say within a window of whole turns.
+
+    Attributes
+    ----------
+    phi : ndarray of shape (n,)
+        Common angle at its pulses, rad.
+    values : ndarray of shape (n,)
+        How far its shaft is ahead of it there, as an angle of the first shaft, rad, the mean removed.
+    mean : float
+        The mean, rad.
+    spacing : ndarray of shape (n,)
+        Part of the angle that each pulse stands for, rad.
+    """
+
+    phi: np.ndarray
+    values: np.ndarray
+    mean: float
+    spacing: np.ndarray
+
+    def window(self, begin: float, turns: float) -> np.ndarray:
+        """Return the weights of the pulses, normalised so that the sum with a line's exponential is its amplitude."""
+        part = (self.phi - begin) / (TURN * turns)
+        weights = self.spacing * np.where((part >= 0.0) & (part < 1.0), 1.0 - np.cos(TURN * part), 0.0)
+        return 2.0 / weights.sum() * weights
+
+
+def deviations(
+    train: PulseTrain, course: Course, begin: float, end: float, scale: float, known: Sequence[float] = ()
+) -> Deviations:
+    """Return how far a shaft is ahead of the common angle at its pulses.
+
+    Pulses that are missing are bridged: by a straight line through what is left when the lines at the `known` orders of
+    the common angle are taken out, which a line of pulses two marks apart would not follow.
+    """
+    numbers, times, there = train.every()
+    inside = (times >= course.begin) & (times <= course.end)
+    phi = course.angle(times[inside])
+    there = there[inside]
+    ahead = scale * TURN / train.lines * numbers[inside] - phi
+    # the trapezoidal rule for uneven points; at the ends the window is zero
+    spacing = np.gradient(phi)
+    kept = (phi >= begin) & (phi <= end)
+    phi, ahead, there, spacing = phi[kept], ahead[kept], there[kept], spacing[kept]
+    mean = float(ahead[there].mean())
+    found = Deviations(phi, ahead - mean, mean, spacing)
+    if there.all() or not known:
+        return found
+    turns = (end - begin) / TURN
+    model = np.zeros_like(phi)
+    for order in known:
+        model += np.real(line(found, order, begin, turns) * np.exp(1j * order * phi))
+    holes = ~there
+    ahead = found.values.copy()
+    ahead[holes] = model[holes] + np.interp(phi[holes], phi[there], (found.values - model)[there])
+    return Deviations(phi, ahead, mean, spacing)
+
+
+def line(found: Deviations, order: float, begin: float, turns: float) -> complex:
+    """Return the complex amplitude of one order of the common angle, rad."""
+    return complex(np.sum(found.window(begin, turns) * found.values * np.exp(-1j * order * found.phi)))
+
+
+def lines(
+    found: Sequence[Deviations], step: float, count: int, begin: float, turns: float, signs: Sequence[float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return lines at orders step, 2 step, ... of the common angle, of the sum of several encoders' deviations.
+
+    Parameters
+    ----------
+    found : sequence of Deviations
+    step : float
+        1 for the orders of the first shaft, omega_2/omega_1 for those of the second.
+    count : int
+    begin, turns : float
+        Window of the common angle, rad and turns; ``turns step`` turns of the shaft whose orders these are.
+    signs : sequence of float
+        Factors of the encoders.
+
+    Returns
+    -------
+    values : ndarray of complex, shape (count,)
+        Amplitudes, rad.
+    variances : ndarray of shape (count,)
+        Of the real part, and of the imaginary part, by the scatter from turn to turn of the shaft.
+    """
+    values = np.zeros(count, dtype=complex)
+    whole = math.floor(turns * step + WHOLE)
+    by_turn = np.zeros((count, whole), dtype=complex)
+    length = TURN / step
+    for one, sign in zip(found, signs):
+        weighted = sign * one.window(begin, turns) * one.values
+        plain = sign * (2.0 / length) * one.spacing * one.values
+        edges = np.searchsorted(one.phi, begin + length * np.arange(whole + 1))
+        turn, rotating = np.exp(-1j * step * one.phi), np.ones(one.phi.size, dtype=complex)
+        for k in range(count):
+            rotating *= turn
+            values[k] += weighted @ rotating
+            by_turn[k] += np.add.reduceat((plain * rotating)[: edges[-1]], edges[:-1])
+    scatter = by_turn - by_turn.mean(axis=1, keepdims=True)
+    variances = HANN_NOISE * 0.5 * (np.abs(scatter) ** 2).sum(axis=1) / (whole * max(whole - 1, 1))
+    return values, variances
+
+
+def whole_number(value: Fraction | float) -> int | None:
+    """Return the whole number that an order is, or None."""
+    near = round(value)
+    return near if abs(float(value) - near) < WHOLE * max(1.0, abs(near)) else None
+
+
+def folded(order: float, lines_of_turn: int) -> float:
+    """Return the order below half the lines that marks make of one."""
+    return abs((order + 0.5 * lines_of_turn) % lines_of_turn - 0.5 * lines_of_turn)
+
+
+def folding(mesh_order: float, lines_of_turn: int, harmonics: int) -> Iterator[tuple[int, float]]:
+    """Yield the mesh harmonics that are not below half the lines, with the orders that they are seen at."""
+    for k in range(1, harmonics + 1):
+        if k * mesh_order >= 0.5 * lines_of_turn - WHOLE:
+            yield k, folded(k * mesh_order, lines_of_turn)
+
+
+def beside(values: np.ndarray, turns: int, order: float, high: bool) -> np.ndarray:
+    """Return what of a curve, closed over some turns, lies at an order and above, or below it."""
+    spectrum = np.fft.rfft(values)
+    above = np.arange(spectrum.size) >= order * turns
+    spectrum[~above if high else above] = 0.0
+    return np.fft.irfft(spectrum, values.size)

@@ -1,0 +1,235 @@
+"""Trains of pulses, one for each mark that passes a reading head: numbered, mended, and as angle of the shaft.
+
+Pulse n of an encoder with L lines tells when its shaft stands at 2 pi n/L + e[n mod L], e being the errors of the
+marks. `docs/theory/angle_measurement.md` derives what can be known of the shaft from it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.rotation.phase import described, mended_count, pulse_edges, pulse_faults
+from gearmbs.signals.signal.arguments import takes_data
+
+TURN = 2.0 * math.pi
+FEWEST_TURNS = 2
+"""Turns of a shaft that a train of pulses must cover: less, and nothing of it recurs."""
+SAME_MARK = 0.5
+"""Share of the turns in which a mark must be missing to be one that the disc lacks, which numbers the others."""
+INDEX_REACH = 1.0
+"""Pitches within which a pulse must follow an index pulse to be that of mark 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class PulseTrain:
+    """Pulses of an encoder or a tacho, numbered.
+
+    Attributes
+    ----------
+    times : ndarray of shape (n,)
+        When they came, s, increasing.
+    numbers : ndarray of int, shape (n,)
+        Which they are: the mark is the number modulo `lines`. Missing pulses have numbers, but no times.
+    lines : int
+        Marks of a turn, those that the disc lacks included.
+    referenced : bool
+        Whether mark 0 is the same in each record: known from index pulses, or the one that the disc lacks.
+    name : str
+    tooth_at_zero : tuple of float, optional
+        Tooth of the shaft's wheel that is in mesh as mark 0 passes, and the step of the numbers, 1 or -1.
+    notes : list of str
+        What was mended.
+    """
+
+    times: np.ndarray
+    numbers: np.ndarray
+    lines: int
+    referenced: bool = False
+    name: str = "encoder"
+    tooth_at_zero: tuple[float, float] | None = None
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def turns(self) -> float:
+        """Turns of the shaft from the first pulse to the last."""
+        return float(self.numbers[-1] - self.numbers[0]) / self.lines
+
+    @property
+    def mean_speed(self) -> float:
+        """Mean speed, rad/s."""
+        return TURN * self.turns / float(self.times[-1] - self.times[0])
+
+    def every(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return numbers without holes, the times, and whether each was measured.
+
+        A missing pulse lies between its neighbours on a straight line.
+        """
+        numbers = np.arange(self.numbers[0], self.numbers[-1] + 1)
+        return numbers, np.interp(numbers, self.numbers, self.times), np.isin(numbers, self.numbers)
+
+
+def pulse_train(
+    times: ArrayLike,
+    lines: int,
+    *,
+    index: ArrayLike | None = None,
+    name: str = "encoder",
+    faults: Literal["mend", "refuse", "keep"] = "mend",
+    tooth_at_zero: Sequence[float] | None = None,
+) -> PulseTrain:
+    """Number the pulses of an encoder, a tacho or reflecting marks.
+
+    Missing and extra pulses are told from the intervals beside them and mended (`gearmbs.signals.rotation.phase`). A
+    mark that is missing in every turn is one that the disc lacks: it is mark 0 unless index pulses say which is.
+
+    Parameters
+    ----------
+    times : array_like of shape (n,)
+        Times of the rising edges, s.
+    lines : int
+        Marks of a turn.
+    index : array_like, optional
+        Times of a pulse once a turn: the next pulse of the train is that of mark 0.
+    name : str
+        Of the encoder, for messages.
+    faults : {"mend", "refuse", "keep"}
+        What to do about missing and extra pulses.
+    tooth_at_zero : (number, step), optional
+        Tooth in mesh as mark 0 passes, and 1 or -1 where the next one has the next lower number.
+
+    Raises
+    ------
+    SignalError
+        If times do not increase, pulses are too few, or something is out of range.
+    """
+    at = np.asarray(times, dtype=float)
+    if isinstance(lines, bool) or int(lines) != lines or lines < 1:
+        raise SignalError(f"lines: must be a whole number of marks a turn, got {lines!r} for {name!r}")
+    if faults not in ("mend", "refuse", "keep"):
+        raise SignalError(f"faults: must be 'mend', 'refuse' or 'keep', got {faults!r}")
+    if at.ndim != 1 or not np.isfinite(at).all() or np.any(np.diff(at) <= 0.0):
+        back = int(np.argmax(np.diff(at) <= 0.0)) if at.ndim == 1 and at.size > 1 else 0
+        raise SignalError(
+            f"times: those of {name!r} must increase, but do not behind pulse {back}; give the times of rising edges "
+            "in s, in the order they came, of a shaft that turns one way"
+        )
+    if at.size < FEWEST_TURNS * lines:
+        raise SignalError(
+            f"times: {name!r} has {at.size} pulses, less than {FEWEST_TURNS} turns of {lines} lines; record longer, or "
+            "check the lines"
+        )
+    found = [] if faults == "keep" else pulse_faults(at, float(lines))
+    words = [f"{name}: {text}" for text in described(at, found)]
+    if words and faults == "refuse":
+        raise SignalError(f"faults: {' '.join(words)} Mend them with faults='mend', or take them with faults='keep'")
+    kept, counted = mended_count(at.size, found)
+    train = PulseTrain(at[kept], counted.astype(np.int64), int(lines), name=name)
+    train, words = _referenced(train, None if index is None else np.asarray(index, dtype=float), words)
+    if tooth_at_zero is not None:
+        number, step = tooth_at_zero
+        train = replace(train, tooth_at_zero=(float(number), math.copysign(1.0, step)))
+    return replace(train, notes=words)
+
+
+def _referenced(train: PulseTrain, index: np.ndarray | None, words: list[str]) -> tuple[PulseTrain, list[str]]:
+    """Number the marks from the index pulses, or from the mark that the disc lacks."""
+    if index is not None:
+        after = np.searchsorted(train.times, index)
+        after = after[(after > 0) & (after < train.times.size)]
+        marks = train.numbers[after] % train.lines
+        if not marks.size:
+            raise SignalError(f"index: no index pulse of {train.name!r} lies within the record; leave index out")
+        # an index pulse at the same instant as a mark may come a tick before or behind it
+        zero = int(marks[0])
+        apart = (marks - zero + train.lines // 2) % train.lines - train.lines // 2
+        if np.abs(apart).max() > INDEX_REACH:
+            raise SignalError(
+                f"index: pulses of {train.name!r} come at the marks {zero} to {zero + int(apart.max())} of "
+                f"{train.lines}, not once a turn; check the lines, or leave index out"
+            )
+        zero += round(float(np.median(apart)))
+        return replace(train, numbers=train.numbers - zero, referenced=True), words
+    missing = np.setdiff1d(np.arange(train.numbers[0], train.numbers[-1]), train.numbers) % train.lines
+    marks, counts = np.unique(missing, return_counts=True)
+    lacking = marks[counts > max(1.0, SAME_MARK * (train.turns - 1.0))]
+    if not lacking.size:
+        return train, words
+    zero = int(lacking[0])
+    told = f"{train.name}: the disc lacks {lacking.size} of {train.lines} marks, mark 0 is one that is missing."
+    return replace(train, numbers=train.numbers - zero, referenced=lacking.size == 1), [told]
+
+
+@takes_data()
+def pulses_of_channel(
+    signal: xr.DataArray,
+    lines: int,
+    channel: str | None = None,
+    *,
+    threshold: float | None = None,
+    index: str | None = None,
+    **known: Any,
+) -> PulseTrain:
+    """Take the pulses from a channel that was sampled, as the voltage of an encoder or a tacho.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    lines : int
+        Pulses of a turn.
+    channel, index : str, optional
+        Channel of the pulses, and that of a pulse once a turn.
+    threshold : float, optional
+        Level of the edges; default the middle of the swing.
+    **known
+        Further arguments of `pulse_train`.
+    """
+    edges, name, _ = pulse_edges(signal, channel, threshold)
+    once = None if index is None else pulse_edges(signal, index, threshold)[0]
+    return pulse_train(edges, lines, index=once, **{"name": name, **known})
+
+
+def angle_of_pulses(train: PulseTrain, marks: ArrayLike | None = None) -> xr.DataArray:
+    """Angle of the shaft at its pulses.
+
+    Parameters
+    ----------
+    train : PulseTrain
+    marks : array_like of shape (lines,), optional
+        Errors of the marks, rad, as `encoder_marks` finds them; default none.
+
+    Returns
+    -------
+    xarray.DataArray
+        rad, dimension (time,); zero at mark 0. Times are those of the pulses, as uneven as the shaft turns.
+    """
+    angle = TURN / train.lines * train.numbers
+    if marks is not None:
+        angle = angle + errors_of(marks, train)[train.numbers % train.lines]
+    return xr.DataArray(
+        angle,
+        dims=("time",),
+        coords={"time": ("time", train.times, {"units": "s"})},
+        name="angle",
+        attrs={"units": "rad", "origin": "tacho"},
+    )
+
+
+def errors_of(marks: ArrayLike, train: PulseTrain) -> np.ndarray:
+    """Return the errors of a train's marks, rad; SignalError if they are of another disc, or nothing numbers them."""
+    errors = np.asarray(getattr(marks, "errors", marks), dtype=float)
+    if errors.shape != (train.lines,):
+        raise SignalError(f"marks: {train.name!r} has {train.lines} lines, the marks are {errors.size}; give its own")
+    if not train.referenced:
+        raise SignalError(
+            f"marks: nothing says which pulse of {train.name!r} is that of mark 0; give index pulses with index=..."
+        )
+    return errors

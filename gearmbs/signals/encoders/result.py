@@ -1,0 +1,342 @@
+"""What two encoders said of a pair: orders with intervals, curves, single-flank values, teeth; tables and words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from gearmbs._display import Shown
+from gearmbs.signals.analysis.report import markdown_table
+from gearmbs.signals.encoders.estimate import Found, amplitude_interval
+from gearmbs.signals.encoders.orders import beside
+from gearmbs.signals.encoders.pulses import TURN
+from gearmbs.signals.errors import SignalError
+
+if TYPE_CHECKING:
+    from gearmbs.signals.encoders.transmission import Gearing
+
+MESH_POINTS = 64
+"""Points of a mesh cycle in curves."""
+MOST_POINTS = 1 << 21
+"""Points of a curve over all that two wheels do before they meet again, at most: 16 MB."""
+OUTSTANDING = 5.0
+"""Robust standard deviations by which a tooth stands out: of 100 teeth of chance one does in 20,000 wheels."""
+SHAFTS = ("driver", "driven")
+
+
+class OrderLine(NamedTuple):
+    """What is known of one order; the first four as in `gearmbs.signals.encoders.transmission.Order`."""
+
+    order: Fraction
+    first: int | None
+    second: int | None
+    harmonic: int | None
+    found: Found
+    freedom: float
+    calibrated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTransmissionError(Shown):
+    """Transmission error from the pulses of two shafts: lag of the driven one on the driver's base circle, m.
+
+    Attributes
+    ----------
+    gearing : Gearing
+        Ratio of the speeds, and mesh order of the driver.
+    radius : float
+        Of the driver's base circle, m.
+    lines : list of OrderLine
+        Whole orders of either shaft.
+    loads : tuple of str
+    refused : list of str
+        Orders that the encoders cannot show, and why.
+    notes : list of str
+    probability : float
+        Of the intervals.
+    teeth : tuple of int or None
+    tooth_at_zero : tuple
+        Of each shaft: tooth in mesh at mark 0, and step; None where it is not known.
+    referenced : tuple of bool
+        Of each shaft: whether mark 0 is a known one.
+    speed : float
+        Mean speed of the driver in the first run, rad/s.
+    places : dict of str to float
+        Angle of the driven disc as mark 0 of the driver passes, rad, by load.
+    lines_of : tuple of int
+    """
+
+    gearing: Gearing
+    radius: float
+    lines: list[OrderLine]
+    loads: tuple[str, ...]
+    refused: list[str]
+    notes: list[str]
+    probability: float
+    teeth: tuple[int, ...] | None
+    tooth_at_zero: tuple[tuple[float, float] | None, ...]
+    referenced: tuple[bool, ...]
+    speed: float
+    places: Mapping[str, float]
+    lines_of: tuple[int, int]
+    source: str = field(default="pulses")
+
+    def _load(self, load: str | None) -> str:
+        if load is None:
+            return self.loads[0]
+        if load not in self.loads:
+            raise SignalError(f"load: there is no {load!r}; the runs are of {', '.join(self.loads)}")
+        return load
+
+    def lines_with_intervals(self, factors: Mapping[str, float], lines: Iterable[OrderLine]) -> pd.DataFrame:
+        """Return a combination of the loads' errors at some orders, with the intervals of the amplitudes.
+
+        Parameters
+        ----------
+        factors : mapping of str to float
+            Of loads: ``{"high": 1, "low": -1}`` is a difference.
+        lines : iterable of OrderLine
+        """
+        names = {f"T {self._load(load)}": complex(factor) for load, factor in factors.items()}
+        cancels = abs(sum(factors.values())) < 1e-12
+        rows = []
+        for one in lines:
+            value, variance = one.found.of(names)
+            freedom = math.inf if cancels and not one.calibrated else one.freedom
+            low, high = amplitude_interval(abs(value), variance, freedom, self.probability)
+            rows.append((
+                one.harmonic or 0, float(one.order), float(self.gearing.on_second(one.order)), self.radius * abs(value),
+                self.radius * low, self.radius * high, float(np.angle(value)), one.calibrated or cancels,
+            ))  # fmt: skip
+        columns = ["harmonic", "order_driver", "order_driven", "amplitude", "low", "high", "phase", "calibrated"]
+        return pd.DataFrame(rows, columns=columns)
+
+    def harmonics(self, load: str | None = None) -> pd.DataFrame:
+        """Mesh harmonics of a load: amplitude with its interval (m), phase (rad) at mark 0 of the driver."""
+        return self.lines_with_intervals({self._load(load): 1.0}, [o for o in self.lines if o.harmonic])
+
+    def difference(self, load: str, other: str) -> pd.DataFrame:
+        """Mesh harmonics of the difference of two loads' errors, of which the marks are no part."""
+        return self.lines_with_intervals({load: 1.0, other: -1.0}, [o for o in self.lines if o.harmonic])
+
+    def shaft_orders(self, load: str | None = None) -> pd.DataFrame:
+        """Orders of the shafts that are no mesh orders, as `harmonics`."""
+        return self.lines_with_intervals({self._load(load): 1.0}, [o for o in self.lines if not o.harmonic])
+
+    def _value(self, one: OrderLine, load: str) -> tuple[complex, float]:
+        value, variance = one.found.of({f"T {load}": 1.0 + 0.0j})
+        return self.radius * value, self.radius**2 * variance
+
+    def _closed(
+        self, load: str, shaft: int | None, with_mesh: bool = True, clear: bool = True
+    ) -> tuple[np.ndarray, int, float]:
+        """Return a closed curve (m), how many turns of its shaft it covers, and the variance of its points.
+
+        Of a shaft its whole orders, over one turn of it; of none all orders, until the wheels meet again. With `clear`
+        only lines that chance would not give at one of all orders: hundreds of lines of noise add to a range of their
+        own.
+        """
+        turns = 1 if shaft is not None else self.gearing.ratio.numerator
+        mesh = self.gearing.mesh if shaft != 1 else self.gearing.on_second(self.gearing.mesh)
+        top = max((max(o.order, self.gearing.on_second(o.order)) for o in self.lines), default=Fraction(1))
+        count = 2 * math.ceil(max(float(mesh) * MESH_POINTS, 4.0 * float(top)) * turns / 2.0)
+        if count > MOST_POINTS:
+            raise SignalError(
+                f"ratio: the wheels meet again after {turns} turns, a curve of {count} points; ask for those of the "
+                "shafts"
+            )
+        spectrum, total = np.zeros(count // 2 + 1, dtype=complex), 0.0
+        # the square of a line of chance exceeds x times the variance of each part with the probability exp(-x/2)
+        bound = 2.0 * math.log(len(self.lines) / (1.0 - self.probability))
+        for one in self.lines:
+            whole = (one.first, one.second)[shaft] if shaft is not None else int(one.order * turns)
+            if whole is None or (one.harmonic and not with_mesh):
+                continue
+            value, variance = self._value(one, load)
+            if clear and abs(value) ** 2 < bound * variance:
+                continue
+            by_second = one.first is None and one.second is not None
+            if one.second is not None and (shaft == 1) != by_second:
+                value *= np.exp((1j if by_second else -1j) * one.second * self.places[load])
+            spectrum[whole] += 0.5 * count * value
+            total += variance
+        return np.fft.irfft(spectrum, count), turns, total
+
+    def curve(self, load: str | None = None, shaft: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Error over the angle.
+
+        Parameters
+        ----------
+        load : str, optional
+            Default: the first.
+        shaft : {"driver", "driven"}, optional
+            What recurs with each turn of a shaft, its mesh orders included; default all, over the turns of the driver
+            after which the wheels meet again.
+
+        Returns
+        -------
+        angle : ndarray of shape (n,)
+            Turns of the shaft from its mark 0.
+        error : ndarray of shape (n,)
+            m, without its mean, which encoders do not know.
+        """
+        values, turns, _ = self._closed(self._load(load), None if shaft is None else _shaft(shaft))
+        return turns * np.arange(values.size) / values.size, values
+
+    def mesh_cycle(self, load: str | None = None, points: int = 400) -> tuple[np.ndarray, np.ndarray]:
+        """Error over one mesh cycle from its mesh harmonics: phase, 0 up to 1 from mark 0 of the driver, and error, m."""
+        phase = np.arange(points) / points
+        error = np.zeros(points)
+        for one in self.lines:
+            if one.harmonic:
+                error += np.real(self._value(one, self._load(load))[0] * np.exp(1j * TURN * one.harmonic * phase))
+        return phase, error
+
+    def single_flank(self, load: str | None = None) -> pd.DataFrame:
+        """The values of single-flank testing, m: of the pair, and of what recurs with each shaft.
+
+        Returns
+        -------
+        DataFrame
+            ``F_i`` total range, ``f_i`` largest range within one pitch, ``f_l`` range of the long waves, orders below
+            half the mesh order, ``f_k`` range of the short waves, all others; ``within`` what they are known to.
+        """
+        rows = []
+        for name, shaft in (("pair", None), ("driver", 0), ("driven", 1)):
+            values, turns, variance = self._closed(self._load(load), shaft)
+            mesh = float(self.gearing.mesh if shaft != 1 else self.gearing.on_second(self.gearing.mesh))
+            long, short = (beside(values, turns, 0.5 * mesh, high) for high in (False, True))
+            width = max(2, round(values.size / (turns * mesh)))
+            steps = np.lib.stride_tricks.sliding_window_view(np.concatenate((values, values[: width - 1])), width)
+            reach = float(stats.norm.ppf(0.5 + 0.5 * self.probability)) * math.sqrt(2.0 * variance)
+            rows.append((name, np.ptp(values), np.ptp(steps, axis=1).max(), np.ptp(long), np.ptp(short), reach))
+        return pd.DataFrame(rows, columns=["of", "F_i", "f_i", "f_l", "f_k", "within"])
+
+    def tooth_errors(self, shaft: str = "driver", load: str | None = None) -> pd.DataFrame:
+        """Errors of a wheel tooth by tooth.
+
+        Parameters
+        ----------
+        shaft : {"driver", "driven"}
+        load : str, optional
+
+        Returns
+        -------
+        DataFrame
+            ``tooth``, as the train's `tooth_at_zero` numbers them, else from the one in mesh at mark 0; ``error``, what
+            the wheel's orders beside the mesh orders come to over the tooth's pitch, on average, m; ``within`` what
+            that is known to; ``f_i`` the range over this pitch, mesh orders included, m; and whether it stands out.
+
+        Raises
+        ------
+        SignalError
+            If the teeth are not known.
+        """
+        at, load = _shaft(shaft), self._load(load)
+        if self.teeth is None:
+            raise SignalError("teeth: not known; give teeth=(z1, z2) for tooth-by-tooth errors")
+        count = self.teeth[at]
+        own, _, _ = self._closed(load, at, with_mesh=False, clear=False)
+        whole, _, _ = self._closed(load, at)
+        number, step = self.tooth_at_zero[at] or (0.0, 1.0)
+        # tooth m is in mesh, half a pitch to either side, at the angle (m - number) step pitches
+        slot = np.mod(np.round(number + step * count * np.arange(own.size) / own.size), count).astype(int)
+        inside = [slot == m for m in range(count)]
+        error = np.array([own[k].mean() for k in inside])
+        variance = 0.0
+        for one in self.lines:
+            order = (one.first, one.second)[at]
+            if order is not None and not one.harmonic:
+                variance += self._value(one, load)[1] * np.sinc(order / count) ** 2
+        within = float(stats.norm.ppf(0.5 + 0.5 * self.probability)) * math.sqrt(variance)
+        off = error - np.median(error)
+        scale = 1.4826 * float(np.median(np.abs(off)))
+        out = np.abs(off) > max(OUTSTANDING * scale, within)
+        ranges = [float(np.ptp(np.roll(whole, whole.size // 2)[np.roll(k, k.size // 2)])) for k in inside]
+        return pd.DataFrame({"tooth": np.arange(count), "error": error, "within": within, "f_i": ranges, "stands_out": out})
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """All numbers as tables: mesh_harmonics, shaft_orders, single_flank and, with teeth, driver and driven."""
+        found = {
+            name: pd.concat([make(load).assign(load=load) for load in self.loads], ignore_index=True)
+            for name, make in (
+                ("mesh_harmonics", self.harmonics), ("shaft_orders", self.shaft_orders),
+                ("single_flank", self.single_flank),
+            )
+        }  # fmt: skip
+        for shaft in SHAFTS if self.teeth is not None else ():
+            found[f"{shaft}_teeth"] = pd.concat(
+                [self.tooth_errors(shaft, load).assign(load=load) for load in self.loads], ignore_index=True
+            )
+        return found
+
+    @property
+    def verdict(self) -> str:
+        """What is sure, in a sentence."""
+        mesh = self.harmonics()
+        sure = mesh[mesh["low"] > 0.0]
+        if not len(sure):
+            return "No mesh harmonic stands clear of the marks: run the shafts free, or turn a disc, and give those runs."
+        first = sure.iloc[0]
+        open_ones = int((~mesh["calibrated"]).sum())
+        rest = (
+            f"; {open_ones} of {len(mesh)} harmonics have the interval that marks leave, which only runs that differ "
+            "take away"
+            if open_ones
+            else ""
+        )
+        return (
+            f"Mesh harmonic {int(first['harmonic'])} of the transmission error is {1e6 * first['amplitude']:.3g} um "
+            f"({1e6 * first['low']:.3g} to {1e6 * first['high']:.3g} um){rest}."
+        )
+
+    def to_markdown(self) -> str:
+        """The report as Markdown text, lengths in micrometres."""
+        parts = [
+            f"# Transmission error from {self.source}", "",
+            f"- Driver {self.speed * 30.0 / math.pi:.1f} rpm, ratio {self.gearing.ratio}, mesh order "
+            f"{float(self.gearing.mesh):g}; lag of the driven shaft on the driver's base circle of "
+            f"{1e3 * self.radius:.4g} mm",
+            f"- Encoders of {self.lines_of[0]} and {self.lines_of[1]} lines; intervals of {100 * self.probability:g} %",
+            *(f"- {note}" for note in self.notes), "",
+            f"**{self.verdict}**",
+        ]  # fmt: skip
+        for load in self.loads:
+            title = f" ({load})" if len(self.loads) > 1 else ""
+            parts += ["", f"## Mesh harmonics, um{title}", "", _micro(self.harmonics(load))]
+            parts += ["", f"## Single-flank values, um{title}", "", _micro(self.single_flank(load))]
+            for shaft in SHAFTS if self.teeth is not None else ():
+                teeth = self.tooth_errors(shaft, load)
+                out = teeth[teeth["stands_out"]]
+                words = ", ".join(f"{t} ({1e6 * e:+.2f} um)" for t, e in zip(out["tooth"], out["error"]))
+                within = 1e6 * float(teeth["within"].iloc[0])
+                parts += ["", f"Teeth of the {shaft} that stand out{title}: {words or 'none'} (known to {within:.2g} um)."]
+        if self.refused:
+            parts += ["", "## What these encoders cannot show", "", *(f"- {text}" for text in self.refused)]
+        return "\n".join(parts)
+
+    def __str__(self) -> str:
+        return self.to_markdown()
+
+
+def _shaft(name: str) -> int:
+    if name not in SHAFTS:
+        raise SignalError(f"shaft: must be 'driver' or 'driven', got {name!r}")
+    return SHAFTS.index(name)
+
+
+def _micro(table: pd.DataFrame) -> str:
+    """Return a table in Markdown with lengths in micrometres."""
+    out = table.copy()
+    for column in out.columns.intersection(["amplitude", "low", "high", "F_i", "f_i", "f_l", "f_k", "within"]):
+        out[column] = [f"{1e6 * value:.4g}" for value in out[column]]
+    if "phase" in out:
+        out["phase"] = out["phase"].round(3)
+    return markdown_table(list(out.columns), out.to_numpy().tolist())

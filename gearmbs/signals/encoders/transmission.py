@@ -1,0 +1,458 @@
+"""Transmission error of two shafts from the pulses of their encoders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.progress import waiting
+from gearmbs.signals.encoders.estimate import Found, Row, estimate
+from gearmbs.signals.encoders.orders import (
+    FEWEST_TURNS,
+    Course,
+    Deviations,
+    deviations,
+    folding,
+    lines,
+    smooth_angle,
+    whole_number,
+)
+from gearmbs.signals.encoders.pulses import TURN, PulseTrain
+from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
+from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.signal.signal import check_teeth
+from gearmbs.units import Quantity, to_si
+
+LEVEL_LINES = 32
+"""Orders beside one, at most, by whose median the level of the marks is told."""
+FOLDED_HARMONICS = 20
+"""Mesh harmonics that are looked at for where marks fold them to: of contact forces later ones are below a percent."""
+SLIPPED = 0.05
+"""Pitches by which wheels and discs of two runs may stand otherwise than told: a twentieth is 18 degrees of the mesh."""
+LARGEST_TERM = 2000
+"""Of a ratio given as a decimal number, as a fraction."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledRun:
+    """A run of both shafts in mesh.
+
+    Attributes
+    ----------
+    driver, driven : PulseTrain
+        Of one clock.
+    load : str
+        Which load; runs of one load have one transmission error.
+    shift : (float or str, float or str)
+        Angles, rad, by which the discs of driver and driven have been turned on their shafts in the sense of rotation
+        since the first run. Of one disc this need only be known to a quarter of a tooth: the pulses tell the rest.
+    """
+
+    driver: PulseTrain
+    driven: PulseTrain
+    load: str = "load"
+    shift: tuple[Quantity, Quantity] = (0.0, 0.0)
+
+
+class Gearing(NamedTuple):
+    """How two shafts turn: omega_1/omega_2, and the mesh order by turns of the first."""
+
+    ratio: Fraction
+    mesh: Fraction
+
+    def on_second(self, order: Fraction) -> Fraction:
+        """Return an order of the first shaft as one of the second."""
+        return order * self.ratio
+
+
+class Order(NamedTuple):
+    """An order by turns of the first shaft; as a whole order of each shaft, or None; and as mesh harmonic, or None."""
+
+    order: Fraction
+    first: int | None
+    second: int | None
+    harmonic: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """Lines of one run: amplitudes (rad of the first shaft) and variances by order, and the place of the second disc."""
+
+    run: CoupledRun
+    values: dict[Fraction, tuple[complex, float]]
+    place: float
+    turns: int
+
+
+@waiting("transmission error")
+def transmission_error_from_pulses(
+    runs: CoupledRun | Sequence[CoupledRun],
+    teeth: Sequence[int] | None = None,
+    *,
+    base_radius: Quantity,
+    ratio: Fraction | float | None = None,
+    mesh_order: Fraction | float | None = None,
+    free: Mapping[str, PulseTrain | Sequence[PulseTrain]] | None = None,
+    mark_error: float | Sequence[float] | None = None,
+    probability: float = 0.95,
+) -> MeasuredTransmissionError:
+    """Transmission error of two shafts, its mesh and shaft orders, with the interval that the marks leave.
+
+    Mesh orders are whole orders of both shafts, as are errors of the marks, so that one run cannot tell them apart.
+    Runs that differ can: a shaft that turns free, and a disc that has been turned on its shaft. What they leave is the
+    interval; without any it is the level of the marks.
+
+    Parameters
+    ----------
+    runs : CoupledRun or sequence of CoupledRun
+        Records of both shafts. Of several, mark 0 of both discs must be known (`pulse_train`).
+    teeth : (int, int), optional
+        Of driver and driven.
+    base_radius : float or str
+        Of the driver, m: the error is a length on its base circle, positive where the driven wheel lags.
+    ratio, mesh_order : Fraction or float, optional
+        Instead of teeth, of any train: speed of the first shaft by that of the second, and meshes during a turn of the
+        first. Of a planetary set with its ring at rest, sun first, 1 + z_r/z_s and z_r z_s/(z_s + z_r).
+    free : mapping, optional
+        "driver" and "driven": trains of each shaft running free, from which its marks are known.
+    mark_error : float or (float, float), optional
+        RMS of the errors of the marks as a share of their pitch; default: from the orders beside the mesh orders.
+    probability : float
+        Of the intervals.
+
+    Returns
+    -------
+    MeasuredTransmissionError
+
+    Raises
+    ------
+    SignalError
+        If records do not fit each other, the ratio or what is told of the discs, or are too short.
+    """
+    runs = [runs] if isinstance(runs, CoupledRun) else list(runs)
+    if not runs:
+        raise SignalError("runs: give at least one CoupledRun")
+    if not 0.0 < probability < 1.0:
+        raise SignalError(f"probability: must lie between 0 and 1, got {probability!r}")
+    gearing = _gearing(teeth, ratio, mesh_order)
+    radius = to_si(base_radius, "length", "base_radius")
+    if not 0.0 < radius < math.inf:
+        raise SignalError(f"base_radius: must be positive, got {base_radius!r}")
+    trains = (runs[0].driver, runs[0].driven)
+    freed = {name: _listed((free or {}).get(name)) for name in ("driver", "driven")}
+    stray = set(free or {}) - set(freed)
+    if stray:
+        raise SignalError(f"free: has {sorted(stray)}; the shafts are 'driver' and 'driven'")
+    _check_trains(runs, freed, gearing)
+    orders, refused = _orders(gearing, trains)
+    measured = [_lines_of(run, gearing, orders) for run in runs]
+    shifts, notes = _shifts(measured, gearing)
+    notes = list(dict.fromkeys([note for r in runs for t in (r.driver, r.driven) for note in t.notes] + notes))
+    marks = {
+        name: [_free_lines(train, name, max(_whole(orders, k), default=0)) for train in freed[name]]
+        for k, name in enumerate(freed)
+    }
+    levels = _Levels(gearing, orders, measured, trains, mark_error, {n for n in marks if marks[n]})
+    found = []
+    for order in orders:
+        rows = _rows(order, gearing, measured, shifts, marks)
+        known = {name: level for name in ("driver", "driven") if (level := levels.at(order, name)) is not None}
+        solved = estimate(rows, known)
+        calibrated = all(_is_calibrated(solved, known, name) for name in solved.names if name in known)
+        freedom = 2.0 * sum(m.turns - 1 for m in measured) if calibrated else levels.freedom
+        found.append(OrderLine(*order, solved, freedom, calibrated))
+    return MeasuredTransmissionError(
+        gearing=gearing, radius=radius, lines=found, loads=tuple(dict.fromkeys(r.load for r in runs)), refused=refused,
+        notes=notes, probability=probability, teeth=None if teeth is None else check_teeth(teeth),  # type: ignore[arg-type]
+        tooth_at_zero=(trains[0].tooth_at_zero, trains[1].tooth_at_zero),
+        referenced=(trains[0].referenced, trains[1].referenced), speed=trains[0].mean_speed,
+        places={m.run.load: m.place for m in reversed(measured)},
+        lines_of=(trains[0].lines, trains[1].lines),
+    )  # fmt: skip
+
+
+CALIBRATED = 0.1
+"""Share of a level that is left of a mark's variance where runs have told it: then noise is all that matters."""
+
+
+def _is_calibrated(solved: Found, known: Mapping[str, float], name: str) -> bool:
+    k = solved.names.index(name)
+    return bool(np.real(solved.covariance[k, k]) < CALIBRATED * known[name])
+
+
+def _listed(trains: PulseTrain | Sequence[PulseTrain] | None) -> list[PulseTrain]:
+    return [] if trains is None else [trains] if isinstance(trains, PulseTrain) else list(trains)
+
+
+def _fraction(value: Any, name: str) -> Fraction:
+    found = value if isinstance(value, Fraction) else Fraction(float(value)).limit_denominator(LARGEST_TERM)
+    if not found > 0 or abs(float(found) - float(value)) > 1e-9 * float(value):
+        raise SignalError(f"{name}: {value!r} is no ratio of whole numbers; give it as fractions.Fraction(34, 21)")
+    return found
+
+
+def _gearing(teeth: Sequence[int] | None, ratio: Any, mesh_order: Any) -> Gearing:
+    if teeth is not None:
+        counts = check_teeth(teeth)
+        if ratio is not None or mesh_order is not None or len(counts) != 2:
+            raise SignalError(f"teeth: give two counts alone, such as teeth=(21, 34), got {teeth!r}")
+        return Gearing(Fraction(counts[1], counts[0]), Fraction(counts[0]))
+    if ratio is None or mesh_order is None:
+        raise MissingMetadataError("teeth", "a transmission error", "pass teeth=(z1, z2), or ratio= and mesh_order=")
+    return Gearing(_fraction(ratio, "ratio"), _fraction(mesh_order, "mesh_order"))
+
+
+def _check_trains(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrain]], gearing: Gearing) -> None:
+    """Refuse trains of other discs, of another ratio, or without mark 0 where runs are combined."""
+    for name in freed:
+        trains = [*freed[name], *(getattr(run, name) for run in runs)]
+        counts = {train.lines for train in trains}
+        if len(counts) > 1:
+            raise SignalError(f"runs: trains of the {name} have {sorted(counts)} lines; give those of one disc")
+        loose = [train.name for train in trains if not train.referenced]
+        if loose and len(trains) > 1:
+            raise SignalError(
+                f"runs: nothing says which pulse of {loose[0]!r} is that of mark 0, by which records of the {name} are "
+                "combined; record index pulses and give them with index=..., or use one run alone"
+            )
+    for run in runs:
+        measured = run.driver.mean_speed / run.driven.mean_speed
+        if abs(measured / float(gearing.ratio) - 1.0) > 0.5 / max(run.driver.turns, 1.0):
+            raise SignalError(
+                f"ratio: the driver turns {measured:.6g} times as fast as the driven shaft, not "
+                f"{float(gearing.ratio):.6g} times; check teeth, lines ({run.driver.lines}, {run.driven.lines}) and "
+                "which of the trains is the driver's"
+            )
+
+
+def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order], list[str]]:
+    """Return the orders that both encoders see, and what is refused of those that they do not."""
+    limits = [Fraction(train.lines, 2) for train in trains]
+    top = min(limits[0], limits[1] / gearing.ratio)
+    asked: dict[Fraction, None] = {}
+    for step in (gearing.mesh, Fraction(1), 1 / gearing.ratio):
+        asked |= dict.fromkeys(step * k for k in range(1, math.ceil(top / step)))
+    refused = []
+    shadows: list[list[tuple[int, float]]] = []
+    for name, train, mesh in zip(
+        ("driver", "driven"), trains, (gearing.mesh, gearing.on_second(gearing.mesh))
+    ):
+        shadows.append(list(folding(float(mesh), train.lines, FOLDED_HARMONICS)))
+        if shadows[-1]:
+            first = shadows[-1][0][0]
+            refused.append(
+                f"Mesh harmonic {first} and later ones: order {float(first * mesh):g} of the {name} is not below half "
+                f"of its {train.lines} lines."
+            )
+    orders = []
+    for order in sorted(asked):
+        harmonic = whole_number(order / gearing.mesh)
+        one = Order(order, whole_number(order), whole_number(gearing.on_second(order)), harmonic)
+        own = (order, gearing.on_second(order))
+        cast = [
+            (name, float(own[k]), h)
+            for k, name in enumerate(("driver", "driven"))
+            for h, at in shadows[k]
+            if abs(at - float(own[k])) < SHADOW * trains[k].lines / max(trains[k].turns * trains[k].lines, 1.0)
+        ]
+        if cast:
+            name, at, h = cast[0]
+            what = f"mesh harmonic {harmonic}, " if harmonic else ""
+            refused.append(
+                f"{what[:1].upper()}{what[1:]}{'o' if what else 'O'}rder {at:g} of the {name}: its marks fold mesh "
+                f"harmonic {h} onto it."
+            )
+            continue
+        orders.append(one)
+    if not any(o.harmonic for o in orders):
+        raise SignalError(
+            f"lines: {trains[0].lines} and {trains[1].lines} marks show no mesh harmonic. {' '.join(refused[:3])} Use "
+            "discs of more lines"
+        )
+    return orders, refused
+
+
+SHADOW = 2.0
+"""Width of a line with the Hann window, by the reciprocal of the turns: nearer orders are not parted."""
+
+
+def _window(gearing: Gearing, begin: float, end: float) -> float:
+    """Return the turns of the first shaft that are evaluated: whole ones of both if they fit, else of the slower."""
+    turns = (end - begin) / TURN
+    hunting = gearing.ratio.numerator
+    if turns >= hunting:
+        return float(hunting * math.floor(turns / hunting))
+    slower = max(float(gearing.ratio), 1.0)
+    return slower * math.floor(turns / slower)
+
+
+def _lines_of(run: CoupledRun, gearing: Gearing, orders: Sequence[Order]) -> _Measured:
+    """Evaluate a run at all orders."""
+    course = smooth_angle(run.driver)
+    begin, end = _common(course, run.driven)
+    turns = _window(gearing, begin, end)
+    slower = turns / max(float(gearing.ratio), 1.0)
+    if slower < FEWEST_TURNS:
+        raise SignalError(
+            f"runs: the records of {run.driver.name!r} and {run.driven.name!r} have {max(slower, 0.0):.3g} turns of the "
+            f"slower shaft in common beside one that the smooth angle takes; {FEWEST_TURNS} are needed, record longer"
+        )
+    end = begin + TURN * turns
+    known = [float(o.order) for o in orders if o.harmonic]
+    scale = float(gearing.ratio)
+    first = deviations(run.driver, course, begin, end, 1.0, known)
+    second = deviations(run.driven, course, begin, end, scale, known)
+    both, signs = (first, second), (1.0, -1.0)
+    values: dict[Fraction, tuple[complex, float]] = {}
+    for step in (Fraction(1), 1 / gearing.ratio, gearing.mesh):
+        count = max((k for o in orders if o.order not in values and (k := whole_number(o.order / step))), default=0)
+        if count:
+            amplitudes, variances = lines(both, float(step), count, begin, turns, signs)
+            wanted = {o.order for o in orders}
+            for k in range(1, count + 1):
+                if step * k in wanted and step * k not in values:
+                    values[step * k] = (complex(amplitudes[k - 1]), float(variances[k - 1]))
+    return _Measured(run, values, second.mean / scale, max(2, math.floor(slower)))
+
+
+def _common(course: Course, driven: PulseTrain) -> tuple[float, float]:
+    """Return the stretch of the common angle that both encoders cover."""
+    low, high = max(course.begin, float(driven.times[0])), min(course.end, float(driven.times[-1]))
+    if low >= high:
+        raise SignalError(f"runs: the pulses of {driven.name!r} and of the driver are not of the same time")
+    return float(course.angle(low)), float(course.angle(high))
+
+
+def _free_lines(train: PulseTrain, name: str, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lines of a shaft that runs free, at its orders 1 to count: those of its marks with the sign turned."""
+    course = smooth_angle(train)
+    begin, end = float(course.angle(course.begin)), float(course.angle(course.end))
+    turns = math.floor((end - begin) / TURN)
+    if turns < FEWEST_TURNS:
+        raise SignalError(
+            f"free: {train.name!r} of the {name} has {turns} turns beside one that the smooth angle takes; "
+            f"{FEWEST_TURNS} are needed, record longer"
+        )
+    found: Deviations = deviations(train, course, begin, begin + TURN * turns, 1.0)
+    return lines((found,), 1.0, count, begin, float(turns), (1.0,))
+
+
+def _shifts(measured: Sequence[_Measured], gearing: Gearing) -> tuple[list[tuple[float, float]], list[str]]:
+    """Return the angles of the discs of each run, rad, a single one corrected by where the pulses say it stands."""
+    pitch = TURN / float(gearing.on_second(gearing.mesh))
+    found, notes = [], []
+    for k, one in enumerate(measured):
+        told = tuple(to_si(s, "angle", "shift") for s in one.run.shift)
+        if k == 0:
+            found.append((told[0], told[1]))
+            continue
+        expected = (told[0] - found[0][0]) / float(gearing.ratio) + told[1] - found[0][1]
+        off = one.place - measured[0].place - expected
+        off -= pitch * round(off / pitch)
+        if sum(s != 0.0 for s in told) == 1:
+            at = 0 if told[0] else 1
+            by = off * (float(gearing.ratio) if at == 0 else 1.0)
+            told = (told[0] + by, told[1]) if at == 0 else (told[0], told[1] + by)
+            notes.append(
+                f"Run {k + 1}: the disc of the {('driver', 'driven')[at]} was turned by {math.degrees(told[at]):.4f} "
+                f"deg, {math.degrees(by):+.4f} deg off what was told."
+            )
+            if abs(off) > 0.25 * pitch:
+                raise SignalError(
+                    f"shift: the pulses of run {k + 1} put the disc {math.degrees(by):+.3f} deg off the "
+                    f"{math.degrees(told[at] - by):.3f} deg that are told, more than a quarter of a tooth; check which "
+                    "disc was turned, by how much, and its sense"
+                )
+        elif abs(off) > SLIPPED * pitch:
+            raise SignalError(
+                f"shift: discs and wheels of run {k + 1} stand {math.degrees(off):+.3f} deg otherwise than in the first "
+                "run; give the angle of the disc that was turned, or leave out the run in which a coupling slipped"
+            )
+        found.append((told[0], told[1]))
+    return found, notes
+
+
+def _rows(
+    order: Order,
+    gearing: Gearing,
+    measured: Sequence[_Measured],
+    shifts: Sequence[tuple[float, float]],
+    marks: Mapping[str, list[tuple[np.ndarray, np.ndarray]]],
+) -> list[Row]:
+    """Return what all runs measured at one order, and of what it consists."""
+    rows = []
+    for one, shift in zip(measured, shifts):
+        value, variance = one.values[order.order]
+        if order.first is not None or order.second is None:
+            phase = np.exp(1j * float(order.order) * shift[0])
+        else:
+            phase = np.exp(1j * order.second * (one.place + shift[1]))
+        factors: dict[str, complex] = {f"T {one.run.load}": complex(phase)}
+        if order.first is not None:
+            factors["driver"] = -1.0 + 0.0j
+        if order.second is not None:
+            factors["driven"] = complex(float(gearing.ratio) * np.exp(1j * order.second * one.place))
+        rows.append(Row(value, variance, factors))
+    for name, whole in (("driver", order.first), ("driven", order.second)):
+        if whole is not None:
+            rows += [Row(complex(v[whole - 1]), float(s[whole - 1]), {name: -1.0 + 0.0j}) for v, s in marks[name]]
+    return rows
+
+
+def _whole(orders: Iterable[Order], shaft: int) -> list[int]:
+    """Return the whole orders of a shaft."""
+    return [o for order in orders if (o := order.second if shaft else order.first) is not None]
+
+
+class _Levels:
+    """Variances of the marks' lines: as told, or by the orders of each shaft beside the mesh orders."""
+
+    def __init__(
+        self, gearing: Gearing, orders: Sequence[Order], measured: Sequence[_Measured], trains: Sequence[PulseTrain],
+        told: float | Sequence[float] | None, calibrated: set[str],
+    ) -> None:  # fmt: skip
+        self.told: dict[str, float] | None = None
+        self.freedom = math.inf
+        self.orders: dict[str, np.ndarray] = {}
+        self.squares: dict[str, np.ndarray] = {}
+        if told is not None:
+            shares = np.broadcast_to(np.asarray(told, dtype=float), (2,))
+            if not (np.isfinite(shares).all() and (shares >= 0.0).all()):
+                raise SignalError(f"mark_error: must be one or two shares of the pitch of the marks, got {told!r}")
+            # a line of L independent errors of variance s^2 has 2 s^2/L in each part
+            self.told = {
+                name: 2.0 * (share * TURN / train.lines) ** 2 / train.lines
+                for name, share, train in zip(("driver", "driven"), shares, trains)
+            }
+            return
+        scales = {"driver": 1.0, "driven": float(gearing.ratio)}
+        counted = []
+        for shaft, name in enumerate(scales):
+            own = [o for o in orders if o.harmonic is None and (o.second if shaft else o.first) is not None]
+            alone = [o for o in own if (o.first if shaft else o.second) is None]
+            shared = not alone
+            used = own if shared else alone
+            at = np.array([o.second if shaft else o.first for o in used], dtype=float)
+            square = np.array([np.mean([abs(m.values[o.order][0]) ** 2 for m in measured]) for o in used])
+            # where both discs are seen at once, each has half, unless the other is known
+            part = 0.5 if shared and not calibrated else 1.0
+            self.orders[name], self.squares[name] = at, part * square / scales[name] ** 2
+            counted.append(min(LEVEL_LINES, at.size))
+        # the median of squares has half the freedom of their mean, two for each
+        self.freedom = float(max(2, min(counted, default=2)))
+
+    def at(self, order: Order, name: str) -> float | None:
+        """Return the variance of a disc's line at an order; None where the order is none of the disc's."""
+        whole = order.first if name == "driver" else order.second
+        if whole is None:
+            return None
+        if self.told is not None:
+            return self.told[name]
+        near = np.argsort(np.abs(self.orders[name] - whole), kind="stable")[:LEVEL_LINES]
+        # squares of a line of chance have the median 2 ln 2 times the variance of each part
+        return float(np.median(self.squares[name][near])) / (2.0 * math.log(2.0)) if near.size else 0.0
