@@ -27,7 +27,7 @@ Differential-algebraic equations
 Signals
     `read_signal`, `write_signal`, `make_signal`, `to_signal`, `analyse`, `compare`, `trend`, `series`, `features`,
     `spectrum`, `envelope_spectrum`, `spectrogram`, `waterfall`, `order_map`, `order_track`, `campbell`,
-    `diagnose_bearing`
+    `diagnose_bearing`, `read_pulses`, `CoupledRun`, `transmission_error_from_pulses`
 ADAMS decks
     `read_deck`, `run_deck`, `write_deck`
 Views

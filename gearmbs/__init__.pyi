@@ -47,6 +47,7 @@ from .mechanism import quasi_static as quasi_static
 from .mechanism import simulate as simulate
 from .mechanism import static_equilibrium as static_equilibrium
 from .saving import save as save
+from .signals import CoupledRun as CoupledRun
 from .signals import analyse as analyse
 from .signals import campbell as campbell
 from .signals import compare as compare
@@ -57,11 +58,13 @@ from .signals import features as features
 from .signals import make_signal as make_signal
 from .signals import order_map as order_map
 from .signals import order_track as order_track
+from .signals import read_pulses as read_pulses
 from .signals import read_signal as read_signal
 from .signals import series as series
 from .signals import spectrogram as spectrogram
 from .signals import spectrum as spectrum
 from .signals import to_signal as to_signal
+from .signals import transmission_error_from_pulses as transmission_error_from_pulses
 from .signals import trend as trend
 from .signals import waterfall as waterfall
 from .signals import write_signal as write_signal

@@ -27,17 +27,19 @@ PLOTS = {
     "ComparisonReport": "gearmbs.view:report_plot",
     "BearingReport": "gearmbs.view:bearing_plot",
     "PlanetaryReport": "gearmbs.view:planetary_plot",
+    "MeasuredTransmissionError": "gearmbs.view:measured_error_plot",
     "PaperStudy": "gearmbs.studies.show:study_plot",
 }
 """What draws an object, by the name of its class."""
 
+REPORTS = ("AnalysisReport", "VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport")
 TABLES = {
     "GearSpec": "gearmbs.gears.mesh:wheel_html",
     "Mechanism": "gearmbs.mechanism.solve.measures:mechanism_html",
     "Solution": "gearmbs.dae.results.solution:solution_html",
     "Case": "gearmbs.studies.show:case_html",
     **dict.fromkeys(
-        ("AnalysisReport", "VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport"),
+        (*REPORTS, "MeasuredTransmissionError"),
         "gearmbs.view.pages:report_body",
     ),
 }

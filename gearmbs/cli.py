@@ -16,6 +16,7 @@ from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
 from gearmbs.identify.commands import identify
 from gearmbs.signals.commands import analyse, compare, trend, waterfall
+from gearmbs.signals.encoders.commands import transmission_error
 from gearmbs.studies.commands import bench, campbell, gearbox, paper, resonance, run, sweep
 
 app = typer.Typer(
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-of_records = (analyse, waterfall, trend, compare)
+of_records = (analyse, waterfall, trend, compare, transmission_error)
 for command in (paper, run, sweep, bench, gearbox, resonance, campbell, *of_records, identify, adams, plant):
     app.command()(command)
 app.add_typer(campaign)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from gearmbs._display import REPORTS
 from gearmbs.progress import waiting
 from gearmbs.wording import any_of
 
@@ -32,7 +33,7 @@ WRITERS: dict[str, dict[str, str]] = {
     },
 }
 WRITERS["GearPair"] = WRITERS["GearSpec"]
-for _report_kind in ("VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport"):
+for _report_kind in (*REPORTS, "MeasuredTransmissionError"):
     WRITERS[_report_kind] = WRITERS["AnalysisReport"]
 REPORT_FACTS = ("source", "rate", "duration", "teeth", "speed", "speed_origin", "gmf", "missing", "notes")
 """Attributes of reports that go into JSON beside their tables; speeds in rad/s."""

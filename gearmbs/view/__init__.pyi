@@ -18,6 +18,7 @@ from .figures.charts import sensitivity_map as sensitivity_map
 from .figures.drawings import mechanism_plot as mechanism_plot
 from .figures.drawings import mesh_view as mesh_view
 from .figures.drawings import wheel_plot as wheel_plot
+from .figures.measured_error import measured_error_plot as measured_error_plot
 from .figures.mesh_cycle import MeshAnimation as MeshAnimation
 from .figures.mesh_cycle import contact_pattern_plot as contact_pattern_plot
 from .figures.mesh_cycle import load_sharing_plot as load_sharing_plot

@@ -1,4 +1,4 @@
-"""Virtual encoders: from the angle of a shaft to the pulses that a disc with errors and a counter would give."""
+"""Virtual encoders: from a simulated shaft to the pulses that a disc with errors and a counter would give."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ def encoder(
     Parameters
     ----------
     angle : xarray.DataArray
-        Of the shaft, rad, dimension (time,), turning one way. Between its samples it is a quintic spline.
+        Of the shaft, rad, dimension (time,), turning one way (`shaft_angles`, or an angle of a solution). Between its
+        samples it is a quintic spline.
     lines : int
         Marks of a turn.
     marks : array_like of shape (lines,), optional
@@ -81,6 +82,9 @@ def encoder(
     errors = np.zeros(lines) if marks is None else np.asarray(marks, dtype=float)
     if errors.shape != (lines,):
         raise SignalError(f"marks: {errors.size} errors for {lines} lines; give one for each")
+    if tooth_at_zero is None and "teeth_in_mesh" in angle.attrs:
+        count, number, step = angle.attrs["teeth_in_mesh"]
+        tooth_at_zero = ((number + step * count * start / TURN) % count, step)
     values, at = np.asarray(angle.values, dtype=float), np.asarray(angle["time"].values, dtype=float)
     values = values if values[-1] > values[0] else -values
     if np.any(np.diff(values) <= 0.0):
@@ -98,7 +102,9 @@ def encoder(
     )
     once = None
     if index:
-        turns = np.arange(math.ceil((values[0] - start) / TURN + 0.1), math.floor((values[-1] - start) / TURN - 0.1) + 1)
+        turns = np.arange(
+            math.ceil((values[0] - start) / TURN + 0.1), math.floor((values[-1] - start) / TURN - 0.1) + 1
+        )
         once = _noted(_times_of(course, start + TURN * turns - 0.5 * TURN / lines, at, values), tick)
     return pulse_train(_noted(np.sort(noted), tick), lines, index=once, name=name, tooth_at_zero=tooth_at_zero)
 
@@ -115,3 +121,61 @@ def _times_of(course: scipy.interpolate.BSpline, wanted: np.ndarray, at: np.ndar
 def _noted(times: np.ndarray, tick: float) -> np.ndarray:
     """Return times cut to whole steps of a clock."""
     return np.floor(times / tick) * tick if tick else times
+
+
+def shaft_angles(record: xr.Dataset, *shafts: str) -> tuple[xr.DataArray, ...]:
+    """Return angles of the shafts of a simulated record, for `encoder`.
+
+    Parameters
+    ----------
+    record : xarray.Dataset
+        Of a case (`gearmbs.run_case`): driver and driven shaft, which stand to each other as its transmission error
+        says. Of a drivetrain or a planetary set: the shafts or members that are named, from their speeds.
+    *shafts : str
+        Names, of a drivetrain or a planetary set.
+
+    Returns
+    -------
+    tuple of xarray.DataArray
+        rad, dimension (time,), zero at the start of the record; of a case with the attribute ``teeth_in_mesh``: count
+        of teeth, the one in mesh at angle 0, and the step of the numbers.
+
+    Raises
+    ------
+    SignalError
+        If the record has no such shafts.
+    """
+    dim = next((str(d) for d in record["speed"].dims if d != "time"), "") if "speed" in record.data_vars else ""
+    at = np.asarray(record["time"].values, dtype=float)
+    if dim:
+        names = [str(n) for n in record[dim].values]
+        stray = [n for n in shafts if n not in names]
+        if stray or not shafts:
+            raise SignalError(f"shafts: {stray or 'none'} given; the record has {', '.join(names)}")
+        speeds = [np.abs(record["speed"].sel({dim: n}).values) for n in shafts]
+        turned = [scipy.interpolate.make_interp_spline(at, v, k=5).antiderivative()(at) for v in speeds]
+        return tuple(_angle(at, v - v[0], {}) for v in turned)
+    if "transmission_error" not in record or "operation_speed" not in record.attrs:
+        raise SignalError(
+            "record: not that of a case, a drivetrain or a planetary set; give angles to `encoder` itself"
+        )
+    told = record.attrs
+    teeth = [int(z) for z in told["gears_teeth"]]
+    radius = 0.5 * float(told["gears_module"]) * teeth[0] * math.cos(float(told["gears_pressure_angle"]))
+    known = [float(v) for v in np.ravel(record["acceleration"].attrs.get("teeth_in_mesh", ()))]
+    since = known[0] if known else at[0]
+    if "angle" in record.coords:
+        signal_time = record["signal_time"].values
+        driver = scipy.interpolate.make_interp_spline(signal_time, record["angle"].values, k=5)(at)
+    else:
+        driver = float(told["operation_speed"]) * (at - since)
+    driven = (driver - record["transmission_error"].values / radius) * teeth[0] / teeth[1]
+    numbers = [(z, *known[k : k + 2]) for z, k in zip(teeth, (1, 3))] if known else [None, None]
+    return tuple(_angle(at, v, {} if n is None else {"teeth_in_mesh": n}) for v, n in zip((driver, driven), numbers))
+
+
+def _angle(at: np.ndarray, values: np.ndarray, attrs: dict) -> xr.DataArray:
+    return xr.DataArray(
+        values, dims=("time",), coords={"time": ("time", at, {"units": "s"})}, name="angle",
+        attrs={"units": "rad", **attrs},
+    )  # fmt: skip

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -33,6 +33,17 @@ HANN_NOISE = 1.5
 """Variance of a line with the Hann window by that without any, for noise."""
 WHOLE = 1e-9
 """Difference from a whole number up to which an order is one: of ratios written as decimals."""
+
+
+class Gearing(NamedTuple):
+    """How two shafts turn: omega_1/omega_2, and the mesh order by turns of the first."""
+
+    ratio: Fraction
+    mesh: Fraction
+
+    def on_second(self, order: Fraction) -> Fraction:
+        """Return an order of the first shaft as one of the second."""
+        return order * self.ratio
 
 
 class Course(NamedTuple):
@@ -87,12 +98,17 @@ class Deviations:
         The mean, rad.
     spacing : ndarray of shape (n,)
         Part of the angle that each pulse stands for, rad.
+    numbers : ndarray of int, shape (n,)
+    there : ndarray of bool, shape (n,)
+        Whether the pulse was measured.
     """
 
     phi: np.ndarray
     values: np.ndarray
     mean: float
     spacing: np.ndarray
+    numbers: np.ndarray
+    there: np.ndarray
 
     def window(self, begin: float, turns: float) -> np.ndarray:
         """Return the weights of the pulses, normalised so that the sum with a line's exponential is its amplitude."""
@@ -102,80 +118,109 @@ class Deviations:
 
 
 def deviations(
-    train: PulseTrain, course: Course, begin: float, end: float, scale: float, known: Sequence[float] = ()
+    train: PulseTrain,
+    course: Course,
+    begin: float,
+    end: float,
+    scale: float,
+    known: Sequence[float] = (),
+    errors: np.ndarray | None = None,
 ) -> Deviations:
-    """Return how far a shaft is ahead of the common angle at its pulses.
+    """Return how far a shaft is ahead of the common angle at its pulses, whose marks have errors (rad) or none.
 
     Pulses that are missing are bridged: by a straight line through what is left when the lines at the `known` orders of
     the common angle are taken out, which a line of pulses two marks apart would not follow.
     """
     numbers, times, there = train.every()
     inside = (times >= course.begin) & (times <= course.end)
-    phi = course.angle(times[inside])
-    there = there[inside]
-    ahead = scale * TURN / train.lines * numbers[inside] - phi
+    numbers, there, phi = numbers[inside], there[inside], course.angle(times[inside])
+    angle = TURN / train.lines * numbers
+    ahead = scale * (angle if errors is None else angle + errors[numbers % train.lines]) - phi
     # the trapezoidal rule for uneven points; at the ends the window is zero
     spacing = np.gradient(phi)
     kept = (phi >= begin) & (phi <= end)
-    phi, ahead, there, spacing = phi[kept], ahead[kept], there[kept], spacing[kept]
+    phi, ahead, there, spacing, numbers = (v[kept] for v in (phi, ahead, there, spacing, numbers))
     mean = float(ahead[there].mean())
-    found = Deviations(phi, ahead - mean, mean, spacing)
+    found = Deviations(phi, ahead - mean, mean, spacing, numbers, there)
     if there.all() or not known:
         return found
     turns = (end - begin) / TURN
     model = np.zeros_like(phi)
+    weighted = found.window(begin, turns) * found.values
     for order in known:
-        model += np.real(line(found, order, begin, turns) * np.exp(1j * order * phi))
+        rotating = np.exp(1j * order * phi)
+        model += np.real((weighted @ rotating.conj()) * rotating)
     holes = ~there
     ahead = found.values.copy()
     ahead[holes] = model[holes] + np.interp(phi[holes], phi[there], (found.values - model)[there])
-    return Deviations(phi, ahead, mean, spacing)
+    return replace(found, values=ahead)
 
 
-def line(found: Deviations, order: float, begin: float, turns: float) -> complex:
-    """Return the complex amplitude of one order of the common angle, rad."""
-    return complex(np.sum(found.window(begin, turns) * found.values * np.exp(-1j * order * found.phi)))
+class Line(NamedTuple):
+    """Amplitude of an order (rad), and the variance of its real part, which is that of the imaginary one."""
+
+    value: complex
+    variance: float
 
 
 def lines(
-    found: Sequence[Deviations], step: float, count: int, begin: float, turns: float, signs: Sequence[float]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return lines at orders step, 2 step, ... of the common angle, of the sum of several encoders' deviations.
+    found: Sequence[Deviations],
+    orders: Sequence[Fraction],
+    steps: Sequence[Fraction],
+    begin: float,
+    turns: float,
+    signs: Sequence[float],
+) -> dict[Fraction, Line]:
+    """Return lines of the sum of several encoders' deviations, with variances by the scatter from turn to turn.
 
     Parameters
     ----------
     found : sequence of Deviations
-    step : float
-        1 for the orders of the first shaft, omega_2/omega_1 for those of the second.
-    count : int
+    orders : sequence of Fraction
+        Of the common angle.
+    steps : sequence of Fraction
+        Orders of which these are multiples, such as 1 and omega_2/omega_1 of the two shafts: one after the other each
+        takes its multiples, and scatter is that from one of its turns to the next.
     begin, turns : float
-        Window of the common angle, rad and turns; ``turns step`` turns of the shaft whose orders these are.
+        Window of the common angle, rad and turns.
     signs : sequence of float
         Factors of the encoders.
-
-    Returns
-    -------
-    values : ndarray of complex, shape (count,)
-        Amplitudes, rad.
-    variances : ndarray of shape (count,)
-        Of the real part, and of the imaginary part, by the scatter from turn to turn of the shaft.
     """
-    values = np.zeros(count, dtype=complex)
-    whole = math.floor(turns * step + WHOLE)
-    by_turn = np.zeros((count, whole), dtype=complex)
-    length = TURN / step
+    wanted: dict[Fraction, dict[int, Fraction]] = {step: {} for step in steps}
+    for order in orders:
+        step = next(step for step in steps if (order / step).denominator == 1)
+        wanted[step][int(order / step)] = order
+    values = dict.fromkeys(orders, 0.0j)
+    variances = dict.fromkeys(orders, 0.0)
     for one, sign in zip(found, signs):
-        weighted = sign * one.window(begin, turns) * one.values
-        plain = sign * (2.0 / length) * one.spacing * one.values
-        edges = np.searchsorted(one.phi, begin + length * np.arange(whole + 1))
-        turn, rotating = np.exp(-1j * step * one.phi), np.ones(one.phi.size, dtype=complex)
-        for k in range(count):
-            rotating *= turn
-            values[k] += weighted @ rotating
-            by_turn[k] += np.add.reduceat((plain * rotating)[: edges[-1]], edges[:-1])
-    scatter = by_turn - by_turn.mean(axis=1, keepdims=True)
-    variances = HANN_NOISE * 0.5 * (np.abs(scatter) ** 2).sum(axis=1) / (whole * max(whole - 1, 1))
-    return values, variances
+        weights = one.window(begin, turns)
+        # what is left beside all lines is noise: those of one shaft would scatter over turns of the other
+        left = one.values.copy()
+        for step, places in wanted.items():
+            for order, rotating in _rotating(one.phi, step, places):
+                value = complex((weights * one.values) @ rotating)
+                values[order] += sign * value
+                left -= np.real(value * rotating.conj())
+        for step, places in wanted.items():
+            length = TURN / float(step)
+            whole = math.floor(turns * float(step) + WHOLE)
+            edges = np.searchsorted(one.phi, begin + length * np.arange(whole + 1))
+            if whole < 2 or np.any(np.diff(edges) < 1):
+                continue
+            plain = (2.0 / length) * one.spacing * left
+            for order, rotating in _rotating(one.phi, step, places):
+                by_turn = np.add.reduceat((plain * rotating)[: edges[-1]], edges[:-1])
+                variances[order] += HANN_NOISE * 0.5 * float(np.var(by_turn, ddof=1)) / whole
+    return {order: Line(values[order], variances[order]) for order in orders}
+
+
+def _rotating(phi: np.ndarray, step: Fraction, places: dict[int, Fraction]) -> Iterator[tuple[Fraction, np.ndarray]]:
+    """Yield exp(-i order phi) of multiples of an order, each from the one before."""
+    turn, rotating = np.exp(-1j * float(step) * phi), np.ones(phi.size, dtype=complex)
+    for k in range(1, max(places, default=0) + 1):
+        rotating *= turn
+        if k in places:
+            yield places[k], rotating
 
 
 def whole_number(value: Fraction | float) -> int | None:
@@ -184,16 +229,11 @@ def whole_number(value: Fraction | float) -> int | None:
     return near if abs(float(value) - near) < WHOLE * max(1.0, abs(near)) else None
 
 
-def folded(order: float, lines_of_turn: int) -> float:
-    """Return the order below half the lines that marks make of one."""
-    return abs((order + 0.5 * lines_of_turn) % lines_of_turn - 0.5 * lines_of_turn)
-
-
 def folding(mesh_order: float, lines_of_turn: int, harmonics: int) -> Iterator[tuple[int, float]]:
     """Yield the mesh harmonics that are not below half the lines, with the orders that they are seen at."""
     for k in range(1, harmonics + 1):
         if k * mesh_order >= 0.5 * lines_of_turn - WHOLE:
-            yield k, folded(k * mesh_order, lines_of_turn)
+            yield k, abs((k * mesh_order + 0.5 * lines_of_turn) % lines_of_turn - 0.5 * lines_of_turn)
 
 
 def beside(values: np.ndarray, turns: int, order: float, high: bool) -> np.ndarray:

@@ -197,14 +197,14 @@ def pulses_of_channel(
     return pulse_train(edges, lines, index=once, **{"name": name, **known})
 
 
-def angle_of_pulses(train: PulseTrain, marks: ArrayLike | None = None) -> xr.DataArray:
+def angle_of_pulses(train: PulseTrain, marks: Any = None) -> xr.DataArray:
     """Angle of the shaft at its pulses.
 
     Parameters
     ----------
     train : PulseTrain
-    marks : array_like of shape (lines,), optional
-        Errors of the marks, rad, as `encoder_marks` finds them; default none.
+    marks : EncoderMarks or array_like of shape (lines,), optional
+        Errors of the marks, rad (`encoder_marks`); default none.
 
     Returns
     -------
@@ -223,7 +223,7 @@ def angle_of_pulses(train: PulseTrain, marks: ArrayLike | None = None) -> xr.Dat
     )
 
 
-def errors_of(marks: ArrayLike, train: PulseTrain) -> np.ndarray:
+def errors_of(marks: Any, train: PulseTrain) -> np.ndarray:
     """Return the errors of a train's marks, rad; SignalError if they are of another disc, or nothing numbers them."""
     errors = np.asarray(getattr(marks, "errors", marks), dtype=float)
     if errors.shape != (train.lines,):

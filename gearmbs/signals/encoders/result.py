@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,12 +15,9 @@ from scipy import stats
 from gearmbs._display import Shown
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.encoders.estimate import Found, amplitude_interval
-from gearmbs.signals.encoders.orders import beside
+from gearmbs.signals.encoders.orders import Gearing, beside
 from gearmbs.signals.encoders.pulses import TURN
 from gearmbs.signals.errors import SignalError
-
-if TYPE_CHECKING:
-    from gearmbs.signals.encoders.transmission import Gearing
 
 MESH_POINTS = 64
 """Points of a mesh cycle in curves."""
@@ -191,7 +188,7 @@ class MeasuredTransmissionError(Shown):
         return turns * np.arange(values.size) / values.size, values
 
     def mesh_cycle(self, load: str | None = None, points: int = 400) -> tuple[np.ndarray, np.ndarray]:
-        """Error over one mesh cycle from its mesh harmonics: phase, 0 up to 1 from mark 0 of the driver, and error, m."""
+        """Error over one mesh cycle from its harmonics: phase, 0 up to 1 from mark 0 of the driver, and error, m."""
         phase = np.arange(points) / points
         error = np.zeros(points)
         for one in self.lines:
@@ -260,7 +257,9 @@ class MeasuredTransmissionError(Shown):
         scale = 1.4826 * float(np.median(np.abs(off)))
         out = np.abs(off) > max(OUTSTANDING * scale, within)
         ranges = [float(np.ptp(np.roll(whole, whole.size // 2)[np.roll(k, k.size // 2)])) for k in inside]
-        return pd.DataFrame({"tooth": np.arange(count), "error": error, "within": within, "f_i": ranges, "stands_out": out})
+        return pd.DataFrame(
+            {"tooth": np.arange(count), "error": error, "within": within, "f_i": ranges, "stands_out": out}
+        )
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """All numbers as tables: mesh_harmonics, shaft_orders, single_flank and, with teeth, driver and driven."""
@@ -283,7 +282,9 @@ class MeasuredTransmissionError(Shown):
         mesh = self.harmonics()
         sure = mesh[mesh["low"] > 0.0]
         if not len(sure):
-            return "No mesh harmonic stands clear of the marks: run the shafts free, or turn a disc, and give those runs."
+            return (
+                "No mesh harmonic stands clear of the marks: run the shafts free, or turn a disc, and give those runs."
+            )
         first = sure.iloc[0]
         open_ones = int((~mesh["calibrated"]).sum())
         rest = (
@@ -317,7 +318,10 @@ class MeasuredTransmissionError(Shown):
                 out = teeth[teeth["stands_out"]]
                 words = ", ".join(f"{t} ({1e6 * e:+.2f} um)" for t, e in zip(out["tooth"], out["error"]))
                 within = 1e6 * float(teeth["within"].iloc[0])
-                parts += ["", f"Teeth of the {shaft} that stand out{title}: {words or 'none'} (known to {within:.2g} um)."]
+                parts += [
+                    "",
+                    f"Teeth of the {shaft} that stand out{title}: {words or 'none'} (known to {within:.2g} um).",
+                ]
         if self.refused:
             parts += ["", "## What these encoders cannot show", "", *(f"- {text}" for text in self.refused)]
         return "\n".join(parts)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -12,10 +12,13 @@ import numpy as np
 
 from gearmbs.progress import waiting
 from gearmbs.signals.encoders.estimate import Found, Row, estimate
+from gearmbs.signals.encoders.marks import encoder_marks
 from gearmbs.signals.encoders.orders import (
     FEWEST_TURNS,
     Course,
     Deviations,
+    Gearing,
+    Line,
     deviations,
     folding,
     lines,
@@ -33,7 +36,7 @@ LEVEL_LINES = 32
 FOLDED_HARMONICS = 20
 """Mesh harmonics that are looked at for where marks fold them to: of contact forces later ones are below a percent."""
 SLIPPED = 0.05
-"""Pitches by which wheels and discs of two runs may stand otherwise than told: a twentieth is 18 degrees of the mesh."""
+"""Pitches by which wheels and discs of two runs may stand otherwise than told: 1/20 is 18 degrees of the mesh."""
 LARGEST_TERM = 2000
 """Of a ratio given as a decimal number, as a fraction."""
 
@@ -59,17 +62,6 @@ class CoupledRun:
     shift: tuple[Quantity, Quantity] = (0.0, 0.0)
 
 
-class Gearing(NamedTuple):
-    """How two shafts turn: omega_1/omega_2, and the mesh order by turns of the first."""
-
-    ratio: Fraction
-    mesh: Fraction
-
-    def on_second(self, order: Fraction) -> Fraction:
-        """Return an order of the first shaft as one of the second."""
-        return order * self.ratio
-
-
 class Order(NamedTuple):
     """An order by turns of the first shaft; as a whole order of each shaft, or None; and as mesh harmonic, or None."""
 
@@ -81,12 +73,19 @@ class Order(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """Lines of one run: amplitudes (rad of the first shaft) and variances by order, and the place of the second disc."""
+    """Lines of one run by order, in rad of the first shaft, and the place of the second disc."""
 
     run: CoupledRun
-    values: dict[Fraction, tuple[complex, float]]
+    values: dict[Fraction, Line]
+    mesh: list[Fraction]
+    ratio: float
     place: float
     turns: int
+
+    @property
+    def wander(self) -> float:
+        """RMS of the lag in the mesh, rad of the second shaft at most."""
+        return math.sqrt(0.5 * sum(abs(self.values[o].value) ** 2 for o in self.mesh)) / self.ratio
 
 
 @waiting("transmission error")
@@ -149,19 +148,21 @@ def transmission_error_from_pulses(
     if stray:
         raise SignalError(f"free: has {sorted(stray)}; the shafts are 'driver' and 'driven'")
     _check_trains(runs, freed, gearing)
-    orders, refused = _orders(gearing, trains)
-    measured = [_lines_of(run, gearing, orders) for run in runs]
+    orders, refused, remarks = _orders(gearing, trains)
+    # known marks are put right where the pulses are, as the wheels' lag moves them; what is left of them is an unknown
+    errors = {name: encoder_marks(trains).errors if trains else None for name, trains in freed.items()}
+    measured = [_lines_of(run, gearing, orders, errors) for run in runs]
     shifts, notes = _shifts(measured, gearing)
-    notes = list(dict.fromkeys([note for r in runs for t in (r.driver, r.driven) for note in t.notes] + notes))
+    notes = list(dict.fromkeys([n for r in runs for t in (r.driver, r.driven) for n in t.notes] + notes + remarks))
     marks = {
-        name: [_free_lines(train, name, max(_whole(orders, k), default=0)) for train in freed[name]]
+        name: [_free_lines(train, name, _whole(orders, k), errors[name]) for train in freed[name]]
         for k, name in enumerate(freed)
     }
     levels = _Levels(gearing, orders, measured, trains, mark_error, {n for n in marks if marks[n]})
     found = []
     for order in orders:
-        rows = _rows(order, gearing, measured, shifts, marks)
-        known = {name: level for name in ("driver", "driven") if (level := levels.at(order, name)) is not None}
+        known = {name: level for name in marks if not marks[name] and (level := levels.at(order, name)) is not None}
+        rows = _rows(order, gearing, measured, shifts, marks, known.get("driven", 0.0))
         solved = estimate(rows, known)
         calibrated = all(_is_calibrated(solved, known, name) for name in solved.names if name in known)
         freedom = 2.0 * sum(m.turns - 1 for m in measured) if calibrated else levels.freedom
@@ -230,8 +231,8 @@ def _check_trains(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrai
             )
 
 
-def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order], list[str]]:
-    """Return the orders that both encoders see, and what is refused of those that they do not."""
+def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order], list[str], list[str]]:
+    """Return the orders that both encoders see, what is refused of those that they do not, and remarks."""
     limits = [Fraction(train.lines, 2) for train in trains]
     top = min(limits[0], limits[1] / gearing.ratio)
     asked: dict[Fraction, None] = {}
@@ -239,9 +240,7 @@ def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order]
         asked |= dict.fromkeys(step * k for k in range(1, math.ceil(top / step)))
     refused = []
     shadows: list[list[tuple[int, float]]] = []
-    for name, train, mesh in zip(
-        ("driver", "driven"), trains, (gearing.mesh, gearing.on_second(gearing.mesh))
-    ):
+    for name, train, mesh in zip(("driver", "driven"), trains, (gearing.mesh, gearing.on_second(gearing.mesh))):
         shadows.append(list(folding(float(mesh), train.lines, FOLDED_HARMONICS)))
         if shadows[-1]:
             first = shadows[-1][0][0]
@@ -249,34 +248,44 @@ def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order]
                 f"Mesh harmonic {first} and later ones: order {float(first * mesh):g} of the {name} is not below half "
                 f"of its {train.lines} lines."
             )
-    orders = []
+    orders, remarks = [], []
+    lost: dict[str, list[tuple[float, int]]] = {"driver": [], "driven": []}
     for order in sorted(asked):
+        own = {"driver": float(order), "driven": float(gearing.on_second(order))}
         harmonic = whole_number(order / gearing.mesh)
-        one = Order(order, whole_number(order), whole_number(gearing.on_second(order)), harmonic)
-        own = (order, gearing.on_second(order))
         cast = [
-            (name, float(own[k]), h)
-            for k, name in enumerate(("driver", "driven"))
-            for h, at in shadows[k]
-            if abs(at - float(own[k])) < SHADOW * trains[k].lines / max(trains[k].turns * trains[k].lines, 1.0)
+            (name, h)
+            for name, train, shadow in zip(own, trains, shadows)
+            for h, at in shadow
+            if abs(at - own[name]) < SHADOW / max(train.turns, 1.0)
         ]
-        if cast:
-            name, at, h = cast[0]
-            what = f"mesh harmonic {harmonic}, " if harmonic else ""
-            refused.append(
-                f"{what[:1].upper()}{what[1:]}{'o' if what else 'O'}rder {at:g} of the {name}: its marks fold mesh "
-                f"harmonic {h} onto it."
-            )
+        dark = [(name, h) for name, h in cast if harmonic is None or h <= DARK * harmonic]
+        if dark:
+            lost[dark[0][0]].append((own[dark[0][0]], dark[0][1]))
             continue
-        orders.append(one)
+        remarks += [
+            f"The marks of the {name} fold mesh harmonic {h} onto {harmonic}: lines that are no multiple of the teeth "
+            "part them."
+            for name, h in cast[:1]
+        ]
+        orders.append(Order(order, whole_number(order), whole_number(gearing.on_second(order)), harmonic))
+    for name, places in lost.items():
+        if places:
+            listed = ", ".join(f"{at:g} (harmonic {h})" for at, h in places[:LISTED])
+            more = f" and {len(places) - LISTED} more" if len(places) > LISTED else ""
+            refused.append(f"Orders of the {name} onto which its marks fold mesh harmonics: {listed}{more}.")
     if not any(o.harmonic for o in orders):
         raise SignalError(
-            f"lines: {trains[0].lines} and {trains[1].lines} marks show no mesh harmonic. {' '.join(refused[:3])} Use "
-            "discs of more lines"
+            f"lines: {trains[0].lines} and {trains[1].lines} marks show no mesh harmonic. {' '.join(refused)} Use "
+            "discs of more lines, no multiple of the teeth"
         )
-    return orders, refused
+    return orders, refused, remarks
 
 
+LISTED = 12
+DARK = 7
+"""A mesh harmonic is refused where one of up to so many times its number is folded onto it, and remarked on where one
+beyond is: amplitudes that fall as the number's square are then 2 % of it."""
 SHADOW = 2.0
 """Width of a line with the Hann window, by the reciprocal of the turns: nearer orders are not parted."""
 
@@ -291,7 +300,9 @@ def _window(gearing: Gearing, begin: float, end: float) -> float:
     return slower * math.floor(turns / slower)
 
 
-def _lines_of(run: CoupledRun, gearing: Gearing, orders: Sequence[Order]) -> _Measured:
+def _lines_of(
+    run: CoupledRun, gearing: Gearing, orders: Sequence[Order], errors: Mapping[str, np.ndarray | None]
+) -> _Measured:
     """Evaluate a run at all orders."""
     course = smooth_angle(run.driver)
     begin, end = _common(course, run.driven)
@@ -299,25 +310,18 @@ def _lines_of(run: CoupledRun, gearing: Gearing, orders: Sequence[Order]) -> _Me
     slower = turns / max(float(gearing.ratio), 1.0)
     if slower < FEWEST_TURNS:
         raise SignalError(
-            f"runs: the records of {run.driver.name!r} and {run.driven.name!r} have {max(slower, 0.0):.3g} turns of the "
-            f"slower shaft in common beside one that the smooth angle takes; {FEWEST_TURNS} are needed, record longer"
+            f"runs: the records of {run.driver.name!r} and {run.driven.name!r} have {max(slower, 0.0):.3g} turns of "
+            f"the slower shaft in common beside two that the smooth angle takes; {FEWEST_TURNS} are needed"
         )
     end = begin + TURN * turns
     known = [float(o.order) for o in orders if o.harmonic]
     scale = float(gearing.ratio)
-    first = deviations(run.driver, course, begin, end, 1.0, known)
-    second = deviations(run.driven, course, begin, end, scale, known)
-    both, signs = (first, second), (1.0, -1.0)
-    values: dict[Fraction, tuple[complex, float]] = {}
-    for step in (Fraction(1), 1 / gearing.ratio, gearing.mesh):
-        count = max((k for o in orders if o.order not in values and (k := whole_number(o.order / step))), default=0)
-        if count:
-            amplitudes, variances = lines(both, float(step), count, begin, turns, signs)
-            wanted = {o.order for o in orders}
-            for k in range(1, count + 1):
-                if step * k in wanted and step * k not in values:
-                    values[step * k] = (complex(amplitudes[k - 1]), float(variances[k - 1]))
-    return _Measured(run, values, second.mean / scale, max(2, math.floor(slower)))
+    first = deviations(run.driver, course, begin, end, 1.0, known, errors["driver"])
+    second = deviations(run.driven, course, begin, end, scale, known, errors["driven"])
+    steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
+    values = lines((first, second), [o.order for o in orders], steps, begin, turns, (1.0, -1.0))
+    mesh = [o.order for o in orders if o.harmonic]
+    return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)))
 
 
 def _common(course: Course, driven: PulseTrain) -> tuple[float, float]:
@@ -328,18 +332,18 @@ def _common(course: Course, driven: PulseTrain) -> tuple[float, float]:
     return float(course.angle(low)), float(course.angle(high))
 
 
-def _free_lines(train: PulseTrain, name: str, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lines of a shaft that runs free, at its orders 1 to count: those of its marks with the sign turned."""
+def _free_lines(train: PulseTrain, name: str, orders: Sequence[int], errors: np.ndarray | None) -> dict[Fraction, Line]:
+    """Return the lines of a shaft that runs free, at whole orders: what is left of its marks with the sign turned."""
     course = smooth_angle(train)
     begin, end = float(course.angle(course.begin)), float(course.angle(course.end))
     turns = math.floor((end - begin) / TURN)
     if turns < FEWEST_TURNS:
         raise SignalError(
-            f"free: {train.name!r} of the {name} has {turns} turns beside one that the smooth angle takes; "
+            f"free: {train.name!r} of the {name} has {turns} turns beside two that the smooth angle takes; "
             f"{FEWEST_TURNS} are needed, record longer"
         )
-    found: Deviations = deviations(train, course, begin, begin + TURN * turns, 1.0)
-    return lines((found,), 1.0, count, begin, float(turns), (1.0,))
+    found: Deviations = deviations(train, course, begin, begin + TURN * turns, 1.0, errors=errors)
+    return lines((found,), [Fraction(k) for k in orders], (Fraction(1),), begin, float(turns), (1.0,))
 
 
 def _shifts(measured: Sequence[_Measured], gearing: Gearing) -> tuple[list[tuple[float, float]], list[str]]:
@@ -370,8 +374,8 @@ def _shifts(measured: Sequence[_Measured], gearing: Gearing) -> tuple[list[tuple
                 )
         elif abs(off) > SLIPPED * pitch:
             raise SignalError(
-                f"shift: discs and wheels of run {k + 1} stand {math.degrees(off):+.3f} deg otherwise than in the first "
-                "run; give the angle of the disc that was turned, or leave out the run in which a coupling slipped"
+                f"shift: discs and wheels of run {k + 1} stand {math.degrees(off):+.3f} deg otherwise than in the "
+                "first run; give the angle of the disc that was turned, or leave this run out"
             )
         found.append((told[0], told[1]))
     return found, notes
@@ -382,12 +386,19 @@ def _rows(
     gearing: Gearing,
     measured: Sequence[_Measured],
     shifts: Sequence[tuple[float, float]],
-    marks: Mapping[str, list[tuple[np.ndarray, np.ndarray]]],
+    marks: Mapping[str, list[dict[Fraction, Line]]],
+    unknown: float,
 ) -> list[Row]:
-    """Return what all runs measured at one order, and of what it consists."""
+    """Return what all runs measured at one order, and of what it consists.
+
+    The wheels' lag moves the driven marks to and fro under the line: of unknown ones, whose lines have this variance,
+    each run has another part (kappa lag)^2 of it.
+    """
     rows = []
     for one, shift in zip(measured, shifts):
         value, variance = one.values[order.order]
+        if unknown and order.second is not None:
+            variance += unknown * (order.second * one.wander) ** 2 * float(gearing.ratio) ** 2
         if order.first is not None or order.second is None:
             phase = np.exp(1j * float(order.order) * shift[0])
         else:
@@ -400,7 +411,7 @@ def _rows(
         rows.append(Row(value, variance, factors))
     for name, whole in (("driver", order.first), ("driven", order.second)):
         if whole is not None:
-            rows += [Row(complex(v[whole - 1]), float(s[whole - 1]), {name: -1.0 + 0.0j}) for v, s in marks[name]]
+            rows += [Row(*found[Fraction(whole)], {name: -1.0 + 0.0j}) for found in marks[name]]
     return rows
 
 

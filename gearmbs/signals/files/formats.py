@@ -17,7 +17,7 @@ from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.csv import CUT
 from gearmbs.signals.files.table import TABLE, Asked, Content, format_of, known_endings
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
-from gearmbs.signals.signal.record import Progress, checked_gaps, columns_asked, record_of, signal_from
+from gearmbs.signals.signal.record import Progress, Record, checked_gaps, columns_asked, record_of, signal_from
 from gearmbs.signals.signal.signal import as_signal, check_units
 
 FORMATS = tuple(TABLE)
@@ -143,7 +143,11 @@ def write_signal(
     SignalFileError
         If the format cannot hold the signal or the folder is missing.
     """
-    path = Path(path)
+    return write_record(record_of(as_signal(signal)), Path(path), format, progress)
+
+
+def write_record(record: Record, path: Path, format: str | None = None, progress: Progress | None = None) -> Path:
+    """Write a record as `write_signal` does a signal; samples that are missing are NaN."""
     format = _format(path, format)
     known = format_of(format)
     if known.write is None:
@@ -152,7 +156,6 @@ def write_signal(
         )
     if path.suffix.lower() in known.not_written:
         raise SignalFileError(path, known.not_written[path.suffix.lower()])
-    record = record_of(as_signal(signal))
     if not path.parent.is_dir():
         raise SignalFileError(path, f"there is no folder {path.parent}; make it first")
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)

@@ -1,0 +1,145 @@
+"""Pulses in and out of files of any format: a column of times, or of counts of a clock, for each encoder.
+
+Columns may differ in length; the shorter ones end with empty cells. A column `name index` holds the pulses once a turn.
+Where a column holds neither times nor counts, it is the sampled voltage of an encoder, and its edges are taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.progress import staged
+from gearmbs.signals.encoders.pulses import PulseTrain, pulse_train, pulses_of_channel
+from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
+from gearmbs.signals.files.formats import checked_format, damage_named, read_signal, write_record
+from gearmbs.signals.files.table import Asked, format_of
+from gearmbs.signals.signal.record import SECONDS, Record
+from gearmbs.units import Quantity, to_si
+
+INDEX = " index"
+"""End of the name of a column with the pulses once a turn."""
+COUNTS = frozenset({"ticks", "tick", "counts", "count"})
+KNOWN = "encoders"
+"""Attribute of a file that says how many lines the encoders have, and which teeth are at mark 0."""
+
+
+def write_pulses(trains: Mapping[str, PulseTrain] | Sequence[PulseTrain], path: str | Path) -> Path:
+    """Write trains of pulses as columns of times, as `read_pulses` reads them.
+
+    Parameters
+    ----------
+    trains : mapping of str to PulseTrain, or sequence
+        By the names of their columns, or under their own names. Of those whose mark 0 is known it is told by a column
+        of index pulses, unless the disc itself tells.
+    path : path-like
+        The ending says as what (`gearmbs.write_signal`).
+    """
+    named = dict(trains) if isinstance(trains, Mapping) else {train.name: train for train in trains}
+    if not named or (not isinstance(trains, Mapping) and len(named) < len(trains)):
+        raise SignalError("trains: give at least one, and each another name")
+    columns: dict[str, np.ndarray] = {}
+    known: dict[str, Any] = {}
+    for name, train in named.items():
+        columns[name] = train.times
+        known[name] = {"lines": train.lines}
+        if train.tooth_at_zero is not None:
+            known[name]["tooth_at_zero"] = list(train.tooth_at_zero)
+        marks = train.numbers % train.lines
+        if train.referenced and np.any(marks == 0):
+            before = train.numbers[(marks == 0) & (train.numbers > train.numbers[0])] - 0.5
+            columns[name + INDEX] = np.interp(before, train.numbers, train.times)
+    count = max(column.size for column in columns.values())
+    values = np.full((count, len(columns)), np.nan)
+    for k, column in enumerate(columns.values()):
+        values[: column.size, k] = column
+    record = Record(values, list(columns), ["s"] * len(columns), rate=1.0, attrs={KNOWN: known})
+    return write_record(record, Path(path))
+
+
+@staged("reading")
+def read_pulses(
+    path: str | Path,
+    lines: int | Mapping[str, int] | None = None,
+    *,
+    clock: Quantity | None = None,
+    rate: Any = None,
+    progress: Any = None,
+    **known: Any,
+) -> dict[str, PulseTrain]:
+    """Read the pulses of encoders and tachos.
+
+    Parameters
+    ----------
+    path : path-like
+        A file of any format that `gearmbs.read_signal` reads.
+    lines : int or mapping of str to int, optional
+        Marks of a turn, of all or by column; not needed of files that say it, as those of `write_pulses` do. Of a
+        mapping only its columns are read.
+    clock : float or str, optional
+        Frequency of the clock, Hz or "20 MHz", of columns that count its ticks.
+    rate : float, optional
+        Sampling rate of sampled voltages, Hz, where the file does not say it.
+    **known
+        Further arguments of `pulse_train`.
+
+    Returns
+    -------
+    dict of str to PulseTrain
+
+    Raises
+    ------
+    MissingMetadataError
+        If the lines of a column are not known, or the clock of counts.
+    SignalFileError
+        If a column is not there.
+    """
+    path = Path(path)
+    format, content = checked_format(path, None)
+    with damage_named(path, format):
+        # empty cells end columns that are shorter: they are kept here
+        record = format_of(format).read(path, Asked(content=content, rate=1.0, gaps="longest", progress=progress))
+    table = dict(zip(record.names, record.values.T))
+    units = dict(zip(record.names, record.units))
+    told: dict[str, dict[str, Any]] = record.attrs.get(KNOWN, {})
+    asked = list(lines) if isinstance(lines, Mapping) else list(told) or [n for n in table if not n.endswith(INDEX)]
+    missing = [name for name in asked if name not in table]
+    if missing:
+        raise SignalFileError(path, f"has no column {missing[0]!r}; it holds {record.names}")
+    found = {}
+    for name in asked:
+        about = told.get(name, {})
+        count = lines[name] if isinstance(lines, Mapping) else lines or about.get("lines")
+        if count is None:
+            raise MissingMetadataError(
+                "lines", f"the pulses in {path.name}", f"pass lines={{{name!r}: ...}}, the marks of a turn"
+            )
+        more = {"name": name, "tooth_at_zero": about.get("tooth_at_zero"), **known}
+        factor = _factor(units[name], clock, path)
+        once = name + INDEX if name + INDEX in table else None
+        if factor is None:
+            signal = read_signal(path, rate=rate, channels=[name, once] if once else [name])
+            found[name] = pulses_of_channel(signal, count, name, index=once, **more)
+        else:
+            index = None if once is None else factor * _present(table[once])
+            found[name] = pulse_train(factor * _present(table[name]), count, index=index, **more)
+    return found
+
+
+def _present(column: np.ndarray) -> np.ndarray:
+    return column[np.isfinite(column)]
+
+
+def _factor(unit: str, clock: Quantity | None, path: Path) -> float | None:
+    """Return the seconds of a unit of a column, or None of a sampled voltage."""
+    key = unit.strip().lower()
+    if key in SECONDS and key:
+        return SECONDS[key]
+    if key in COUNTS or (clock is not None and key in ("", "unknown")):
+        if clock is None:
+            raise MissingMetadataError("clock", f"the counts in {path.name}", "pass clock='20 MHz' of the counter")
+        return 1.0 / to_si(clock, "frequency", "clock")
+    return None

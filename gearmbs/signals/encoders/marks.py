@@ -1,0 +1,103 @@
+"""What one train says alone: the errors of its marks, and the torsional vibration of its shaft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.signals.encoders.orders import Deviations, deviations, smooth_angle
+from gearmbs.signals.encoders.pulses import TURN, PulseTrain, errors_of
+from gearmbs.signals.errors import SignalError
+
+
+@dataclass(frozen=True, eq=False)
+class EncoderMarks:
+    """Errors of the marks of a disc.
+
+    Attributes
+    ----------
+    errors : ndarray of shape (lines,)
+        Angle by which each mark lies behind its place, rad, their mean zero; zero of marks that the disc lacks.
+    uncertainty : float
+        Standard deviation of each, rad, by the scatter from turn to turn.
+    """
+
+    errors: np.ndarray
+    uncertainty: float
+
+    @property
+    def rms(self) -> float:
+        """RMS of the errors as a share of the pitch."""
+        return float(np.sqrt(np.mean(self.errors**2))) * self.errors.size / TURN
+
+
+def encoder_marks(trains: PulseTrain | Sequence[PulseTrain]) -> EncoderMarks:
+    """Errors of the marks from a shaft that runs free, its inertia keeping the speed.
+
+    What of its motion is of whole orders of its turn counts as marks: of a torque T sin(k theta) on an inertia J that
+    is T/(J k^2 omega^2), so that a fast run down is best, and two at different speeds show what is left of it.
+
+    Parameters
+    ----------
+    trains : PulseTrain or sequence of PulseTrain
+        Of one disc, whose mark 0 is known if there are several.
+    """
+    trains = [trains] if isinstance(trains, PulseTrain) else list(trains)
+    if len(trains) > 1 and not all(train.referenced for train in trains):
+        raise SignalError("trains: several need index pulses, by which their marks are the same; give index=...")
+    lines = {train.lines for train in trains}
+    if len(lines) != 1:
+        raise SignalError(f"trains: have {sorted(lines)} lines; give those of one disc")
+    numbers, values = [], []
+    for train in trains:
+        found = _own(train)
+        numbers.append(found.numbers[found.there] % train.lines)
+        values.append(-found.values[found.there])
+    at, off = np.concatenate(numbers), np.concatenate(values)
+    count = np.bincount(at, minlength=trains[0].lines)
+    total = np.bincount(at, off, trains[0].lines)
+    errors = np.divide(total, count, out=np.zeros(count.size), where=count > 0)
+    spread = float(np.sqrt(np.sum((off - errors[at]) ** 2) / max(off.size - np.count_nonzero(count), 1)))
+    errors -= errors[count > 0].mean()
+    return EncoderMarks(np.where(count > 0, errors, 0.0), spread / math.sqrt(off.size / np.count_nonzero(count)))
+
+
+def torsional_vibration(train: PulseTrain, marks: Any = None) -> xr.DataArray:
+    """Angle by which a shaft is ahead of its smooth turning, at even steps of its own angle.
+
+    Without marks, their errors are part of it at all whole orders; orders above half the lines are folded down.
+
+    Parameters
+    ----------
+    train : PulseTrain
+    marks : EncoderMarks or array_like of shape (lines,), optional
+        Errors of the marks (`encoder_marks`).
+
+    Returns
+    -------
+    xarray.DataArray
+        rad, dimensions (angle, channel), angle in turns from mark 0, `lines` samples a turn: what
+        `gearmbs.signals.order_spectrum` takes. The speed over time is `instantaneous_speed` of `angle_of_pulses`.
+    """
+    found = _own(train)
+    values = found.values
+    if marks is not None:
+        values = values + errors_of(marks, train)[found.numbers % train.lines]
+    return xr.DataArray(
+        values[:, None],
+        dims=("angle", "channel"),
+        coords={"angle": found.numbers / train.lines, "channel": [train.name], "units": ("channel", ["rad"])},
+        attrs={"samples_per_rev": train.lines, "units": "rad", "mean_speed": train.mean_speed},
+    )
+
+
+def _own(train: PulseTrain) -> Deviations:
+    """Return the deviations of a shaft from its own smooth angle, over whole turns."""
+    course = smooth_angle(train)
+    begin, end = float(course.angle(course.begin)), float(course.angle(course.end))
+    return deviations(train, course, begin, begin + TURN * math.floor((end - begin) / TURN) - 1e-9, 1.0)

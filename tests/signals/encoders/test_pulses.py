@@ -1,0 +1,174 @@
+"""Trains of pulses: numbered and mended, in and out of files, and what one shaft says alone."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from gearmbs.cli import app
+from gearmbs.signals import (
+    MissingMetadataError,
+    SignalError,
+    SignalFileError,
+    angle_of_pulses,
+    encoder,
+    encoder_marks,
+    instantaneous_speed,
+    make_signal,
+    mark_errors,
+    order_spectrum,
+    pulse_train,
+    read_pulses,
+    shaft_angles,
+    torsional_vibration,
+    write_pulses,
+    write_signal,
+)
+from tests.generators import seed
+from tests.says import says
+from tests.signals.encoders.bench import Discs, angle, coupled, free
+
+
+def steady(turns=6.0, speed=50.0, rate=20e3):
+    times = np.arange(round(turns * math.tau / speed * rate)) / rate
+    return angle(speed * times, times)
+
+
+@pytest.mark.parametrize("lines", [1, 4, 60, 1024])
+def test_pulses_come_when_the_marks_pass(lines):
+    train = encoder(steady(), lines, mounted=0.2, index=True)
+    off = train.times * 50.0 - 0.2 - math.tau / lines * train.numbers
+    assert np.allclose(off, math.tau * round(off[0] / math.tau), atol=1e-9)
+    assert math.isclose(train.mean_speed, 50.0, rel_tol=1e-9)
+    assert train.referenced
+    assert not encoder(steady(), lines).referenced
+
+
+@pytest.mark.parametrize("lines", [60, 1024])
+def test_lost_and_doubled_pulses_are_mended_and_told(lines):
+    rng = np.random.default_rng(seed(7) + lines)
+    lost, doubled = (int(p) for p in rng.choice(np.arange(20, 4 * lines, 7), 2, replace=False))
+    sound = encoder(steady(), lines, index=True)
+    mended = encoder(steady(), lines, index=True, lost=[lost], doubled=[doubled])
+    assert mended.times.size == sound.times.size - 1
+    assert np.isin(mended.numbers, sound.numbers).all()
+    assert np.allclose(mended.times, np.interp(mended.numbers, sound.numbers, sound.times), atol=1e-12)
+    assert [w for w in ("missing", "too many") if any(w in note for note in mended.notes)] == ["missing", "too many"]
+    with pytest.raises(SignalError, match=says("faults", "missing", "mend")):
+        pulse_train(np.delete(sound.times, lost), lines, faults="refuse")
+
+
+def test_a_mark_that_the_disc_lacks_numbers_the_others():
+    whole, lacking = encoder(steady(), 60, index=True), encoder(steady(), 60, lacking=[0])
+    assert lacking.referenced
+    assert set(lacking.numbers % 60) == set(range(1, 60))
+    assert np.allclose(lacking.times, np.interp(lacking.numbers, whole.numbers, whole.times))
+    assert "lacks 1 of 60" in lacking.notes[0]
+
+
+def test_uneven_reflectors_are_taken_as_they_are():
+    uneven = np.array([0.0, 0.25, -0.1, 0.3])
+    train = encoder(steady(40.0), 4, marks=uneven, index=True)
+    assert not train.notes
+    found = encoder_marks(train)
+    assert np.allclose(found.errors, uneven - uneven.mean(), atol=2e-3)
+
+
+def test_marks_of_a_free_shaft_and_its_torsional_vibration():
+    discs = Discs(256, error=0.02)
+    found = encoder_marks(discs.free()["driven"])
+    true = discs.marks[1] - discs.marks[1].mean()
+    assert np.abs(found.errors - true).max() < 5 * found.uncertainty
+    assert 0.015 < found.rms < 0.025
+    times = np.arange(40_000) / 20e3
+    swinging = angle(60.0 * times + 1e-4 * np.cos(29 * 60.0 * times), times)
+    train = discs.pulses(1, swinging)
+    lines = order_spectrum(torsional_vibration(train, found), segment=8.0, window="hann")
+    assert abs(float(lines.sel(order=29)[0]) / 1e-4 - 1.0) < 0.01
+    bare = order_spectrum(torsional_vibration(train), segment=8.0)
+    assert abs(float(bare.sel(order=29)[0]) / 1e-4 - 1.0) > 0.03
+    speed = instantaneous_speed(angle_of_pulses(encoder(swinging, 1024)))
+    assert abs(float(speed.max()) - (60.0 + 29 * 60e-4)) < 0.01
+    with pytest.raises(SignalError, match=says("marks", "256", "1024")):
+        angle_of_pulses(encoder(swinging, 1024), found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [".csv", ".npz", ".mat", ".nc"])
+def test_files_give_the_trains_back(ending, tmp_path):
+    discs = Discs(64)
+    trains = {"driver": discs.pulses(0, free()), "driven": discs.pulses(1, free(seconds=0.7))}
+    found = read_pulses(write_pulses(trains, tmp_path / f"run{ending}"))
+    assert list(found) == ["driver", "driven"]
+    for name, train in trains.items():
+        assert np.array_equal(found[name].times, train.times)
+        assert np.array_equal((found[name].numbers - train.numbers) % 64, np.zeros(train.numbers.size))
+        assert found[name].referenced
+
+
+def test_counts_and_voltages_are_read_as_pulses(tmp_path):
+    train = encoder(steady(), 32, index=True)
+    counts = pd.DataFrame({"A [ticks]": np.round(train.times * 20e6)})
+    counts.to_csv(tmp_path / "counts.csv", index=False)
+    found = read_pulses(tmp_path / "counts.csv", 32, clock="20 MHz")["A"]
+    assert np.allclose(found.times, train.times, atol=5e-8)
+    with pytest.raises(MissingMetadataError, match=says("clock")):
+        read_pulses(tmp_path / "counts.csv", 32)
+    with pytest.raises(MissingMetadataError, match=says("lines", "A")):
+        read_pulses(tmp_path / "counts.csv", clock="20 MHz")
+    with pytest.raises(SignalFileError, match=says("no column", "B")):
+        read_pulses(tmp_path / "counts.csv", {"B": 32}, clock="20 MHz")
+    turned = steady()
+    volts = make_signal({"tacho": np.sin(32 * turned.values)}, 20e3, units="V")
+    write_signal(volts, tmp_path / "volts.csv")
+    sampled = read_pulses(tmp_path / "volts.csv", 32)["tacho"]
+    assert np.allclose(np.diff(sampled.times), math.tau / 32 / 50.0, rtol=1e-3)
+
+
+@pytest.mark.slow
+def test_the_command_reads_what_virtual_encoders_write(tmp_path):
+    discs = Discs(200)
+    angles = coupled(lambda turned: 5e-6 * np.cos(math.tau * 29 * turned), (29, 29), 0.04, turns=10)
+    run = discs.run(angles)
+    write_pulses([run.driver, run.driven], tmp_path / "run.csv")
+    for name, train in discs.free().items():
+        write_pulses([train], tmp_path / f"{name}.csv")
+    words = ["transmission-error", str(tmp_path / "run.csv"), "--teeth", "29,29", "--base-radius", "40 mm"]
+    out = CliRunner().invoke(app, words)
+    assert out.exit_code == 0
+    assert "have the interval that marks leave" in out.output
+    alone = ["--free-driver", str(tmp_path / "driver.csv"), "--free-driven", str(tmp_path / "driven.csv")]
+    out = CliRunner().invoke(app, [*words, *alone, "--tables", str(tmp_path), "--figures", str(tmp_path)])
+    assert out.exit_code == 0
+    table = pd.read_csv(tmp_path / "mesh_harmonics.csv")
+    assert abs(table["amplitude"][0] / 5e-6 - 1.0) < 0.02
+    assert table["calibrated"].all()
+    assert (tmp_path / "transmission_error.png").exists()
+    ratio = [*words[:2], "--ratio", "1", "--mesh-order", "29", "--base-radius", "40 mm"]
+    assert "Mesh harmonic 1" in CliRunner().invoke(app, ratio).output
+    out = CliRunner().invoke(app, [*words, "--columns", "a,b"])
+    assert out.exit_code != 0
+    assert "--columns" in out.output
+
+
+def test_what_is_no_train_is_refused():
+    times = np.arange(300) / 100.0
+    with pytest.raises(SignalError, match=says("lines", "2.5")):
+        pulse_train(times, 2.5)
+    with pytest.raises(SignalError, match=says("times", "increase", "rising edges")):
+        pulse_train(times[::-1], 60)
+    with pytest.raises(SignalError, match=says("300", "1024", "record")):
+        pulse_train(times, 1024)
+    with pytest.raises(SignalError, match=says("faults", "guess")):
+        pulse_train(times, 60, faults="guess")
+    with pytest.raises(SignalError, match=says("index", "lines")):
+        pulse_train(times, 60, index=[0.5, 1.3, 2.0])
+    with pytest.raises(SignalError, match=says("marks", "3", "60")):
+        encoder(steady(), 60, marks=np.zeros(3))
+    with pytest.raises(SignalError, match=says("angle", "back")):
+        encoder(angle(np.sin(times), times), 4)
+    with pytest.raises(SignalError, match=says("record", "encoder")):
+        shaft_angles(make_signal(times, 100.0).to_dataset(name="x"))
+    assert mark_errors(1000, 0.01, 3).std() * 1000 / math.tau == pytest.approx(0.01, rel=0.1)

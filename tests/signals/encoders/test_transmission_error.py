@@ -1,0 +1,233 @@
+"""Transmission error from the pulses of two encoders: against the exact one of the bench, with and without marks."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.signals import CoupledRun, SignalError, encoder, mark_errors, transmission_error_from_pulses
+from tests.generators import seed
+from tests.says import says
+from tests.signals.encoders.bench import Discs, closed, coupled, paper_error
+
+TEETH = (29, 29)
+
+
+def paper_angles(torque=100.0, turns=20, rate=40e3):
+    error, radius = paper_error(torque)
+    lag = closed(error.error)
+    return coupled(lambda turned: lag(29 * turned), TEETH, radius, turns, rate=rate)
+
+
+def exact_lines(error, count):
+    return np.abs(np.fft.rfft(error.error))[1 : count + 1] * 2 / error.error.size
+
+
+@pytest.mark.slow
+def test_marks_known_from_free_runs_leave_the_mesh_harmonics_within_two_percent():
+    error, radius = paper_error()
+    discs = Discs()
+    found = transmission_error_from_pulses(
+        discs.run(paper_angles(turns=60, rate=100e3)), TEETH, base_radius=radius, free=discs.free(seconds=2.0)
+    )
+    mesh, exact = found.harmonics(), exact_lines(error, 17)
+    assert len(mesh) == 17
+    assert mesh["calibrated"].all()
+    assert np.all(np.abs(mesh["amplitude"] - exact)[:7] < 0.02 * exact[:7])
+    # what counting leaves of a small one
+    assert np.all(np.abs(mesh["amplitude"] - exact) < 0.05e-6)
+    assert any("mesh harmonic 18" in text.lower() for text in found.refused)
+    # the curve, as far as 17 harmonics hold it
+    lines = np.fft.rfft(error.error)
+    lines[0] = lines[18:] = 0.0
+    off = found.mesh_cycle(points=400)[1] - np.fft.irfft(lines, 400)
+    assert np.sqrt(np.mean(off**2)) < 0.06e-6
+    assert np.abs(off).max() < 0.17e-6
+    pair = found.single_flank().set_index("of").loc["pair"]
+    assert pair["f_l"] < pair["within"]
+    assert abs(pair["F_i"] - error.peak_to_peak) < pair["within"] + 0.5e-6
+
+
+@pytest.mark.slow
+def test_sixty_lines_show_one_harmonic_and_refuse_the_rest_by_name():
+    error, radius = paper_error()
+    discs = Discs(60)
+    found = transmission_error_from_pulses(discs.run(paper_angles()), TEETH, base_radius=radius, free=discs.free())
+    mesh = found.harmonics()
+    assert mesh["harmonic"].tolist() == [1]
+    assert abs(mesh["amplitude"][0] / exact_lines(error, 1)[0] - 1.0) < 0.03
+    words = " ".join(found.refused)
+    assert "Mesh harmonic 2 and later ones: order 58 of the driver is not below half of its 60 lines" in words
+    assert "2 (harmonic 2)" in words
+    assert 2.0 not in found.shaft_orders()["order_driver"].tolist()
+    few = Discs(56)
+    with pytest.raises(SignalError, match=says("lines", "56", "29")):
+        transmission_error_from_pulses(few.run(paper_angles()), TEETH, base_radius=radius)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("told", "teeth"), [(None, (29, 29)), (0.01, (21, 34))])
+def test_without_known_marks_the_interval_covers_the_truth(told, teeth):
+    error, radius = paper_error()
+    lag = closed(error.error)
+    angles = coupled(lambda turned: lag(teeth[0] * turned), teeth, radius, turns=max(10, 7 * teeth[1] / teeth[0]))
+    exact = exact_lines(error, 3)
+    draws, inside = 200, np.zeros(3)
+    for k in range(draws):
+        run = Discs(256, seed=1000 + k).run(angles)
+        mesh = transmission_error_from_pulses(run, teeth, base_radius=radius, mark_error=told).harmonics()[:3]
+        assert not mesh["calibrated"].any()
+        inside += (mesh["low"] <= exact) & (exact <= mesh["high"])
+    # of 200 draws at 95 %, fewer than 180 are seen once in 500 times
+    assert inside.min() >= 180, inside
+
+
+@pytest.mark.slow
+def test_turned_discs_tell_marks_and_errors_apart():
+    error, radius = paper_error()
+    angles, discs = paper_angles(), Discs()
+    half = math.pi / 29
+    base = discs.run(angles)
+    first = CoupledRun(
+        discs.pulses(0, angles[0], 1, mounted=half), discs.pulses(1, angles[1], 1), shift=(half + 0.01, 0)
+    )
+    second = CoupledRun(
+        discs.pulses(0, angles[0], 2), discs.pulses(1, angles[1], 2, mounted=0.3 + half), shift=(0, "6 deg")
+    )
+    found = transmission_error_from_pulses([base, first, second], TEETH, base_radius=radius)
+    mesh, exact = found.harmonics(), exact_lines(error, 3)
+    assert abs(mesh["amplitude"][0] / exact[0] - 1.0) < 0.005
+    assert abs(mesh["amplitude"][2] / exact[2] - 1.0) < 0.01
+    # a disc turned by a tooth says nothing of the second harmonic
+    assert mesh["high"][1] - mesh["low"][1] > 5 * (mesh["high"][0] - mesh["low"][0])
+    assert sum("was turned by 6.2" in note for note in found.notes) == 2
+    one = transmission_error_from_pulses([base, first], TEETH, base_radius=radius).harmonics()
+    assert not one["calibrated"][0]
+    assert one["low"][0] <= exact[0] <= one["high"][0]
+    silent = CoupledRun(first.driver, first.driven)
+    with pytest.raises(SignalError, match=says("shift", "give", "angle")):
+        transmission_error_from_pulses([base, silent], TEETH, base_radius=radius)
+    wrong = CoupledRun(first.driver, first.driven, shift=(0.4 * half, 0))
+    with pytest.raises(SignalError, match=says("shift", "sense")):
+        transmission_error_from_pulses([base, wrong], TEETH, base_radius=radius)
+
+
+@pytest.mark.slow
+def test_the_difference_of_two_loads_knows_no_marks():
+    errors = [paper_error(torque)[0] for torque in (100.0, 200.0)]
+    radius, discs = paper_error()[1], Discs()
+    runs = [discs.run(paper_angles(t), k, load=name) for k, (t, name) in enumerate(((100.0, "low"), (200.0, "high")))]
+    found = transmission_error_from_pulses(runs, TEETH, base_radius=radius, probability=0.999)
+    exact = np.abs(np.fft.rfft(errors[1].error - errors[0].error))[1:4] / 200
+    difference = found.difference("high", "low")[:3]
+    assert np.allclose(difference["amplitude"], exact, rtol=0.02)
+    assert np.all((difference["low"] <= exact) & (exact <= difference["high"]))
+    assert not found.harmonics("low")["calibrated"].any()
+
+
+@pytest.mark.parametrize("case", range(4))
+def test_orders_of_both_shafts_come_back_from_any_pair(case):
+    """Lines at chance orders of both shafts and the mesh, perfect discs: each to a part in a thousand."""
+    rng = np.random.default_rng(seed(3) + case)
+    teeth = tuple(int(z) for z in rng.integers(12, 40, 2))
+    turns = (
+        2 * teeth[1] // math.gcd(*teeth) if teeth[1] // math.gcd(*teeth) < 25 else 12 * max(1.0, teeth[1] / teeth[0])
+    )
+    orders = {Fraction(1): 3e-6, Fraction(teeth[0], teeth[1]) * 2: 2e-6, Fraction(teeth[0]): 4e-6}
+    phases = dict(zip(orders, rng.uniform(0, math.tau, len(orders))))
+
+    def lag(turned):
+        return sum(a * np.cos(math.tau * float(o) * turned + phases[o]) for o, a in orders.items())
+
+    angles = coupled(lag, teeth, 0.04, turns=turns + 3, speed=float(rng.uniform(20.0, 300.0)))
+    lines = [int(n) for n in rng.integers(180, 400, 2)]
+    trains = [encoder(a, n, index=True) for a, n in zip(angles, lines)]
+    found = transmission_error_from_pulses(CoupledRun(*trains), teeth, base_radius=0.04)
+    lost = max(teeth) * 20 > min(lines) / 2  # mesh harmonics that could be folded onto the others
+    for order, amplitude in orders.items():
+        row = [line for line in found.lines if line.order == order]
+        if not row:
+            assert lost
+            continue
+        value, _ = row[0].found.of({"T load": 1.0})
+        assert abs(abs(value) * 0.04 - amplitude) < 2e-3 * amplitude + 2e-9, (teeth, lines, order)
+
+
+def test_records_that_do_not_fit_are_refused():
+    _, radius = paper_error()
+    angles, discs = paper_angles(turns=9), Discs(200)
+    run = discs.run(angles)
+    known = {"base_radius": radius}
+    with pytest.raises(SignalError, match=says("ratio", "teeth", "lines")):
+        transmission_error_from_pulses(run, (29, 40), **known)
+    with pytest.raises(SignalError, match=says("teeth", "ratio", "mesh_order")):
+        transmission_error_from_pulses(run, **known)
+    with pytest.raises(SignalError, match=says("base_radius", "0")):
+        transmission_error_from_pulses(run, TEETH, base_radius=0)
+    with pytest.raises(SignalError, match=says("mark_error", "-1")):
+        transmission_error_from_pulses(run, TEETH, mark_error=-1, **known)
+    with pytest.raises(SignalError, match=says("probability", "2")):
+        transmission_error_from_pulses(run, TEETH, probability=2, **known)
+    with pytest.raises(SignalError, match=says("free", "rotor", "driver")):
+        transmission_error_from_pulses(run, TEETH, free={"rotor": run.driver}, **known)
+    with pytest.raises(SignalError, match=says("driver", "lines", "128", "200")):
+        transmission_error_from_pulses(run, TEETH, free={"driver": encoder(angles[0], 128, index=True)}, **known)
+    bare = CoupledRun(encoder(angles[0], 200), encoder(angles[1], 200))
+    with pytest.raises(SignalError, match=says("mark 0", "index")):
+        transmission_error_from_pulses([bare, bare], TEETH, **known)
+    assert len(transmission_error_from_pulses(bare, TEETH, **known).harmonics()) == 3
+    short = CoupledRun(encoder(angles[0][:9000], 200), encoder(angles[1][:9000], 200))
+    with pytest.raises(SignalError, match=says("turns", "smooth")):
+        transmission_error_from_pulses(short, TEETH, **known)
+
+
+@pytest.mark.slow
+def test_a_tooth_with_an_error_is_found_by_its_number():
+    """The dynamic error of a simulated pair with two wrong teeth, through encoders."""
+    faults = [
+        {"kind": "single pitch error", "amount": "10 um", "tooth": 8, "wheel": "driver"},
+        {"kind": "single pitch error", "amount": "-6 um", "tooth": 20, "wheel": "driven"},
+    ]
+    case = gm.Case(
+        gears={"teeth": (21, 34), "module": "2.5 mm", "face_width": "20 mm"},
+        operation={"duration": 1.6, "speed": "1500 rpm", "torque": "60 N m"},
+        fault={"teeth": faults},
+    )
+    angles = gm.signals.shaft_angles(gm.run_case(case))
+    discs = Discs()
+    radius = case.pair().geometry.driver.base_radius
+    found = transmission_error_from_pulses(discs.run(angles), (21, 34), base_radius=radius, free=discs.free())
+    for shaft, tooth, sense in (("driver", 8, -1.0), ("driven", 20, 1.0)):
+        teeth = found.tooth_errors(shaft)
+        assert int(teeth["error"].abs().idxmax()) == tooth
+        assert np.sign(teeth["error"][tooth]) == sense
+        assert teeth["stands_out"][tooth]
+        # the next one shares the load of a contact ratio of 1.6
+        assert set(teeth.index[teeth["stands_out"]]) <= {tooth - 1, tooth, (tooth + 1) % len(teeth)}
+    text = found.to_markdown()
+    assert "Teeth of the driver that stand out:" in text
+    assert " 8 (-" in text
+    assert " 20 (+" in text
+    assert {"mesh_harmonics", "shaft_orders", "single_flank", "driver_teeth", "driven_teeth"} == set(found.tables())
+    figure = found.plot()
+    assert len(figure.axes) == 5
+
+
+def test_marks_with_a_period_are_no_chance():
+    """Errors of the marks at the mesh order alone pass for transmission error in one run, and not in two."""
+    _, radius = paper_error()
+    lines = 240
+    wave = 1e-4 * np.cos(math.tau * 29 * np.arange(lines) / lines)
+    angles = coupled(lambda turned: 0.0 * turned, TEETH, radius, turns=12)
+    still = mark_errors(lines, 0.0, 0)
+    one = CoupledRun(
+        encoder(angles[0], lines, marks=wave, index=True), encoder(angles[1], lines, marks=still, index=True)
+    )
+    seen = transmission_error_from_pulses(one, TEETH, base_radius=radius).harmonics()
+    assert abs(seen["amplitude"][0] / (1e-4 * radius) - 1.0) < 1e-3
+    turned = math.pi / 29
+    two = CoupledRun(encoder(angles[0], lines, marks=wave, index=True, mounted=turned), one.driven, shift=(turned, 0.0))
+    known = transmission_error_from_pulses([one, two], TEETH, base_radius=radius, mark_error=(0.01, 1e-6)).harmonics()
+    assert known["amplitude"][0] < 1e-3 * 1e-4 * radius
