@@ -8,6 +8,7 @@ import pytest
 
 import gearmbs as gm
 from gearmbs.signals import CoupledRun, SignalError, encoder, mark_errors, transmission_error_from_pulses
+from gearmbs.view import measured_error_plot
 from tests.generators import seed
 from tests.says import says
 from tests.signals.encoders.bench import Discs, closed, coupled, paper_error
@@ -211,8 +212,8 @@ def test_a_tooth_with_an_error_is_found_by_its_number():
     assert " 8 (-" in text
     assert " 20 (+" in text
     assert {"mesh_harmonics", "shaft_orders", "single_flank", "driver_teeth", "driven_teeth"} == set(found.tables())
-    figure = found.plot()
-    assert len(figure.axes) == 5
+    figure = measured_error_plot(found, title="two wrong teeth")
+    assert len(figure.axes) == len(found.plot().axes) == 5
 
 
 def test_marks_with_a_period_are_no_chance():
