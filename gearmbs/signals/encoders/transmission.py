@@ -245,8 +245,8 @@ def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order]
         if shadows[-1]:
             first = shadows[-1][0][0]
             refused.append(
-                f"Mesh harmonic {first} and later ones: order {float(first * mesh):g} of the {name} is not below half "
-                f"of its {train.lines} lines."
+                f"Mesh harmonic {first} and later ones: order {float(first * mesh):g} of the {name} is half "
+                f"of its {train.lines} lines or more."
             )
     orders, remarks = [], []
     lost: dict[str, list[tuple[float, int]]] = {"driver": [], "driven": []}
