@@ -15,8 +15,16 @@ import numpy as np
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def whole_file(path: str | Path, *, durable: Path | None = None) -> Iterator[Path]:
     """Yield a temporary path in the same folder; rename it to ``path`` on success, remove it on failure.
+
+    Parameters
+    ----------
+    path : path-like
+    durable : Path, optional
+        A folder that holds it. The file then survives a power cut once this returns: it is written, brought to the
+        disk, renamed, and the entries of its folders up to that one are brought to the disk, in this order, so that
+        after a power cut at any moment the name stands for the former content or for all of the new one.
 
     Raises
     ------
@@ -28,7 +36,13 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     part = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
     try:
         yield part
+        if durable is not None:
+            to_disk(part)
         os.replace(part, path)
+        if durable is not None:
+            # those that are there already may have been made by a process that was killed before it came to this
+            for folder in path.parents[: len(path.relative_to(durable).parts)]:
+                to_disk(folder)
     except OSError as error:
         # a full disk is told without a file, anything else with one that nobody has asked for
         if error.errno is None or error.filename not in (None, str(part)):
@@ -39,10 +53,25 @@ def whole_file(path: str | Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
-def write_whole(path: str | Path, text: str) -> Path:
-    """Write a text file as a whole and return its path."""
-    with whole_file(path) as part:
-        part.write_text(text, encoding="utf-8")
+def to_disk(path: Path) -> None:
+    """Bring a file, or the entries of a folder, to the disk; folders only where the system opens them."""
+    try:
+        handle = os.open(path, os.O_RDWR if path.is_file() else os.O_RDONLY)
+    except PermissionError:
+        # Windows opens no folders, and keeps their entries itself
+        if path.is_dir():
+            return
+        raise
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write_whole(path: str | Path, content: str | bytes, *, durable: Path | None = None) -> Path:
+    """Write a file as a whole and return its path; see `whole_file`."""
+    with whole_file(path, durable=durable) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
 
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from gearmbs.campaigns import Campaign, PolynomialChaos, fit_chaos, load_plan, total_bounds
-from gearmbs.campaigns.folder import read_ledger
+from gearmbs.campaigns.codes import known_code
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
 from gearmbs.files import whole_file, write_whole
 from gearmbs.signals import COMPONENTS
@@ -66,14 +66,17 @@ def store(campaign: Campaign) -> None:
     with whole_file(DATA / "claims.parquet") as part:
         data.to_parquet(part, index=False, compression="zstd", use_dictionary=["plane"], use_byte_stream_split=numbers)
     status = campaign.status()
-    ledger = read_ledger(campaign.folder.ledger(campaign.folder.done()[0])) or {}
+    ledger = campaign.folder.entry(campaign.folder.done()[0])
+    code = known_code(campaign.folder, ledger["code"])
+    setting = {} if code is None else code.setting
     facts = {
         "planned": status.cases,
         "done": status.done,
         "failed": status.failed,
         "processor_hours": round(status.processor_seconds / 3600.0, 2),
-        "processor": ledger.get("processor", "unknown"),
-        "versions": {name: ledger[name] for name in ("gearmbs", "numpy", "scipy", "numba") if name in ledger},
+        "processor": setting.get("processor", "unknown"),
+        "versions": {"gearmbs": ledger["gearmbs"]}
+        | {name: setting[name].split()[0] for name in ("numpy", "scipy", "numba") if name in setting},
     }
     facts["bounds"] = {ratio: bounds(data, ratio) for ratio in LEAST if ratio != "load_each"}
     write_whole(DATA / "claims.json", json.dumps(facts, indent=1) + "\n")

@@ -4,7 +4,6 @@ from .factors import Choice as Choice
 from .factors import Factor as Factor
 from .factors import Specimens as Specimens
 from .factors import choose as choose
-from .folder import CampaignStatus as CampaignStatus
 from .plan import Plan as Plan
 from .plan import load_plan as load_plan
 from .plan import make_plan as make_plan
@@ -13,10 +12,12 @@ from .sensitivity import main_effects as main_effects
 from .sensitivity import morris_effects as morris_effects
 from .sensitivity import sobol_indices as sobol_indices
 from .settings import CampaignError as CampaignError
+from .settings import CampaignWarning as CampaignWarning
 from .settings import canonical as canonical
 from .settings import content_key as content_key
 from .sobol_bounds import TotalBounds as TotalBounds
 from .sobol_bounds import total_bounds as total_bounds
+from .status import CampaignStatus as CampaignStatus
 from .subjects import BearingSubject as BearingSubject
 from .subjects import DeckSubject as DeckSubject
 from .subjects import DrivetrainSubject as DrivetrainSubject

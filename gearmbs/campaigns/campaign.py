@@ -8,7 +8,8 @@ import io
 import os
 import random
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
@@ -18,15 +19,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.campaigns.factors import Factor
-from gearmbs.campaigns.folder import CampaignStatus, Folder, extend_folder, make_folder, read_status
+from gearmbs.campaigns.folder import Folder, check_folder, extend_folder, litter, make_folder
 from gearmbs.campaigns.plan import Plan
 from gearmbs.campaigns.results import factor_names, result_names
 from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
-from gearmbs.campaigns.settings import CampaignError, limit, whole
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning, limit, whole
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
+from gearmbs.campaigns.status import CampaignStatus, read_status
 from gearmbs.campaigns.surrogates import PolynomialChaos
 from gearmbs.files import write_whole
 from gearmbs.progress import alone, bars, watched
+from gearmbs.schema.described import chosen
+from gearmbs.studies.run.claims import owner, told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +38,8 @@ if TYPE_CHECKING:
 
     from gearmbs.campaigns.surrogates import ResponseSurface
 
-    pass
+OTHER_CODE = ("refuse", "mix", "again")
+"""What may become of units that other code has done."""
 
 MOST_TRIES = 8
 """Attempts of a unit that end with a worker's death, after which the run gives up."""
@@ -87,8 +92,9 @@ class Campaign:
         client: Any = None,
         progress: bool | Callable[[CampaignStatus], None] | None = None,
         minutes: float | None = None,
+        other_code: str = "refuse",
     ) -> CampaignStatus:
-        """Work on what is not done yet, until all is.
+        """Work on what is not done yet, until all is; what is damaged is done again.
 
         Parameters
         ----------
@@ -100,13 +106,17 @@ class Campaign:
             A bar, see `gearmbs.progress`, or ``progress(status)`` after every unit.
         minutes : float, optional
             Start no unit after so long.
+        other_code : {"refuse", "mix", "again"}
+            What becomes of it if results so far come from other code, versions or another kind of processor: refuse to
+            work, go on all the same, or do those units again.
 
         Raises
         ------
         OSError
             If the disk is full. What is done stays, and another run goes on.
         CampaignError
-            If workers die again and again over the same unit, or with ``on_failure="stop"`` at the first failed case.
+            If results so far come from other code; if workers die again and again over the same unit, or no worker can
+            work, with the reason; or with ``on_failure="stop"`` at the first failed case.
         """
         from gearmbs.campaigns.cluster import DaskRunner
         from gearmbs.studies.run.engine import here, processes
@@ -122,9 +132,11 @@ class Campaign:
         else:
             # workers need modules only, which they import by name
             where = here if workers == 0 else partial(processes, own_main=False)
-        return self._drive(where, workers or available_cores(), self._pending(), progress, minutes)
+        return self._drive(where, workers or available_cores(), None, progress, minutes, other_code)
 
-    def work(self, part: int, parts: int, *, minutes: float | None = None) -> CampaignStatus:
+    def work(
+        self, part: int, parts: int, *, minutes: float | None = None, other_code: str = "refuse"
+    ) -> CampaignStatus:
         """Work here on one part of the units: an element of a job array, without any coordination.
 
         Parameters
@@ -133,29 +145,33 @@ class Campaign:
             Part 1 to parts.
         minutes : float, optional
             Start no unit after so long.
+        other_code : {"refuse", "mix", "again"}
+            See `run`.
         """
         from gearmbs.studies.run.engine import here
 
         if not 1 <= whole(part, "part", 0) <= whole(parts, "parts", 1):
             raise CampaignError(f"part {part} of {parts}: give a part from 1 to {parts}")
-        mine = [unit for unit in self._pending() if unit % parts == part - 1]
-        return self._drive(here, 1, mine, False, minutes)
+        mine = range(part - 1, self.folder.unit_count, parts)
+        return self._drive(here, 1, mine, False, minutes, other_code)
 
-    def _pending(self) -> list[int]:
-        done = set(self.folder.done())
-        return [unit for unit in range(self.folder.unit_count) if unit not in done]
-
-    def _drive(self, where: Any, workers: int, units: list[int], progress: Any, minutes: Any) -> CampaignStatus:
+    def _drive(
+        self, where: Any, workers: int, mine: Iterable[int] | None, progress: Any, minutes: Any, other_code: str
+    ) -> CampaignStatus:
         from gearmbs.campaigns.work import work_unit
-        from gearmbs.studies.run.engine import WorkerDied, run_jobs
+        from gearmbs.studies.run.engine import Refused, WorkerDied, run_jobs
 
         minutes = _of_minutes(minutes)
+        self._heal(mine)
+        self._compare(chosen(OTHER_CODE, other_code, "", CampaignError, "other_code"))
+        done = set(self.folder.done())
+        units = [unit for unit in (range(self.folder.unit_count) if mine is None else mine) if unit not in done]
         # drivers side by side begin at different ends, so that they rarely want the same unit
         offset = random.Random(os.getpid()).randrange(len(units)) if _driven(self.folder, units) else 0
         try:
             with _shown(progress, self.folder.path.name, self.status) as tell:
                 run_jobs(
-                    partial(work_unit, os.path.abspath(self.path)),
+                    partial(work_unit, os.path.abspath(self.path), other_code == "mix"),
                     units[offset:] + units[:offset],
                     workers,
                     where=where,
@@ -163,13 +179,35 @@ class Campaign:
                     ledger=self.folder,
                     tries=MOST_TRIES,
                     seconds=None if minutes is None else 60.0 * minutes,
+                    waiting=_say_who,
                 )
         except WorkerDied as died:
             raise CampaignError(
                 f"unit {died.job}: its worker died {MOST_TRIES} times, also with its cases in processes of their own; "
-                f"is there enough memory for {self.plan.unit} results?"
+                f"is there enough memory for {self.folder.unit_size} results?"
             ) from died
+        except Refused as refused:
+            raise CampaignError(f"{refused}; what is done is in the folder") from refused
         return self.status()
+
+    def _heal(self, units: Iterable[int] | None) -> None:
+        """Put right what is damaged, and say what."""
+        for line in check_folder(self.folder, units, sweep=True):
+            warnings.warn(f"{self.path}: {line}; it is put right", CampaignWarning, stacklevel=4)
+
+    def _compare(self, other_code: str) -> None:
+        """Compare this process's code with that of the results so far, before anything is worked on."""
+        from gearmbs.campaigns.codes import admit, plan_modules
+        from gearmbs.studies.run.code import code_of
+
+        code = code_of(plan_modules(self.folder))
+        if other_code == "again":
+            for unit in self.folder.done():
+                if self.folder.entry(unit)["code"] != code.digest:
+                    self.folder.ledger(unit).unlink(missing_ok=True)
+        # what nobody has come to an end with decides nothing
+        fresh = not self.folder.done() and not _driven(self.folder, [0])
+        admit(self.folder, code, mix=other_code == "mix", again=fresh or other_code == "again")
 
     def status(self) -> CampaignStatus:
         """Return how far it is; from anywhere, at any time."""
@@ -183,14 +221,46 @@ class Campaign:
     @property
     def table(self) -> pd.DataFrame:
         """One row a finished case: the plan's columns, ``id``, ``status``, ``message``, ``advice`` and what is kept."""
+        return self.read()
+
+    def read(self, columns: Sequence[str] | None = None, where: str | None = None) -> pd.DataFrame:
+        """Return some columns of the table, of the cases for which a condition holds; see `table`.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Names; default all. Others are not read: of a million cases three columns take some seconds.
+        where : str, optional
+            A condition such as ``"status == 'done' and operation.torque > 100"``, as constraints are written; where a
+            name holds blanks or the like, underscores stand for them.
+
+        Raises
+        ------
+        CampaignError
+            If nothing is finished, there is no such column, or what is stored is damaged, with the unit.
+        """
         from gearmbs.campaigns.results import read_table
 
-        return read_table(self.folder)
+        return read_table(self.folder, columns, where)
 
     def failed(self) -> pd.DataFrame:
         """Return the rows of the cases that failed, each with its message and what to do about it."""
-        table = self.table
-        return table[table["status"] != "done"].reset_index(drop=True)
+        from gearmbs.campaigns.results import read_table
+
+        failed = [unit for unit in self.folder.done() if self.folder.entry(unit)["failed"]]
+        return read_table(self.folder, where="status != 'done'", units=failed)
+
+    def record(self, index: int) -> xr.Dataset:
+        """Return the whole record of a case, or of a failed one what it had computed, if the plan keeps records.
+
+        Raises
+        ------
+        CampaignError
+            If there is none, or it is not as the ledger says.
+        """
+        from gearmbs.campaigns.results import read_record
+
+        return read_record(self.folder, self._unit_of(index), index)
 
     def open(self) -> xr.Dataset:
         """Return everything along ``case`` as one Dataset; signals are read when they are asked for."""
@@ -232,7 +302,7 @@ class Campaign:
         index = whole(index, "case", 0)
         for extent in self.folder.extents:
             if extent.first <= index < extent.last:
-                return extent.first_unit + (index - extent.first) // self.plan.unit
+                return extent.first_unit + (index - extent.first) // self.folder.unit_size
         raise CampaignError(f"case {index}: there are cases 0 to {self.folder.case_count - 1}")
 
     def check(self, *, sweep: bool = False) -> list[str]:
@@ -243,9 +313,17 @@ class Campaign:
         sweep : bool
             Remove the litter of killed workers, and ledgers whose data are damaged, so that `run` does them again.
         """
-        from gearmbs.campaigns.folder import check_folder
+        from gearmbs.campaigns.codes import code_counts, known_code
 
-        return check_folder(self.folder, sweep=sweep)
+        found = check_folder(self.folder, sweep=sweep)
+        counts = code_counts(self.folder).most_common()
+        if len(counts) > 1:
+            most = known_code(self.folder, counts[0][0])
+            for digest, units in counts[1:]:
+                other = known_code(self.folder, digest)
+                told = "another code" if most is None else most.differences(other)
+                found.append(f"code: {units} of {sum(n for _, n in counts)} units by another one: {told}")
+        return [*found, *litter(self.folder, sweep=sweep)]
 
     def retry(self) -> int:
         """Take failed cases' units out of the ledger, so that `run` does them again; return how many units."""
@@ -266,15 +344,19 @@ def _of_minutes(minutes: float | None) -> float | None:
 
 
 def _has_failures(folder: Folder, unit: int) -> bool:
-    from gearmbs.campaigns.folder import read_ledger
+    return bool(folder.entry(unit)["failed"])
 
-    entry = read_ledger(folder.ledger(unit))
-    return bool(entry and entry["failed"])
+
+def _say_who(others: list[tuple[int, dict[str, Any]]]) -> None:
+    """Say for whom a run waits."""
+    first = "; ".join(f"unit {unit}: {told(who)}" for unit, who in others[:3])
+    more = f"; and {len(others) - 3} more" if len(others) > 3 else ""
+    warnings.warn(f"nothing is left but what others are at work on: {first}{more}", CampaignWarning, stacklevel=2)
 
 
 def _driven(folder: Folder, units: list[int]) -> bool:
     """Whether somebody is at work on some of the units."""
-    return bool(units) and any((folder.path / "units").glob("*.claim"))
+    return bool(units) and any(owner(claim) for claim in (folder.path / "units").glob("*.claim"))
 
 
 class _shown:

@@ -6,15 +6,30 @@ start; what is done is in the folder.
 
 from __future__ import annotations
 
+import itertools
 import os
 import shlex
+import warnings
+from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from gearmbs.campaigns.settings import CampaignError, whole
-from gearmbs.studies.run.engine import DEATH, FAILURE, ONE_THREAD, Message, Work, one_thread, outcome, silent
+from gearmbs.studies.run.engine import (
+    DEATH,
+    FAILURE,
+    ONE_THREAD,
+    REFUSED,
+    Message,
+    Refused,
+    Work,
+    WorkerReplaced,
+    one_thread,
+    outcome,
+    silent,
+)
 
 # Job scripts for Slurm and PBS.
 
@@ -100,7 +115,19 @@ class DaskRunner:
     """
 
     def __init__(self, client: Any) -> None:
-        self.client = client
+        self.client, self.refused = client, set[str]()
+
+    def _willing(self) -> list[str]:
+        """Return the workers that have not refused to work."""
+        return [address for address in self.client.nthreads() if address not in self.refused]
+
+    def _goes_on_without(self, refusal: Refused) -> bool:
+        """Leave out a worker that cannot work, and say so; return whether there are others."""
+        if refusal.worker not in self.refused:
+            self.refused.add(refusal.worker)
+            told = f"the Dask worker {refusal.worker} is left out: {refusal}"
+            warnings.warn(told, WorkerReplaced, stacklevel=2)
+        return bool(self._willing())
 
     @property
     def workers(self) -> int:
@@ -119,18 +146,27 @@ class DaskRunner:
         from distributed.comm import CommClosedError
 
         at_work: dict[Any, tuple[int, int]] = {}
-        source = enumerate(units)
+        source, back = enumerate(units), deque[tuple[int, int]]()
+        submitted = itertools.count()
         try:
             while True:
-                while len(at_work) < UNITS_A_WORKER * self.workers and (taken := next(source, None)) is not None:
-                    key = f"unit-{taken[1]}-{os.getpid()}-{id(self)}-{taken[0]}"
-                    future = self.client.submit(outcome, work, taken[1], silent, key=key, pure=False)
+                while len(at_work) < UNITS_A_WORKER * self.workers:
+                    taken = back.popleft() if back else next(source, None)
+                    if taken is None:
+                        break
+                    key = f"unit-{taken[1]}-{os.getpid()}-{id(self)}-{next(submitted)}"
+                    where = {"workers": self._willing()} if self.refused else {}
+                    future = self.client.submit(_at_worker, work, taken[1], key=key, pure=False, **where)
                     at_work[future] = taken
                 if not at_work:
                     return
                 for future in wait(list(at_work), return_when="FIRST_COMPLETED").done:
-                    yield *at_work.pop(future), *self._end(future)
+                    unit, (kind, value) = at_work.pop(future), self._end(future)
                     future.release()
+                    if kind == REFUSED and value.lasting and self._goes_on_without(value):
+                        back.append(unit)
+                    else:
+                        yield *unit, kind, value
         except CommClosedError as error:
             at_work.clear()
             raise CampaignError(
@@ -149,7 +185,20 @@ class DaskRunner:
         # a worker that dies takes the units of its neighbours' queues with it: all are tried again
         if type(error).__name__ in ("KilledWorker", "CancelledError", "FutureCancelledError"):
             return DEATH, None
+        if isinstance(error, ImportError):
+            # the worker could not even read its unit
+            return REFUSED, Refused(f"a Dask worker cannot work: {type(error).__name__}: {error}")
         return FAILURE, error
+
+
+def _at_worker(work: Work, unit: int) -> tuple[str, Any]:
+    """Return the end of a unit at a worker of Dask, with its address if it refuses."""
+    from distributed import get_worker
+
+    kind, value = outcome(work, unit, silent)
+    if kind == REFUSED:
+        value.worker = get_worker().address
+    return kind, value
 
 
 def batch_cluster(system: str, *, walltime: str = "01:00:00", memory: str = "2GB", **settings: Any) -> Any:

@@ -15,6 +15,8 @@ app = typer.Typer(
 
 Place = Annotated[Path, typer.Argument(help="Folder of the campaign.")]
 
+OTHER_CODE = "If results so far come from other code: refuse to work, mix, or do those units again."
+
 
 @app.command()
 def plan(
@@ -42,6 +44,7 @@ def run(
     walltime: Annotated[str, typer.Option(help="Of a job of Slurm or PBS.")] = "01:00:00",
     queue: Annotated[str | None, typer.Option(help="Of Slurm or PBS.")] = None,
     minutes: Annotated[float | None, typer.Option(help="Start no further unit after so long.")] = None,
+    other_code: Annotated[str, typer.Option(help=OTHER_CODE)] = "refuse",
 ) -> None:
     """Work on what is not done yet; after an interruption, the same command goes on."""
     with guarded():
@@ -51,9 +54,9 @@ def run(
         if dask is not None:
             jobs = {"walltime": walltime, "queue": queue} if dask in ("slurm", "pbs") else {}
             with dask_client(dask, workers, **jobs) as client:
-                status = campaign.run(client=client, progress=True, minutes=minutes)
+                status = campaign.run(client=client, progress=True, minutes=minutes, other_code=other_code)
         else:
-            status = campaign.run(workers, progress=True, minutes=minutes)
+            status = campaign.run(workers, progress=True, minutes=minutes, other_code=other_code)
         typer.echo(str(status))
         if status.failed:
             typer.echo(f"see gearmbs campaign failed {folder}")
@@ -64,6 +67,7 @@ def work(
     folder: Place,
     part: Annotated[str, typer.Option(help='Which part of how many, as "3/200".')] = "1/1",
     minutes: Annotated[float | None, typer.Option(help="Start no further unit after so long.")] = None,
+    other_code: Annotated[str, typer.Option(help=OTHER_CODE)] = "refuse",
 ) -> None:
     """Work here on one part of the units, as an element of a job array; parts need not know of each other."""
     with guarded():
@@ -72,7 +76,7 @@ def work(
         number, _, count = part.partition("/")
         if not (number.isdigit() and count.isdigit()):
             fail(f"--part is {part!r}; write it as 3/200")
-        typer.echo(str(Campaign(folder).work(int(number), int(count), minutes=minutes)))
+        typer.echo(str(Campaign(folder).work(int(number), int(count), minutes=minutes, other_code=other_code)))
 
 
 @app.command()
@@ -144,7 +148,7 @@ def extend(folder: Place, to: Annotated[int, typer.Option(help="Points of the de
 @app.command()
 def check(
     folder: Place,
-    sweep: Annotated[bool, typer.Option(help="Remove litter, and ledgers whose data are damaged.")] = False,
+    sweep: Annotated[bool, typer.Option(help="Remove litter, and put right what is damaged.")] = False,
 ) -> None:
     """Hold what is stored against the ledgers."""
     with guarded():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
@@ -420,37 +421,45 @@ DESIGNS = (
 )
 
 
-def sequence(design: str, n: int, dimensions: int, seed: int) -> np.ndarray:
-    """Return n points of a design, shape (n, dimensions), in [0, 1).
+def sequence(design: str, n: int, dimensions: int, seed: int, first: int = 0) -> np.ndarray:
+    """Return n points of a design from the first on, shape (n, dimensions), in [0, 1).
 
     Parameters
     ----------
     design : {"sobol", "halton", "random", "latin hypercube"}
+    first : int
+        Number of the first point; 0 of a hypercube.
     """
     from scipy.stats import qmc
 
     if dimensions == 0:
         return np.empty((n, 0))
     if design == "random":
-        return np.random.default_rng(seed).random((n, dimensions))
-    if design == "sobol":
-        # points are drawn in whole blocks: the generator complains of numbers that are no power of two
-        sampler = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
-        return sampler.random_base2(max(0, math.ceil(math.log2(max(n, 1)))))[:n]
-    if design == "halton":
-        return qmc.Halton(dimensions, scramble=True, rng=np.random.default_rng(seed)).random(n)
+        generator = np.random.default_rng(seed)
+        # one draw a number
+        generator.bit_generator.advance(first * dimensions)  # type: ignore[attr-defined]
+        return generator.random((n, dimensions))
+    if design in ("sobol", "halton"):
+        kind = qmc.Sobol if design == "sobol" else qmc.Halton
+        sampler = kind(dimensions, scramble=True, rng=np.random.default_rng(seed))
+        if first:
+            sampler.fast_forward(first)
+        with warnings.catch_warnings():
+            # of a number of points that is no power of two
+            warnings.filterwarnings("ignore", message="The balance properties of Sobol'", category=UserWarning)
+            return sampler.random(n)
     if design == "latin hypercube":
         return qmc.LatinHypercube(dimensions, rng=np.random.default_rng(seed)).random(n)
     raise CampaignError(f"design {design!r} is unknown; choose one of {', '.join(DESIGNS)}")
 
 
-def saltelli(n: int, dimensions: int, seed: int) -> np.ndarray:
-    """Return the points for Sobol' indices, shape (n (d + 2), d).
+def saltelli(n: int, dimensions: int, seed: int, first: int = 0) -> np.ndarray:
+    """Return the points for Sobol' indices, shape (n (d + 2), d), from a base point on.
 
     For each of n base points the rows are A, then A with one coordinate of B for each of the d coordinates, then B
     (A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259).
     """
-    both = sequence("sobol", n, 2 * dimensions, seed)
+    both = sequence("sobol", n, 2 * dimensions, seed, first)
     a, b = both[:, :dimensions], both[:, dimensions:]
     points = np.repeat(a[:, None, :], dimensions + 2, axis=1)
     for k in range(dimensions):
@@ -459,8 +468,8 @@ def saltelli(n: int, dimensions: int, seed: int) -> np.ndarray:
     return points.reshape(-1, dimensions)
 
 
-def morris(n: int, dimensions: int, seed: int, levels: int = 4) -> np.ndarray:
-    """Return n trajectories of one-at-a-time steps, shape (n (d + 1), d).
+def morris(n: int, dimensions: int, seed: int, levels: int = 4, first: int = 0) -> np.ndarray:
+    """Return n trajectories of one-at-a-time steps, shape (n (d + 1), d), from a number on.
 
     M. D. Morris, Technometrics 33 (1991) 161: points on a grid of ``levels``, each step levels / (2 (levels - 1)),
     every
@@ -470,7 +479,7 @@ def morris(n: int, dimensions: int, seed: int, levels: int = 4) -> np.ndarray:
     starts = np.arange(levels // 2) / (levels - 1.0)
     points = np.empty((n, dimensions + 1, dimensions))
     for k in range(n):
-        generator = np.random.default_rng([seed, k])
+        generator = np.random.default_rng([seed, first + k])
         low = generator.choice(starts, dimensions)
         up = generator.random(dimensions) < 0.5
         at = np.where(up, low, low + delta)

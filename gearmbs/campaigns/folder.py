@@ -1,14 +1,20 @@
-"""The folder of a campaign: which file holds what, how far it is, and whether what is stored is what was computed.
+"""The folder of a campaign: which file holds what, and whether what is stored is what was computed.
 
 ::
 
     plan.json            the plan, what has been drawn so far, the arrays of signals; written last when made or extended
     cases/000-00000.parquet   the table of the design, so many units a file
+    cases/plan.json      a copy of the plan
+    codes/               what the results were computed by; first.json names the code of the campaign
     units/00042.json     the ledger of a unit; the unit is done if and only if it is there
     units/00042.claim    who is at work on it; saves work, decides nothing
     table/00042.parquet  numbers of its cases
     signals.zarr/        one array a signal, a shard a unit
     records/, failed/    whole records, and what failed cases computed, as NetCDF
+
+Everything that is read is held against a digest: ledgers and the plan against their own, tables of the design against
+that in the plan, results against those in the ledger. All but claims is written in an order in which a power cut at any
+moment leaves nothing that is taken for what it is not: see `gearmbs.files.whole_file`; data come before their ledger.
 """
 
 from __future__ import annotations
@@ -16,34 +22,38 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
-import os
-import platform
 import shutil
-import socket
 import time
 import uuid
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+import warnings
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearmbs.campaigns.plan import FORMAT, Plan
-from gearmbs.campaigns.settings import CampaignError, whole
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local, whole
 from gearmbs.campaigns.subjects.base import SignalSpec
-from gearmbs.files import whole_file, write_whole
-from gearmbs.studies.run.engine import owner
+from gearmbs.files import to_disk, whole_file, write_whole
+from gearmbs.studies.run.claims import owner, take, told
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 UNITS_A_FILE = 64
 """Units whose cases stand in one file."""
 
-REMEDY = "gearmbs campaign check --sweep takes out what is damaged, and run does it again"
+UNITS, MOST_CASES, MOST_BYTES = 128, 1024, 64e6
+"""Units that cases are divided into where the plan does not say, so that as many workers are busy; but no unit has more
+cases than the second, which a kill would cost, nor more bytes of signals than the third."""
 
-RECENT = 20
-"""Units by whose pace the remaining time is judged."""
+REMEDY = "gearmbs campaign run puts it right"
+
+LITTER_AFTER = 60.0
+"""Seconds after which a temporary file belongs to nobody at work."""
 
 
 @dataclass(frozen=True)
@@ -71,32 +81,26 @@ class Folder:
     Raises
     ------
     CampaignError
-        If there is no campaign.
+        If there is no campaign, or its plan was edited.
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        try:
-            tree = json.loads((self.path / "plan.json").read_text(encoding="utf-8"))
-        except OSError as error:
-            raise CampaignError(f"{self.path}: no campaign here (plan.json: {error.strerror})") from None
-        except ValueError as error:
-            raise CampaignError(f"{self.path}: plan.json is damaged ({error}); plan again in another folder") from None
-        if not isinstance(tree, dict) or tree.get("format") != FORMAT:
-            found = tree.get("format") if isinstance(tree, dict) else None
-            raise CampaignError(f"{self.path}: format {found} is unknown; this version reads {FORMAT}")
-        self.tree = tree
-        self.extents = [Extent(**e) for e in tree["extents"]]
-        self.plan = Plan.from_dict(tree["plan"], self.extents[-1].points)
+        self.path = local(path)
+        self.tree = _plan_tree(self.path)
+        self.extents = [Extent(**e) for e in self.tree["extents"]]
+        plan = Plan.from_dict(self.tree["plan"], self.extents[-1].points)
+        self.plan: Plan = replace(plan, unit=self.tree["unit"])
+        self.unit_size: int = self.tree["unit"]
         self.specs = [
-            SignalSpec(s["name"], tuple(s["channels"]), s["samples"], s["rate"], s["units"]) for s in tree["signals"]
+            SignalSpec(s["name"], tuple(s["channels"]), s["samples"], s["rate"], s["units"])
+            for s in self.tree["signals"]
         ]
 
     @property
     def unit_count(self) -> int:
         """Number of units."""
         last = self.extents[-1]
-        return last.first_unit + last.units(self.plan.unit)
+        return last.first_unit + last.units(self.unit_size)
 
     @property
     def case_count(self) -> int:
@@ -126,28 +130,202 @@ class Folder:
 
     def done(self) -> list[int]:
         """Return the numbers of the units that are done."""
-        return sorted(int(p.stem) for p in (self.path / "units").glob("*.json") if p.stem.isdigit())
+        found = (int(p.stem) for p in (self.path / "units").glob("*.json") if p.stem.isdigit())
+        return sorted(unit for unit in found if unit < self.unit_count)
+
+    def entry(self, unit: int) -> dict[str, Any]:
+        """Return the ledger of a unit that is done.
+
+        Raises
+        ------
+        CampaignError
+            If it is damaged, or not there.
+        """
+        entry = read_ledger(self.ledger(unit))
+        if entry is None or entry["unit"] != unit:
+            raise self.damaged(unit, "its ledger is missing or another unit's")
+        return entry
+
+    def unit_table(self, unit: int, columns: Iterable[str] | None = None) -> pa.Table:
+        """Return the table of a unit that is done, or those of some columns that it has.
+
+        Raises
+        ------
+        CampaignError
+            If it is missing or not what the ledger says.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            content = self.table(unit).read_bytes()
+        except OSError as error:
+            raise self.damaged(unit, f"{self.table(unit)}: {error.strerror}") from None
+        if hashlib.sha256(content).hexdigest() != self.entry(unit)["digests"]["table"]:
+            raise self.damaged(unit, f"{self.table(unit)}: is not as its ledger says")
+        file = pq.ParquetFile(pa.BufferReader(content))
+        known = None if columns is None else [name for name in columns if name in file.schema_arrow.names]
+        return file.read(known)
+
+    def damaged(self, unit: int, what: str) -> CampaignError:
+        """Return the error of a unit whose files are not what they were."""
+        return CampaignError(f"unit {unit} is damaged: {what}; gearmbs campaign run {self.path} does it again")
 
     def size(self, unit: int) -> int:
         """Return the number of cases of a unit."""
         extent = self._extent(unit)
-        start = extent.first + (unit - extent.first_unit) * self.plan.unit
-        return min(self.plan.unit, extent.last - start)
+        start = extent.first + (unit - extent.first_unit) * self.unit_size
+        return min(self.unit_size, extent.last - start)
 
     def _extent(self, unit: int) -> Extent:
         return max((e for e in self.extents if e.first_unit <= unit), key=lambda e: e.first_unit)
 
     def cases(self, unit: int) -> list[dict[str, Any]]:
-        """Return the rows of the cases of a unit."""
-        import pyarrow.parquet as pq
+        """Return the rows of the cases of a unit.
 
+        Raises
+        ------
+        CampaignError
+            If they are not those that were planned.
+        """
         extent = self._extent(unit)
         block, place = divmod(unit - extent.first_unit, UNITS_A_FILE)
-        table = pq.ParquetFile(self._block(self.extents.index(extent), block)).read()
-        return table.slice(place * self.plan.unit, self.plan.unit).to_pylist()
+        name = _block_name(self.extents.index(extent), block)
+        path = self.path / "cases" / name
+        try:
+            about = path.stat()
+            table = _planned(path, self.tree["cases"][name], about.st_mtime_ns, about.st_ino)
+        except OSError as error:
+            raise CampaignError(f"{path}: {error.strerror}; {REMEDY}") from None
+        return table.slice(place * self.unit_size, self.unit_size).to_pylist()
 
-    def _block(self, extent: int, block: int) -> Path:
-        return self.path / "cases" / f"{extent:03d}-{block:05d}.parquet"
+
+@lru_cache(maxsize=2)
+def _planned(path: Path, digest: str, _written: int, _inode: int) -> pa.Table:
+    """Return the cases of a file if they are those that were planned."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    content = path.read_bytes()
+    if hashlib.sha256(content).hexdigest() != digest:
+        raise CampaignError(f"{path}: is edited or damaged, its cases are not those that were planned; {REMEDY}")
+    return pq.ParquetFile(pa.BufferReader(content)).read()
+
+
+def _block_name(extent: int, block: int) -> str:
+    return f"{extent:03d}-{block:05d}.parquet"
+
+
+# Files under a digest of their own.
+
+
+def digest_of(tree: Any) -> str:
+    """Return the digest of a tree of dictionaries, lists, numbers and texts."""
+    return hashlib.sha256(json.dumps(tree, sort_keys=True).encode()).hexdigest()
+
+
+def sealed(tree: dict[str, Any]) -> str:
+    """Return a tree as JSON with its digest."""
+    return json.dumps({**tree, "digest": digest_of(tree)})
+
+
+def unsealed(path: Path) -> dict[str, Any]:
+    """Return the tree of a file that `sealed` made.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        If it is not what was written.
+    """
+    tree = json.loads(path.read_bytes())
+    if not isinstance(tree, dict) or tree.pop("digest", None) != digest_of(tree):
+        raise ValueError("its digest is another one")
+    return tree
+
+
+def read_ledger(path: Path) -> dict[str, Any] | None:
+    """Return a ledger, or None if it is not there.
+
+    Raises
+    ------
+    CampaignError
+        If it is damaged.
+    """
+    try:
+        return unsealed(path)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise CampaignError(f"{path}: this ledger is damaged or edited ({reason}); {REMEDY}") from None
+
+
+# The plan, under a digest of each of its entries, and its copy.
+
+
+def _write_plan(path: Path, tree: dict[str, Any]) -> None:
+    """Write the plan; the copy comes first, so that there is always one that holds."""
+    text = json.dumps({**tree, "digests": _entries(tree)}, indent=1)
+    for place in (path / "cases" / "plan.json", path / "plan.json"):
+        write_whole(place, text, durable=path)
+
+
+def _entries(tree: dict[str, Any]) -> dict[str, str]:
+    """Return the digest of each entry of a plan's file."""
+    inner = tree.get("plan") if isinstance(tree.get("plan"), dict) else {}
+    entries = {f"plan: {name}": value for name, value in (inner or {}).items()}
+    entries |= {name: value for name, value in tree.items() if name not in ("plan", "digests")}
+    return {name: digest_of(value) for name, value in entries.items()}
+
+
+def _plan_tree(path: Path) -> dict[str, Any]:
+    """Return what a plan's file holds, or its copy, where the file is missing or damaged and the copy is whole."""
+    place = path / "plan.json"
+    content, wrong = _look(place)
+    if not wrong:
+        return json.loads(content)
+    copy, _ = _look(path / "cases" / "plan.json")
+    if _ or not (isinstance(wrong, str) or _one_bit(content, copy)):
+        if isinstance(wrong, str):
+            raise CampaignError(f"{path}: {wrong}; make the plan again in another folder")
+        raise CampaignError(
+            f"{place}: was edited ({', '.join(wrong)}), and what is done was done by the plan as it was made; remove "
+            "the file, which run then writes as it was, or plan another campaign in another folder"
+        )
+    reason = wrong if isinstance(wrong, str) else f"plan.json is damaged ({', '.join(wrong)})"
+    warnings.warn(f"{path}: {reason}; its copy is taken, and {REMEDY}", CampaignWarning, stacklevel=4)
+    return json.loads(copy)
+
+
+def _look(place: Path) -> tuple[bytes, str | list[str]]:
+    """Return the content of a plan's file, and what is wrong with it: why it cannot be read, or which entries."""
+    try:
+        content = place.read_bytes()
+        tree = json.loads(content)
+    except OSError as error:
+        return b"", f"no campaign here (plan.json: {error.strerror})"
+    except ValueError as error:
+        return content, f"plan.json is damaged ({error})"
+    if not isinstance(tree, dict) or "digests" not in tree:
+        found = tree.get("format") if isinstance(tree, dict) else None
+        return content, f"format {found} is unknown; this version reads {FORMAT}"
+    noted, now = tree["digests"], _entries(tree)
+    if not isinstance(noted, dict):
+        return content, "plan.json is damaged (digests)"
+    wrong = sorted(name for name in {*noted, *now} if noted.get(name) != now.get(name))
+    if not wrong and tree["format"] != FORMAT:
+        return content, f"format {tree['format']} is unknown; this version reads {FORMAT}"
+    return content, wrong
+
+
+def _one_bit(a: bytes, b: bytes) -> bool:
+    """Return whether two files differ in one bit, as no edit does but one of a digit."""
+    return len(a) == len(b) and sum((x ^ y).bit_count() for x, y in zip(a, b)) == 1
+
+
+# Making, taking up, extending.
 
 
 def make_folder(path: str | Path, plan: Plan) -> Folder:
@@ -158,13 +336,13 @@ def make_folder(path: str | Path, plan: Plan) -> Folder:
     CampaignError
         If a corner is impossible, or the folder holds another campaign. The same plan is taken up again.
     """
-    path = Path(path)
-    if (path / "plan.json").exists():
+    path = local(path)
+    if _planned_here(path):
         return _taken_up(path, plan)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            if (path / "plan.json").exists():  # another maker's, moved here since the first look
+            if _planned_here(path):  # another maker's, moved here since the first look
                 return _taken_up(path, plan)
             raise CampaignError(f"{path}: holds something else than a campaign; choose another folder")
         # made aside and moved in one piece: whoever makes the same campaign at this moment finds it whole or not at all
@@ -172,15 +350,20 @@ def make_folder(path: str | Path, plan: Plan) -> Folder:
         try:
             _fill(aside, plan)
             aside.rename(path.resolve())
+            to_disk(path.resolve().parent)
         finally:
             shutil.rmtree(aside, ignore_errors=True)
     except OSError as error:
-        if (path / "plan.json").exists():
+        if _planned_here(path):
             return _taken_up(path, plan)
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise
         raise CampaignError(f"{path}: cannot be made ({error.strerror or error}); choose another folder") from error
     return Folder(path)
+
+
+def _planned_here(path: Path) -> bool:
+    return (path / "plan.json").exists() or (path / "cases" / "plan.json").exists()
 
 
 def _taken_up(path: Path, plan: Plan) -> Folder:
@@ -203,19 +386,30 @@ def _taken_up(path: Path, plan: Plan) -> Folder:
 
 def _fill(path: Path, plan: Plan) -> None:
     """Write the files of a new campaign."""
+    from gearmbs.campaigns.signals import write_store
+
     specs = plan.check()
-    for name in ("units", "table", "cases"):
+    for name in ("units", "table", "cases", "codes"):
         (path / name).mkdir(parents=True, exist_ok=True)
-    extent = _write_cases(path, plan, plan.n, [])
-    if specs:
-        make_store(path / "signals.zarr", specs, plan.unit, extent.units(plan.unit))
+    unit = plan.unit or _unit_size(plan, specs)
+    extent, digests = _write_cases(path, plan, unit, plan.n, [])
+    write_store(path / "signals.zarr", specs, unit, extent.units(unit), path)
     tree = {
         "format": FORMAT,
-        "plan": plan.as_dict(),
+        "plan": json.loads(json.dumps(plan.as_dict())),
+        "unit": unit,
         "extents": [asdict(extent)],
         "signals": [asdict(s) for s in specs],
+        "cases": digests,
     }
-    write_whole(path / "plan.json", json.dumps(tree, indent=1))
+    _write_plan(path, tree)
+
+
+def _unit_size(plan: Plan, specs: Iterable[SignalSpec]) -> int:
+    """Return how many cases a unit has where the plan does not say."""
+    size = 4 * sum(len(spec.channels) * spec.samples for spec in specs)
+    most = MOST_CASES if not size else int(MOST_BYTES / size)
+    return max(1, min(-(-plan.size // UNITS), MOST_CASES, most))
 
 
 def extend_folder(folder: Folder, n: int) -> Folder:
@@ -224,50 +418,64 @@ def extend_folder(folder: Folder, n: int) -> Folder:
     Raises
     ------
     CampaignError
-        If the design cannot go on, or n is not above what there is.
+        If the design cannot go on, n is not above what there is, or somebody else extends it at this moment.
     """
-    plan, last = folder.plan, folder.extents[-1]
+    from gearmbs.campaigns.signals import write_store
+
     n = whole(n, "extend: n", 1)
-    if not plan.extends:
-        raise CampaignError(f"extend: a {plan.design} design cannot go on where it stopped; a Sobol' sequence can")
-    if n <= last.points:
-        raise CampaignError(f"extend: n = {n}, but {last.points} points have been drawn; give more")
-    extent = _write_cases(folder.path, plan, n, folder.extents)
-    if folder.specs:
-        grow_store(folder.signals, folder.specs, plan.unit * (extent.first_unit + extent.units(plan.unit)))
-    tree = {**folder.tree, "extents": [*folder.tree["extents"], asdict(extent)]}
-    write_whole(folder.path / "plan.json", json.dumps(tree, indent=1))
+    place = folder.path / "units" / "extend.claim"
+    claim = take(place)
+    if claim is None:
+        who = owner(place)
+        raise CampaignError(
+            f"extend: {folder.path} is being extended by {told(who) if who else 'somebody else'}; try again later"
+        )
+    try:
+        folder = Folder(folder.path)
+        plan, last, unit = folder.plan, folder.extents[-1], folder.unit_size
+        if not plan.extends:
+            raise CampaignError(f"extend: a {plan.design} design cannot go on where it stopped; a Sobol' sequence can")
+        if n <= last.points:
+            raise CampaignError(f"extend: n = {n}, but {last.points} points have been drawn; give more")
+        extent, digests = _write_cases(folder.path, plan, unit, n, folder.extents)
+        write_store(folder.signals, folder.specs, unit, extent.first_unit + extent.units(unit), folder.path)
+        tree = {name: value for name, value in folder.tree.items() if name != "digests"}
+        tree["extents"] = [*tree["extents"], asdict(extent)]
+        tree["cases"] = {**tree["cases"], **digests}
+        _write_plan(folder.path, tree)
+    finally:
+        claim.release()
     return Folder(folder.path)
 
 
-def _write_cases(path: Path, plan: Plan, n: int, before: list[Extent]) -> Extent:
-    """Write the cases of the points that are new and return their extent."""
+def _write_cases(path: Path, plan: Plan, unit: int, n: int, before: list[Extent]) -> tuple[Extent, dict[str, str]]:
+    """Write the cases of the points that are new; return their extent and the digests of the files."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     first_point = first = first_unit = 0
     if before:
         last = before[-1]
-        per_n = len(plan.points(1)) if plan.design in ("saltelli", "morris") else 1
-        first_point, first = last.points * per_n, last.last
-        first_unit = last.first_unit + last.units(plan.unit)
-    points = plan.points(n)
-    step = plan.unit * UNITS_A_FILE
+        first_point, first = last.points * plan.points_a_base, last.last
+        first_unit = last.first_unit + last.units(unit)
+    step = unit * UNITS_A_FILE
     waiting: dict[str, np.ndarray] = {}
-    count, block = 0, 0
+    count, digests = 0, dict[str, str]()
 
     def write(columns: dict[str, np.ndarray]) -> None:
-        nonlocal block, count
+        nonlocal count
         size = len(columns["point"])
         index = np.arange(first + count, first + count + size)
-        unit = first_unit + (count + np.arange(size)) // plan.unit
-        with whole_file(path / "cases" / f"{len(before):03d}-{block:05d}.parquet") as part:
-            pq.write_table(pa.table({"index": index, "unit": unit, **columns}), part, compression="zstd")
-        block, count = block + 1, count + size
+        units = first_unit + (count + np.arange(size)) // unit
+        name = _block_name(len(before), len(digests))
+        with whole_file(path / "cases" / name, durable=path) as part:
+            table = pa.table({"index": index, "unit": units, **columns})
+            pq.write_table(table, part, compression="zstd", write_page_checksum=True)
+            digests[name] = hashlib.sha256(part.read_bytes()).hexdigest()
+        count += size
 
-    for start in range(first_point, len(points), max(1, step // plan.variants)):
-        some = points[start : start + max(1, step // plan.variants)]
-        columns = plan.columns(some, start)
+    for start, points in plan.blocks(n, first_point, max(1, step // plan.variants)):
+        columns = plan.columns(points, start)
         good = plan.allowed(columns)
         columns = {name: values[good] for name, values in columns.items()}
         waiting = {k: np.concatenate([waiting[k], v]) for k, v in columns.items()} if waiting else columns
@@ -278,294 +486,98 @@ def _write_cases(path: Path, plan: Plan, n: int, before: list[Extent]) -> Extent
         write(waiting)
     if count == 0:
         raise CampaignError("plan: not one of the points satisfies the constraints; widen them or the ranges")
-    return Extent(n, first_point, first, first + count, first_unit)
+    return Extent(n, first_point, first, first + count, first_unit), digests
 
 
-def surroundings() -> dict[str, str]:
-    """Return versions and machine, which decide the last bits of a result."""
-    found = {"host": socket.gethostname(), "machine": platform.machine(), "python": platform.python_version()}
-    found["processor"] = _processor()
-    for name in ("gearmbs", "numpy", "scipy", "numba"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+# Whether what is stored is what was computed.
 
 
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "unknown")
-
-
-# Signals of a campaign: one Zarr array a signal, a chunk a case, a shard a unit.
-#
-# Two writers in one shard lose data without a word, so that a unit is a shard and is written in one piece. The axis of
-# cases is one of *slots*: unit u has slots [u size, (u + 1) size), of which the last unit of an extent may leave some
-# empty.
-
-
-def make_store(path: Path, specs: Sequence[SignalSpec], unit: int, units: int) -> None:
-    """Make empty arrays (slot, channel, time) in float32, filled with NaN."""
-    import zarr
-
-    group = zarr.open_group(path, mode="w", zarr_format=3)
-    for spec in specs:
-        array = group.create_array(
-            spec.name,
-            shape=(unit * units, len(spec.channels), spec.samples),
-            chunks=(1, len(spec.channels), spec.samples),
-            shards=(unit, len(spec.channels), spec.samples),
-            dtype="float32",
-            fill_value=float("nan"),
-            dimension_names=("slot", f"{spec.name}_channel", f"{spec.name}_time"),
-        )
-        array.attrs.update({"units": spec.units, "sampling_rate": spec.rate, "channels": list(spec.channels)})
-
-
-def grow_store(path: Path, specs: Sequence[SignalSpec], slots: int) -> None:
-    """Give the arrays more slots."""
-    import zarr
-
-    group = zarr.open_group(path, mode="r+")
-    for spec in specs:
-        array: Any = group[spec.name]
-        array.resize((slots, *array.shape[1:]))
-
-
-def check_signals(specs: Sequence[SignalSpec], signals: Mapping[str, np.ndarray]) -> None:
-    """Refuse the signals of a case that have no room in the arrays.
-
-    Raises
-    ------
-    CampaignError
-    """
-    for spec in specs:
-        if spec.name not in signals:
-            continue
-        shape = signals[spec.name].shape
-        if len(shape) != 2 or shape[0] != len(spec.channels):
-            raise CampaignError(f"signal {spec.name!r}: shape {shape}, planned for {len(spec.channels)} channels")
-        if shape[1] > spec.samples:
-            raise CampaignError(
-                f"signal {spec.name!r}: {shape[1]} samples, planned for {spec.samples} from the corners; make a plan "
-                "whose longest record is at a corner"
-            )
-
-
-def write_signals(
-    path: Path, specs: Sequence[SignalSpec], unit: int, number: int, signals: Sequence[dict[str, np.ndarray]]
-) -> dict[str, str]:
-    """Write the signals of the cases of a unit; return the digest of each array's block.
+def check_folder(folder: Folder, units: Iterable[int] | None = None, *, sweep: bool = False) -> list[str]:
+    """Return what is wrong with what is stored, and put it right if that is wanted; see `Campaign.check`.
 
     Parameters
     ----------
-    signals : sequence of dict
-        Of each case its signals, shape (channels, samples); nothing for a case that failed. See `check_signals`.
+    units : iterable of int, optional
+        Look at these of the units that are done; default all.
+    sweep : bool
+        Write the plan, its cases and the arrays' descriptions again as they were, and take units whose results are
+        damaged out of the ledger, so that `run` does them again.
     """
-    import zarr
-
-    group = zarr.open_group(path, mode="r+") if specs else None
-    digests = {}
-    for spec in specs:
-        block = np.full((unit, len(spec.channels), spec.samples), np.nan, dtype=np.float32)
-        for k, case in enumerate(signals):
-            if spec.name not in case:
-                continue
-            values = case[spec.name]
-            block[k, :, : values.shape[1]] = values
-        assert group is not None
-        array: Any = group[spec.name]
-        array[number * unit : (number + 1) * unit] = block
-        digests[spec.name] = hashlib.sha256(block.tobytes()).hexdigest()
-    return digests
-
-
-def stored_digest(path: Path, name: str, unit: int, number: int) -> str:
-    """Return the digest of what is stored of a unit."""
-    import zarr
-
-    array: Any = zarr.open_group(path, mode="r")[name]
-    return hashlib.sha256(np.asarray(array[number * unit : (number + 1) * unit]).tobytes()).hexdigest()
-
-
-# How far a campaign is, read from its files by anybody.
-
-
-@dataclass(frozen=True)
-class CampaignStatus:
-    """How far a campaign is.
-
-    Attributes
-    ----------
-    cases, done, failed, reused, running : int
-        Cases: all, finished (with those that failed), failed, taken over from others, in units at work.
-    units, units_done : int
-    processor_seconds, simulation_seconds : float
-        Spent on finished units, and of that inside simulations.
-    eta : float or None
-        Seconds until the end at the pace of the last units; None if there is none yet.
-    """
-
-    cases: int
-    done: int
-    failed: int
-    reused: int
-    running: int
-    units: int
-    units_done: int
-    processor_seconds: float
-    simulation_seconds: float
-    eta: float | None
-
-    @property
-    def fraction(self) -> float:
-        """Part of the cases that is finished."""
-        return self.done / self.cases if self.cases else 1.0
-
-    @property
-    def complete(self) -> bool:
-        """Whether every unit is done."""
-        return self.units_done == self.units
-
-    @property
-    def overhead(self) -> float:
-        """Part of the processor time that was spent outside simulations and their evaluation."""
-        spent = self.processor_seconds
-        return 1.0 - self.simulation_seconds / spent if spent else 0.0
-
-    def __str__(self) -> str:
-        parts = [f"{self.done} of {self.cases} cases done"]
-        for count, word in ((self.failed, "failed"), (self.reused, "taken over"), (self.running, "in work")):
-            if count:
-                parts.append(f"{count} {word}")
-        if self.eta is not None and not self.complete:
-            parts.append(f"about {_duration(self.eta)} left")
-        return ", ".join(parts)
-
-    def _repr_html_(self) -> str:
-        """Return the bar and the words, for notebooks."""
-        return f"<progress value='{self.fraction:.4f}' max='1'></progress> {self}"
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
-
-
-@lru_cache(maxsize=200_000)
-def _counts(path: str, written: int) -> tuple[int, int, int, float, float, float, float] | None:
-    """Return what is counted of a ledger that was written at a time; a ledger may be taken away and written again."""
-    entry = read_ledger(Path(path))
-    if entry is None:
-        return None
-    names = ("cases", "failed", "reused", "processor_seconds", "simulation_seconds", "started", "finished")
-    return tuple(entry[name] for name in names)  # type: ignore[return-value]
-
-
-def read_ledger(path: Path) -> dict[str, Any] | None:
-    """Return a ledger, or None if it is not there.
-
-    Raises
-    ------
-    CampaignError
-        If it is damaged.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError:
-        return None
-    except ValueError:
-        raise CampaignError(f"{path}: this ledger is damaged; {REMEDY}") from None
-
-
-def read_status(folder: Folder) -> CampaignStatus:
-    """Return how far a campaign is."""
-    rows, done, claims = [], set(), []
-    with os.scandir(folder.path / "units") as files:
-        for file in files:
-            stem, _, kind = file.name.partition(".")
-            if not stem.isdigit():
-                continue
-            if kind == "claim":
-                claims.append(int(stem))
-            elif kind == "json":
-                try:
-                    row = _counts(file.path, file.stat().st_mtime_ns)
-                except OSError:
-                    # taken away at this moment
-                    continue
-                if row is not None:
-                    done.add(int(stem))
-                    rows.append(row)
-    at_work = [u for u in claims if u not in done and owner(folder.claim(u))]
-    finished = sum(row[0] for row in rows)
-    return CampaignStatus(
-        cases=folder.case_count,
-        done=finished,
-        failed=sum(row[1] for row in rows),
-        reused=sum(row[2] for row in rows),
-        running=sum(folder.size(u) for u in at_work),
-        units=folder.unit_count,
-        units_done=len(rows),
-        processor_seconds=sum(row[3] for row in rows),
-        simulation_seconds=sum(row[4] for row in rows),
-        eta=_eta(rows, folder.case_count - finished),
-    )
-
-
-def _eta(rows: list[tuple], left: int) -> float | None:
-    """Return the remaining time at the pace of the last units."""
-    last = sorted(rows, key=lambda row: row[6])[-RECENT:]
-    if not last or left == 0:
-        return None if not last else 0.0
-    span = max(row[6] for row in last) - min(row[5] for row in last)
-    return left * span / max(1, sum(row[0] for row in last))
-
-
-def check_folder(folder: Folder, *, sweep: bool = False) -> list[str]:
-    """Return what is wrong with what is stored and what was left by killed workers; see `Campaign.check`."""
-    from gearmbs.campaigns.folder import stored_digest
-
-    found = []
+    found = _check_plan(folder, sweep)
+    wanted = None if units is None else set(units)
     for unit in folder.done():
-        try:
-            entry = read_ledger(folder.ledger(unit)) or {"digests": {}}
-        except CampaignError:
-            found.append(f"unit {unit}: the ledger is damaged")
-            if sweep:
-                folder.ledger(unit).unlink(missing_ok=True)
+        if wanted is not None and unit not in wanted:
             continue
-        wrong = []
-        for name, digest in entry["digests"].items():
-            try:
-                now = (
-                    hashlib.sha256(folder.table(unit).read_bytes()).hexdigest()
-                    if name == "table"
-                    else stored_digest(folder.signals, name, folder.plan.unit, unit)
-                )
-            except (OSError, KeyError) as error:
-                now = f"missing ({error})"
-            if now != digest:
-                wrong.append(name)
+        wrong = _check_unit(folder, unit)
         if wrong:
-            found.append(f"unit {unit}: {', '.join(wrong)} not as the ledger says")
+            found.append(f"unit {unit}: {wrong}")
             if sweep:
                 folder.ledger(unit).unlink(missing_ok=True)
-    if sweep and folder.specs and not folder.signals.exists():
-        from gearmbs.campaigns.folder import make_store
+    return found
 
-        make_store(folder.signals, folder.specs, folder.plan.unit, folder.unit_count)
-    litter = [p for p in folder.path.rglob(".*") if p.is_file()]
-    litter += [p for p in folder.path.rglob("*.partial*") if p.is_file()]
-    litter += [p for p in (folder.path / "units").glob("*.claim") if owner(p) is None]
-    for path in litter:
+
+def _check_plan(folder: Folder, sweep: bool) -> list[str]:
+    """Return what is wrong with plan, cases and the descriptions of arrays."""
+    from gearmbs.campaigns.signals import check_store, write_store
+
+    found, path, unit = [], folder.path, folder.unit_size
+    contents = [_look(place) for place in (path / "plan.json", path / "cases" / "plan.json")]
+    if any(wrong for _, wrong in contents) or contents[0][0] != contents[1][0]:
+        found.append("plan.json or its copy: missing, damaged or not the same")
+        if sweep:
+            _write_plan(path, {name: value for name, value in folder.tree.items() if name != "digests"})
+    for number, extent in enumerate(folder.extents):
+        names = [name for name in folder.tree["cases"] if name.startswith(f"{number:03d}-")]
+        wrong = [name for name in names if _file_digest(path / "cases" / name) != folder.tree["cases"][name]]
+        if wrong:
+            found.append(f"cases/{', cases/'.join(wrong)}: missing, edited or damaged; made again from the plan by run")
+            if sweep:
+                before = folder.extents[:number]
+                _, digests = _write_cases(path, folder.plan, unit, extent.points, before)
+                if any(digests.get(name) != folder.tree["cases"][name] for name in names):
+                    raise CampaignError(
+                        f"{path}: {wrong[0]} cannot be made again, since the plan gives other cases with this version; "
+                        "take up the campaign with the version that made it"
+                    )
+    try:
+        check_store(folder.signals, folder.specs, unit, folder.unit_count)
+    except CampaignError as error:
+        found.append(str(error))
+        if sweep:
+            write_store(folder.signals, folder.specs, unit, folder.unit_count, path)
+    return found
+
+
+def _check_unit(folder: Folder, unit: int) -> str:
+    """Return what is wrong with the files of a unit, nothing if they are as the ledger says."""
+    from gearmbs.campaigns.signals import shard
+
+    try:
+        entry = folder.entry(unit)
+    except CampaignError:
+        return "the ledger is damaged"
+    places = {name: shard(folder.signals, name, unit) for name in entry["digests"]} | {"table": folder.table(unit)}
+    wrong = [name for name, digest in entry["digests"].items() if _file_digest(places[name]) != digest]
+    wrong += [name for name, digest in entry["files"].items() if _file_digest(folder.path / name) != digest]
+    return f"{', '.join(wrong)} not as the ledger says" if wrong else ""
+
+
+def _file_digest(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+def litter(folder: Folder, *, sweep: bool = False) -> list[str]:
+    """Return what killed workers have left, and remove it if that is wanted."""
+    found = []
+    files = [p for p in folder.path.rglob(".*") if p.is_file()]
+    files += [p for p in (folder.path / "units").glob("*.claim") if owner(p) is None]
+    for path in files:
         # what is younger may belong to somebody at work
-        if time.time() - path.stat().st_mtime > 60.0 or path.suffix == ".claim":
+        if path.suffix == ".claim" or time.time() - path.stat().st_mtime > LITTER_AFTER:
             found.append(f"litter: {path.relative_to(folder.path)}")
             # the claims of what is not done count its attempts
             if sweep and (path.suffix != ".claim" or path.with_suffix(".json").exists()):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, mak
 from gearmbs.files import python_scalar
 from gearmbs.schema.described import chosen, read_toml
 
-FORMAT = 1
+FORMAT = 2
 ALL_CORNERS = 6
 """Up to so many coordinates every corner is checked; beyond, both ends of each and some corners."""
 
@@ -55,10 +55,12 @@ class Plan:
     options : dict
         Of the design: ``levels`` of a grid (where the factor does not say), a one-at-a-time or a Morris design,
         ``generators``, ``faced``, ``centre``, ``rows``.
-    unit : int
-        Cases worked on and stored together.
+    unit : int, optional
+        Cases worked on and stored together; by default as many as make work for a hundred workers, 1024 at most.
     time_limit : float, optional
         Processor seconds of a case.
+    wall_limit : float, optional
+        Seconds of a case by the clock; by default ten times ``time_limit`` and a minute, without that no limit.
     memory_limit : float, optional
         Bytes a case may allocate beyond what its worker has.
     on_failure : {"record", "tighter", "stop"}
@@ -75,8 +77,9 @@ class Plan:
     keep: tuple[str, ...] = ()
     constraints: tuple[str, ...] = ()
     options: dict[str, Any] = field(default_factory=dict)
-    unit: int = 64
+    unit: int | None = None
     time_limit: float | None = None
+    wall_limit: float | None = None
     memory_limit: float | None = None
     on_failure: str = "record"
     reuse: tuple[str, ...] = ()
@@ -120,6 +123,46 @@ class Plan:
     def group(self) -> str | None:
         """Column of the physical individual, the group of every split; None without specimens."""
         return next((f.name for f in self.factors if isinstance(f, Specimens)), None)
+
+    @property
+    def longest(self) -> float | None:
+        """Seconds that a case may take by the clock, None without a limit."""
+        if self.wall_limit is None and self.time_limit is not None:
+            return 10.0 * self.time_limit + 60.0
+        return self.wall_limit
+
+    @property
+    def points_a_base(self) -> int:
+        """Points of the design for each of n."""
+        return {"saltelli": self.dimensions + 2, "morris": self.dimensions + 1}.get(self.design, 1)
+
+    @property
+    def size(self) -> int:
+        """Number of cases, before constraints leave any out."""
+        counted = self.extends or self.design == "latin hypercube"
+        return self.variants * (self.n * self.points_a_base if counted else len(self.points()))
+
+    def blocks(self, n: int, first: int, size: int) -> Iterator[tuple[int, np.ndarray]]:
+        """Yield the points from the first on, some at a time, each block with the number of its first point.
+
+        Those of a sequence or an analysis are drawn block by block: a plan need not fit into memory.
+        """
+        if not self.extends or not self.dimensions:
+            points = self.points(n)
+            for start in range(first, len(points), size):
+                yield start, points[start : start + size]
+            return
+        levels = int(self.options.get("levels", 4))
+        each = self.points_a_base
+        base = max(1, size // each)
+        for start in range(first // each, n, base):
+            count = min(base, n - start)
+            if self.design == "saltelli":
+                yield start * each, designs.saltelli(count, self.dimensions, self.seed, start)
+            elif self.design == "morris":
+                yield start * each, designs.morris(count, self.dimensions, self.seed, levels, start)
+            else:
+                yield start, designs.sequence(self.design, count, self.dimensions, self.seed, start)
 
     def points(self, n: int | None = None) -> np.ndarray:
         """Return the points of the design in the unit cube, shape (points, dimensions)."""

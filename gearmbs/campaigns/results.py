@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.campaigns.folder import REMEDY, Folder
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, local, names_in, satisfied, spelt, texts
 from gearmbs.files import whole_file, write_whole
 
 if TYPE_CHECKING:
@@ -22,28 +24,67 @@ ABOUT = ("index", "unit", "point", "slot", "id", "status", "message", "advice")
 """Columns of a table that are neither factors nor results."""
 
 
-def read_table(folder: Folder) -> pd.DataFrame:
-    """Return the tables of all finished units as one, in the order of the cases.
+def read_table(
+    folder: Folder, columns: Sequence[str] | None = None, where: str | None = None, units: Sequence[int] | None = None
+) -> pd.DataFrame:
+    """Return the tables of finished units as one, in the order of the cases; see `Campaign.read`.
+
+    Parameters
+    ----------
+    units : sequence of int, optional
+        Of those that are done; default all.
 
     Raises
     ------
     CampaignError
-        If nothing is finished, or what is stored is damaged.
+        If nothing is finished, there is no such column, or what is stored is damaged.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     done = folder.done()
     if not done:
         raise CampaignError(f"{folder.path}: no unit is finished yet; run the campaign")
+    wanted = None if columns is None else list(dict.fromkeys(texts(columns, "columns")))
+    asked = [] if where is None else names_in(where)
+    # of what is not wanted nothing is read; a condition may name a column with underscores, which only all columns tell
+    read = None if wanted is None else ["index", *wanted, *asked]
+    if read is not None and any("_" in name for name in asked):
+        read += [n for n in folder.unit_table(done[0]).column_names if spelt(n) in asked]
     tables = []
-    for unit in done:
+    for unit in done[:1] if units is not None and not units else done if units is None else units:
+        table = folder.unit_table(unit, read)
+        if where is not None:
+            known = {name: table[name].to_numpy() for name in table.column_names}
+            held = satisfied(where, {**{spelt(name): values for name, values in known.items()}, **known})
+            table = table.filter(pa.array(held))
+        tables.append(table)
+    table = pa.concat_tables(tables, promote_options="permissive")
+    missing = [name for name in wanted or () if name not in table.column_names]
+    if missing:
+        known_names = folder.unit_table(done[0]).column_names
+        raise CampaignError(f"columns: {', '.join(missing)} unknown; the table has {', '.join(known_names)}")
+    found = table.to_pandas(self_destruct=True).sort_values("index", ignore_index=True)
+    return found if wanted is None else found[wanted]
+
+
+def read_record(folder: Folder, unit: int, index: int) -> xr.Dataset:
+    """Return the record of a case, or what a failed one had computed; see `Campaign.record`."""
+    import xarray as xr
+
+    names = [f"{kind}/{unit:05d}/{index:07d}.nc" for kind in ("records", "failed")]
+    entry = folder.entry(unit) if folder.result(unit) else {"files": {}}
+    for name in names:
+        if name not in entry["files"]:
+            continue
         try:
-            tables.append(pq.ParquetFile(folder.table(unit)).read())
-        except (OSError, pa.ArrowInvalid) as error:
-            raise CampaignError(f"{folder.table(unit)}: missing or damaged ({error}); {REMEDY}") from None
-    table = pa.concat_tables(tables, promote_options="permissive").to_pandas()
-    return table.sort_values("index", ignore_index=True)
+            content = (folder.path / name).read_bytes()
+        except OSError as error:
+            raise folder.damaged(unit, f"{name}: {error.strerror}") from None
+        if hashlib.sha256(content).hexdigest() != entry["files"][name]:
+            raise folder.damaged(unit, f"{name}: is not as its ledger says")
+        with xr.open_dataset(io.BytesIO(content), engine="h5netcdf") as found:
+            return found.load()
+    raise CampaignError(f'case {index}: no record is kept; it is not done yet, or the plan keeps none (keep "record")')
 
 
 def factor_names(folder: Folder) -> list[str]:
@@ -81,16 +122,16 @@ def open_dataset(folder: Folder) -> xr.Dataset:
     )
     if not folder.specs:
         return data
+    from gearmbs.campaigns.signals import check_store, signal_variable
+
     try:
-        stored = xr.open_zarr(folder.signals, consolidated=False, chunks=None)
-    except OSError as error:
-        raise CampaignError(f"{folder.signals}: missing or damaged ({error}); {REMEDY}") from None
-    stored = stored.isel(slot=table["slot"].to_numpy()).rename(slot="case")
+        check_store(folder.signals, folder.specs, folder.unit_size, folder.unit_count)
+    except CampaignError as error:
+        raise CampaignError(f"{error}; {REMEDY}") from None
     for spec in folder.specs:
-        signal = stored[spec.name]
-        signal = signal.assign_coords({f"{spec.name}_channel": list(spec.channels)})
-        signal = signal.assign_coords({f"{spec.name}_time": np.arange(spec.samples) / spec.rate})
-        data[spec.name] = signal.drop_vars("case", errors="ignore")
+        data[spec.name] = signal_variable(folder, spec, table["slot"].to_numpy())
+        places = {f"{spec.name}_channel": list(spec.channels), f"{spec.name}_time": np.arange(spec.samples) / spec.rate}
+        data = data.assign_coords(places)
     return data
 
 
@@ -136,7 +177,7 @@ def export(
     CampaignError
         For an unknown format.
     """
-    target = Path(target)
+    target = local(target)
     if format == "csv":
         return [write_whole(target, campaign.table.to_csv(index=False))]
     if format == "netcdf":

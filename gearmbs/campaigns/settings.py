@@ -9,8 +9,10 @@ import json
 import math
 import operator
 import os
+import re
 from collections.abc import Callable, Mapping
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,10 @@ from gearmbs.schema.described import check_keys
 from gearmbs.schema.quantities import Measure
 
 # The error of campaigns.
+
+
+class CampaignWarning(UserWarning):
+    """Something about a campaign that its results do not suffer from, but that somebody should know."""
 
 
 class CampaignError(ValueError):
@@ -52,12 +58,13 @@ def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str
             found[name] = texts(found[name], name)
     if "reuse" in found:
         # workers may run in other folders than this process
-        found["reuse"] = tuple(os.path.abspath(path) for path in found["reuse"])
+        found["reuse"] = tuple(os.path.abspath(local(path)) for path in found["reuse"])
     for name, least in (("unit", 1), ("seed", 0)):
-        if name in found:
+        if name in found and not (name == "unit" and found[name] is None):
             found[name] = whole(found[name], name, least)
-    if found.get("time_limit") is not None:
-        found["time_limit"] = limit(found["time_limit"], "time_limit", "60 s")
+    for name in ("time_limit", "wall_limit"):
+        if found.get(name) is not None:
+            found[name] = limit(found[name], name, "60 s")
     if found.get("memory_limit") is not None:
         found["memory_limit"] = limit(found["memory_limit"], "memory_limit", "2 GB")
     options = found.get("options", {})
@@ -88,6 +95,21 @@ def whole(value: Any, name: str, least: int) -> int:
         return Measure(low=least, whole=True).as_given(value)
     except ValueError as error:
         raise CampaignError(f"{name} = {value!r}; {error}") from None
+
+
+def local(path: str | Path) -> Path:
+    """Return a path, which must not be the address of an object store.
+
+    Raises
+    ------
+    CampaignError
+    """
+    if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", str(path)):
+        raise CampaignError(
+            f"{path}: an object store cannot hold a campaign, whose files are renamed in one piece; give a folder of a "
+            "disk or of a shared file system, and copy what is done to the store"
+        )
+    return Path(path)
 
 
 def limit(value: Any, name: str, example: str) -> float:
@@ -145,6 +167,23 @@ def satisfied(text: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.broadcast_to(result, (size,))
 
 
+def names_in(text: str) -> list[str]:
+    """Return the names of columns that a condition holds; none of a text that is no condition."""
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except SyntaxError:
+        return []
+    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    named = (n for n in ast.walk(tree) if isinstance(n, (ast.Name, ast.Attribute)) and id(n) not in called | inner)
+    return list(dict.fromkeys(ast.unparse(node) for node in named))
+
+
+def spelt(name: str) -> str:
+    """Return the name by which an expression can hold a column's: with underscores for dots and blanks."""
+    return name.replace(".", "_").replace(" ", "_")
+
+
 def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
     def sub(part: ast.AST) -> Any:
         return _value(part, columns, text)
@@ -188,12 +227,8 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
 # A canonical form is a tree of dictionaries, lists, numbers, texts and truth values in SI with all defaults filled in
 # and no names. Numbers are rounded to twelve digits, since the same quantity written in two units may differ in the
 # last bit; minus zero is zero; tuples are lists. The key is the SHA-256 of that tree as JSON with sorted keys, of the
-# kind of subject and of `PHYSICS`.
+# kind of subject and of the code that simulates it.
 
-
-PHYSICS = 1
-"""Counted up by whoever changes what a simulation returns for the same case, so that no stored result is taken for
-one of the new code. A test holds stored numbers against this code and asks for it."""
 
 DIGITS = 12
 
@@ -234,7 +269,7 @@ def canonical(value: Any) -> Any:
     raise CampaignError(f"{value!r} of type {type(value).__name__} has no canonical form; give numbers and texts")
 
 
-def content_key(kind: str, tree: Any) -> str:
+def content_key(kind: str, tree: Any, code: str = "") -> str:
     """Return the key of a canonical tree: 64 hexadecimal digits.
 
     Parameters
@@ -243,8 +278,8 @@ def content_key(kind: str, tree: Any) -> str:
         Name of the subject, as "pair".
     tree
         Anything `canonical` understands.
+    code : str
+        Digest of what simulates it, see `gearmbs.studies.run.code`; without it the key is that of the content alone.
     """
-    text = json.dumps(
-        {"kind": kind, "physics": PHYSICS, "content": canonical(tree)}, sort_keys=True, separators=(",", ":")
-    )
+    text = json.dumps({"kind": kind, "code": code, "content": canonical(tree)}, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

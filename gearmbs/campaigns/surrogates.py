@@ -491,12 +491,12 @@ def condition_map(
         Part of the cases and how many there are, rows along the vertical axis.
     edges_across, edges_along : ndarray, shape (bins + 1,)
     """
-    from gearmbs.campaigns.settings import satisfied
+    from gearmbs.campaigns.settings import satisfied, spelt
 
     table = campaign.table
     table = table[table["status"] == "done"]
     columns = {str(name): table[name].to_numpy() for name in table.columns}
-    columns |= {str(name).replace(".", "_").replace(" ", "_"): table[name].to_numpy() for name in table.columns}
+    columns |= {spelt(str(name)): table[name].to_numpy() for name in table.columns}
     held = satisfied(condition, columns)
     bins = whole(bins, "bins", 1)
     for name in (across, along):

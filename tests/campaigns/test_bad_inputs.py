@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from gearmbs.campaigns import (
     Campaign,
     CampaignError,
+    CampaignWarning,
     Factor,
     FunctionSubject,
     Specimens,
@@ -23,6 +25,7 @@ from gearmbs.campaigns import (
 )
 from gearmbs.campaigns.folder import make_folder
 from gearmbs.studies import Case
+from gearmbs.studies.run.claims import take
 from tests.campaigns.models import PLACES, ishigami
 from tests.campaigns.support import function, ranges, small
 from tests.says import says
@@ -240,28 +243,78 @@ def test_damaged_files_are_named(tmp_path):
     whole = campaign.table
     ledger = campaign.folder.ledger(1)
     ledger.write_text(ledger.read_text()[:50])
-    with pytest.raises(CampaignError, match="this ledger is damaged; gearmbs campaign check --sweep"):
+    with pytest.raises(CampaignError, match=says("ledger is damaged", "00001.json", "gearmbs campaign run")):
         campaign.status()
     assert campaign.check(sweep=True) == ["unit 1: the ledger is damaged"]
     campaign.run(workers=0)
     campaign.folder.table(0).unlink()
-    with pytest.raises(CampaignError, match="missing or damaged"):
+    with pytest.raises(CampaignError, match=says("unit 0", "00000.parquet", "gearmbs campaign run")):
         _ = campaign.table
     for path in sorted(campaign.folder.signals.rglob("*"), reverse=True):
         path.rmdir() if path.is_dir() else path.unlink()
     campaign.folder.signals.rmdir()
-    with pytest.raises(CampaignError, match="missing or damaged"):
-        campaign.check(sweep=True), campaign.run(workers=0), campaign.folder.table(0).unlink(), campaign.open()
-    campaign.check(sweep=True)
-    campaign.run(workers=0)
+    campaign.folder.ledger(0).unlink()
+    with pytest.raises(CampaignError, match=says("zarr.json", "missing")):
+        campaign.open()
+    # run says what it finds, and does it again
+    with pytest.warns(CampaignWarning, match=says("unit 1", "wave")):
+        campaign.run(workers=0)
     assert campaign.table.equals(whole)
-    plan = campaign.path / "plan.json"
-    plan.write_text(plan.read_text()[:40])
-    with pytest.raises(CampaignError, match=r"plan.json is damaged"):
+    assert campaign.check() == []
+
+
+def test_a_plan_is_what_it_was_made_as(tmp_path):
+    """What cannot be read is taken from its copy, an edit is refused by the name of the entry."""
+    campaign = small(tmp_path / "c", n=16)
+    plan, cases = campaign.path / "plan.json", campaign.path / "cases" / "000-00000.parquet"
+    made, drawn = plan.read_bytes(), cases.read_bytes()
+    for damage in (made[:40], made.replace(b'"seed": 3', b'"seed": 2')):  # one bit
+        plan.write_bytes(damage)
+        with pytest.warns(CampaignWarning, match=says("plan.json", "copy", "run puts it right")):
+            assert Campaign(campaign.path).plan.seed == 3
+    plan.write_bytes(made.replace(b'"seed": 3', b'"seed": 12'))
+    with pytest.raises(CampaignError, match=says("plan.json", "plan: seed", "remove the file")):
+        Campaign(campaign.path)
+    plan.unlink()
+    with pytest.warns(CampaignWarning, match="plan.json"):
+        Campaign(campaign.path).run(workers=0)
+    assert plan.read_bytes() == made
+    plan.unlink()
+    (campaign.path / "cases" / "plan.json").unlink()
+    with pytest.raises(CampaignError, match=says("campaign here", "plan.json")):
         Campaign(campaign.path)
     plan.write_text(json.dumps({}))
     with pytest.raises(CampaignError, match=says("format", "None")):
         Campaign(campaign.path)
+    plan.write_bytes(made)
+    cases.write_bytes(drawn[:100])
+    with pytest.raises(CampaignError, match=says("000-00000.parquet", "planned")):
+        Campaign(campaign.path).case(0)
+    with pytest.warns(CampaignWarning, match="cases/000-00000.parquet"):
+        Campaign(campaign.path).run(workers=0)
+    assert cases.read_bytes() == drawn
+
+
+@pytest.mark.parametrize("place", ["s3://bucket/c", Path("gs://bucket/c"), "https://host/c"])
+def test_addresses_of_object_stores_are_refused(place):
+    with pytest.raises(CampaignError, match=says("object store", "give a folder", "copy")):
+        small(place, n=4)
+    with pytest.raises(CampaignError, match="object store"):
+        Campaign(place)
+
+
+def test_two_extensions_at_once(tmp_path):
+    """Of two that begin at the same time one is refused with who is at it; after it the other finds its points."""
+    campaign = small(tmp_path / "c", n=8)
+    claim = take(campaign.path / "units" / "extend.claim")
+    with pytest.raises(CampaignError, match=says("extended", f"process {os.getpid()}")):
+        campaign.extend(16)
+    claim.release()
+    other = Campaign(campaign.path)
+    campaign.extend(16)
+    with pytest.raises(CampaignError, match=says("n = 12", "16 points")):
+        other.extend(12)
+    assert other.extend(20).folder.case_count == 20
 
 
 def test_questions_put_wrongly(tmp_path):

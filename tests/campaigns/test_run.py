@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, make_plan
+from gearmbs.campaigns.folder import sealed, unsealed
 from gearmbs.files import write_whole
 from tests.campaigns.support import digest, function, ranges, small
 
@@ -182,7 +183,7 @@ def test_failed_cases_may_be_tried_again(tmp_path):
     campaign.run(workers=0)
     for unit in campaign.folder.done():
         ledger = campaign.folder.ledger(unit)
-        write_whole(ledger, json.dumps(json.loads(ledger.read_text()) | {"failed": 0}))
+        write_whole(ledger, sealed(unsealed(ledger) | {"failed": 0}))
     assert campaign.status().failed == 0
 
 

@@ -12,18 +12,8 @@ from pathlib import Path
 import pytest
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
-from gearmbs.studies.run.engine import (
-    DEATH,
-    RESULT,
-    Claim,
-    WorkerDied,
-    claimed,
-    here,
-    processes,
-    run_jobs,
-    take,
-    threads,
-)
+from gearmbs.studies.run.claims import Claim, claimed, take
+from gearmbs.studies.run.engine import DEATH, RESULT, WorkerDied, here, processes, run_jobs, threads
 from gearmbs.studies.run.simulation import simulate_case
 from tests.says import says
 from tests.studies.jobs import (
@@ -171,7 +161,7 @@ def test_jobs_without_a_result_are_known():
 
 def test_a_job_at_work_gives_signs_of_life_without_a_report(tmp_path, monkeypatch):
     """So that its claim is not taken over elsewhere after a lease, which here would have ended long ago."""
-    monkeypatch.setattr("gearmbs.studies.run.engine.BEAT", 0.001)
+    monkeypatch.setattr("gearmbs.studies.run.claims.BEAT", 0.001)
     ledger, beaten = Squares(tmp_path), threading.Event()
     path = ledger.claim(7)
     here_too = Claim.beat

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from gearmbs import cli, files
 from gearmbs.files import KeptElsewhere, check_place
 from gearmbs.studies import Case, CaseError, SimulationFailed, case_mechanism, run_case, run_cases, simulate_case
-from gearmbs.studies.run import engine, simulation
+from gearmbs.studies.run import claims, engine, simulation
 from gearmbs.studies.run.parallel import StorageWarning
 from gearmbs.studies.run.store import RecordFolder, keep_dataset, record_size, stored_record, write_dataset
 from tests.says import says
@@ -138,7 +138,7 @@ def test_two_calls_share_the_cases(tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "POLL", 0.0)
     cases = [Case(name=name, operation=SHORT) for name in ("mine", "theirs", "of the dead")]
     ledger = RecordFolder(tmp_path)
-    claim = engine.take(ledger.claim(cases[1]))
+    claim = claims.take(ledger.claim(cases[1]))
     ledger.claim(cases[2]).write_text(json.dumps({"host": socket.gethostname(), "pid": 2**22 + 1, "started": "1"}))
     record, computed = run_case(cases[1]), []
 
@@ -159,7 +159,7 @@ def test_two_calls_share_the_cases(tmp_path, monkeypatch):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.nc", "of the dead.nc", "theirs.nc"]
     # a claim only saves work: where none can be written, cases run all the same
     (tmp_path / "mine.nc").unlink()
-    monkeypatch.setattr(engine, "take", lambda path: os.open(tmp_path / "no" / "folder", os.O_CREAT))
+    monkeypatch.setattr(claims, "take", lambda path: os.open(tmp_path / "no" / "folder", os.O_CREAT))
     assert len(run_cases(cases, workers=1, folder=tmp_path)) == 3
     assert computed[2:] == ["mine"]
 

@@ -77,6 +77,10 @@ class SignalSpec:
     units: str
 
 
+class NotImportable(CampaignError):
+    """What a plan names by a module cannot be imported here; elsewhere it may be."""
+
+
 class Subject(ABC):
     """What a campaign simulates.
 
@@ -143,6 +147,10 @@ class Subject(ABC):
         """Return the arrays that hold the signals of a campaign whose corners are ``things``."""
         return []
 
+    def modules(self) -> list[str]:
+        """Return the names of the modules that simulate; with what they import they are part of a result's identity."""
+        return [type(self).__module__]
+
     def explain(self, error: Exception) -> Outcome:
         """Return how a case that raised has ended."""
         status = IMPOSSIBLE if isinstance(error, ValueError) else FAILED
@@ -179,14 +187,14 @@ def imported(name: str, what: str) -> Any:
 
     Raises
     ------
-    CampaignError
+    NotImportable
         If there is none.
     """
     module, _, attribute = name.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, ValueError) as error:
-        raise CampaignError(f"{what} {name!r}: cannot be imported ({error}); write module:name") from error
+        raise NotImportable(f"{what} {name!r}: cannot be imported ({error}); write module:name") from error
 
 
 def kept_by_functions(keep: Sequence[str], record: Any) -> dict[str, float]:

@@ -102,6 +102,10 @@ class FunctionSubject(Subject):
         rest = {k: v for k, v in settings.items() if k not in ("function", "parameters")}
         return cls(settings["function"], settings.get("parameters"), **rest)
 
+    def modules(self) -> list[str]:
+        """Return the name of the function's module, too."""
+        return [*super().modules(), self.function.partition(":")[0]]
+
     def base(self) -> dict[str, Any]:
         """Return the parameters."""
         return copy.deepcopy(self.parameters)

@@ -7,8 +7,9 @@ goes on from there. Claims keep two runs of the same jobs from doing the same; t
 Where jobs are worked on, here, in threads of this process or in processes of this machine, is a generator ``(work,
 jobs, workers)`` of *messages* ``(number, job, kind, value)``: the job's number from 0 in the order in which jobs were
 taken, the job, and `PROGRESS` with a number, `RESULT` with what ``work(job, report)`` returned, `CLAIMED` with None if
-somebody else is at work on the job, `FAILURE` with an exception, or `DEATH` with None if what worked on it ended
-without a word. A job is taken when a worker is free for it; closing the generator ends all workers.
+somebody else is at work on the job, `FAILURE` with an exception, `REFUSED` with a `Refused` if the worker's
+surroundings do not allow it, or `DEATH` with None if what worked on it ended without a word, or stood still and was
+ended. A job is taken when a worker is free for it; closing the generator ends all workers.
 
 A worker process is a fresh interpreter that ignores Ctrl-C, which a terminal sends to all of a command's processes; its
 parent ends it. Its work, jobs and results are picklable.
@@ -16,25 +17,24 @@ parent ends it. Its work, jobs and results are picklable.
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import pickle
 import queue
 import signal
-import socket
 import sys
 import threading
 import time
+import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, TypeVar
+from typing import Any
+
+from gearmbs.studies.run.claims import STOPPED, Claimed, Ledger, owner, process_of, spent, vacant
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 GRACE = 5.0
@@ -43,29 +43,48 @@ GRACE = 5.0
 REPORT_SECONDS = 0.2
 """Shortest time between two reports of a job."""
 
-PROGRESS, RESULT, CLAIMED, FAILURE, DEATH = "progress", "result", "claimed", "failure", "death"
+PROGRESS, RESULT, CLAIMED, FAILURE, DEATH, REFUSED = "progress", "result", "claimed", "failure", "death", "refused"
+ALIVE = "alive"
 END = object()
 
 Work = Callable[[Any, Callable[[float], None]], Any]
 Message = tuple[int, Any, str, Any]
 
-T = TypeVar("T")
-
 POLL = 0.5
 """Seconds between looks at jobs that somebody else is at work on."""
 
-LEASE = 1800.0
-"""Seconds without a sign of life after which a claim of another machine is void."""
+NOTICE = 10.0
+"""Seconds for which a run waits for others before it says for whom."""
 
-BEAT = LEASE / 30.0
-"""Seconds between the signs of life of a job, many to a lease: files show late elsewhere."""
+HEARD, QUIET = 5.0, 60.0
+"""Seconds between the signs of life of a worker process, and without any, nor any processor time, after which it is
+taken for stuck: compiled code may keep the interpreter for itself, but then it computes."""
 
-WRITING = 5.0
-"""Seconds for which a claim that cannot be read is taken for one that is being written."""
+REFUSALS = 3
+"""Times that workers may refuse a job, after which the run ends with the reason."""
 
 
-class Claimed(Exception):
-    """Somebody else is at work on the job."""
+class Refused(RuntimeError):
+    """A worker cannot do a job for a reason of its own surroundings: the job is given back.
+
+    Attributes
+    ----------
+    lasting : bool
+        Whether this worker would refuse every job, as for a module that it lacks.
+    worker : str
+        Its address, where it has one.
+    """
+
+    def __init__(self, message: str, lasting: bool = False) -> None:
+        super().__init__(message, lasting)
+        self.lasting, self.worker = lasting, ""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class WorkerReplaced(UserWarning):
+    """A worker stood still and was replaced, or refuses to work; the message says which one and why."""
 
 
 class Cancelled(RuntimeError):
@@ -87,6 +106,8 @@ def outcome(work: Work, job: Any, report: Callable[[float], None]) -> tuple[str,
         return RESULT, work(job, seldom)
     except Claimed:
         return CLAIMED, None
+    except Refused as error:
+        return REFUSED, error
     except Exception as error:
         return FAILURE, error
 
@@ -158,6 +179,7 @@ def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool =
     started: dict[Connection, Any] = {}
     at_work: dict[Connection, tuple[int, Any]] = {}
     idle: list[Connection] = []
+    watch = _Watch()
     try:
         while True:
             while len(at_work) < workers and (taken := next(source, END)) is not END:
@@ -177,15 +199,24 @@ def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool =
             if not at_work:
                 return
             finished = set(wait(list(at_work), timeout=1.0))
-            for ready in [connection for connection in at_work if connection in finished]:
+            stuck = watch.stuck({c: started[c].pid for c in at_work}, finished)
+            for connection in stuck:
+                told = f"worker process {started[connection].pid} stood still, it is ended and its job done by another"
+                warnings.warn(told, WorkerReplaced, stacklevel=2)
+                started[connection].kill()
+            for ready in [connection for connection in at_work if connection in {*finished, *stuck}]:
                 try:
-                    kind, value = ready.recv()
+                    # a process that waits for a file server does not even end when it is killed
+                    kind, value = (DEATH, None) if ready in stuck else ready.recv()
                 except (EOFError, ConnectionError):
                     kind, value = DEATH, None
+                if kind == ALIVE:
+                    continue
                 number, job = at_work[ready]
                 if kind != PROGRESS:
                     del at_work[ready]
-                if kind == DEATH:
+                if kind in (DEATH, REFUSED):
+                    # another process may find what this one lacks
                     ready.close()
                     started.pop(ready).join(GRACE)
                 elif kind != PROGRESS:
@@ -195,13 +226,55 @@ def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool =
         _end(started, bool(at_work))
 
 
+class _Watch:
+    """Looks whether worker processes stand still: stopped, or silent without using the processor."""
+
+    def __init__(self) -> None:
+        self._quiet: dict[Connection, tuple[float, float | None]] = {}
+        self._last = time.monotonic()
+
+    def stuck(self, pids: dict[Connection, int], heard: set[Any]) -> list[Connection]:
+        """Return those that stand still, of those at work."""
+        # a look may be late because this process stood still itself
+        passed, self._last = min(time.monotonic() - self._last, 2.0), time.monotonic()
+        found = []
+        for connection, pid in pids.items():
+            seconds, before = self._quiet.get(connection, (0.0, None))
+            now = spent(pid)
+            moves = connection in heard or (now is not None and now != before)
+            seconds = 0.0 if moves else seconds + passed
+            self._quiet[connection] = seconds, now
+            if seconds > (STOPPED if process_of(pid)[1] == "T" else QUIET):
+                found.append(connection)
+        self._quiet = {connection: self._quiet[connection] for connection in pids}
+        return found
+
+
 def _serve(work: Work, connection: Connection) -> None:
     """Work on the jobs that come through a pipe until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    sending = threading.Lock()
+
+    def send(message: Any) -> None:
+        with sending:
+            connection.send(message)
+
+    busy = threading.Event()
+
+    def beats() -> None:
+        with suppress(OSError):
+            while busy.wait():
+                time.sleep(HEARD)
+                if busy.is_set():
+                    send((ALIVE, None))
+
+    threading.Thread(target=beats, name="signs of life", daemon=True).start()
     while True:
         try:
+            busy.clear()
             job = connection.recv()
+            busy.set()
         except (EOFError, ConnectionError):
             return
         except Exception as error:
@@ -213,9 +286,9 @@ def _serve(work: Work, connection: Connection) -> None:
                 ),
             )
         else:
-            kind, value = outcome(work, job, lambda number: connection.send((PROGRESS, number)))
+            kind, value = outcome(work, job, lambda number: send((PROGRESS, number)))
         try:
-            connection.send((kind, _portable(value) if kind == FAILURE else value))
+            send((kind, _portable(value) if kind == FAILURE else value))
         except ConnectionError:
             return
         except Exception as error:
@@ -223,7 +296,7 @@ def _serve(work: Work, connection: Connection) -> None:
                 f"the result of {job!r}, of type {type(value).__name__}, cannot be sent from its worker process "
                 f"({type(error).__name__}: {error}); return what can be pickled, or run in threads"
             )
-            connection.send((FAILURE, cause))
+            send((FAILURE, cause))
 
 
 def _portable(error: Exception) -> Exception:
@@ -318,16 +391,6 @@ class Results(list[Any]):
         self.left = list(left)
 
 
-class Ledger(Protocol):
-    """What is known of jobs, by their files."""
-
-    def result(self, job: Any) -> Any:
-        """Return what is stored of a job that is done, None of any other."""
-
-    def claim(self, job: Any) -> Path:
-        """Return the path of a job's claim."""
-
-
 def run_jobs(
     work: Work,
     jobs: Sequence[Any],
@@ -339,6 +402,7 @@ def run_jobs(
     ledger: Ledger | None = None,
     tries: int = 1,
     seconds: float | None = None,
+    waiting: Callable[[list[tuple[Any, dict[str, Any]]]], None] | None = None,
 ) -> Results:
     """Return ``work(job, report)`` of all jobs in order.
 
@@ -360,15 +424,22 @@ def run_jobs(
         A job whose worker has died so often ends the run.
     seconds : float, optional
         Start no job after so long; those that were not started are left out of the results and are their ``left``.
+    waiting : callable, optional
+        ``waiting([(job, owner), ...])`` where nothing but the work of others is left, after `NOTICE` seconds and ever
+        more rarely; see `gearmbs.studies.run.claims.owner`.
 
     Raises
     ------
     WorkerDied
+    Refused
+        If workers refused a job again and again.
     Exception
         The first that a job raised; the other jobs are ended.
     """
     results: dict[int, Any] = {}
     deaths: Counter[int] = Counter()
+    refusals: Counter[int] = Counter()
+    begun, patience = time.monotonic(), NOTICE
     queue, elsewhere = deque(range(len(jobs))), deque[int]()
     end = float("inf") if seconds is None else time.monotonic() + seconds
 
@@ -396,6 +467,13 @@ def run_jobs(
                     raise value
                 elif kind == CLAIMED:
                     elsewhere.append(k)
+                elif kind == REFUSED:
+                    refusals[k] += 1
+                    if refusals[k] == REFUSALS:
+                        raise value
+                    # what a file server has lost for a moment may be there again
+                    time.sleep(0.1 * 4.0 ** (refusals[k] - 1))
+                    queue.append(k)
                 elif kind == DEATH:
                     deaths[k] += 1
                     if deaths[k] == tries:
@@ -415,135 +493,10 @@ def run_jobs(
                 if (known := ledger.result(jobs[k])) is not None:
                     finish(k, known)
                 else:
-                    (elsewhere if owner(ledger.claim(jobs[k])) else queue).append(k)
+                    (queue if vacant(ledger.claim(jobs[k])) else elsewhere).append(k)
+            if not elsewhere or queue:
+                begun, patience = time.monotonic(), NOTICE
+            elif waiting is not None and time.monotonic() - begun > patience:
+                patience *= 2.0
+                waiting([(jobs[k], who) for k in elsewhere if (who := owner(ledger.claim(jobs[k])))])
     return Results((results[k] for k in sorted(results)), [job for k, job in enumerate(jobs) if k not in results])
-
-
-@dataclass(frozen=True)
-class Claim:
-    """Who works on a job, and how often it was tried before."""
-
-    path: Path
-    attempts: int
-
-    @contextmanager
-    def beating(self) -> Iterator[None]:
-        """Give signs of life from a thread of its own, for as long as the process lives: a job may report nothing."""
-        over = threading.Event()
-
-        def beats() -> None:
-            while not over.wait(BEAT):
-                self.beat()
-
-        thread = threading.Thread(target=beats, name="signs of life", daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            over.set()
-            thread.join()
-
-    def beat(self) -> None:
-        """Give a sign of life; a disk that does not take it now may take the next one."""
-        with suppress(OSError):
-            os.utime(self.path)
-
-    def release(self) -> None:
-        """Give the job back."""
-        self.path.unlink(missing_ok=True)
-
-
-def claimed(ledger: Ledger, job: Any, work: Callable[[Claim], T]) -> T:
-    """Return the result of a job that is done, else that of the work, during which the job is claimed, however long.
-
-    Raises
-    ------
-    Claimed
-        If somebody else is at work on it.
-    """
-    claim = take(ledger.claim(job))
-    if claim is None:
-        raise Claimed
-    try:
-        known = ledger.result(job)
-        if known is not None:
-            return known
-        with claim.beating():
-            return work(claim)
-    finally:
-        claim.release()
-
-
-def take(path: Path) -> Claim | None:
-    """Claim a job; None if somebody is at work on it.
-
-    A claim whose process has died, or that has shown no sign of life for `LEASE`, is taken over, and the attempts
-    counted.
-    """
-    if os.name == "nt":
-        # signal 0, which tells whether a process lives, is Ctrl-C there
-        return Claim(path, 0)
-    me = {"host": socket.gethostname(), "pid": os.getpid(), "started": _started(os.getpid())}
-    attempts = 0
-    for _ in range(3):
-        try:
-            handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
-        except FileExistsError:
-            old = _read(path)
-            if old is None:
-                # being written, or taken away, at this moment; or cut short by a kill
-                if time.time() - _age_mark(path) < WRITING:
-                    return None
-                old = {}
-            if old and _alive(old, path):
-                return None
-            attempts = max(attempts, int(old.get("attempts", 0)) + 1)
-            path.unlink(missing_ok=True)
-            continue
-        with os.fdopen(handle, "w") as file:
-            json.dump({**me, "attempts": attempts}, file)
-        return Claim(path, attempts)
-    return None
-
-
-def owner(path: Path) -> dict[str, Any] | None:
-    """Return who has claimed a job and is alive, or None."""
-    old = _read(path)
-    return old if old and _alive(old, path) else None
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    try:
-        claim = json.loads(path.read_text())
-    except (OSError, ValueError):
-        return None
-    return claim if isinstance(claim, dict) and {"host", "pid", "started"} <= claim.keys() else None
-
-
-def _age_mark(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return time.time()
-
-
-def _alive(claim: dict[str, Any], path: Path) -> bool:
-    if claim.get("host") == socket.gethostname():
-        started = _started(int(claim["pid"]))
-        return started is not None and started == claim.get("started")
-    return time.time() - _age_mark(path) < LEASE
-
-
-def _started(pid: int) -> str | None:
-    """Return when a process of this machine began, in its own units; None if there is none."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        if Path("/proc/self/stat").exists():
-            return None
-        try:
-            os.kill(pid, 0)
-        except OSError:
-            return None
-        return "unknown"
-    return None if fields[0] == "Z" else fields[19]

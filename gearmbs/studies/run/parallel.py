@@ -16,7 +16,8 @@ from gearmbs.files import check_place
 from gearmbs.progress import bars
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
-from gearmbs.studies.run.engine import Claim, claimed, processes, run_jobs, threads
+from gearmbs.studies.run.claims import Claim, claimed
+from gearmbs.studies.run.engine import processes, run_jobs, threads
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
 from gearmbs.studies.run.store import RecordFolder, file_stem, record_size
 

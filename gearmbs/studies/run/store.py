@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-import gearmbs
 from gearmbs.files import keep, whole_file, write_whole
 from gearmbs.studies.case.case import Case
+from gearmbs.studies.run.code import code_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,8 +24,8 @@ BYTES, COLUMNS, PACKED = 8, 13, 0.6
 """Of a number, numbers an output time holds, and what compression leaves of them at best."""
 
 
-def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
-    """Write a dataset as compressed NetCDF, as a whole, and return its path.
+def write_dataset(path: str | Path, dataset: xr.Dataset, *, durable: Path | None = None) -> Path:
+    """Write a dataset as compressed NetCDF with checksums, as a whole, and return its path; see `whole_file`.
 
     Raises
     ------
@@ -33,12 +33,12 @@ def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
         If the folder cannot be written or the disk is full; nothing is left behind.
     """
     encoding = {
-        name: {"zlib": True, "complevel": 1, "shuffle": True}
+        name: {"zlib": True, "complevel": 1, "shuffle": True, "fletcher32": True}
         for name, variable in dataset.data_vars.items()
         if variable.dtype.kind == "f" and variable.size > 1000
     }
     content = dataset.to_netcdf(engine="h5netcdf", encoding=encoding)
-    with whole_file(path) as part:
+    with whole_file(path, durable=durable) as part:
         part.write_bytes(content)
     return Path(path)
 
@@ -79,16 +79,16 @@ def file_stem(name: str) -> str:
 
 
 def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
-    """Return the record of exactly this case on joints from a folder, None if there is none made by this version."""
+    """Return the record of exactly this case on joints from a folder, None if there is none made by this code."""
     path = Path(folder) / f"{file_stem(case.name)}.nc"
     if not path.is_file():
         return None
     try:
         with xr.open_dataset(path, engine="h5netcdf") as found:
-            known = found.attrs.get("case_json"), found.attrs.get("gearmbs_version")
+            known = found.attrs.get("case_json"), found.attrs.get("code")
             # the case says nothing of rolling bearings, so a record on them is not that of the case alone
             on_joints = "bearings" not in found.attrs
-            return found.load() if on_joints and known == (case.model_dump_json(), gearmbs.__version__) else None
+            return found.load() if on_joints and known == (case.model_dump_json(), code_of().digest) else None
     except (OSError, ValueError, KeyError):
         # damaged, or not one of ours: the case is computed again
         return None
@@ -110,7 +110,8 @@ class RecordFolder:
         return self.path / f".{file_stem(case.name)}.claim"
 
     def enter(self, case: Case, record: xr.Dataset) -> str:
-        """Write the record of a case; return what is to be said if it had to be kept elsewhere, or nowhere."""
+        """Write a case's record with its code; return what is to be said if it had to be kept elsewhere, or nowhere."""
+        record.attrs["code"] = code_of().digest
         try:
             keep_dataset(self.path / f"{file_stem(case.name)}.nc", record)
         except OSError as error:

@@ -1,0 +1,187 @@
+"""Signals of a campaign: one Zarr array a signal, a chunk a case, a shard a unit.
+
+Two writers in one shard would lose data without a word, so that a unit is a shard and is written in one piece. The axis
+of cases is one of *slots*: unit u has slots [u size, (u + 1) size), of which the last unit of an extent may leave some
+empty.
+
+Each chunk and each shard's index has a checksum (CRC-32C), which every reader of Zarr looks at. Here it is also looked
+at whether the shard of a unit is there at all, which others take for NaN.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.subjects.base import SignalSpec
+from gearmbs.files import write_whole
+
+if TYPE_CHECKING:
+    from gearmbs.campaigns.folder import Folder
+
+
+def _in_memory(spec: SignalSpec, unit: int, units: int) -> tuple[Any, Any]:
+    """Return an array (slot, channel, time) in float32, filled with NaN, and the memory that holds its files."""
+    import zarr
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+    from zarr.storage import MemoryStore
+
+    memory = MemoryStore()
+    array = zarr.create_array(
+        memory,
+        name=spec.name,
+        shape=(unit * units, len(spec.channels), spec.samples),
+        chunks=(1, len(spec.channels), spec.samples),
+        shards=(unit, len(spec.channels), spec.samples),
+        dtype="float32",
+        fill_value=float("nan"),
+        compressors=[ZstdCodec(), Crc32cCodec()],
+        dimension_names=("slot", f"{spec.name}_channel", f"{spec.name}_time"),
+        attributes={"units": spec.units, "sampling_rate": spec.rate, "channels": list(spec.channels)},
+        # a unit whose cases all failed has a shard, too, so that none means a loss
+        config={"write_empty_chunks": True},
+    )
+    return array, memory._store_dict
+
+
+def write_store(path: Path, specs: Sequence[SignalSpec], unit: int, units: int, durable: Path) -> None:
+    """Write what the arrays are, without any signals, for so many units; what is there already stays."""
+    for spec in specs:
+        _, files = _in_memory(spec, unit, units)
+        write_whole(path / spec.name / "zarr.json", files[f"{spec.name}/zarr.json"].to_bytes(), durable=durable)
+    if specs:
+        write_whole(path / "zarr.json", files["zarr.json"].to_bytes(), durable=durable)
+
+
+def check_store(path: Path, specs: Sequence[SignalSpec], unit: int, units: int) -> None:
+    """Refuse a description of an array that is not the plan's: read by it, signals would be others.
+
+    Raises
+    ------
+    CampaignError
+    """
+    import zarr
+
+    for spec in specs:
+        try:
+            found = _described(zarr.open_array(path / spec.name, mode="r", zarr_format=3))
+        except (OSError, ValueError, TypeError, KeyError) as error:
+            found = str(error)
+        if found != _described(_in_memory(spec, unit, units)[0]):
+            raise CampaignError(f"{path / spec.name / 'zarr.json'}: is missing, damaged or edited")
+
+
+def _described(array: Any) -> str:
+    return json.dumps(array.metadata.to_dict(), sort_keys=True, default=str)
+
+
+def check_signals(specs: Sequence[SignalSpec], signals: Mapping[str, np.ndarray]) -> None:
+    """Refuse the signals of a case that have no room in the arrays.
+
+    Raises
+    ------
+    CampaignError
+    """
+    for spec in specs:
+        if spec.name not in signals:
+            continue
+        shape = signals[spec.name].shape
+        if len(shape) != 2 or shape[0] != len(spec.channels):
+            raise CampaignError(f"signal {spec.name!r}: shape {shape}, planned for {len(spec.channels)} channels")
+        if shape[1] > spec.samples:
+            raise CampaignError(
+                f"signal {spec.name!r}: {shape[1]} samples, planned for {spec.samples} from the corners; make a plan "
+                "whose longest record is at a corner"
+            )
+
+
+def shard(path: Path, name: str, unit: int) -> Path:
+    """Return the path of the signals of a unit."""
+    return path / name / "c" / str(unit) / "0" / "0"
+
+
+def write_signals(
+    path: Path, specs: Sequence[SignalSpec], unit: int, number: int, signals: Sequence[Mapping[str, np.ndarray]],
+    durable: Path,
+) -> dict[str, str]:  # fmt: skip
+    """Write the signals of the cases of a unit; return the digest of each array's shard.
+
+    Parameters
+    ----------
+    unit, number : int
+        Cases of a unit, and the unit's number.
+    signals : sequence of mapping
+        Of each case its signals, shape (channels, samples); nothing for a case that failed. See `check_signals`.
+    """
+    digests = {}
+    for spec in specs:
+        block = np.full((unit, len(spec.channels), spec.samples), np.nan, dtype=np.float32)
+        for k, case in enumerate(signals):
+            if spec.name in case:
+                values = case[spec.name]
+                block[k, :, : values.shape[1]] = values
+        # one unit by itself: a shard does not know where it belongs
+        array, files = _in_memory(spec, unit, 1)
+        array[:] = block
+        content = files[f"{spec.name}/c/0/0/0"].to_bytes()
+        write_whole(shard(path, spec.name, number), content, durable=durable)
+        digests[spec.name] = hashlib.sha256(content).hexdigest()
+    return digests
+
+
+class Signals(BackendArray):
+    """Signals of some slots, read when they are asked for, with a look whether they are there and whole.
+
+    Parameters
+    ----------
+    folder : Folder
+    spec : SignalSpec
+    slots : ndarray of int
+        Of the cases, in their order.
+    """
+
+    def __init__(self, folder: Folder, spec: SignalSpec, slots: np.ndarray) -> None:
+        import zarr
+
+        self.folder, self.spec, self.slots = folder, spec, slots
+        self.shape = (len(slots), len(spec.channels), spec.samples)
+        self.dtype = np.dtype("float32")
+        self._array: Any = zarr.open_array(folder.signals / spec.name, mode="r", zarr_format=3)
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self.read)
+
+    def read(self, key: tuple[Any, ...]) -> np.ndarray:
+        """Return what numbers, slices and lists of places take of the cases, channels and samples."""
+        wanted = np.atleast_1d(self.slots[key[0]])
+        found = np.empty((len(wanted), *self.shape[1:]), dtype=self.dtype)
+        units = wanted // self.folder.unit_size
+        for unit in np.unique(units):
+            place = shard(self.folder.signals, self.spec.name, int(unit))
+            rows = np.flatnonzero(units == unit)
+            try:
+                place.stat()
+                found[rows] = self._array.oindex[wanted[rows]]
+            except (OSError, ValueError, RuntimeError, KeyError) as error:
+                raise self.folder.damaged(int(unit), f"{self.spec.name}, {place}: {error}") from None
+        numbers = tuple(axis for axis, k in enumerate(key) if not isinstance(k, slice) and np.ndim(k) == 0)
+        for axis in (1, 2):
+            part = [key[axis]] if axis in numbers else key[axis]
+            found = found[(*[slice(None)] * axis, part)]
+        return found.squeeze(axis=numbers)
+
+
+def signal_variable(folder: Folder, spec: SignalSpec, slots: np.ndarray) -> xr.Variable:
+    """Return the signals of some slots as a variable (case, channel, time) that is read when it is asked for."""
+    lazy = indexing.LazilyIndexedArray(Signals(folder, spec, slots))
+    attributes = {"units": spec.units, "sampling_rate": spec.rate, "channels": list(spec.channels)}
+    return xr.Variable(("case", f"{spec.name}_channel", f"{spec.name}_time"), lazy, attributes)

@@ -1,0 +1,461 @@
+"""What computed a number: the code, the versions and the processor, under one fingerprint.
+
+Results are only put beside each other if they come from equal code. What counts of a source is its syntax tree without
+what cannot change a number:
+
+* docstrings, comments, layout;
+* messages: texts with a blank, and texts put together, in the arguments of exceptions, of warnings and of ``assert``.
+  A text without a blank may be a name that a handler looks for, and counts; so do numbers.
+
+Of the package count all modules but `OUTSIDE`, and its tables; a test runs simulations in a process that cannot import
+those. Beyond it count the modules that a plan names, with all they import that belongs to them, wherever in the file
+that is written; of other packages their version and the digests that their installer noted. Kernels are made
+of these sources by numba and LLVM for a target processor: their versions, options and the processor count, too.
+
+What a module reads while it runs, such as a table beside it, is not known here.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import importlib.util
+import json
+import os
+import platform
+import sys
+import sysconfig
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+
+from gearmbs.files import write_whole
+
+PACKAGE = Path(__file__).parents[2]
+
+OUTSIDE = (
+    "__main__", "_command", "campaigns.campaign", "campaigns.cluster", "campaigns.datasets", "campaigns.results",
+    "campaigns.sensitivity", "campaigns.sobol_bounds", "campaigns.status", "campaigns.surrogates", "cli", "compile",
+    "identify", "saving", "view",
+)  # fmt: skip
+"""Modules and folders of the package that simulate nothing: they ask, show, write and distribute."""
+
+COMMANDS = "commands"
+"""Modules of this name, in any folder, simulate nothing, either."""
+
+TABLES = (".toml", ".json", ".csv", ".npz")
+"""Files of the package beside its modules that hold numbers."""
+
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "scikit-sundae", "xarray")
+OPTIONS = ("GEARMBS_COMPILER", "NUMBA_OPT", "NUMBA_LOOP_VECTORIZE", "NUMBA_SLP_VECTORIZE", "NUMBA_ENABLE_AVX",
+           "NUMBA_DISABLE_JIT", "NUMBA_BOUNDSCHECK", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")  # fmt: skip
+"""Variables of the environment by which kernels become others."""
+
+MESSAGES_FROM = ("warn", "warn_explicit")
+"""Functions whose texts are read by people only."""
+
+CLOCK_TICKS = 0.02
+"""Seconds to which the beginning of a process is known; an interpreter takes longer until it imports anything."""
+
+MOST_KNOWN = 5000
+"""Digests of sources that are remembered between processes."""
+
+
+class CodeChanged(RuntimeError):
+    """A source was edited after this process had read it, so that what the process runs is not what stands there."""
+
+
+@dataclass(frozen=True)
+class Code:
+    """What computed a number.
+
+    Attributes
+    ----------
+    sources : dict of str
+        Of each module and table its digest, without what cannot change a number.
+    setting : dict of str
+        Versions of Python and libraries, the processor that kernels are made for, options.
+    """
+
+    sources: dict[str, str]
+    setting: dict[str, str]
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """The fingerprint."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:32]
+
+    def differences(self, other: Code | None) -> str:
+        """Return in words in what another code differs from this one."""
+        if other is None:
+            return "nothing is known of it"
+        told = [
+            f"{name} {theirs or 'missing'} instead of {mine or 'missing'}"
+            for name, mine, theirs in _unequal(self.setting, other.setting)
+        ]
+        modules = [name for name, _, _ in _unequal(self.sources, other.sources)]
+        if modules:
+            more = f" and {len(modules) - 3} more" if len(modules) > 3 else ""
+            told.append(f"another source of {', '.join(modules[:3])}{more}")
+        return "; ".join(told) or "nothing"
+
+
+def _unequal(mine: Mapping[str, str], theirs: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    both = sorted({*mine, *theirs})
+    return [(n, mine.get(n, ""), theirs.get(n, "")) for n in both if mine.get(n) != theirs.get(n)]
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A file that counts: the name it is known by, and how it looked when it was read."""
+
+    name: str
+    path: Path
+    stamp: tuple[int, int, int]
+
+
+def _stamp(path: Path) -> tuple[int, int, int]:
+    about = path.stat()
+    return about.st_mtime_ns, about.st_ctime_ns, about.st_size
+
+
+_seen: dict[tuple[str, ...], tuple[Code, list[_Source]]] = {}
+
+
+def code_of(modules: Iterable[str] = ()) -> Code:
+    """Return the code by which this process simulates.
+
+    Parameters
+    ----------
+    modules : iterable of str
+        Modules beyond the package's that take part, with what they import.
+
+    Raises
+    ------
+    CodeChanged
+        If a source is not any more what it was when this process looked first.
+    ImportError
+        If a module is not there.
+    """
+    names = tuple(sorted(set(modules)))
+    known = _seen.get(names)
+    if known is not None and all(_stamped(source) for source in known[1]):
+        return known[0]
+    new, files = _read(names)
+    if known is not None and new != known[0]:
+        raise CodeChanged(f"the code was edited while this process was at work: {known[0].differences(new)}")
+    _seen[names] = new, files
+    return new
+
+
+def running_code(modules: Iterable[str] = ()) -> Code:
+    """Return the code by which this process simulates, after a look whether that is what it has loaded.
+
+    Raises
+    ------
+    CodeChanged
+        If a source was edited since it was loaded, and what that changed can be seen or cannot be told.
+    """
+    names = tuple(sorted(set(modules)))
+    first = names not in _seen
+    code = code_of(names)
+    if first:
+        for source in _seen[names][1]:
+            _as_loaded(source)
+    return code
+
+
+def _stamped(source: _Source) -> bool:
+    try:
+        return _stamp(source.path) == source.stamp
+    except OSError:
+        return False
+
+
+def _read(names: Iterable[str]) -> tuple[Code, list[_Source]]:
+    files, packages, digests, memory = [], set(LIBRARIES), {}, _Memory()
+    waiting = [(name, path) for name, path in _package_files()]
+    done = {name for name, _ in waiting}
+    own = {name.partition(".")[0] for name in names} - {"gearmbs"}
+    further = list(names)
+    while waiting or further:
+        if not waiting:
+            name = further.pop()
+            if name in done:
+                continue
+            done.add(name)
+            path = _file_of(name, required=name in names)
+            if path is None:
+                continue
+            top = name.partition(".")[0]
+            if top not in own and top != "gearmbs" and _installed(path):
+                if not path.is_relative_to(sysconfig.get_path("stdlib")) or "site-packages" in path.parts:
+                    packages.add(top)
+                continue
+            waiting.append((name, path))
+        name, path = waiting.pop()
+        files.append(_Source(name, path, _stamp(path)))
+        digests[name], imports = memory.of(name, path)
+        if not name.startswith("gearmbs."):
+            further += imports
+    memory.keep()
+    return Code(digests, setting(packages)), files
+
+
+def _package_files() -> Iterator[tuple[str, Path]]:
+    """Yield name and path of what counts of the package."""
+    for folder, folders, files in os.walk(PACKAGE):
+        folders[:] = sorted(f for f in folders if f != "__pycache__")
+        for file in sorted(files):
+            path = Path(folder, file)
+            if path.suffix not in (".py", *TABLES):
+                continue
+            parts = path.relative_to(PACKAGE).with_suffix("" if path.suffix == ".py" else path.suffix).parts
+            name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+            if counts(name):
+                yield f"gearmbs.{name}".rstrip("."), path
+
+
+def counts(name: str) -> bool:
+    """Return whether a module of the package, by its name without the package's, takes part in simulations."""
+    return name.rpartition(".")[2] != COMMANDS and not any(name == o or name.startswith(f"{o}.") for o in OUTSIDE)
+
+
+def _file_of(module: str, required: bool) -> Path | None:
+    """Return the file of a module that is none of the interpreter's own."""
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, AttributeError, ValueError):
+        spec = None
+    if spec is None:
+        if required:
+            raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+        return None
+    return Path(spec.origin) if spec.origin not in (None, "built-in", "frozen") else None
+
+
+def _installed(path: Path) -> bool:
+    """Return whether a module is of the standard library or was put where packages are installed."""
+    return any(path.is_relative_to(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
+
+
+# What counts of a source.
+
+
+class _Messages(ast.NodeTransformer):
+    """Takes out of a syntax tree what cannot change a number."""
+
+    def visit_Raise(self, node: ast.Raise) -> ast.AST:
+        if isinstance(node.exc, ast.Call):
+            _mute(node.exc)
+        return self.generic_visit(node)
+
+    def visit_Assert(self, node: ast.Assert) -> ast.AST:
+        node.msg = None
+        return self.generic_visit(node)
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        if getattr(node.func, "attr", getattr(node.func, "id", None)) in MESSAGES_FROM:
+            _mute(node)
+        return self.generic_visit(node)
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        # a text that stands for itself describes what is beside it
+        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            return None
+        return self.generic_visit(node)
+
+
+class _Muted(ast.NodeTransformer):
+    def visit(self, node: ast.AST) -> ast.AST:
+        words = isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value
+        return ast.Constant("") if words or isinstance(node, ast.JoinedStr) else self.generic_visit(node)
+
+
+def _mute(call: ast.Call) -> None:
+    """Take the messages out of the arguments of a call."""
+    call.args = [_Muted().visit(arg) for arg in call.args]
+    for keyword in call.keywords:
+        keyword.value = _Muted().visit(keyword.value)
+
+
+def what_counts(source: bytes) -> str:
+    """Return a digest of a source in Python without what cannot change a number."""
+    return hashlib.sha256(ast.dump(_Messages().visit(ast.parse(source))).encode()).hexdigest()[:32]
+
+
+def _imports(name: str, path: Path, source: bytes) -> list[str]:
+    """Return the names of all modules that a module may import, with those in functions; some are not modules."""
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+    # packages run their own code before that of what they hold
+    return sorted({".".join(n.split(".")[: k + 1]) for n in found if n for k in range(n.count(".") + 1)})
+
+
+class _Memory:
+    """Digests of sources by those of their raw bytes: a tree of all of the package takes some seconds to read."""
+
+    def __init__(self) -> None:
+        home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+        self.path = Path(home, "gearmbs", "sources.json")
+        self.known, self.new = dict[str, str](), dict[str, str]()
+        with suppress(OSError, ValueError):
+            known = json.loads(self.path.read_text())
+            if known.pop("check") == _check(known):
+                self.known = known
+
+    def of(self, name: str, path: Path) -> tuple[str, list[str]]:
+        """Return the digest of a file and the names of what it imports."""
+        content = path.read_bytes()
+        raw = hashlib.sha256(content).hexdigest()[:32]
+        if path.suffix != ".py":
+            return raw, []
+        # syntax trees are those of a version of Python
+        key = f"{raw} {sys.version_info[0]}.{sys.version_info[1]}"
+        if key not in self.known:
+            self.known[key] = self.new[key] = what_counts(content)
+        return self.known[key], [] if name.startswith("gearmbs") else _imports(name, path, content)
+
+    def keep(self) -> None:
+        """Write down what was found out; where that cannot be done it is found out again."""
+        if self.new:
+            kept = self.known if len(self.known) <= MOST_KNOWN else self.new
+            with suppress(OSError):
+                write_whole(self.path, json.dumps({**kept, "check": _check(kept)}))
+
+
+def _check(known: Mapping[str, str]) -> str:
+    return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
+
+
+# Versions and processor.
+
+
+@functools.cache
+def processor() -> str:
+    """Return the processor that kernels are made for, with its instructions as a digest."""
+    try:
+        from llvmlite import binding
+
+        name = os.environ.get("NUMBA_CPU_NAME") or binding.get_host_cpu_name()
+        features = os.environ.get("NUMBA_CPU_FEATURES") or binding.get_host_cpu_features().flatten()
+    except (ImportError, RuntimeError):
+        return platform.processor() or platform.machine()
+    return f"{name} {hashlib.sha256(features.encode()).hexdigest()[:8]}"
+
+
+def setting(packages: Iterable[str] = LIBRARIES) -> dict[str, str]:
+    """Return the versions and options that numbers depend on."""
+    found = {"python": platform.python_version(), "machine": platform.machine(), "processor": processor()}
+    found |= {name: value for name in OPTIONS if (value := os.environ.get(name))}
+    return found | {name: told for name in packages if (told := _installed_as(name))}
+
+
+@functools.cache
+def _installed_as(name: str) -> str:
+    """Return the version of a package, with a digest of what its installer noted of its code."""
+    try:
+        about = distribution(name)
+    except PackageNotFoundError:
+        from importlib.metadata import packages_distributions
+
+        # some are imported under another name than they are installed by
+        known = packages_distributions().get(name)
+        if not known:
+            return "not installed"
+        about = distribution(known[0])
+    noted = [
+        line
+        for line in (about.read_text("RECORD") or "").splitlines()
+        if not line.startswith("..") and line.partition(",")[0].endswith((".py", ".so", ".pyd", ".dylib", ".dll"))
+    ]
+    return f"{about.version} {hashlib.sha256(repr(sorted(noted)).encode()).hexdigest()[:8]}"
+
+
+# Whether a process runs what stands in the files.
+
+
+@functools.cache
+def _began() -> float:
+    """Return when this process began, in seconds since 1970; where that is not known, when it came here."""
+    try:
+        ticks = float(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
+        since_boot = float(Path("/proc/uptime").read_text().split()[0]) - ticks / os.sysconf("SC_CLK_TCK")
+        return time.clock_gettime(time.CLOCK_REALTIME) - since_boot
+    except (OSError, ValueError, IndexError):
+        return time.time()
+
+
+def _as_loaded(source: _Source) -> None:
+    """Refuse a source that was edited since this process began unless what it has loaded is the same.
+
+    Raises
+    ------
+    CodeChanged
+    """
+    module = sys.modules.get(source.name)
+    if module is None or source.path.suffix != ".py" or source.stamp[1] / 1e9 < _began() + CLOCK_TICKS:
+        return
+    if not _same(module, source.path.read_bytes(), str(source.path)):
+        raise CodeChanged(f"{source.name} was edited after this process had loaded it")
+
+
+def _same(module: ModuleType, source: bytes, path: str) -> bool:
+    """Return whether a module's functions and constants are those of a source, as far as that can be seen."""
+    tree = ast.parse(source)
+    codes = {c.co_qualname: _plain(c) for c in _inner(compile(source, path, "exec"))}
+    for value in vars(module).values():
+        functions = vars(value).values() if isinstance(value, type) else [value]
+        for function in functions:
+            function = getattr(function, "py_func", getattr(function, "__func__", function))
+            if not isinstance(function, FunctionType) or function.__module__ != module.__name__:
+                continue
+            if "<locals>" not in function.__qualname__ and codes.get(function.__qualname__) != _plain(
+                function.__code__
+            ):
+                return False
+    return all(_same_statement(module, node) for node in tree.body)
+
+
+def _same_statement(module: ModuleType, node: ast.stmt) -> bool:
+    """Return whether a statement at the top of a module gave what the module has; of most that cannot be seen."""
+    if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Import, ast.ImportFrom, ast.AsyncFunctionDef)):
+        return True
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return True
+    if isinstance(node, ast.Assign) and all(isinstance(target, ast.Name) for target in node.targets):
+        try:
+            value = ast.literal_eval(node.value)
+        except ValueError:
+            return False
+        return all(getattr(module, target.id, node) == value for target in node.targets)  # type: ignore[attr-defined]
+    return False
+
+
+def _inner(code: CodeType) -> Iterator[CodeType]:
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield constant
+            yield from _inner(constant)
+
+
+def _plain(code: CodeType) -> tuple:
+    """Return what a function does, without its lines and its texts of several words."""
+    constants = [
+        _plain(c) if isinstance(c, CodeType) else repr(c)
+        for c in code.co_consts
+        if not (isinstance(c, str) and " " in c)
+    ]
+    return code.co_code, constants, code.co_names, code.co_varnames

@@ -1,0 +1,239 @@
+"""What results come from is known, and nothing is put beside what comes from something else."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from gearmbs.campaigns import Campaign, CampaignError, Factor, FunctionSubject, make_plan
+from gearmbs.campaigns.codes import code_counts
+from gearmbs.campaigns.work import refusal
+from gearmbs.studies.run import code
+from gearmbs.studies.run.code import Code, CodeChanged, code_of, running_code, what_counts
+from tests.says import says
+
+SOURCE = '''
+"""A module."""
+import numpy as np
+
+GAIN = 2.0
+
+
+def f(x, kind="rolling bearing"):
+    """Return a number."""
+    if not x > 0:
+        raise ValueError(f"x = {x}; give a positive number")
+    if kind == "rolling bearing":
+        raise Stop("late", 0.5 * x)
+    assert x < 9, "x is large"
+    return GAIN * x
+'''
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"""A module."""', '"""Another text.\n\nWith two parts."""'),
+        ('    """Return a number."""\n', ""),
+        ("GAIN = 2.0", "# doubles\nGAIN = 2.0"),
+        ("give a positive number", "must be above zero"),
+        ('"x is large"', 'f"{x} is above 9"'),
+        ("GAIN * x", "(GAIN  *  x)"),
+    ],
+    ids=["module", "docstring", "comment", "message", "assertion", "layout"],
+)
+def test_texts_do_not_count(old, new):
+    assert old in SOURCE
+    assert what_counts(SOURCE.encode()) == what_counts(SOURCE.replace(old, new).encode())
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("GAIN = 2.0", "GAIN = 2.5"),
+        ('if kind == "rolling bearing"', 'if kind == "plain bearing"'),
+        ("not x > 0", "not x >= 0"),
+        ("0.5 * x", "0.25 * x"),
+        ('"late"', '"early"'),
+        ("x < 9", "x < 8"),
+        ("ValueError", "KeyError"),
+    ],
+    ids=["constant", "name with a blank", "condition", "number in an error", "name in an error", "bound", "kind"],
+)
+def test_what_may_change_a_number_counts(old, new):
+    assert old in SOURCE
+    assert what_counts(SOURCE.encode()) != what_counts(SOURCE.replace(old, new).encode())
+
+
+@pytest.fixture
+def modules(tmp_path, monkeypatch):
+    """A user's module with a helper in a package, found by this process; the name is used once, for it is loaded."""
+    name = f"user_{os.getpid()}_{abs(hash(tmp_path)) % 10**8}"
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "__init__.py").write_text("")
+    (tmp_path / name / "model.py").write_text(
+        "import json\n\n\ndef model(x):\n    from .helper import offset\n\n    return {'y': x + offset()}\n"
+    )
+    (tmp_path / name / "helper.py").write_text("OFFSET = 1.0\n\n\ndef offset():\n    return OFFSET\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(code, "_seen", {})
+    return tmp_path / name
+
+
+def made(modules, path, **settings) -> Campaign:
+    subject = FunctionSubject(f"{modules.name}.model:model", {"x": 0.0})
+    settings = {"n": 8, "unit": 2, **settings}
+    return Campaign(path, make_plan(subject, [Factor("x", 0.0, 1.0)], **settings))
+
+
+def loaded_anew(modules, monkeypatch) -> None:
+    """Let the process be one that has loaded nothing yet."""
+    monkeypatch.setattr(code, "_seen", {})
+    for name in [name for name in sys.modules if name.startswith(modules.name)]:
+        del sys.modules[name]
+
+
+def test_a_module_counts_with_what_belongs_to_it(modules):
+    found = code_of([f"{modules.name}.model"])
+    own = sorted(name for name in found.sources if not name.startswith("gearmbs"))
+    assert own == [modules.name, f"{modules.name}.helper", f"{modules.name}.model"]
+    assert any(name.startswith("gearmbs.contact.") for name in found.sources)
+    assert "gearmbs.studies.presets.bench.toml" in found.sources
+    assert "gearmbs.mechanism.compile" in found.sources
+    assert not [n for n in found.sources if n.startswith(("gearmbs.view", "gearmbs.compile")) or "commands" in n]
+    assert {"python", "processor", "numba", "llvmlite", "numpy"} <= found.setting.keys()
+    with pytest.raises(ImportError, match="nowhere"):
+        code_of(["nowhere_at_all.model"])
+
+
+def test_an_edit_in_the_middle_is_refused_by_name(modules, tmp_path, monkeypatch):
+    """Refused; gone on with if that is told, which is then told; or done again."""
+    campaign = made(modules, tmp_path / "c")
+    campaign.work(1, 2)
+    helper = modules / "helper.py"
+    helper.write_text(helper.read_text().replace("return OFFSET", "return OFFSET  # as it was"))
+    loaded_anew(modules, monkeypatch)
+    assert campaign.work(1, 4).codes == 1
+    helper.write_text(helper.read_text().replace("1.0", "2.5"))
+    loaded_anew(modules, monkeypatch)
+    with pytest.raises(CampaignError, match=says("another code", f"{modules.name}.helper", "--other-code")):
+        campaign.run(workers=0)
+    status = campaign.run(workers=0, other_code="mix")
+    assert (status.done, status.codes) == (8, 2)
+    assert "from 2 different codes" in str(status)
+    assert any("2 of 4 units" in line and "helper" in line for line in campaign.check())
+    assert sorted(round(y - x, 9) for x, y in campaign.table[["x", "y"]].to_numpy()) == [1.0] * 4 + [2.5] * 4
+    status = campaign.run(workers=0, other_code="again")
+    assert status.codes == 1
+    assert set((campaign.table.y - campaign.table.x).round(9)) == {2.5}
+    with pytest.raises(CampaignError, match=says("other_code", "'all'", "mix")):
+        campaign.run(workers=0, other_code="all")
+
+
+def test_results_of_other_code_are_not_taken_over(modules, tmp_path, monkeypatch):
+    made(modules, tmp_path / "first").run(workers=0)
+    assert made(modules, tmp_path / "second", reuse=[str(tmp_path / "first")]).run(workers=0).reused == 8
+    helper = modules / "helper.py"
+    helper.write_text(helper.read_text().replace("1.0", "3.0"))
+    loaded_anew(modules, monkeypatch)
+    third = made(modules, tmp_path / "third", reuse=[str(tmp_path / "first")])
+    assert third.run(workers=0).reused == 0
+    assert set((third.table.y - third.table.x).round(9)) == {3.0}
+
+
+def test_an_edit_under_a_worker_makes_it_refuse(modules, tmp_path, monkeypatch):
+    """Between two units, and after it was loaded but before the first look: what runs is not what stands there."""
+    campaign = made(modules, tmp_path / "c")
+    campaign.work(1, 4)
+    helper = modules / "helper.py"
+    text = helper.read_text()
+    helper.write_text(text.replace("1.0", "2.5"))
+    with pytest.raises(CodeChanged, match=says("edited while", f"{modules.name}.helper")):
+        running_code([*campaign.plan.subject.modules()])
+    monkeypatch.setattr(code, "_seen", {})
+    with pytest.raises(CodeChanged, match=says("edited after", f"{modules.name}.helper")):
+        running_code([*campaign.plan.subject.modules()])
+    # a text was edited, and that can be seen
+    helper.write_text('"""Texts."""\n' + text)
+    monkeypatch.setattr(code, "_seen", {})
+    assert running_code([*campaign.plan.subject.modules()]).sources
+
+
+def test_the_code_of_a_campaign_is_found_again_when_its_note_is_lost(modules, tmp_path):
+    campaign = made(modules, tmp_path / "c")
+    campaign.work(1, 2)
+    (first,) = code_counts(campaign.folder)
+    for path in (campaign.path / "codes").iterdir():
+        path.write_text("{}")
+    campaign.run(workers=0)
+    assert list(code_counts(campaign.folder)) == [first]
+
+
+def test_what_is_the_surroundings_and_what_is_the_case():
+    for error in (ModuleNotFoundError("x"), OSError(116, "Stale file handle"), PermissionError(13, "denied")):
+        around = RuntimeError("the case failed")
+        around.__cause__ = error
+        assert refusal(error) is not None
+        assert refusal(around) is not None
+    for error in (ValueError("x"), FileNotFoundError(2, "No such file"), OSError("unable to open"), MemoryError()):
+        assert refusal(error) is None
+
+
+def test_differences_are_told():
+    one = Code({"a": "1", "b": "2"}, {"numba": "0.63", "processor": "znver5"})
+    other = Code({"a": "1", "b": "3"}, {"numba": "0.68", "processor": "znver5"})
+    assert one.differences(other) == "numba 0.68 instead of 0.63; another source of b"
+    assert one.differences(one) == "nothing"
+    assert one.digest != other.digest
+
+
+STAGE = {
+    "running": True,
+    "shafts": {"in": {"length": "100 mm"}, "out": {"length": "100 mm"}},
+    "wheels": {
+        "pinion": {"shaft": "in", "teeth": 20, "module": "3 mm"},
+        "gear": {"shaft": "out", "teeth": 40, "module": "3 mm"},
+    },
+    "meshes": {"mesh": {"driver": "pinion", "driven": "gear", "backlash": "0.1 mm"}},
+    "bearings": {"a": {"shaft": "in"}, "b": {"shaft": "out"}},
+    "drives": {"motor": {"shaft": "in", "speed": "1500 rpm"}},
+    "loads": {"brake": {"shaft": "out", "torque": "80 N m"}},
+    "run": {"settling": "10 ms", "duration": "20 ms"},
+}
+SIMULATED = {
+    "pair": ({"case": {"operation": {"duration": 0.06, "run_up": 0.01, "settling": 0.01}}}, "harmonics contact"),
+    "drivetrain": ({"tables": STAGE}, "harmonics forces"),
+}  # fmt: skip
+REFUSING = """
+import sys
+from gearmbs.studies.run.code import counts
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.startswith("gearmbs.") and not counts(name.removeprefix("gearmbs.")):
+            raise AssertionError(name + " takes part")
+
+sys.meta_path.insert(0, Refuse())
+from gearmbs.campaigns.subjects.base import make_subject
+kind, settings, keep = sys.argv[1], eval(sys.argv[2]), sys.argv[3].split()
+subject = make_subject(kind, settings)
+thing = subject.check(subject.base(), "x")
+subject.canonical(thing)
+print(len(subject.reduce(thing, subject.run(thing, lambda fraction: None, keep), keep).numbers))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SIMULATED)
+def test_modules_that_do_not_count_simulate_nothing(kind):
+    """A case is carried out by a process that cannot import them."""
+    settings, keep = SIMULATED[kind]
+    found = subprocess.run(
+        [sys.executable, "-c", REFUSING, kind, repr(settings), keep], capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(p or "." for p in sys.path)},
+    )  # fmt: skip
+    assert found.returncode == 0, found.stderr
+    assert int(found.stdout) > 3
