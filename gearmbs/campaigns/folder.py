@@ -36,6 +36,7 @@ import numpy as np
 
 from gearmbs.campaigns.plan import FORMAT, Plan
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local, whole
+from gearmbs.campaigns.signals import Signals, check_store, shard, write_store
 from gearmbs.campaigns.subjects.base import SignalSpec
 from gearmbs.files import to_disk, whole_file, write_whole
 from gearmbs.studies.run.claims import owner, take, told
@@ -166,6 +167,10 @@ class Folder:
         file = pq.ParquetFile(pa.BufferReader(content))
         known = None if columns is None else [name for name in columns if name in file.schema_arrow.names]
         return file.read(known)
+
+    def stored_signals(self, spec: SignalSpec, slots: np.ndarray) -> Signals:
+        """Return the signals of some slots, which are read when they are asked for."""
+        return Signals(self.signals, spec, self.unit_size, slots, self.damaged)
 
     def damaged(self, unit: int, what: str) -> CampaignError:
         """Return the error of a unit whose files are not what they were."""
@@ -386,8 +391,6 @@ def _taken_up(path: Path, plan: Plan) -> Folder:
 
 def _fill(path: Path, plan: Plan) -> None:
     """Write the files of a new campaign."""
-    from gearmbs.campaigns.signals import write_store
-
     specs = plan.check()
     for name in ("units", "table", "cases", "codes"):
         (path / name).mkdir(parents=True, exist_ok=True)
@@ -420,8 +423,6 @@ def extend_folder(folder: Folder, n: int) -> Folder:
     CampaignError
         If the design cannot go on, n is not above what there is, or somebody else extends it at this moment.
     """
-    from gearmbs.campaigns.signals import write_store
-
     n = whole(n, "extend: n", 1)
     place = folder.path / "units" / "extend.claim"
     claim = take(place)
@@ -518,8 +519,6 @@ def check_folder(folder: Folder, units: Iterable[int] | None = None, *, sweep: b
 
 def _check_plan(folder: Folder, sweep: bool) -> list[str]:
     """Return what is wrong with plan, cases and the descriptions of arrays."""
-    from gearmbs.campaigns.signals import check_store, write_store
-
     found, path, unit = [], folder.path, folder.unit_size
     contents = [_look(place) for place in (path / "plan.json", path / "cases" / "plan.json")]
     if any(wrong for _, wrong in contents) or contents[0][0] != contents[1][0]:
@@ -550,8 +549,6 @@ def _check_plan(folder: Folder, sweep: bool) -> list[str]:
 
 def _check_unit(folder: Folder, unit: int) -> str:
     """Return what is wrong with the files of a unit, nothing if they are as the ledger says."""
-    from gearmbs.campaigns.signals import shard
-
     try:
         entry = folder.entry(unit)
     except CampaignError:

@@ -129,7 +129,7 @@ def open_dataset(folder: Folder) -> xr.Dataset:
     except CampaignError as error:
         raise CampaignError(f"{error}; {REMEDY}") from None
     for spec in folder.specs:
-        data[spec.name] = signal_variable(folder, spec, table["slot"].to_numpy())
+        data[spec.name] = signal_variable(spec, folder.stored_signals(spec, table["slot"].to_numpy()))
         places = {f"{spec.name}_channel": list(spec.channels), f"{spec.name}_time": np.arange(spec.samples) / spec.rate}
         data = data.assign_coords(places)
     return data

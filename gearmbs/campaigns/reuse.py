@@ -10,7 +10,6 @@ import numpy as np
 
 from gearmbs.campaigns.folder import Folder
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning
-from gearmbs.campaigns.signals import Signals
 from gearmbs.campaigns.subjects.base import DONE, Kept
 
 _known: dict[tuple[str, ...], Reuse] = {}
@@ -83,7 +82,7 @@ class Reuse:
 def _signals(folder: Folder, slot: int) -> dict[str, np.ndarray]:
     found = {}
     for spec in folder.specs:
-        values = Signals(folder, spec, np.array([slot])).read((0, slice(None), slice(None)))
+        values = folder.stored_signals(spec, np.array([slot])).read((0, slice(None), slice(None)))
         long = np.flatnonzero(np.isfinite(values).any(axis=0))
         found[spec.name] = values[:, : int(long[-1]) + 1 if long.size else 0]
     return found

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,9 +24,6 @@ from xarray.core import indexing
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.base import SignalSpec
 from gearmbs.files import write_whole
-
-if TYPE_CHECKING:
-    from gearmbs.campaigns.folder import Folder
 
 
 def _in_memory(spec: SignalSpec, unit: int, units: int) -> tuple[Any, Any]:
@@ -143,19 +140,26 @@ class Signals(BackendArray):
 
     Parameters
     ----------
-    folder : Folder
+    path : Path
+        Of the arrays.
     spec : SignalSpec
+    unit : int
+        Cases of a unit.
     slots : ndarray of int
         Of the cases, in their order.
+    damaged : callable
+        Returns the error of a unit, from its number and what is wrong with it.
     """
 
-    def __init__(self, folder: Folder, spec: SignalSpec, slots: np.ndarray) -> None:
+    def __init__(
+        self, path: Path, spec: SignalSpec, unit: int, slots: np.ndarray, damaged: Callable[[int, str], Exception]
+    ) -> None:
         import zarr
 
-        self.folder, self.spec, self.slots = folder, spec, slots
+        self.path, self.spec, self.unit, self.slots, self.damaged = path, spec, unit, slots, damaged
         self.shape = (len(slots), len(spec.channels), spec.samples)
         self.dtype = np.dtype("float32")
-        self._array: Any = zarr.open_array(folder.signals / spec.name, mode="r", zarr_format=3)
+        self._array: Any = zarr.open_array(path / spec.name, mode="r", zarr_format=3)
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self.read)
@@ -164,15 +168,15 @@ class Signals(BackendArray):
         """Return what numbers, slices and lists of places take of the cases, channels and samples."""
         wanted = np.atleast_1d(self.slots[key[0]])
         found = np.empty((len(wanted), *self.shape[1:]), dtype=self.dtype)
-        units = wanted // self.folder.unit_size
+        units = wanted // self.unit
         for unit in np.unique(units):
-            place = shard(self.folder.signals, self.spec.name, int(unit))
+            place = shard(self.path, self.spec.name, int(unit))
             rows = np.flatnonzero(units == unit)
             try:
                 place.stat()
                 found[rows] = self._array.oindex[wanted[rows]]
             except (OSError, ValueError, RuntimeError, KeyError) as error:
-                raise self.folder.damaged(int(unit), f"{self.spec.name}, {place}: {error}") from None
+                raise self.damaged(int(unit), f"{self.spec.name}, {place}: {error}") from None
         numbers = tuple(axis for axis, k in enumerate(key) if not isinstance(k, slice) and np.ndim(k) == 0)
         for axis in (1, 2):
             part = [key[axis]] if axis in numbers else key[axis]
@@ -180,8 +184,8 @@ class Signals(BackendArray):
         return found.squeeze(axis=numbers)
 
 
-def signal_variable(folder: Folder, spec: SignalSpec, slots: np.ndarray) -> xr.Variable:
-    """Return the signals of some slots as a variable (case, channel, time) that is read when it is asked for."""
-    lazy = indexing.LazilyIndexedArray(Signals(folder, spec, slots))
+def signal_variable(spec: SignalSpec, signals: Signals) -> xr.Variable:
+    """Return signals as a variable (case, channel, time) that is read when it is asked for."""
+    lazy = indexing.LazilyIndexedArray(signals)
     attributes = {"units": spec.units, "sampling_rate": spec.rate, "channels": list(spec.channels)}
     return xr.Variable(("case", f"{spec.name}_channel", f"{spec.name}_time"), lazy, attributes)

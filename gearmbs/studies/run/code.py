@@ -33,6 +33,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
+from typing import Any
 
 from gearmbs.files import write_whole
 
@@ -272,7 +273,7 @@ class _Messages(ast.NodeTransformer):
 
 
 class _Muted(ast.NodeTransformer):
-    def visit(self, node: ast.AST) -> ast.AST:
+    def visit(self, node: ast.AST) -> Any:
         words = isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value
         return ast.Constant("") if words or isinstance(node, ast.JoinedStr) else self.generic_visit(node)
 
