@@ -1,8 +1,9 @@
 """What campaigns cost and what they survive: ``python -m benchmarks.campaigns FOLDER [part ...]``.
 
 Parts are ``overhead`` (a Sobol' study of the gear pair: where processor time goes, memory, width of the intervals),
-``million`` (a plan of a million cases), ``content`` (equal cases are found whatever they are called), ``engines`` (the
-same bits from processes, parts and Dask, its scheduler killed), ``memory`` (of the driver) and ``kills``.
+``million`` (results of a million cases read, ten millions planned), ``content`` (equal cases are found whatever they
+are called), ``engines`` (the same bits from processes, parts and Dask, its scheduler killed), ``memory`` (of the
+driver) and ``kills``.
 """
 
 from __future__ import annotations
@@ -145,15 +146,52 @@ def _spent() -> float:
     return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
-def million(folder: Path, n: int = 1 << 20) -> None:
-    """A plan of a million cases, nothing simulated."""
-    start, cpu = time.perf_counter(), time.process_time()
-    campaign = cheap(folder / "million.campaign", "plain", n, unit=256)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-    print(
-        f"{campaign.folder.case_count} cases planned in {time.perf_counter() - start:.1f} s "
-        f"({time.process_time() - cpu:.1f} s of processor time), {peak:.0f} MB"
-    )
+def million(folder: Path, n: int = 1_000_000) -> None:
+    """A million cases with results that nobody simulated: how long three columns take; and ten millions planned.
+
+    Each in a process of its own, whose memory is its peak.
+    """
+    filled = (f"from benchmarks.campaigns import peak, {stubs.__name__}\nimport sys\n"
+              f"{stubs.__name__}(sys.argv[1], int(sys.argv[2]))\nprint(f'filled, {{peak():.0f}} MB')")  # fmt: skip
+    read = ("from benchmarks.campaigns import peak\nfrom gearmbs.campaigns import Campaign\nimport sys, time\n"
+            "start, cpu = time.perf_counter(), time.process_time()\n"
+            "table = Campaign(sys.argv[1]).read(['a', 'y', 'z'])\n"
+            "print(f'{len(table)} cases, three columns: {time.process_time() - cpu:.2f} s of processor time, '\n"
+            "      f'{time.perf_counter() - start:.2f} s, {peak():.0f} MB')\n"
+            "start = time.process_time(); print(Campaign(sys.argv[1]).status())\n"
+            "failed = Campaign(sys.argv[1]).failed()\n"
+            "print(f'{len(failed)} failures: {time.process_time() - start:.2f} s of processor time')")  # fmt: skip
+    plan = ("from benchmarks.campaigns import cheap, peak\nimport sys, time\nfrom pathlib import Path\n"
+            "start = time.process_time(); c = cheap(Path(sys.argv[1]), 'plain', int(sys.argv[2]), unit=None)\n"
+            "print(f'{c.folder.case_count} cases planned in {c.folder.unit_count} units: '\n"
+            "      f'{time.process_time() - start:.1f} s of processor time, {peak():.0f} MB')")  # fmt: skip
+    for text, place, count in ((filled, "million", n), (read, "million", n), (plan, "planned", 10 * n)):
+        subprocess.run([sys.executable, "-c", text, folder / f"{place}.campaign", str(count)], check=True,
+                       env=_environment())  # fmt: skip
+
+
+def stubs(path: str, n: int) -> None:
+    """Make a campaign of n cases and store results that were not simulated."""
+    from gearmbs.campaigns.codes import admit, plan_modules
+    from gearmbs.campaigns.subjects.base import FAILED, Kept, Outcome
+    from gearmbs.campaigns.work import CaseResult, enter, store
+    from gearmbs.studies.run.code import code_of
+
+    folder = cheap(Path(path), "plain", n, unit=None, keep=["numbers"]).folder
+    admit(folder, code := code_of(plan_modules(folder)))
+    for unit in range(folder.unit_count):
+        rows = folder.cases(unit)
+        numbers = [{name: row["a"] + k for k, name in enumerate("yzuvw")} for row in rows]
+        results = [CaseResult(Outcome(), Kept(kept), f"{row['index']:064x}") for row, kept in zip(rows, numbers)]
+        if unit % 100 == 0:
+            results[0] = CaseResult(Outcome(FAILED, "no such luck"))
+        about = {"processor_seconds": 0.0, "wall_seconds": 0.1, "started": 0.0, "code": code.digest}
+        enter(folder, unit, rows, results, store(folder, unit, rows, results), about)
+
+
+def peak() -> float:
+    """Return the largest resident memory that this process has had, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
 def content(folder: Path, n: int = 10_000) -> None:

@@ -300,7 +300,7 @@ def _plan_tree(path: Path) -> dict[str, Any]:
             "the file, which run then writes as it was, or plan another campaign in another folder"
         )
     reason = wrong if isinstance(wrong, str) else f"plan.json is damaged ({', '.join(wrong)})"
-    warnings.warn(f"{path}: {reason}; its copy is taken, and {REMEDY}", CampaignWarning, stacklevel=4)
+    warnings.warn(f"{path}: {reason}; its copy cases/plan.json is taken, and {REMEDY}", CampaignWarning, stacklevel=4)
     return json.loads(copy)
 
 

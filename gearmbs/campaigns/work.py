@@ -331,9 +331,30 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
             results.append(result)
     finally:
         runner.close()
-    digests = _store(folder, unit, rows, results)
+    digests = store(folder, unit, rows, results)
     if _code(folder, mix) != code:
         raise CodeChanged("the code was edited while the unit was done")
+    about = {
+        "processor_seconds": round(time.process_time() - cpu, 4),
+        "wall_seconds": round(time.monotonic() - clock, 4),
+        "started": started,
+        "attempts": claim.attempts,
+        "guarded": guarded,
+        "code": code,
+    }
+    enter(folder, unit, rows, results, digests, about)
+    return True
+
+
+def enter(
+    folder: Folder,
+    unit: int,
+    rows: list[dict[str, Any]],
+    results: list[CaseResult],
+    digests: dict[str, str],
+    about: dict[str, Any],
+) -> None:
+    """Write the ledger of a unit whose results are stored."""
     seconds = [round(r.seconds, 4) for r in results]
     files = {name: hashlib.sha256((folder.path / name).read_bytes()).hexdigest() for r in results for name in r.files}
     entry = {
@@ -345,21 +366,15 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
         "index": [rows[0]["index"], rows[-1]["index"] + 1],
         "status": {str(row["index"]): r.outcome.status for row, r in zip(rows, results) if r.outcome.status != DONE},
         "seconds": seconds,
-        "processor_seconds": round(time.process_time() - cpu, 4),
         "simulation_seconds": round(sum(seconds), 4),
-        "wall_seconds": round(time.monotonic() - clock, 4),
-        "started": started,
         "finished": time.time(),
-        "attempts": claim.attempts,
-        "guarded": guarded,
         "digests": digests,
         "files": files,
-        "code": code,
         "gearmbs": gearmbs.__version__,
         "host": socket.gethostname(),
+        **about,
     }
     write_whole(folder.ledger(unit), sealed(entry), durable=folder.path)
-    return True
 
 
 def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], reuse: Reuse | None) -> CaseResult:
@@ -378,7 +393,7 @@ def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], 
     return result
 
 
-def _store(folder: Folder, unit: int, rows: list[dict[str, Any]], results: list[CaseResult]) -> dict[str, str]:
+def store(folder: Folder, unit: int, rows: list[dict[str, Any]], results: list[CaseResult]) -> dict[str, str]:
     """Write signals and table of a unit; return digests."""
     import pyarrow as pa
     import pyarrow.parquet as pq

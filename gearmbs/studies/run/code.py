@@ -416,14 +416,14 @@ def _as_loaded(source: _Source) -> None:
 def _same(module: ModuleType, source: bytes, path: str) -> bool:
     """Return whether a module's functions and constants are those of a source, as far as that can be seen."""
     tree = ast.parse(source)
-    codes = {c.co_qualname: _plain(c) for c in _inner(compile(source, path, "exec"))}
+    codes = {c.co_qualname: _doing(c) for c in _inner(compile(source, path, "exec"))}
     for value in vars(module).values():
         functions = vars(value).values() if isinstance(value, type) else [value]
         for function in functions:
             function = getattr(function, "py_func", getattr(function, "__func__", function))
             if not isinstance(function, FunctionType) or function.__module__ != module.__name__:
                 continue
-            if "<locals>" not in function.__qualname__ and codes.get(function.__qualname__) != _plain(
+            if "<locals>" not in function.__qualname__ and codes.get(function.__qualname__) != _doing(
                 function.__code__
             ):
                 return False
@@ -452,10 +452,10 @@ def _inner(code: CodeType) -> Iterator[CodeType]:
             yield from _inner(constant)
 
 
-def _plain(code: CodeType) -> tuple:
+def _doing(code: CodeType) -> tuple:
     """Return what a function does, without its lines and its texts of several words."""
     constants = [
-        _plain(c) if isinstance(c, CodeType) else repr(c)
+        _doing(c) if isinstance(c, CodeType) else repr(c)
         for c in code.co_consts
         if not (isinstance(c, str) and " " in c)
     ]
