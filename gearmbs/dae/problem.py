@@ -150,6 +150,9 @@ class DAEProblem:
         What has to live as long as the addresses in ``idata``.
     numbers : mapping of str to Number
         Inputs and other numbers that can be changed by their names, with their places in ``rdata``.
+    watched : ndarray of int64
+        Places in the scratch array: what a step's last evaluation of the residual leaves there is handed to a
+        ``consumer`` behind the unknowns. Default: none.
     counted : Counted, optional
         Angles whose full turns ``hook`` counts; runs keep what is in its places at their outputs.
     """
@@ -186,3 +189,4 @@ class DAEProblem:
     callbacks: Sequence[Any] = ()
     numbers: Mapping[str, Number] = field(default_factory=dict)
     counted: Counted | None = None
+    watched: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))

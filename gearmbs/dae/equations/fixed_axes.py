@@ -63,8 +63,9 @@ TURN_MATRIX = 19
 """A = a + b cos(phi) + c sin(phi): three matrices, row-major."""
 TURN_COLUMNS = 46
 
-COUNTS = 3
-"""Integers at the end of ``idata``: number of markers looked at, of slots, of axes."""
+COUNTS = 4
+"""Integers at the end of ``idata``: number of markers looked at, of slots, of axes; where in the work array stand the
+unknowns of the last evaluation and, behind them, the slopes of the wrenches, see `keep_slopes`, -1 for nowhere."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -102,6 +103,15 @@ def turn_body(k, y, axes, turns, fval, kin):
     cross3(row, KIN_W, row, KIN_R, row, KIN_V)
     for q in range(3):
         row[KIN_R + q] += turn[TURN_POINT + q]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def keep_unknowns(y, idata, work):
+    """Keep the unknowns of an evaluation for whoever reads what it leaves in the work array."""
+    kept = idata[idata.size - 1]
+    if kept >= 0:
+        for i in range(y.size):
+            work[kept + i] = y[i]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -160,13 +170,14 @@ def axes_residual(t, y, yp, out, idata, rdata, work):
     tab = T.unpack(idata, rdata, work)
     axes, markers, _, turns = axes_in(idata, rdata)
     update_axes(t, y, axes, markers, turns, tab)
+    keep_unknowns(y, idata, work)
     for k in range(axes.shape[0]):
         tab.kin[k + 1, KIN_FORCE] = 0.0
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
         if row[T.FORCE_KIND] == T.COMPILED:
             if row[T.FORCE_PART] == 0:
-                evaluate_element(row, t, y, tab, np.int64(0))
+                evaluate_element(row, t, y, tab, row[T.FORCE_WANT])
                 add_own_states(row, y, yp, idata, tab.state, tab.scratch, out)
             wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
         else:
@@ -355,7 +366,7 @@ def element_axis_entries(mode, t, row, y, cj, idata, axes, turns, tab, slot, val
         expressions.load(row, t, y, tab, wrench, rows, np.int64(1))
         return moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k)
     if row[T.FORCE_PART] == 0:
-        evaluate_element(row, t, y, tab, np.int64(DERIVATIVES))
+        evaluate_element(row, t, y, tab, DERIVATIVES | row[T.FORCE_WANT])
         one = vector_at(tab.scratch, S_FORCE, 1)
         one[0] = 1.0
         for q in range(row[T.FORCE_STATES]):
@@ -370,6 +381,47 @@ def element_axis_entries(mode, t, row, y, cj, idata, axes, turns, tab, slot, val
     wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
     rows = matrix_at(tab.scratch, T.SCRATCH_FIXED + 6 * row[T.FORCE_PART] * width, 6, width)
     return moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k)
+
+
+@njit(cache=True, error_model="numpy")
+def keep_slopes(f, y, idata, axes, turns, tab, work):
+    """Keep the derivatives of a compiled element's wrench by the unknowns, six rows of them behind the unknowns kept.
+
+    Parameters
+    ----------
+    f : int
+        The force element, whose spatial derivatives have just been evaluated.
+    y : ndarray, shape (n,)
+    idata : ndarray of int
+    axes, turns : ndarray
+        Of `gearmbs.dae.equations.fixed_axes`.
+    tab : Tables
+        Up to date with y.
+    work : ndarray
+        The work array, written.
+    """
+    row, n, kept = tab.force[f], y.size, idata[idata.size - 1]
+    if kept < 0 or row[T.FORCE_KIND] != T.COMPILED:
+        return
+    slopes = matrix_at(work, kept + n + 6 * n * f, 6, n)
+    rows = matrix_at(tab.scratch, T.SCRATCH_FIXED + 6 * row[T.FORCE_PART] * row[T.FORCE_WIDTH], 6, row[T.FORCE_WIDTH])
+    slopes[:] = 0.0
+    s = vector_at(tab.scratch, S_CHAIN, 9)
+    depends = row[T.FORCE_DEPENDS]
+    bodies = tab.extra_i[depends]
+    for q in range(bodies):
+        a = tab.extra_i[depends + 1 + q] - 1
+        if a < 0 or axes[a, AXIS_OMEGA] < 0:
+            continue
+        prepare_chain(a, turns, tab, s)
+        for r in range(6):
+            phi, omega = chain(a, y[axes[a, AXIS_OMEGA]], rows[r], 12 * q, turns, s)
+            slopes[r, axes[a, AXIS_PHI]] += phi
+            slopes[r, axes[a, AXIS_OMEGA]] += omega
+    after = depends + 2 + bodies
+    for q in range(tab.extra_i[after - 1]):
+        for r in range(6):
+            slopes[r, tab.extra_i[after + q]] += rows[r, 12 * bodies + q]
 
 
 @njit(cache=True, error_model="numpy")
@@ -431,8 +483,10 @@ def axes_jacobian(t, y, yp, cj, vals, idata, rdata, work):
         k = put(mode, slot, vals, k, omega, phi, -turned)
         k = put(mode, slot, vals, k, phi, omega, 1.0)
         k = put(mode, slot, vals, k, phi, phi, -cj)
+    keep_unknowns(y, idata, work)
     for f in range(idata[T.H_FORCES]):
         k = element_axis_entries(mode, t, tab.force[f], y, cj, idata, axes, turns, tab, slot, vals, k)
+        keep_slopes(f, y, idata, axes, turns, tab, work)
     for state in range(idata[T.H_STATES]):
         if tab.state[state, T.STATE_TAPE] >= 0:
             k = axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, vals, k)

@@ -242,7 +242,7 @@ def residual(t, y, yp, out, idata, rdata, work):
         wrench = vector_at(tab.scratch, S_WRENCH, 6)
         if row[T.FORCE_KIND] == T.COMPILED:
             if row[T.FORCE_PART] == 0:
-                evaluate_element(row, t, y, tab, np.int64(0))
+                evaluate_element(row, t, y, tab, row[T.FORCE_WANT])
                 add_own_states(row, y, yp, idata, tab.state, tab.scratch, out)
             wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
         else:

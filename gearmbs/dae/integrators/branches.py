@@ -236,10 +236,17 @@ def kept_its_index(functions, st):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _unforeseen(st, i, old):
-    """Return whether unknown i has missed its prediction by a good part of its way, and of its tolerance."""
+    """Return whether unknown i has missed its prediction by a good part of its way, and of its tolerance, and turned.
+
+    Beyond a pole that is told by another sign of its equation without the rate the rate has another sign, too, than in
+    the step before. Unknowns that oscillate miss their predictions by part of their way where they turn, and their
+    rates pass through zero there.
+    """
     off = abs(st.y[i] - st.y_pred[i])
     far = (off > MISSED_PART * abs(st.y[i] - old[i])) & (off * st.w_error[i] > MISSED)
-    return far & (st.differential[i] != 0.0)
+    # with one point alone the rate of the start stands for that before
+    turned = st.yp[i] * (old[i] - rows_from(st, 2)[0, i] if st.n_past > 1 else st.yp_start[i]) <= 0.0
+    return far & turned & (st.differential[i] != 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -125,7 +125,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     t0 = float(problem.t0)
     n_events = int(problem.n_events) if problem.events is not None else 0
     stops = options.stops(t0, t_end)
-    st = _empty_state(problem, outputs, stops, n_events, _rows_of_records(problem.n, keep, options), keep)
+    st = _empty_state(problem, options, outputs, stops, n_events, _rows_of_records(problem.n, keep, options), keep)
     st.stops[:] = stops
     _set_tables(st, problem)
     _set_tolerances(st, problem, options, t_end - t0)
@@ -170,9 +170,16 @@ def _rows_of_records(n: int, keep: bool, options: Options) -> int:
 
 
 def _empty_state(
-    problem: DAEProblem, outputs: np.ndarray, stops: list[float], n_events: int, records: int, keep: bool
+    problem: DAEProblem,
+    options: Options,
+    outputs: np.ndarray,
+    stops: list[float],
+    n_events: int,
+    records: int,
+    keep: bool,
 ) -> RunState:
     n = problem.n
+    watched = problem.watched if options.consumer is not None else problem.watched[:0]
     kept = np.empty(0, dtype=np.int64) if problem.counted is None else problem.counted.places
     sizes = Sizes(
         n=n,
@@ -192,7 +199,8 @@ def _empty_state(
         yp_out=np.empty((len(outputs), n)),
         kept=kept,
         kept_out=np.tile(problem.rdata[kept], (len(outputs), 1)),
-        record_y=np.empty((records if keep else 1, n)),
+        watched=watched,
+        record_y=np.empty((records if keep else 1, n + len(watched))),
     )
 
 
@@ -233,7 +241,7 @@ def _record_start(st: RunState) -> None:
     """Make the start the first record, and the first output if one is wanted there."""
     st.n_records = 1
     st.record_t[0] = st.t
-    st.record_y[0] = st.y
+    st.record_y[0, : len(st.y)] = st.y
     if len(st.outputs) and st.outputs[0] == st.t:
         st.y_out[0] = st.y
         st.yp_out[0] = st.yp
@@ -270,6 +278,7 @@ def begin(run: Run) -> Failure | None:
     st, problem = run.state, run.problem
     t0 = float(st.t)
     _residual(run)
+    st.record_y[0, problem.n :] = st.work[st.watched]
     if run.user_exception() is not None:
         return run.user_failure()
     bad = np.flatnonzero(~np.isfinite(st.res))
@@ -452,7 +461,7 @@ def _repair(run: Run, h: float) -> Failure | None:
         y -= st.delta if sweep < REPAIR_SWEEPS else np.where(run.problem.differential, 0.0, st.delta)
     st.yp[:] = rates
     newest_point(st)[:] = y
-    st.record_y[0] = y
+    st.record_y[0, : len(y)] = y
     if st.next_output:
         st.y_out[0] = y
     _residual(run)

@@ -97,8 +97,11 @@ class RunState(Struct):
         Outputs.
     kept, kept_out : ndarray, shapes (p,) and (m, p)
         Places in ``rdata`` of counted turns, and what stood there at each output.
+    watched : ndarray of int64, shape (w,)
+        Places in ``work`` that are recorded with each step.
     record_t, record_h, record_order, record_y : ndarray
-        End, size, order and result of accepted steps since the last call; rows of order 0 are history alone.
+        End, size, order and result of accepted steps since the last call, of ``record_y`` (records, n + w) with what
+        the last evaluation left in the watched places; rows of order 0 are history alone.
     g_old, g_new : ndarray
         Event functions at the last accepted point and at the new one.
     g_between : ndarray, shape (samples, n_events)
@@ -263,6 +266,7 @@ class RunState(Struct):
     yp_out: Matrix
     kept: IntVector
     kept_out: Matrix
+    watched: IntVector
     record_t: Vector
     record_h: Vector
     record_order: IntVector

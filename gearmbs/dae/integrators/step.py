@@ -380,6 +380,7 @@ def accept(st):
     st.matrix_age += 1
     st.drop_age += 1
     count_noise(st)
+    record_watched(st)
     st.n_past = min(st.n_past + 1, bdf.HISTORY)
     st.t = st.t_new
     if st.rate > st.rate_allowed:
@@ -423,6 +424,16 @@ def deliver(functions, st, part):
         st.passing = True
     choose_next(st)
     return close_step(functions, st)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def record_watched(st):
+    """Keep what the corrector's last evaluation has left in the watched places, before another one comes."""
+    n, watched, work = st.y.shape[0], st.watched, st.work
+    if watched.shape[0] > 0:
+        row = st.record_y[st.n_records]
+        for k in range(watched.shape[0]):
+            row[n + k] = work[watched[k]]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -248,14 +248,14 @@ def _with_axes(
     table[:, fx.AXIS_FUNCTION] = _functions(model, axes)
     markers = _watched_markers(idata)
     rdata = np.concatenate([rdata, turns.ravel()])
-    ends = [len(markers), 0, len(axes)]
+    ends = [len(markers), 0, len(axes), -1]
     return np.concatenate([idata, table.ravel(), markers, ends]), rdata, size
 
 
 def _with_slots(idata: np.ndarray, slots: np.ndarray) -> np.ndarray:
     """Return the integers with the slots of the Jacobian."""
-    markers, _, axes = idata[-fx.COUNTS :]
-    return np.concatenate([idata[: -fx.COUNTS], slots, [markers, len(slots), axes]])
+    markers, _, axes, kept = idata[-fx.COUNTS :]
+    return np.concatenate([idata[: -fx.COUNTS], slots, [markers, len(slots), axes, kept]])
 
 
 def _shared_once(lists: list[np.ndarray]) -> list[np.ndarray]:
@@ -284,6 +284,13 @@ def _functions(model: Model, axes: Sequence[Axis]) -> list[int]:
     """Return the functions of time of the motions about the axes, -1 of a free one."""
     rows = [axis.motion for axis in axes]
     return [-1 if r is None else int(model.terms[model.rows[r, T.ROW_FIRST], T.TERM_FUNCTION]) for r in rows]
+
+
+def axes_of(idata: np.ndarray, rdata: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the integers and the reals of the axes, one a row, as `fx.axes_in` does in compiled code."""
+    markers, slots, count, _ = (int(number) for number in idata[-fx.COUNTS :])
+    first = idata.size - fx.COUNTS - slots - markers - fx.AXIS_COLUMNS * count
+    return T.rows_in(idata, first, count, fx.AXIS_COLUMNS), _turns_in(rdata, count)
 
 
 def _turns_in(rdata: np.ndarray, count: int) -> np.ndarray:

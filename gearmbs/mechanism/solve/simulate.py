@@ -21,6 +21,7 @@ from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
+from gearmbs.dae.results.watched import Watch
 from gearmbs.dae.state import State
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
@@ -152,6 +153,7 @@ def simulate(
     progress: bool | Callable[[float], None] | None = None,
     advice: Mapping[Status, str] | None = None,
     consumer: Callable[[Solution], None] | None = None,
+    watch: Sequence[tuple[str, str]] = (),
     lump: bool | None = None,
     stops: Sequence[StopAt] = (),
     continued: bool = False,
@@ -193,6 +195,11 @@ def simulate(
         With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
         and each valid during the call only, instead of keeping all steps in memory; see
         `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
+    watch : sequence of (str, str)
+        With a ``consumer``: methods of the solution, ``"reaction_force"``, ``"orientation"`` or ``"diagnostics"``, with
+        the names they will be called with. The parts handed to it then return what the integrator has of them at its
+        own steps, off by what the corrector leaves, where everything else is evaluated anew for each step, which takes
+        about as long as the step. What an integrator or a formulation does not have at hand is evaluated as without it.
     lump : bool, optional
         Integrate bodies that fixed joints connect, or fix to the ground, as one, and if all that is left turns about
         fixed axes, its angles alone; default the mechanism's ``lump``, which only some presets set, and not with
@@ -227,6 +234,8 @@ def simulate(
         than the loads press them; if a function of the user fails, its
         ``solution`` has what was computed until then.
     """
+    if watch and consumer is None:
+        raise ModelError("watch: what it names is handed to a consumer; give consumer=, too")
     if consumer is not None and not every_step:
         raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
     t_start = start_time(quantity(t_start, "time", "t_start"), initial)
@@ -270,7 +279,9 @@ def simulate(
     problem.advice = {**ADVICE, **(advice or {})}
     held, lumping = locking_remark(mechanism, system), lumping if asked else ""
     remark = " ".join(text for text in (held, lumping) if text)
-    stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
+    watched = Watch(system, problem, members, watch) if watch and INTEGRATORS[name].can("consumer") else None
+    problem = problem if watched is None else watched.problem
+    stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members, watched)
     if stream is not None:
         stream.whole.inside = just_inside(t_eval)
     warn_of_stiff_seats(mechanism.joints, mechanism.elements)
@@ -441,6 +452,7 @@ SETTINGS = (
     "rate_scale",
     "progress",
     "consumer",
+    "watch",
     "lump",
     "stops",
     "continued",

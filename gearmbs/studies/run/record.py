@@ -31,6 +31,13 @@ SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"
 COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
 """Contact quantities of a record, with units; numbers of tooth pairs cannot be interpolated."""
 
+WATCHED = (
+    *(("reaction_force", seat) for seat in rig.SEATS),
+    *(("orientation", gear) for gear in rig.GEARS),
+    ("diagnostics", rig.MESH),
+)
+"""What a record takes from the integrator's own steps."""
+
 TURN_BEFORE = 0.02
 """Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
 

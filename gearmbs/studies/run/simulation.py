@@ -21,6 +21,7 @@ from gearmbs.studies.run import rig
 from gearmbs.studies.run.periodic import PeriodicRecorder, reach, signal_stop
 from gearmbs.studies.run.record import (
     VARIABLES,
+    WATCHED,
     Measured,
     Recorder,
     attributes_of,
@@ -243,7 +244,7 @@ def run_case(
     _load_kernels(case.solver.integrator, case.lump)
     periodic = PeriodicRecorder(case, mechanism is None) if case.is_auto else None
     recorder = Recorder(case) if periodic is None else periodic.recorder
-    options: dict[str, Any] = {"every_step": True, "consumer": recorder.take}
+    options: dict[str, Any] = {"every_step": True, "consumer": recorder.take, "watch": WATCHED}
     if periodic is not None and INTEGRATORS[case.solver.integrator].can("pause"):
         options["pause"] = periodic.pause
     solution = simulate_case(case, progress, mechanism=mechanism, **options)

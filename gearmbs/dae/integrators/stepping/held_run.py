@@ -67,7 +67,7 @@ class LastRecords:
             return LastStep(st.window_t[first : first + count].copy(), rows, st.y.copy(), st.yp.copy(), self.table)
         p = int(np.flatnonzero(st.record_order[: st.n_records])[-1])
         points = slice(p - int(st.record_order[p]), p + 1)
-        nodes, rows = st.record_t[points][::-1].copy(), st.record_y[points][::-1].copy()
+        nodes, rows = st.record_t[points][::-1].copy(), st.record_y[points, :n][::-1].copy()
         return LastStep(nodes, rows, rows[0].copy(), st.yp.copy(), self.before)
 
 

@@ -36,6 +36,7 @@ OWN = {
     "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one", "entry_row", "entry_col", "idata",
     "rdata", "stops", "outputs", "y_out", "yp_out", "kept", "kept_out", "record_t", "record_h", "record_order",
     "record_y", "g_new", "g_between", "event_direction", "event_action", "crossing_t", "crossing_event", "crossing_y",
+    "watched",
 }  # fmt: skip
 """Arrays of a run that are its own, or scratch, or follow from the state."""
 ARRAYS = tuple(name for name in RunState.array_members if name not in OWN)
@@ -224,7 +225,7 @@ def record_window(st: RunState) -> None:
     for row in range(first + min(st.n_past, HISTORY - 1) - 1, first - 1, -1):
         p = st.n_records
         st.record_t[p], st.record_h[p], st.record_order[p] = st.window_t[row], 0.0, 0
-        st.record_y[p] = st.window_y[row * n : (row + 1) * n]
+        st.record_y[p, :n] = st.window_y[row * n : (row + 1) * n]
         st.n_records = p + 1
 
 

@@ -1,0 +1,302 @@
+"""Forces, orientations and diagnostics at the integrator's own steps, from what the steps have left of them.
+
+Accelerations and reactions of an output are else found by solving the index-1 system there, with all loads evaluated
+once more, which takes longer than the step itself. But multipliers are unknowns in SI2, and the last evaluation of the
+residual has left what force elements tell in the scratch array. Where bodies turn about fixed axes the loads are no
+unknowns; there the last evaluation, at y_m, and the Jacobian of the corrector give them as a Newton step would,
+
+    F = F(y_m) + dF/dy (y - y_m),
+
+and a fixed joint transmits what moves the bodies beyond it, sum m (a - g), less the loads on them. All of this is off
+by what the corrector leaves, a part of the tolerance; diagnostics, those at y_m, by what the last correction was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.constraints import terms
+from gearmbs.dae.equations.loads.forces import DIAGNOSTICS
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, matrix_of
+from gearmbs.dae.equations.unknowns import SI2
+from gearmbs.dae.problem import DAEProblem, ModelError
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.system import System
+
+MOST = 64
+"""Numbers watched at most, half a kilobyte a step: copying more would cost what it saves."""
+
+BALANCED = 1e-12
+"""Distance of a centre of mass from its axis, m, that is rounding: at 1000 rad/s it moves a kilogram by 1e-6 N."""
+
+MOMENTS_ONLY = (terms.DOT1, terms.ROTATION, terms.ANGLE)
+"""Terms of constraints that exert no force."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Some accepted steps: unknowns, (m, n), the watched numbers, (m, w), and the integer table valid there."""
+
+    y: np.ndarray
+    left: np.ndarray
+    idata: np.ndarray
+
+
+Reader = Callable[[Steps], Any]
+
+
+class Watch:
+    """What is read of a run's own steps, by method and name.
+
+    Parameters
+    ----------
+    system : System
+    problem : DAEProblem
+    members : Members or None
+        Of bodies that are integrated as one.
+    wanted : iterable of (str, str)
+        Methods of a solution, and the names that they are to be called with. What cannot be read is left out.
+
+    Attributes
+    ----------
+    problem : DAEProblem
+        The problem to integrate: with the places that are watched.
+    readers : mapping
+        Of (method, name) to what returns the method's result from `Steps`.
+
+    Raises
+    ------
+    ModelError
+        For a method that cannot be watched.
+    """
+
+    def __init__(
+        self, system: System, problem: DAEProblem, members: Members | None, wanted: Iterable[tuple[str, str]]
+    ) -> None:
+        self.system, self.members = system, members
+        self.places: list[int] = []
+        self.idata, self.rdata = problem.idata.copy(), problem.rdata
+        self.turns = members is not None and len(members.turn) > 0
+        size = problem.work_size
+        if self.turns:
+            self.idata[-1] = size
+            size += problem.n * (1 + 6 * int(self.idata[T.H_FORCES]))
+        self.n = problem.n
+        self.readers: dict[tuple[str, str], Reader] = {}
+        kinds = {
+            "reaction_force": self._reaction_force,
+            "orientation": self._orientation,
+            "diagnostics": self._diagnostics,
+        }
+        known = problem.index_one is None or not problem.index_one.any()
+        for method, name in wanted if known else ():
+            if method not in kinds:
+                raise ModelError(f"watch: {method!r} cannot be watched; give one of {', '.join(kinds)}")
+            reader = kinds[method](name)
+            if reader is not None:
+                self.readers[method, name] = reader
+        if len(self.places) > MOST:
+            self.readers, self.places = {}, []
+        watched = np.array(self.places, dtype=np.int64)
+        self.problem = problem
+        if self.places:
+            self.problem = replace(problem, idata=self.idata, work_size=size, watched=watched)
+
+    def read(self, steps: Steps) -> Mapping[tuple[str, str], Callable[[], Any]]:
+        """Return what returns the results of the methods at some steps."""
+        return {key: partial(reader, steps) for key, reader in self.readers.items()}
+
+    def _columns(self, places: Iterable[int]) -> slice:
+        """Watch some places; return their columns."""
+        first = len(self.places)
+        self.places += [int(place) for place in places]
+        return slice(first, len(self.places))
+
+    # --- diagnostics ----------------------------------------------------------------------------------
+
+    def _diagnostics(self, name: str) -> Reader | None:
+        """Return a reader of what a compiled element tells in each evaluation."""
+        model = self.system.model
+        if name not in model.names.forces:
+            return None
+        number = model.names.forces.index(name)
+        told, row = model.diagnostics[number], T.forces_in(self.idata)[number]
+        if not told or row[T.FORCE_KIND] != T.COMPILED:
+            return None
+        row[T.FORCE_WANT] = DIAGNOSTICS
+        first = self._work_of(row) + 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
+        columns = self._columns(range(first, first + len(told)))
+        return lambda steps: dict(zip((d.name for d in told), steps.left[:, columns].T, strict=True))
+
+    def _work_of(self, row: np.ndarray) -> int:
+        """Return where in the work array an element's wrenches begin."""
+        return int(self.idata[T.H_W_SCRATCH] + row[T.FORCE_WORK])
+
+    # --- orientations ---------------------------------------------------------------------------------
+
+    def _orientation(self, name: str) -> Reader | None:
+        """Return a reader of a body's rotation matrices."""
+        if name not in self.system.model.names.bodies:
+            return None
+        number = self.system.model.names.bodies.index(name)
+        if self.turns:
+            return self._orientation_about_axis(number)
+        if self.members is not None:
+            return None
+        row = T.rows_in(self.idata, int(self.idata[T.H_I_AT]), int(self.idata[T.H_BODIES]), T.AT_COLUMNS)[number + 1]
+        if row[T.AT_ANGLES] != 3:
+            return None
+        first, place = int(row[T.AT_THETA]), int(self.idata[T.H_I_CODE]) + number + 1
+
+        def reader(steps: Steps) -> np.ndarray:
+            angles = steps.y[:, first : first + 3].T
+            found = np.empty((9, len(steps.y)))
+            turns = zip(np.cos(angles), np.sin(angles), strict=True)
+            matrix_of.py_func(*turns, steps.idata[place], found, 0)
+            return found.T.reshape(-1, 3, 3)
+
+        return reader
+
+    def _orientation_about_axis(self, number: int) -> Reader | None:
+        """Return the same for a member of a group that turns about a fixed axis: A = a + b cos(phi) + c sin(phi)."""
+        from gearmbs.dae.equations import fixed_axes as fx
+        from gearmbs.dae.model.fixed_axes import axes_of
+        from gearmbs.dae.model.members import PLACE_A, PLACE_MASS
+
+        members = self.members
+        assert members is not None
+        group = int(members.group[number])
+        if group == 0:
+            return None
+        axis, turn = (table[group - 1] for table in axes_of(self.idata, self.rdata))
+        place = members.place[number, PLACE_A:PLACE_MASS].reshape(3, 3)
+        a, b, c = (part.reshape(3, 3) @ place for part in turn[fx.TURN_MATRIX : fx.TURN_MATRIX + 27].reshape(3, 9))
+        if axis[fx.AXIS_PHI] >= 0:
+            column, shift, sense = int(axis[fx.AXIS_PHI]), 0.0, 1.0
+        else:
+            value = int(self.idata[T.H_W_FUNCTION]) + T.FUNCTION_VALUES * int(axis[fx.AXIS_FUNCTION])
+            column = self.n + self._columns([value]).start
+            shift, sense = float(turn[fx.TURN_START]), float(turn[fx.TURN_SENSE])
+
+        def reader(steps: Steps) -> np.ndarray:
+            phi = steps.y[:, column] if column < self.n else steps.left[:, column - self.n]
+            phi = sense * (phi - shift)
+            cosine, sine = np.cos(phi)[:, None], np.sin(phi)[:, None]
+            return (a.ravel() + b.ravel() * cosine + c.ravel() * sine).reshape(-1, 3, 3)
+
+        return reader
+
+    # --- forces of joints -----------------------------------------------------------------------------
+
+    def _reaction_force(self, joint: str) -> Reader | None:
+        """Return a reader of the force of a joint on I's body."""
+        rows = self.system.model.rows_of_joint.get(joint)
+        if rows is None or self.turns:
+            return None if rows is None else self._force_inside(rows)
+        if self.members is not None or self.idata[T.H_FORMULATION] != SI2:
+            return None
+        table = T.rows_in(self.idata, int(self.idata[T.H_I_ROW]), int(self.idata[T.H_ROWS]) + 1, T.ROW_COLUMNS)
+        term = T.rows_in(self.idata, int(self.idata[T.H_I_TERM]), int(self.idata[T.H_TERMS]), T.TERM_COLUMNS)
+        coefficients = self.rdata[int(self.idata[T.H_R_COEF]) :]
+        parts = []
+        for r in rows:
+            for k in range(table[r, T.ROW_FIRST], table[r + 1, T.ROW_FIRST]):
+                kind, i = term[k, T.TERM_TYPE], term[k, T.TERM_I]
+                if kind in MOMENTS_ONLY and i == term[table[r, T.ROW_FIRST], T.TERM_I]:
+                    continue
+                if kind != terms.POINT or i != term[table[r, T.ROW_FIRST], T.TERM_I]:
+                    return None
+                parts.append((int(term[k, T.TERM_AXES]), int(self.idata[T.H_LAMBDA]) + r, -float(coefficients[k])))
+            if table[r, T.ROW_TAPE] >= 0:
+                return None
+
+        def reader(steps: Steps) -> np.ndarray:
+            force = np.zeros((len(steps.y), 3))
+            for axis, column, factor in parts:
+                force[:, axis] += factor * steps.y[:, column]
+            return force
+
+        return reader
+
+    def _force_inside(self, rows: list[int]) -> Reader | None:
+        """Return the same for a fixed joint inside a group that turns about a fixed axis."""
+        from gearmbs.dae.model import members as mb
+
+        members = self.members
+        assert members is not None
+        edge = next((e for e in members.edge if e[mb.EDGE_ROWS] == rows[0]), None)
+        if edge is None or len(rows) != 6:
+            return None
+        beyond = {int(edge[mb.EDGE_CHILD])}
+        for other in members.edge[::-1]:
+            if other[mb.EDGE_PARENT] in beyond:
+                beyond.add(int(other[mb.EDGE_CHILD]))
+        side = 1.0 if edge[mb.EDGE_CHILD_HAS_I] == 1 else -1.0
+        group = int(members.group[edge[mb.EDGE_CHILD]])
+        if group > 0 and {int(members.of_marker[m]) for m in members.turn[group - 1, [mb.TURN_I, mb.TURN_J]]} & beyond:
+            # the joint that the group turns in exerts what is not known yet: the same from the other side
+            beyond, side = set(np.flatnonzero(members.group == group).tolist()) - beyond, -side
+        loads = self._loads_on(beyond)
+        if loads is None or not self._are_balanced(beyond):
+            return None
+        weight = -sum(members.place[m, mb.PLACE_MASS] for m in beyond) * self.system.model.gravity
+
+        def reader(steps: Steps) -> np.ndarray:
+            force = np.tile(weight, (len(steps.y), 1))
+            for sign, wrench, slopes, seen in loads:
+                moved, by_unknown = steps.y - steps.left[:, seen], steps.left[:, slopes]
+                force -= sign * steps.left[:, wrench]
+                for i in range(self.n):
+                    force -= sign * by_unknown[:, i :: self.n] * moved[:, i : i + 1]
+            return side * force
+
+        return reader
+
+    def _are_balanced(self, beyond: set[int]) -> bool:
+        """Whether the centre of mass of some members is on their axis, so that no turn moves it."""
+        from gearmbs.dae.equations import fixed_axes as fx
+        from gearmbs.dae.model.fixed_axes import axes_of
+        from gearmbs.dae.model.members import PLACE_MASS
+
+        members, pose = self.members, self.system.pose
+        assert members is not None
+        inside = sorted(beyond)
+        group = int(members.group[inside[0]])
+        if group == 0:
+            return True
+        turn = axes_of(self.idata, self.rdata)[1][group - 1]
+        masses = members.place[inside, PLACE_MASS]
+        arm = masses @ (pose[inside, POSE_R:POSE_A] - turn[fx.TURN_POINT : fx.TURN_POINT + 3])
+        off = np.linalg.norm(np.cross(turn[fx.TURN_AXIS : fx.TURN_AXIS + 3], arm))
+        return bool(off <= BALANCED * masses.sum())
+
+    def _loads_on(self, beyond: set[int]) -> list[tuple[float, slice, slice, slice]] | None:
+        """Return the elements whose forces act on some members: sign; columns of force, slopes and unknowns at y_m."""
+        members, kept, n = self.members, int(self.idata[-1]), self.n
+        assert members is not None
+        found = []
+        for f, row in enumerate(T.forces_in(self.idata)):
+            on = [int(members.of_marker[row[column]]) in beyond for column in (T.FORCE_I, T.FORCE_J)]
+            sign = float(on[0]) - float(on[1])
+            if sign == 0.0 or row[T.FORCE_F] < 0:
+                continue
+            if row[T.FORCE_KIND] != T.COMPILED:
+                return None
+            wrench, slopes = self._work_of(row) + 6 * int(row[T.FORCE_PART]), kept + n + 6 * n * f
+            found.append(
+                (
+                    sign,
+                    self._columns(range(wrench, wrench + 3)),
+                    self._columns(range(slopes, slopes + 3 * n)),
+                    self._columns(range(kept, kept + n)),
+                )
+            )
+        return found
