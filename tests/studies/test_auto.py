@@ -57,7 +57,9 @@ def test_harmonics_are_those_of_a_long_precise_record_or_it_is_told_that_they_ar
     )
     found, wanted = (one["gmf_rms"].sel(way="orders").values for one in (record, exact))
     levels = np.maximum(wanted, 0.01 * wanted.max(axis=0))
-    assert np.abs((found - wanted) / levels).max() < 5e-3, case.name
+    if np.abs((found - wanted) / levels).max() > 5e-3:
+        # wheels that leave each other have several motions, and a tolerance of 1e-8, 1e-9 or 1e-10 decides which
+        assert "other motions may exist" in record.attrs["record_length"], case.name
 
 
 @pytest.mark.slow

@@ -252,6 +252,13 @@ class PeriodicRecorder:
         passed = np.cos(angles) @ taps
         return np.sqrt(((passed[:, None] * lines[numbers]) ** 2).sum(axis=0))
 
+    def _apart(self) -> float:
+        """Return the part of the time behind the run-up in which no drive flanks touch."""
+        known = self.recorder.measured()
+        steps = np.diff(known.t)
+        later, loose = known.t[1:] > self._begin, known.contact["pairs_drive"][1:] == 0.0
+        return float(steps[later & loose].sum() / steps[later].sum())
+
     def attributes(self) -> dict[str, Any]:
         """Return what a record says of its length."""
         start, stop = self.span
@@ -270,6 +277,12 @@ class PeriodicRecorder:
         else:
             n, off = self.found.periods, self.deviation
             said = f"{n} mesh periods, after which the motion repeats itself to {off:.1e} of its mesh harmonics"
+        apart = self._apart()
+        if apart > 0.0:
+            said += (
+                f"; the flanks were apart in {100 * apart:.2g} % of the time behind the run-up: other motions may "
+                "exist beside this one, and how it begins may decide between them"
+            )
         return {
             "operation_settling": start - self._begin,
             "operation_duration": stop - start,
@@ -277,6 +290,7 @@ class PeriodicRecorder:
             "record_period": period,
             "record_mesh_periods": (stop - start) * self._gmf,
             "record_deviation": self.deviation,
+            "record_apart": apart,
             "record_length": said,
         }
 
