@@ -11,7 +11,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 # the interpreter looks for cycles among all modules once more while it ends, which takes as long as importing them
@@ -108,3 +108,34 @@ def former_name(old: str, method: Callable[..., Any], remedy: str) -> Callable[.
 
     call.__name__, call.__doc__ = old, f"Deprecated: {remedy}."
     return call
+
+
+ASKED_FOR = ("dask", "pint", "cupy", "sparse", "cubed")
+"""Libraries of arrays by which xarray tells them apart."""
+
+
+@functools.cache
+def spare_duck_arrays() -> None:
+    """Let xarray look for arrays of a library only once that has been imported.
+
+    To ask whether an array is one of dask's or pint's, it imports them where they are installed: a fifth of what a
+    fresh process spends on a pair. An array of theirs can only be there once they have been imported. An xarray that
+    looks for them in another way stays as it is.
+    """
+    from packaging.version import Version
+    from xarray.namedarray import pycompat, utils
+
+    look_up: Any = getattr(pycompat, "_get_cached_duck_array_module", None)
+    is_of_dask: Any = getattr(utils, "is_dask_collection", None)
+    if look_up is None or is_of_dask is None:
+        return
+    nothing = SimpleNamespace(module=None, version=Version("0.0.0"), type=(), available=False)
+
+    def known(name: str) -> Any:
+        return nothing if name in ASKED_FOR and name not in sys.modules else look_up(name)
+
+    def is_dask_collection(x: object) -> bool:
+        return "dask" in sys.modules and is_of_dask(x)
+
+    vars(pycompat)["_get_cached_duck_array_module"] = known
+    vars(utils)["is_dask_collection"] = is_dask_collection

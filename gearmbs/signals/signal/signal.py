@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gearmbs._lazy import spare_duck_arrays
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.wording import did_you_mean
 
@@ -96,6 +97,8 @@ def make_signal(
     (('time', 'channel'), 'm/s', 483.3)
     """
     import xarray as xr
+
+    spare_duck_arrays()
 
     values, channels = _columns(data, channels)
     names = [f"ch{i + 1}" for i in range(values.shape[1])] if channels is None else [str(c) for c in channels]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import gearmbs
+from gearmbs._lazy import spare_duck_arrays
 from gearmbs.dae.results.solution import Solution
 from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, gmf_rms, make_signal, trim
 from gearmbs.signals.analysis.bands import order_rms
@@ -250,6 +251,8 @@ def evaluate(
         RMS of the mesh harmonics by band and by orders, if they are known; default from the acceleration.
     """
     import xarray as xr
+
+    spare_duck_arrays()
 
     level = LEVELS[0 if case.operation.speed_curve is None else 1]
     wanted = set(VARIABLES if variables is None else variables) - (set(LEVELS) - {level})

@@ -114,7 +114,7 @@ def test_counts_and_voltages_are_read_as_pulses(tmp_path):
     counts.to_csv(tmp_path / "counts.csv", index=False)
     found = read_pulses(tmp_path / "counts.csv", 32, clock="20 MHz")["A"]
     assert np.allclose(found.times, train.times, atol=5e-8)
-    with pytest.raises(MissingMetadataError, match=says("clock")):
+    with pytest.raises(MissingMetadataError, match=says("clock", "MHz")):
         read_pulses(tmp_path / "counts.csv", 32)
     with pytest.raises(MissingMetadataError, match=says("lines", "A")):
         read_pulses(tmp_path / "counts.csv", clock="20 MHz")
