@@ -72,13 +72,24 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
         )
     else:
         deck.title = first.strip().lstrip("!").strip()
-    ended = False
-    for raw in statements(text, skip=0 if untitled else 1):
-        if _take(deck, raw, errors):
-            ended = True
-            break
-    if not ended:
-        deck.diagnostics.append(Diagnostic(WARNING, "END is missing; the deck may have been cut off", file, 0))
+    return _read_all(deck, statements(text, skip=0 if untitled else 1), errors)
+
+
+def deck_of(raws: Iterable[RawStatement], title: str, file: str) -> Deck:
+    """Return the deck of statements that another reader has made; see `parse_deck`."""
+    end = RawStatement("END", (0,), (0,))
+    return _read_all(Deck(title=title, file=file), (*raws, end), [])
+
+
+def _read_all(deck: Deck, raws: Iterable[RawStatement], errors: list[Diagnostic]) -> Deck:
+    """Read statements into a deck, and check it.
+
+    Raises
+    ------
+    DeckError
+    """
+    if not any(_take(deck, raw, errors) for raw in raws):
+        deck.diagnostics.append(Diagnostic(WARNING, "END is missing; the deck may have been cut off", deck.file, 0))
     _read_named(deck, errors)
     if not errors:
         errors += check(deck)

@@ -1,0 +1,130 @@
+"""Instances of View's own definitions: springs and motions by their variables; controllers' lists; others are named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from gearmbs.adams.view.lexer import ViewError
+from gearmbs.adams.view.model import Item
+from gearmbs.adams.view.runtime import translated
+from gearmbs.adams.write.text import number
+
+if TYPE_CHECKING:
+    from gearmbs.adams.view.statements import Deckmaker
+
+
+def _variable(m: Deckmaker, item: Item, name: str, default: Any = None) -> Any:
+    found = m.db.items.get(f"{item.path}.{name}".lower())
+    return default if found is None else m.values.variable(found)
+
+
+def _pair(m: Deckmaker, item: Item) -> tuple[Item, Item]:
+    found = [_variable(m, item, f"{side}_marker") for side in "ij"]
+    for one in found:
+        if not isinstance(one, Item) or one.kind != "marker":
+            raise ViewError("i_marker and j_marker are missing")
+    return found[0], found[1]
+
+
+def _coefficient(m: Deckmaker, item: Item, what: str) -> float:
+    mode = str(_variable(m, item, f"{what}_mode", "linear")).lower()
+    if mode == "none":
+        return 0.0
+    if mode != "linear":
+        raise ViewError(f"{what}_mode = {mode}; give linear, or a single component force with a spline")
+    value = _variable(m, item, f"{what}_coefficient", 0.0)
+    if not isinstance(value, (int, float)):
+        raise ViewError(f"{what}_coefficient is no number")
+    return float(value)
+
+
+def _spring(turning: bool) -> Callable[[Deckmaker, Item], None]:
+    """Return what makes a SPRINGDAMPER of a translational or a torsion spring."""
+
+    def make(m: Deckmaker, item: Item) -> None:
+        i, j = _pair(m, item)
+        stiffness, damping = _coefficient(m, item, "stiffness"), _coefficient(m, item, "damping")
+        what = "angle" if turning else "length"
+        free = float(_variable(m, item, f"free_{what}", 0.0))
+        if str(_variable(m, item, f"free_{what}_mode", f"design_{what}")).lower().startswith("design"):
+            call = m.values.evaluate(("call", "AZ" if turning else "DM", (("value", i), ("value", j))))
+            free = float(call)
+        preload = float(_variable(m, item, "preload", 0.0))
+        names, per = (("KT", "CT", "ANGLE", "TORQUE"), m.radian) if turning else (("K", "C", "LENGTH", "FORCE"), 1.0)
+        m.add(
+            item,
+            f"SPRINGDAMPER/{m.fresh('SPRINGDAMPER')}",
+            f"I = {m.id(i)}",
+            f"J = {m.id(j)}",
+            "ROTATIONAL" if turning else "TRANSLATIONAL",
+            f"{names[0]} = {number(stiffness / per)}",
+            f"{names[1]} = {number(damping / per)}",
+            f"{names[2]} = {number(free * per)}",
+            f"{names[3]} = {number(preload)}",
+        )
+
+    return make
+
+
+LEVELS = {1: "DISPLACEMENT", 2: "VELOCITY", 3: "ACCELERATION"}
+DIRECTIONS = {"t1": "X", "t2": "Y", "t3": "Z", "r1": "B1", "r2": "B2", "r3": "B3"}
+
+
+def _general_motion(m: Deckmaker, item: Item) -> None:
+    """MOTION for each component that is not free."""
+    i, j = _pair(m, item)
+    for name, direction in DIRECTIONS.items():
+        kind = int(_variable(m, item, f"{name}_type", 0))
+        if kind == 0:
+            continue
+        if kind not in LEVELS:
+            raise ViewError(f"{name}_type = {kind}; 0 is free, 1 to 3 are displacement, velocity and acceleration")
+        text = str(_variable(m, item, f"{name}_func", "0 * time"))
+        scale = m.radian if name.startswith("r") else 1.0
+        start = [
+            f"{keyword} = {number(float(_variable(m, item, f'{name}_{key}', 0.0)) * scale)}"
+            for least, key, keyword in ((2, "ic_disp", "ICDISP"), (3, "ic_velo", "ICVEL"))
+            if kind >= least
+        ]
+        m.add(
+            item,
+            f"MOTION/{m.fresh('MOTION')}",
+            f"I = {m.id(i)}",
+            f"J = {m.id(j)}",
+            direction,
+            LEVELS[kind],
+            *start,
+            f"FUNCTION = {translated(m, text, item.line)}",
+        )
+
+
+def _nothing(m: Deckmaker, item: Item) -> None:
+    """Lists of inputs and outputs for a control program: the deck has them as PINPUT and POUTPUT."""
+
+
+DEFINITIONS: dict[str, Callable[[Deckmaker, Item], None]] = {
+    "forces.spring": _spring(turning=False),
+    "forces.torsion_spring": _spring(turning=True),
+    "constraints.general_motion": _general_motion,
+    "controls.controls_plant": _nothing,
+}
+"""By the last two parts of a definition's name."""
+
+
+def make_instance(m: Deckmaker, item: Item) -> None:
+    """What an instance stands for.
+
+    Raises
+    ------
+    ViewError
+        If its definition is not known.
+    """
+    name = m.values.text(item, "definition_name") or ""
+    make = DEFINITIONS.get(".".join(name.lower().split(".")[-2:]))
+    if make is None:
+        raise ViewError(f"instances of {name[:60]} are not modelled; write what it stands for: joints, forces, variables")
+    make(m, item)
+
+
+MAKERS = {"ude": make_instance}

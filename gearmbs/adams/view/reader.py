@@ -1,0 +1,262 @@
+"""Read a command file of View: ``read_view``, ``parse_view``; what of it becomes a deck, its simulations and variables."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError, Diagnostic
+from gearmbs.adams.parse.commands import Script, parse_script
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.reader import deck_of, read_file
+from gearmbs.adams.view import data, forces, instances, measures, statements
+from gearmbs.adams.view.expressions import text_of
+from gearmbs.adams.view.interpreter import Interpreter
+from gearmbs.adams.view.lexer import ViewError
+from gearmbs.adams.view.model import Item
+from gearmbs.adams.view.statements import Deckmaker, Made
+from gearmbs.adams.write.text import number
+
+SIGNS = re.compile(
+    r"^\s*(?:model\s+cre\w*\b|part\s+(?:cre|mod)\w*\s+\w+|marker\s+cre\w*\b|defaults\s+(?:units|model|coord)\w*|"
+    r"constraint\s+cre\w*\s+\w+|force\s+cre\w*\s+\w+|geometry\s+cre\w*\s+\w+|variable\s+(?:set|create)\b)",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""How command files of View begin lines; no statement of a deck does."""
+
+
+def is_view(text: str) -> bool:
+    """Return whether a text is a command file of View, not a deck."""
+    return SIGNS.search(text) is not None and not re.search(r"^\s*(?:PART|MARKER|UNITS)/", text, re.MULTILINE)
+
+
+@dataclass
+class ViewModel:
+    """What a command file holds.
+
+    Attributes
+    ----------
+    deck : Deck
+        Its model, as the statements of a deck.
+    text : str
+        These statements as they are written into an .adm file.
+    scripts : dict of str to Script
+        Its simulations by name, those that it runs itself under the numbers of their lines.
+    variables : dict of str to float
+        Its design variables with one number each: what ``variables`` of `read_view` may change.
+    name : str
+    """
+
+    deck: Deck
+    text: str
+    scripts: dict[str, Script] = field(default_factory=dict)
+    variables: dict[str, float] = field(default_factory=dict)
+    name: str = ""
+
+    @property
+    def script(self) -> Script | None:
+        """The simulation to run when none is named: the last that the file runs itself, else the last that it holds."""
+        return next(reversed(self.scripts.values()), None)
+
+
+def read_view(
+    path: str | Path, variables: Mapping[str, float] | None = None, model: str | None = None
+) -> ViewModel:
+    """Read a command file of View (.cmd).
+
+    Parameters
+    ----------
+    path : str or Path
+    variables : mapping of str to float, optional
+        Values of design variables instead of those in the file, by full names or their ends.
+    model : str, optional
+        Which model becomes the deck, where the file makes several; default: the last with a part.
+
+    Returns
+    -------
+    ViewModel
+
+    Raises
+    ------
+    DeckError
+        Naming file and line of everything that cannot be carried out.
+    """
+    path = Path(path)
+    return parse_view(read_file(path), str(path), variables, model, path.parent)
+
+
+def parse_view(
+    text: str,
+    file: str = "<commands>",
+    variables: Mapping[str, float] | None = None,
+    model: str | None = None,
+    folder: Path | None = None,
+) -> ViewModel:
+    """Carry out the commands of a text, as `read_view` does those of a file.
+
+    Parameters
+    ----------
+    text, file : str
+    variables, model
+        As in `read_view`.
+    folder : Path, optional
+        Where files that are named may be; without it none is read.
+
+    Raises
+    ------
+    DeckError
+    """
+    run = Interpreter(folder, variables)
+    run.run(text)
+    errors = [Diagnostic(ERROR, str(error), file, max(error.line, 0)) for error in run.errors]
+    missing = [name for name in run.overrides if name not in run.overridden]
+    if missing and not errors:
+        errors += [Diagnostic(ERROR, f"there is no variable {name}", file, 0) for name in missing]
+    chosen = _chosen(run, model)
+    if chosen is None and not errors:
+        errors.append(Diagnostic(ERROR, "no model is created; write 'model create model_name = ...'", file, 0))
+    if errors:
+        raise DeckError(errors)
+    assert chosen is not None
+    maker = _made(run, chosen, file)
+    made = maker.statements
+    title = f"ADAMS/View model name: {chosen.name}"
+    deck = deck_of([one.raw() for one in made], title, file)
+    deck.diagnostics += maker.problems
+    if run.ignored:
+        what = ", ".join(f"{word} {len(lines)}" for word, lines in sorted(run.ignored.items()))
+        first = min(min(lines) for lines in run.ignored.values())
+        deck.diagnostics.append(Diagnostic(IGNORED, f"commands without effect on the motion: {what}", file, first))
+    lines = [title, "!", *(line for one in made for line in one.lines()), "END"]
+    values = {}
+    for item in run.database.of("variable"):
+        value = run.values.variable(item) if item.line and "real_value" in item.fields else None
+        if isinstance(value, (int, float)):
+            values[item.path] = float(value)
+    return ViewModel(deck, "\n".join(lines) + "\n", _scripts(run, chosen, file), values, chosen.name)
+
+
+def _chosen(run: Interpreter, name: str | None) -> Item | None:
+    models = run.database.of("model")
+    if name is not None:
+        return next((one for one in models if one.name.lower() == name.lower().lstrip(".")), None)
+    full = [one for one in models if sum(child.kind in statements.PART_KEYWORDS for child in one.children.values()) > 1]
+    return (full or models or [None])[-1]
+
+
+def _made(run: Interpreter, model: Item, file: str) -> Deckmaker:
+    """Return a model's statements, and what is left out with all that needs it."""
+    failed: frozenset[int] = frozenset()
+    while True:
+        maker = Deckmaker(run.values, model, file, failed)
+        _statements(maker)
+        if maker.failed <= failed:
+            return maker
+        failed |= maker.failed
+
+
+def _statements(maker: Deckmaker) -> None:
+    """Make all statements of a model, in the order of a deck."""
+    names = maker.db.units.names
+    units = tuple(f"{quantity.upper()} = {names[quantity]}" for quantity in ("force", "mass", "length", "time"))
+    maker.statements.append(Made("UNITS/", units, "", maker.model.line))
+    makers = statements.MAKERS | forces.MAKERS | data.MAKERS | instances.MAKERS
+    maker.run(makers, statements.PART_KEYWORDS)
+    maker.run(makers, ("marker", "floating_marker"))
+    maker.run(makers, [kind for kind in makers if kind not in (*statements.PART_KEYWORDS, "marker", "floating_marker")])
+    before = len(maker.problems)
+    maker.run(data.REQUESTS | measures.MAKERS, (*data.REQUESTS, *measures.MAKERS))
+    # results that are not made change nothing of the motion
+    for k in range(before, len(maker.problems)):
+        problem = maker.problems[k]
+        severity = WARNING if problem.severity == UNSUPPORTED else problem.severity
+        maker.problems[k] = Diagnostic(severity, f"{problem.message}; it is left out", problem.file, problem.line)
+
+
+# Simulations.
+
+
+def _scripts(run: Interpreter, model: Item, file: str) -> dict[str, Script]:
+    """Return the simulations of a model by name."""
+    found: dict[str, Script] = {}
+    for item in run.database.of("script"):
+        if run.database.model_of(item) is not model:
+            continue
+        try:
+            lines = _script_lines(run, item)
+        except ViewError as error:
+            raise DeckError([Diagnostic(ERROR, str(error), file, error.line or item.line)]) from error
+        if lines:
+            found[item.name] = _script(lines, file, item.line)
+    own: list[str] = []
+    for row, given, line in run.runs:
+        if row.words[-1] == "scripted":
+            name = text_of((given.get("sim_script_name") or [""])[0]).rsplit(".", 1)[-1]
+            held = next((key for key in found if key.lower() == name.lower()), None)
+            if held is not None:
+                found[held] = found.pop(held)
+            continue
+        own += _simulation(row.words[-1], {key: value[0] for key, value in given.items() if value}, line)
+    if own:
+        found["the file itself"] = _script(own, file, run.runs[-1][2])
+    return found
+
+
+def _script(lines: list[str], file: str, line: int) -> Script:
+    try:
+        return parse_script("\n".join(["model", "output", *lines]), file)
+    except DeckError as error:
+        raise DeckError([Diagnostic(d.severity, f"in the simulation: {d.message}", file, line) for d in error.diagnostics]) from error
+
+
+def _script_lines(run: Interpreter, item: Item) -> list[str]:
+    values = run.values
+    for key in ("solver_commands", "commands"):
+        if key not in item.fields:
+            continue
+        pieces = [text_of(one) for one in values.values(item, key)]
+        lines = [line for piece in pieces for line in piece.splitlines()]
+        if key == "solver_commands":
+            return [line for line in lines if line.strip() and not line.lstrip().startswith("!")]
+        found: list[str] = []
+        inner = Interpreter(None)
+        inner.database.model, inner.values = run.database.model, values
+        inner.database.items, inner.database.by_name = run.database.items, run.database.by_name
+        inner.run("\n".join(lines))
+        if inner.errors:
+            raise ViewError(f"in the simulation {item.path}: {inner.errors[0]}", item.line)
+        for row, arguments, line in inner.runs:
+            if row.words[-1] == "scripted":
+                other = run.database.find(text_of((arguments.get("sim_script_name") or [""])[0]), ("script",))
+                found += _script_lines(run, other) if other is not None and other is not item else []
+            found += _simulation(row.words[-1], {key: value[0] for key, value in arguments.items() if value}, line)
+        return found
+    given: dict[str, Any] = {key: values.values(item, key)[0] for key in item.fields if key != "adams_id"}
+    return _simulation("transient", given, item.line)
+
+
+def _simulation(kind: str, given: dict[str, Any], line: int) -> list[str]:
+    """Return a simulation as commands of the solver."""
+    if kind == "equilibrium":
+        return ["SIMULATE/STATICS"]
+    if kind == "assemble":
+        return ["SIMULATE/INITIAL_CONDITIONS"]
+    if kind == "eigensolution":
+        return ["LINEAR/EIGENSOL"]
+    if kind not in ("transient",) or not {"end_time", "duration"} & given.keys():
+        return []
+    word = text_of(given.get("type", "dynamic")).lower()
+    analysis = {"kinematic": "KINEMATICS", "static": "STATICS", "quasi_static": "STATICS"}.get(word, "DYNAMICS")
+    words = [f"SIMULATE/{analysis}"]
+    for key, keyword in (("end_time", "END"), ("duration", "DURATION"), ("number_of_steps", "STEPS"), ("step_size", "DTOUT")):
+        value = given.get(key)
+        if value is None:
+            continue
+        if not isinstance(value, (int, float)):
+            raise DeckError([Diagnostic(ERROR, f"{key} = {text_of(value)[:40]} is no number", "", line)])
+        words.append(f"{keyword}={number(int(value) if keyword == 'STEPS' else value)}")
+    first = ["SIMULATE/STATICS"] if text_of(given.get("initial_static", "no")).lower() in ("yes", "on", "true") else []
+    return [*first, ", ".join(words)]

@@ -1,0 +1,471 @@
+"""Mass, centre and inertia of a part from its geometry and density, where the file gives no mass.
+
+Every solid is the sum of integrals of 1, r and r r^T over it, which add up and move with frames; that of a part is
+the sum over its solids, whatever they share, as in View.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.adams.view import frames
+from gearmbs.adams.view.lexer import ViewError
+from gearmbs.adams.view.model import Item
+from gearmbs.adams.write.text import listed, number
+
+if TYPE_CHECKING:
+    from gearmbs.adams.view.statements import Deckmaker
+
+STANDARD = {
+    "steel": 7801.0, "stainless": 7750.0, "aluminum": 2740.0, "brass": 8545.0, "cast_iron": 7080.0, "copper": 8906.0,
+    "glass": 2595.0, "lead": 11370.0, "magnesium": 1795.0, "nickel": 7750.0, "titanium": 4850.0, "tungsten": 19222.0,
+    "wood": 438.0,
+}  # fmt: skip
+"""Densities in kg/m^3 of the materials that View's models begin with (table of standard materials of its manual)."""
+FLAT = frozenset("circle arc polyline plane graphic".split())
+"""Geometry without volume."""
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Integrals over a solid: volume, first moments, second moments."""
+
+    volume: float
+    first: np.ndarray
+    second: np.ndarray
+
+    def moved(self, a: np.ndarray, r: np.ndarray) -> Moments:
+        """Return those of the solid turned by a and then moved by r."""
+        first = a @ self.first
+        cross = np.outer(r, first)
+        second = a @ self.second @ a.T + cross + cross.T + self.volume * np.outer(r, r)
+        return Moments(self.volume, first + self.volume * r, second)
+
+    def __add__(self, other: Moments) -> Moments:
+        return Moments(self.volume + other.volume, self.first + other.first, self.second + other.second)
+
+
+def _prism(area: float, sx: float, sy: float, sxx: float, syy: float, sxy: float, low: float, high: float) -> Moments:
+    """Return the moments of a plane figure, by its own integrals, between two heights."""
+    z1, z2, z3 = high - low, (high**2 - low**2) / 2.0, (high**3 - low**3) / 3.0
+    if z1 < 0.0:
+        z1, z2, z3 = -z1, -z2, -z3
+    second = np.array([[sxx * z1, sxy * z1, sx * z2], [sxy * z1, syy * z1, sy * z2], [sx * z2, sy * z2, area * z3]])
+    return Moments(area * z1, np.array([sx * z1, sy * z1, area * z2]), second)
+
+
+def box(x: float, y: float, z: float) -> Moments:
+    """Return the moments of a box between the origin and a corner."""
+    a = np.array([x, y, z])
+    volume = abs(x * y * z)
+    second = volume * np.outer(a, a) / 4.0
+    second[np.diag_indices(3)] = volume * a**2 / 3.0
+    return Moments(volume, volume * a / 2.0, second)
+
+
+def ellipsoid(x: float, y: float, z: float) -> Moments:
+    """Return the moments of an ellipsoid with three semi-axes about the origin."""
+    volume = 4.0 / 3.0 * math.pi * abs(x * y * z)
+    return Moments(volume, np.zeros(3), volume * np.diag([x**2, y**2, z**2]) / 5.0)
+
+
+def sector(angle: float) -> tuple[float, float, float, float, float, float]:
+    """Return area, first and second moments of a sector of the unit circle that begins at x."""
+    s, c = math.sin(angle), math.cos(angle)
+    if abs(angle - 2.0 * math.pi) < 1e-12:
+        s, c = 0.0, 1.0
+    return (
+        angle / 2.0,
+        s / 3.0,
+        (1.0 - c) / 3.0,
+        (angle / 2.0 + s * c / 2.0) / 4.0,
+        (angle / 2.0 - s * c / 2.0) / 4.0,
+        s * s / 8.0,
+    )
+
+
+def frustum(length: float, bottom: float, top: float, angle: float) -> Moments:
+    """Return the moments of a frustum, or of a sector of one, along z from the origin.
+
+    Radii go linearly with z, so that the integrands are polynomials of fourth order, which three points of Gauss integrate exactly.
+    """
+    area, sx, sy, sxx, syy, sxy = sector(angle)
+    total = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+    for point, weight in zip(*np.polynomial.legendre.leggauss(3)):
+        share = (point + 1.0) / 2.0
+        z, r, w = share * length, bottom + share * (top - bottom), abs(length) * weight / 2.0
+        first = np.array([sx * r**3, sy * r**3, area * r**2 * z])
+        second = np.array(
+            [
+                [sxx * r**4, sxy * r**4, sx * r**3 * z],
+                [sxy * r**4, syy * r**4, sy * r**3 * z],
+                [sx * r**3 * z, sy * r**3 * z, area * r**2 * z**2],
+            ]
+        )
+        total += Moments(w * area * r**2, w * first, w * second)
+    return total
+
+
+def torus(major: float, minor: float, angle: float) -> Moments:
+    """Return the moments of a torus about z, or of a part of its turn from x."""
+    section = math.pi * minor**2
+    # integrals over the section of rho, rho^2, rho^3 and rho z^2
+    rho1, rho2 = section * major, section * (major**2 + minor**2 / 4.0)
+    rho3, z2 = section * (major**3 + 0.75 * major * minor**2), section * major * minor**2 / 4.0
+    return _turned(rho1, rho2, rho3, 0.0, 0.0, z2, angle)
+
+
+def _turned(rho1: float, rho2: float, rho3: float, rho1z: float, rho2z: float, rho1zz: float, angle: float) -> Moments:
+    """Return the moments of a section that turns about z by an angle from x, by its integrals of rho^a z^b."""
+    s, c = math.sin(angle), math.cos(angle)
+    if abs(angle - 2.0 * math.pi) < 1e-12:
+        s, c = 0.0, 1.0
+    cc, ss, cs = angle / 2.0 + s * c / 2.0, angle / 2.0 - s * c / 2.0, s * s / 2.0
+    first = np.array([rho2 * s, rho2 * (1.0 - c), rho1z * angle])
+    second = np.array(
+        [
+            [rho3 * cc, rho3 * cs, rho2z * s],
+            [rho3 * cs, rho3 * ss, rho2z * (1.0 - c)],
+            [rho2z * s, rho2z * (1.0 - c), rho1zz * angle],
+        ]
+    )
+    return Moments(rho1 * angle, first, second)
+
+
+def _triangles(points: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield the signed areas of the triangles between the origin and the edges of a polygon, with their corners."""
+    for p, q in zip(points, np.roll(points, -1, axis=0)):
+        yield 0.5 * (p[0] * q[1] - p[1] * q[0]), np.array([np.zeros(2), p, q])
+
+
+def polygon(points: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    """Return area, first and second moments of a polygon, counted positive."""
+    total = np.zeros(6)
+    for area, corners in _triangles(points):
+        mean = corners.mean(axis=0)
+        # the mid-points of a triangle's edges integrate squares exactly
+        mids = 0.5 * (corners + np.roll(corners, -1, axis=0))
+        xx, yy, xy = (mids[:, 0] ** 2).mean(), (mids[:, 1] ** 2).mean(), (mids[:, 0] * mids[:, 1]).mean()
+        total += area * np.array([1.0, mean[0], mean[1], xx, yy, xy])
+    area, sx, sy, sxx, syy, sxy = total if total[0] >= 0.0 else -total
+    return area, sx, sy, sxx, syy, sxy
+
+
+def revolution(points: np.ndarray, angle: float) -> Moments:
+    """Return the moments of a polygon in (rho, z), rho not negative, that turns about z."""
+    # a triangle's integrals of polynomials of third order, with seven points (Radon's rule)
+    a, b = (6.0 - math.sqrt(15.0)) / 21.0, (6.0 + math.sqrt(15.0)) / 21.0
+    wa, wb = (155.0 - math.sqrt(15.0)) / 1200.0, (155.0 + math.sqrt(15.0)) / 1200.0
+    rule = [((1 / 3, 1 / 3, 1 / 3), 0.225)]
+    for at, weight in ((a, wa), (b, wb)):
+        rule += [(tuple(np.roll((1.0 - 2.0 * at, at, at), k)), weight) for k in range(3)]
+    total = np.zeros(6)
+    for area, corners in _triangles(points):
+        for shares, weight in rule:
+            rho, z = np.array(shares) @ corners
+            total += area * weight * np.array([rho, rho**2, rho**3, rho * z, rho**2 * z, rho * z**2])
+    if total[0] < 0.0:
+        total = -total
+    return _turned(*(float(x) for x in total), angle)
+
+
+# The shapes of View.
+
+
+Shape = Callable[["Deckmaker", Item], tuple[Item, Moments]]
+
+
+def _need(m: Deckmaker, item: Item, key: str) -> float:
+    value = m.values.number(item, key)
+    if value is None:
+        raise ViewError(f"{item.path} has no {key}", item.line)
+    return value
+
+
+def _marker(m: Deckmaker, item: Item, key: str) -> Item:
+    found = m.values.ref(item, key, ("marker", "floating_marker"))
+    if found is None:
+        raise ViewError(f"{item.path} has no {key}", item.line)
+    return found
+
+
+def _angle(m: Deckmaker, item: Item) -> float:
+    given = m.values.number(item, "angle_extent")
+    return 2.0 * math.pi if given is None else given * m.radian
+
+
+def _block(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    size = m.values.numbers(item, "diag_corner_coords", 3)
+    if size is None:
+        raise ViewError(f"{item.path} has no diag_corner_coords", item.line)
+    return _marker(m, item, "corner_marker"), box(*size)
+
+
+def _radius(m: Deckmaker, item: Item) -> float:
+    other = m.values.ref(item, "ref_radius_by_marker", ("marker",))
+    if other is None:
+        return _need(m, item, "radius")
+    a, r = m.values.pose(_marker(m, item, "center_marker"))
+    seen = a.T @ (m.values.point(other) - r)
+    return math.hypot(seen[0], seen[1])
+
+
+def _cylinder(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    r = _radius(m, item)
+    return _marker(m, item, "center_marker"), frustum(_need(m, item, "length"), r, r, _angle(m, item))
+
+
+def _frustum(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    radii = _need(m, item, "bottom_radius"), _need(m, item, "top_radius")
+    return _marker(m, item, "center_marker"), frustum(_need(m, item, "length"), *radii, _angle(m, item))
+
+
+def _ellipsoid(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    # the scales are whole axes
+    axes = (_need(m, item, f"{c}_scale_factor") / 2.0 for c in "xyz")
+    return _marker(m, item, "center_marker"), ellipsoid(*axes)
+
+
+def _sphere(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    r = _need(m, item, "radius")
+    return _marker(m, item, "center_marker"), ellipsoid(r, r, r)
+
+
+def _torus(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    radii = _need(m, item, "major_radius"), _need(m, item, "minor_radius")
+    return _marker(m, item, "center_marker"), torus(*radii, _angle(m, item))
+
+
+def rounded(points: np.ndarray, radius: float, low: float, high: float) -> Moments:
+    """Return the moments of a plate: a convex polygon, or a line, widened by a radius all around."""
+    total = _prism(*polygon(points), low, high) if len(points) > 2 else Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+    if radius == 0.0:
+        return total
+    turn = 1.0 if len(points) < 3 or sum(area for area, _ in _triangles(points)) >= 0.0 else -1.0
+    count = len(points)
+    for k in range(count):
+        p, q, before = points[k], points[(k + 1) % count], points[k - 1]
+        edge, last = q - p, p - before
+        length = float(np.hypot(*edge))
+        if length < frames.SMALL or np.hypot(*last) < frames.SMALL:
+            raise ViewError("two corners of a plate or link are one")
+        x = edge / length
+        out = turn * np.array([x[1], -x[0]])
+        # a strip along the edge, then the sector at its first corner
+        a = np.eye(3)
+        a[:2, 0], a[:2, 1] = x, np.array([-x[1], x[0]])
+        strip = box(length, -turn * radius, 1.0)
+        strip = Moments(strip.volume, strip.first, strip.second)
+        area, sx, sy, sxx, syy, sxy = _plane(strip)
+        total += _prism(area, sx, sy, sxx, syy, sxy, low, high).moved(a, np.array([p[0], p[1], 0.0]))
+        start = turn * np.array([last[1], -last[0]]) / np.hypot(*last)
+        angle = math.atan2(start[0] * out[1] - start[1] * out[0], float(start @ out))
+        if count == 2:
+            angle = math.pi
+        if turn * angle < -1e-9:
+            raise ViewError("a plate that is not convex")
+        b = np.eye(3)
+        first = start if turn > 0 else out
+        b[:2, 0], b[:2, 1] = first, np.array([-first[1], first[0]])
+        area, sx, sy, sxx, syy, sxy = sector(abs(angle))
+        r = radius
+        cap = _prism(area * r**2, sx * r**3, sy * r**3, sxx * r**4, syy * r**4, sxy * r**4, low, high)
+        total += cap.moved(b, np.array([p[0], p[1], 0.0]))
+    return total
+
+
+def _plane(solid: Moments) -> tuple[float, float, float, float, float, float]:
+    """Return the integrals of the plane figure of a prism of height 1."""
+    s, t = solid.first, solid.second
+    return solid.volume, s[0], s[1], t[0, 0], t[1, 1], t[0, 1]
+
+
+Outline = tuple[Item, np.ndarray, float, float]
+"""A marker, points in its xy plane, and where along its z axis the solid begins and ends."""
+ARC = 16
+"""Chords for half a circle where a rounded solid touches: they are at most 0.5 % of the radius inside."""
+
+
+def _spine(m: Deckmaker, item: Item) -> tuple[Outline, float]:
+    """Return the middle line of a link, and how far it is widened."""
+    i, j = _marker(m, item, "i_marker"), _marker(m, item, "j_marker")
+    width, depth = _need(m, item, "width"), _need(m, item, "depth")
+    a, r = m.values.pose(i)
+    across = a.T @ (m.values.point(j) - r)
+    if math.hypot(across[0], across[1]) < frames.SMALL or abs(across[2]) > 1e-6 * float(np.linalg.norm(across)):
+        raise ViewError(f"{item.path}: a link whose markers are not in one plane of the first", item.line)
+    return (i, np.array([[0.0, 0.0], across[:2]]), -depth / 2.0, depth / 2.0), width / 2.0
+
+
+def _corners(m: Deckmaker, item: Item) -> tuple[Outline, float]:
+    """Return the corners of a plate, and how far they are widened."""
+    markers = m.values.refs(item, "marker_name", ("marker", "floating_marker"))
+    if len(markers) < 3:
+        raise ViewError(f"{item.path}: a plate has three corners or more", item.line)
+    a, r = m.values.pose(markers[0])
+    corners = np.array([a.T @ (m.values.point(one) - r) for one in markers])
+    if np.abs(corners[:, 2]).max() > 1e-6 * np.abs(corners).max():
+        raise ViewError(f"{item.path}: its corners are not in the plane of the first marker", item.line)
+    width = _need(m, item, "width")
+    return (markers[0], corners[:, :2], -width / 2.0, width / 2.0), m.values.number(item, "radius", 0.0) or 0.0
+
+
+def _link(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    (marker, points, low, high), radius = _spine(m, item)
+    return marker, rounded(points, radius, low, high)
+
+
+def _plate(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    (marker, points, low, high), radius = _corners(m, item)
+    return marker, rounded(points, radius, low, high)
+
+
+def _widened(points: np.ndarray, radius: float) -> np.ndarray:
+    """Return the outline of a convex polygon, or a line, widened by a radius: chords for its arcs."""
+    if radius == 0.0:
+        return points
+    if len(points) > 2 and sum(area for area, _ in _triangles(points)) < 0.0:
+        points = points[::-1]
+    found = []
+    for before, p, after in zip(np.roll(points, 1, axis=0), points, np.roll(points, -1, axis=0)):
+        start = math.atan2(-(p - before)[0], (p - before)[1])
+        end = math.atan2(-(after - p)[0], (after - p)[1])
+        turn = (end - start) % (2.0 * math.pi)
+        count = max(1, math.ceil(ARC * turn / math.pi))
+        angles = start + turn * np.arange(count + 1) / count
+        found.append(p + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+    return np.concatenate(found)
+
+
+def link_outline(m: Deckmaker, item: Item) -> Outline:
+    """Return the outline of a link."""
+    (marker, points, low, high), radius = _spine(m, item)
+    return marker, _widened(points, radius), low, high
+
+
+def plate_outline(m: Deckmaker, item: Item) -> Outline:
+    """Return the outline of a plate."""
+    (marker, points, low, high), radius = _corners(m, item)
+    return marker, _widened(points, radius), low, high
+
+
+def _profile(m: Deckmaker, item: Item) -> np.ndarray:
+    points = m.values.numbers(item, "points_for_profile")
+    if points is None or len(points) % 3 or len(points) < 9:
+        raise ViewError(f"{item.path}: its profile is not given by points", item.line)
+    found = np.array(points).reshape(-1, 3)
+    relative = m.values.ref(item, "relative_to")
+    home = _marker(m, item, "reference_marker")
+    if relative is not None and relative is not home:
+        a, r = m.values.pose(relative)
+        b, s = m.values.pose(home)
+        found = (found @ a.T + r - s) @ b
+    return found[:-1] if np.allclose(found[0], found[-1]) else found
+
+
+def extrusion_outline(m: Deckmaker, item: Item) -> Outline:
+    """Return the profile of an extrusion along z."""
+    points = _profile(m, item)
+    length = m.values.number(item, "length_along_z_axis")
+    if length is None or np.ptp(points[:, 2]) > 1e-9 * np.abs(points).max():
+        raise ViewError(f"{item.path}: an extrusion along a path", item.line)
+    z = float(points[0, 2])
+    return _marker(m, item, "reference_marker"), points[:, :2], min(z, z + length), max(z, z + length)
+
+
+def _extrusion(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    marker, points, low, high = extrusion_outline(m, item)
+    return marker, _prism(*polygon(points), low, high)
+
+
+def _revolution(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    points = _profile(m, item)
+    rho = np.hypot(points[:, 0], points[:, 1])
+    return _marker(m, item, "reference_marker"), revolution(np.column_stack([rho, points[:, 2]]), _angle(m, item))
+
+
+SHAPES: dict[str, Shape] = {
+    "block": _block, "cylinder": _cylinder, "frustum": _frustum, "ellipsoid": _ellipsoid, "sphere": _sphere,
+    "torus": _torus, "link": _link, "plate": _plate, "extrusion": _extrusion, "revolution": _revolution,
+}  # fmt: skip
+"""Shapes whose moments are known exactly."""
+UNKNOWN = frozenset("csg shell solid feature".split())
+"""Solids whose moments are not computed."""
+
+
+def density_of(m: Deckmaker, item: Item) -> float:
+    """Return the density of a part: its own, or that of its material.
+
+    Raises
+    ------
+    ViewError
+    """
+    density = m.values.number(item, "density")
+    if density is not None:
+        return density
+    if "material_type" in item.fields:
+        name = str(m.values.text(item, "material_type"))
+        found = m.db.find(name, ("material",))
+        if found is not None:
+            return _need(m, found, "density")
+        standard = STANDARD.get(name.rsplit(".", 1)[-1].lower())
+        if standard is None:
+            raise ViewError(f"{item.path}: there is no material {name[:60]}", item.line)
+    else:
+        standard = STANDARD["steel"]
+    units = m.db.units
+    return standard * units.si("length") ** 3 / units.si("mass")
+
+
+def moments_of(m: Deckmaker, item: Item) -> Moments | None:
+    """Return the moments of all solids of a part in its frame, None if it has none.
+
+    Raises
+    ------
+    ViewError
+        If those of one are not known.
+    """
+    total = None
+    home = m.values.pose(item)
+    for one in item.children.values():
+        if one.kind in UNKNOWN:
+            raise ViewError(
+                f"{one.path} is a {one.kind}, whose mass is not computed; give the part mass, center_of_mass_marker, ixx ...",
+                item.line,
+            )
+        if one.kind not in SHAPES:
+            continue
+        marker, solid = SHAPES[one.kind](m, one)
+        a, r = m.values.pose(marker)
+        placed = solid.moved(home[0].T @ a, home[0].T @ (r - home[1]))
+        total = placed if total is None else total + placed
+    return total
+
+
+def mass_of_geometry(m: Deckmaker, item: Item, marker: Item | None) -> list[str | None]:
+    """Return mass, centre and inertia of a part as arguments, from its solids; none of a part without any."""
+    found = moments_of(m, item)
+    if found is None or not found.volume > 0.0:
+        return []
+    mass = density_of(m, item) * found.volume
+    centre = found.first / found.volume
+    spread = found.second / found.volume - np.outer(centre, centre)
+    inertia = mass * (np.trace(spread) * np.eye(3) - spread)
+    if marker is None:
+        a, r = m.values.pose(item)
+        at, axes = m.new_marker(item, item, a, a @ centre + r), frames.IDENTITY
+    else:
+        at, axes = m.id(marker), m.values.orientation(marker)
+        m.centres[id(marker)] = centre
+    turned = axes.T @ inertia @ axes
+    values = [turned[0, 0], turned[1, 1], turned[2, 2], -turned[0, 1], -turned[0, 2], -turned[1, 2]]
+    # products that are rounding alone are none
+    values = [0.0 if abs(x) < 1e-13 * max(values[:3]) else float(x) for x in values]
+    if item.kind == "point_mass":
+        return [f"MASS = {number(mass)}", f"CM = {at}"]
+    return [f"MASS = {number(mass)}", f"CM = {at}", f"IP = {listed(values if any(values[3:]) else values[:3])}"]
