@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from gearmbs.adams.view.deckmaker import Deckmaker
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
 from gearmbs.adams.view.statements import refuse
 from gearmbs.adams.write.text import listed, number
-
-if TYPE_CHECKING:
-    from gearmbs.adams.view.statements import Deckmaker
 
 ARRAYS = ("array", "ic_array", "x_array", "u_array", "y_array")
 MATRICES = ("matrix", "sparse_matrix")
@@ -241,7 +238,9 @@ MAKERS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "diff": make_diff,
     **dict.fromkeys(ARRAYS, make_array),
     **dict.fromkeys(MATRICES, make_matrix),
-    "file_matrix": refuse("a matrix in a file is read in decks; write it into the command file, or into the deck of --to-deck"),
+    "file_matrix": refuse(
+        "a matrix in a file is read in decks; write it into the command file, or into the deck of --to-deck"
+    ),
     "curve": make_curve,
     "spline": make_spline,
     "string": make_string,

@@ -281,7 +281,13 @@ class Evaluator:
             return self.lookup(f"{owner.path}.{tree[2]}")
         if kind == "unary":
             value = self(tree[2])
-            return int(not self.truth(value)) if tree[1] == "!" else self.each(lambda x: -x, value) if tree[1] == "-" else value
+            return (
+                int(not self.truth(value))
+                if tree[1] == "!"
+                else self.each(lambda x: -x, value)
+                if tree[1] == "-"
+                else value
+            )
         left = self.truth(self(tree[2]))
         return int(left and self.truth(self(tree[3])) if tree[1] == "&&" else left or self.truth(self(tree[3])))
 
@@ -327,9 +333,7 @@ class Evaluator:
         n = max(len(v) for v in lists)
         if any(len(v) not in (1, n) for v in lists):
             raise self.error(f"lists of {' and '.join(str(len(v)) for v in lists)} members do not go together")
-        return [
-            self.each(function, *((v[k % len(v)] if isinstance(v, list) else v) for v in values)) for k in range(n)
-        ]
+        return [self.each(function, *((v[k % len(v)] if isinstance(v, list) else v) for v in values)) for k in range(n)]
 
     def member(self, value: Any, index: list[Any]) -> Any:
         """Return a member of a list, counted from 1."""

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from gearmbs.adams.view.deckmaker import JOINTS, Deckmaker
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import PARTS, Item
-from gearmbs.adams.view.solids import extrusion_outline, link_outline, plate_outline
-from gearmbs.adams.view.statements import JOINTS, refuse
+from gearmbs.adams.view.solids import bodies_of, extrusion_outline, link_outline, plate_outline
+from gearmbs.adams.view.statements import refuse
+from gearmbs.adams.view.values import fixed
 from gearmbs.adams.write.text import listed, number
-
-if TYPE_CHECKING:
-    from gearmbs.adams.view.statements import Deckmaker
+from gearmbs.solids.bodies import PART_NUMBER
 
 
 def make_gravity(m: Deckmaker, item: Item) -> None:
@@ -30,7 +29,7 @@ def make_sforce(m: Deckmaker, item: Item) -> None:
     m.add(item, f"SFORCE/{m.id(item)}", "ROTATIONAL" if turning else "TRANSLATIONAL", *m.pair(item), only, *function)
 
 
-COMPONENTS = {
+COMPONENTS: dict[str, tuple[tuple[str, str], ...]] = {
     "vforce": (("x_force_function", "FX"), ("y_force_function", "FY"), ("z_force_function", "FZ")),
     "vtorque": (("x_torque_function", "TX"), ("y_torque_function", "TY"), ("z_torque_function", "TZ")),
 }
@@ -217,8 +216,11 @@ def _solid(m: Deckmaker, shape: Item) -> list[str | None]:
         ]  # fmt: skip
     if kind in OUTLINES:
         return _drawn_out(m, shape)
+    if kind == "parasolid":
+        return _of_file(m, shape)
     raise ViewError(
-        f"{shape.path} is a {kind}, which cannot touch here; give a block, cylinder, frustum, torus, ellipsoid, link, plate or extrusion"
+        f"{shape.path} is a {kind}, which cannot touch here; give a block, cylinder, frustum, torus, ellipsoid, link, "
+        "plate or extrusion"
     )
 
 
@@ -242,9 +244,49 @@ def _drawn_out(m: Deckmaker, shape: Item) -> list[str | None]:
     return ["EXTRUSION", f"RM = {at}", f"CID = {curve}", f"LENGTH = {number(high - low)}"]
 
 
+def _shapes(m: Deckmaker, item: Item, side: str) -> list[Item]:
+    """Return the solids of one side of a contact; those of a Parasolid file are entered under their names.
+
+    Raises
+    ------
+    ViewError
+        If one is neither in the command file nor in such a file.
+    """
+    key = f"{side}_geometry_name"
+    found = []
+    for value in m.values.values(item, key) if key in item.fields else ():
+        shape = value if isinstance(value, Item) else m.db.find(str(value))
+        if shape is None:
+            owner, _, name = str(value).rpartition(".")
+            part = m.db.find(owner, PARTS)
+            body = (
+                next((b for b in bodies_of(m, part) if b.name.lower() == name.lower()), None)
+                if part is not None
+                else None
+            )
+            if part is None or body is None:
+                raise ViewError(f"{key}: there is no {str(value)[:80]}, neither here nor in a Parasolid file beside")
+            shape = Item("parasolid", f"{part.path}.{name}", item.line, {"part": fixed(part)})
+        found.append(m.solids.setdefault(shape.path.lower(), shape))
+    return found
+
+
+def _of_file(m: Deckmaker, shape: Item) -> list[str | None]:
+    """Return the arguments of a solid of a Parasolid file: it is in the frame of its part."""
+    part = m.values.ref(shape, "part", PARTS)
+    assert part is not None
+    for path, bodies in m.bodies.items():
+        if any(
+            b.name.lower() == shape.name.lower() and b.attributes.get(PART_NUMBER) == m.ids[id(part)] for b in bodies
+        ):
+            at = m.new_marker(shape, part, *m.values.pose(part))
+            return ["EXTERNAL", f"RM = {at}", f"FILE = {path.name}", f"ELEMENT = {shape.name}"]
+    raise ViewError(f"{shape.path} is in no Parasolid file")
+
+
 def _graphics(m: Deckmaker, item: Item, side: str) -> str:
     ids = []
-    for shape in m.values.refs(item, f"{side}_geometry_name"):
+    for shape in _shapes(m, item, side):
         if id(shape) not in m.graphics:
             arguments = _solid(m, shape)
             m.graphics[id(shape)] = m.fresh("GRAPHICS")

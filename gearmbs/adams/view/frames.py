@@ -74,8 +74,8 @@ def unit(v: np.ndarray, what: str) -> np.ndarray:
 def along(axis: str, direction: np.ndarray) -> np.ndarray:
     """Return a frame one of whose axes has a direction, turned about it as in View.
 
-    Along x or z the y axis is as near to the global one as can be, along y the z axis. This, and what is done where that
-    axis and the direction are parallel, was found from some 3000 markers of exported models that hold both the
+    Along x or z the y axis is as near to the global one as can be, along y the z axis. This, and what is done where
+    that axis and the direction are parallel, was found from some 3000 markers of exported models that hold both the
     expression and its value.
     """
     d = unit(direction, "the axis")

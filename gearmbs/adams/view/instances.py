@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from gearmbs.adams.view.deckmaker import Deckmaker, translated
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
-from gearmbs.adams.view.runtime import translated
 from gearmbs.adams.write.text import number
-
-if TYPE_CHECKING:
-    from gearmbs.adams.view.statements import Deckmaker
 
 
 def _variable(m: Deckmaker, item: Item, name: str, default: Any = None) -> Any:
@@ -123,7 +120,9 @@ def make_instance(m: Deckmaker, item: Item) -> None:
     name = m.values.text(item, "definition_name") or ""
     make = DEFINITIONS.get(".".join(name.lower().split(".")[-2:]))
     if make is None:
-        raise ViewError(f"instances of {name[:60]} are not modelled; write what it stands for: joints, forces, variables")
+        raise ViewError(
+            f"instances of {name[:60]} are not modelled; write what it stands for: joints, forces, variables"
+        )
     make(m, item)
 
 

@@ -166,7 +166,7 @@ class _Reader:
         return self.at
 
     def _values(self, name: str) -> tuple[Value, ...]:
-        values = []
+        values: list[Value] = []
         while True:
             if self._skip() >= len(self.text):
                 if values:

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from gearmbs.adams.view.deckmaker import MEASURES, Deckmaker, translated
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import PARTS, Item
-from gearmbs.adams.view.runtime import translated
-from gearmbs.adams.view.statements import MEASURES
 from gearmbs.adams.view.values import is_ground
 from gearmbs.adams.write.text import number
-
-if TYPE_CHECKING:
-    from gearmbs.adams.view.statements import Deckmaker
 
 MARKERS = ("marker", "floating_marker")
 KINEMATIC = {
@@ -35,14 +29,15 @@ FORCES = {
     "contact": "CONTACT", "ptcv": "PTCV", "gear": "GEAR", "coupler": "COUPLER", "friction": "FRICTION",
 }  # fmt: skip
 ANGULAR = frozenset(
-    "angular_velocity angular_acceleration cm_angular_velocity cm_angular_acceleration ax_ay_az_projection_angles".split()
+    """angular_velocity angular_acceleration cm_angular_velocity cm_angular_acceleration
+    ax_ay_az_projection_angles""".split()
 )
 """What View gives in its unit of angle, and the solver in radians."""
 EULER = {"psi": "PSI", "theta": "THETA", "phi": "PHI", "yaw": "YAW", "pitch": "PITCH", "roll": "ROLL"}
 
 
 def variable_of(m: Deckmaker, item: Item, depth: int = 0) -> int | None:
-    """Return the id of the VARIABLE that holds a measure, as in View's own decks; it is made when it is first asked for.
+    """Return the id of the VARIABLE that holds a measure, as in View's own decks; it is made when first asked for.
 
     Raises
     ------
@@ -159,7 +154,11 @@ def _object(m: Deckmaker, item: Item) -> str | None:
     if functions is not None and functions[_component(m, item)]:
         name = functions[_component(m, item)]
         ends = [_marker(m, found)] if found.kind in PARTS else _ends(m, found)
-        return _angle(m, f"{name}({', '.join(map(str, ends))})") if what in ANGULAR else f"{name}({', '.join(map(str, ends))})"
+        return (
+            _angle(m, f"{name}({', '.join(map(str, ends))})")
+            if what in ANGULAR
+            else f"{name}({', '.join(map(str, ends))})"
+        )
     if found.kind == "spring" and what in ("deformation", "deformation_velocity"):
         name = "VR" if what.endswith("velocity") else "DM"
         base = f"{name}({', '.join(map(str, _ends(m, found)))})"

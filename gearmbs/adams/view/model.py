@@ -203,7 +203,7 @@ class Database:
         """
         if item.path.lower() == path.lower():
             return
-        if item.children and item.kind != "csg" or path.lower() in self.items:
+        if (item.children and item.kind != "csg") or path.lower() in self.items:
             raise ViewError(f"{item.path} cannot become {path}", line)
         before = self.items.get(item.parent.lower())
         if before is not None:

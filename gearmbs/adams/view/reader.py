@@ -1,4 +1,4 @@
-"""Read a command file of View: ``read_view``, ``parse_view``; what of it becomes a deck, its simulations and variables."""
+"""Read a command file of View: ``read_view``, ``parse_view``; its deck, its simulations and its variables."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from gearmbs.adams.parse.commands import Script, parse_script
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import deck_of, read_file
 from gearmbs.adams.view import data, forces, instances, measures, statements
+from gearmbs.adams.view.deckmaker import PART_KEYWORDS, Deckmaker, Made
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.interpreter import Interpreter
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
-from gearmbs.adams.view.statements import Deckmaker, Made
 from gearmbs.adams.write.text import number
 
 SIGNS = re.compile(
@@ -62,9 +62,7 @@ class ViewModel:
         return next(reversed(self.scripts.values()), None)
 
 
-def read_view(
-    path: str | Path, variables: Mapping[str, float] | None = None, model: str | None = None
-) -> ViewModel:
+def read_view(path: str | Path, variables: Mapping[str, float] | None = None, model: str | None = None) -> ViewModel:
     """Read a command file of View (.cmd).
 
     Parameters
@@ -143,19 +141,20 @@ def _chosen(run: Interpreter, name: str | None) -> Item | None:
     models = run.database.of("model")
     if name is not None:
         return next((one for one in models if one.name.lower() == name.lower().lstrip(".")), None)
-    full = [one for one in models if sum(child.kind in statements.PART_KEYWORDS for child in one.children.values()) > 1]
-    return (full or models or [None])[-1]
+    top = [one for one in models if one.path.count(".") == 1]
+    full = [one for one in top if any(part.path.lower().startswith(f"{one.path.lower()}.") for part in run.parts())]
+    return next(reversed(full or top), None)
 
 
 def _made(run: Interpreter, model: Item, file: str) -> Deckmaker:
     """Return a model's statements, and what is left out with all that needs it."""
-    failed: frozenset[int] = frozenset()
-    while True:
-        maker = Deckmaker(run.values, model, file, failed)
+    maker = Deckmaker(run.values, model, file, measures.variable_of, run.parasolids, run.folder)
+    before = -1
+    while len(maker.failed) > before:
+        before = len(maker.failed)
+        maker.start_again()
         _statements(maker)
-        if maker.failed <= failed:
-            return maker
-        failed |= maker.failed
+    return maker
 
 
 def _statements(maker: Deckmaker) -> None:
@@ -164,16 +163,18 @@ def _statements(maker: Deckmaker) -> None:
     units = tuple(f"{quantity.upper()} = {names[quantity]}" for quantity in ("force", "mass", "length", "time"))
     maker.statements.append(Made("UNITS/", units, "", maker.model.line))
     makers = statements.MAKERS | forces.MAKERS | data.MAKERS | instances.MAKERS
-    maker.run(makers, statements.PART_KEYWORDS)
+    maker.run(makers, PART_KEYWORDS)
     maker.run(makers, ("marker", "floating_marker"))
-    maker.run(makers, [kind for kind in makers if kind not in (*statements.PART_KEYWORDS, "marker", "floating_marker")])
-    before = len(maker.problems)
+    maker.run(makers, [kind for kind in makers if kind not in (*PART_KEYWORDS, "marker", "floating_marker")])
+    before, known = len(maker.problems), set(maker.failed)
     maker.run(data.REQUESTS | measures.MAKERS, (*data.REQUESTS, *measures.MAKERS))
     # results that are not made change nothing of the motion
     for k in range(before, len(maker.problems)):
         problem = maker.problems[k]
         severity = WARNING if problem.severity == UNSUPPORTED else problem.severity
         maker.problems[k] = Diagnostic(severity, f"{problem.message}; it is left out", problem.file, problem.line)
+    for key in maker.failed.keys() - known:
+        del maker.failed[key]
 
 
 # Simulations.
@@ -209,7 +210,9 @@ def _script(lines: list[str], file: str, line: int) -> Script:
     try:
         return parse_script("\n".join(["model", "output", *lines]), file)
     except DeckError as error:
-        raise DeckError([Diagnostic(d.severity, f"in the simulation: {d.message}", file, line) for d in error.diagnostics]) from error
+        raise DeckError(
+            [Diagnostic(d.severity, f"in the simulation: {d.message}", file, line) for d in error.diagnostics]
+        ) from error
 
 
 def _script_lines(run: Interpreter, item: Item) -> list[str]:
@@ -251,7 +254,12 @@ def _simulation(kind: str, given: dict[str, Any], line: int) -> list[str]:
     word = text_of(given.get("type", "dynamic")).lower()
     analysis = {"kinematic": "KINEMATICS", "static": "STATICS", "quasi_static": "STATICS"}.get(word, "DYNAMICS")
     words = [f"SIMULATE/{analysis}"]
-    for key, keyword in (("end_time", "END"), ("duration", "DURATION"), ("number_of_steps", "STEPS"), ("step_size", "DTOUT")):
+    for key, keyword in (
+        ("end_time", "END"),
+        ("duration", "DURATION"),
+        ("number_of_steps", "STEPS"),
+        ("step_size", "DTOUT"),
+    ):
         value = given.get(key)
         if value is None:
             continue

@@ -9,17 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearmbs.adams.view import frames
+from gearmbs.adams.view.deckmaker import Deckmaker
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
 from gearmbs.adams.write.text import listed, number
-
-if TYPE_CHECKING:
-    from gearmbs.adams.view.statements import Deckmaker
+from gearmbs.dae.problem import ModelError
+from gearmbs.solids.bodies import PART_NUMBER, Body, faceted, read_bodies
 
 STANDARD = {
     "steel": 7801.0, "stainless": 7750.0, "aluminum": 2740.0, "brass": 8545.0, "cast_iron": 7080.0, "copper": 8906.0,
@@ -92,7 +91,7 @@ def sector(angle: float) -> tuple[float, float, float, float, float, float]:
 def frustum(length: float, bottom: float, top: float, angle: float) -> Moments:
     """Return the moments of a frustum, or of a sector of one, along z from the origin.
 
-    Radii go linearly with z, so that the integrands are polynomials of fourth order, which three points of Gauss integrate exactly.
+    Radii go linearly with z, so that the integrands are polynomials of fourth order: three points of Gauss are exact.
     """
     area, sx, sy, sxx, syy, sxy = sector(angle)
     total = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
@@ -171,7 +170,8 @@ def revolution(points: np.ndarray, angle: float) -> Moments:
             total += area * weight * np.array([rho, rho**2, rho**3, rho * z, rho**2 * z, rho * z**2])
     if total[0] < 0.0:
         total = -total
-    return _turned(*(float(x) for x in total), angle)
+    rho1, rho2, rho3, rho1z, rho2z, rho1zz = (float(x) for x in total)
+    return _turned(rho1, rho2, rho3, rho1z, rho2z, rho1zz, angle)
 
 
 # The shapes of View.
@@ -242,40 +242,37 @@ def _torus(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
 
 
 def rounded(points: np.ndarray, radius: float, low: float, high: float) -> Moments:
-    """Return the moments of a plate: a convex polygon, or a line, widened by a radius all around."""
+    """Return the moments of a plate: a polygon, or a line, widened by a radius all around."""
     total = _prism(*polygon(points), low, high) if len(points) > 2 else Moments(0.0, np.zeros(3), np.zeros((3, 3)))
     if radius == 0.0:
         return total
-    turn = 1.0 if len(points) < 3 or sum(area for area, _ in _triangles(points)) >= 0.0 else -1.0
-    count = len(points)
+    if len(points) > 2 and sum(area for area, _ in _triangles(points)) < 0.0:
+        points = points[::-1]
+    count, thin = len(points), 1e-12 * float(np.ptp(points))
     for k in range(count):
-        p, q, before = points[k], points[(k + 1) % count], points[k - 1]
-        edge, last = q - p, p - before
-        length = float(np.hypot(*edge))
-        if length < frames.SMALL or np.hypot(*last) < frames.SMALL:
+        p, edge, last = points[k], points[(k + 1) % count] - points[k], points[k] - points[k - 1]
+        length, before = float(np.hypot(*edge)), float(np.hypot(*last))
+        if not min(length, before) > thin:
             raise ViewError("two corners of a plate or link are one")
-        x = edge / length
-        out = turn * np.array([x[1], -x[0]])
-        # a strip along the edge, then the sector at its first corner
+        x, w = edge / length, last / before
         a = np.eye(3)
-        a[:2, 0], a[:2, 1] = x, np.array([-x[1], x[0]])
-        strip = box(length, -turn * radius, 1.0)
-        strip = Moments(strip.volume, strip.first, strip.second)
-        area, sx, sy, sxx, syy, sxy = _plane(strip)
-        total += _prism(area, sx, sy, sxx, syy, sxy, low, high).moved(a, np.array([p[0], p[1], 0.0]))
-        start = turn * np.array([last[1], -last[0]]) / np.hypot(*last)
-        angle = math.atan2(start[0] * out[1] - start[1] * out[0], float(start @ out))
-        if count == 2:
-            angle = math.pi
-        if turn * angle < -1e-9:
-            raise ViewError("a plate that is not convex")
-        b = np.eye(3)
-        first = start if turn > 0 else out
-        b[:2, 0], b[:2, 1] = first, np.array([-first[1], first[0]])
-        area, sx, sy, sxx, syy, sxy = sector(abs(angle))
-        r = radius
-        cap = _prism(area * r**2, sx * r**3, sy * r**3, sxx * r**4, syy * r**4, sxy * r**4, low, high)
-        total += cap.moved(b, np.array([p[0], p[1], 0.0]))
+        a[:2, 0], a[:2, 1] = x, (-x[1], x[0])
+        # a strip along the edge, then the sector that closes the gap at its first corner
+        total += _prism(*_plane(box(length, -radius, 1.0)), low, high).moved(a, np.array([*p, 0.0]))
+        turn = math.pi if count == 2 else math.atan2(w[0] * x[1] - w[1] * x[0], float(w @ x))
+        if turn >= 0.0:
+            b = np.eye(3)
+            b[:2, 0], b[:2, 1] = (w[1], -w[0]), w
+            area, sx, sy, sxx, syy, sxy = sector(turn)
+            r = radius
+            cap = _prism(area * r**2, sx * r**3, sy * r**3, sxx * r**4, syy * r**4, sxy * r**4, low, high)
+            total += cap.moved(b, np.array([*p, 0.0]))
+        else:
+            # at a corner that goes inwards two strips have a kite in common
+            n, o = radius * np.array([w[1], -w[0]]), radius * np.array([x[1], -x[0]])
+            kite = np.array([p, p + n, p + (n + o) / (1.0 + math.cos(turn)), p + o])
+            twice = _prism(*polygon(kite), low, high)
+            total += Moments(-twice.volume, -twice.first, -twice.second)
     return total
 
 
@@ -394,8 +391,9 @@ SHAPES: dict[str, Shape] = {
     "torus": _torus, "link": _link, "plate": _plate, "extrusion": _extrusion, "revolution": _revolution,
 }  # fmt: skip
 """Shapes whose moments are known exactly."""
-UNKNOWN = frozenset("csg shell solid feature".split())
+UNKNOWN = frozenset("csg solid feature".split())
 """Solids whose moments are not computed."""
+REMEDY = "give the part mass, center_of_mass_marker, ixx, iyy and izz"
 
 
 def density_of(m: Deckmaker, item: Item) -> float:
@@ -422,7 +420,56 @@ def density_of(m: Deckmaker, item: Item) -> float:
     return standard * units.si("length") ** 3 / units.si("mass")
 
 
-def moments_of(m: Deckmaker, item: Item) -> Moments | None:
+def polyhedron(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
+    """Return the moments of a closed surface of triangles: those of the tetrahedra over the origin."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    whole = a + b + c
+    second = np.einsum("i,ij,ik->jk", volume, whole, whole)
+    for corner in (a, b, c):
+        second += np.einsum("i,ij,ik->jk", volume, corner, corner)
+    return Moments(float(volume.sum()), (volume[:, None] * whole).sum(axis=0) / 4.0, second / 20.0)
+
+
+def _facets(m: Deckmaker, body: Body) -> Moments:
+    """Return the moments of a body of a Parasolid file in the model's units, extrapolated from two tolerances.
+
+    The difference of a surface from its chords goes with the square of their length, that is with the tolerance.
+    """
+    scale = 1.0 / m.db.units.si("length")
+    extent = faceted(body)[0]
+    tolerance = 1e-3 * float(np.linalg.norm(np.ptp(extent, axis=0)))
+    coarse, fine = (polyhedron(scale * v, t) for v, t in (faceted(body, tolerance * f) for f in (0.5, 0.25)))
+    return Moments(
+        2.0 * fine.volume - coarse.volume, 2.0 * fine.first - coarse.first, 2.0 * fine.second - coarse.second
+    )
+
+
+def bodies_of(m: Deckmaker, item: Item) -> list[Body]:
+    """Return the bodies that a part has in the model's Parasolid files.
+
+    Raises
+    ------
+    ViewError
+        If a file is missing or cannot be read: nobody knows then whether the part has one.
+    """
+    found = []
+    for name, line in m.parasolids:
+        path = m.beside(name)
+        if path is None:
+            raise ViewError(
+                f"{name[:80]} is not beside the command file, and may hold the geometry of {item.path}", line
+            )
+        if path not in m.bodies:
+            try:
+                m.bodies[path] = read_bodies(path)
+            except ModelError as error:
+                raise ViewError(f"{name[:80]}: {error}", line) from error
+        found += [body for body in m.bodies[path] if body.attributes.get(PART_NUMBER) == m.ids[id(item)]]
+    return found
+
+
+def moments_of(m: Deckmaker, item: Item, marker: Item | None) -> Moments | None:
     """Return the moments of all solids of a part in its frame, None if it has none.
 
     Raises
@@ -430,28 +477,43 @@ def moments_of(m: Deckmaker, item: Item) -> Moments | None:
     ViewError
         If those of one are not known.
     """
-    total = None
-    home = m.values.pose(item)
+    total = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+    a, r = m.values.pose(item)
+    shells = False
     for one in item.children.values():
         if one.kind in UNKNOWN:
-            raise ViewError(
-                f"{one.path} is a {one.kind}, whose mass is not computed; give the part mass, center_of_mass_marker, ixx ...",
-                item.line,
-            )
-        if one.kind not in SHAPES:
-            continue
-        marker, solid = SHAPES[one.kind](m, one)
-        a, r = m.values.pose(marker)
-        placed = solid.moved(home[0].T @ a, home[0].T @ (r - home[1]))
-        total = placed if total is None else total + placed
-    return total
+            raise ViewError(f"{one.path} is a {one.kind}, whose mass is not computed; {REMEDY}", item.line)
+        shells |= one.kind == "shell"
+        if one.kind in SHAPES:
+            at, solid = SHAPES[one.kind](m, one)
+            b, s = m.values.pose(at)
+            total += solid.moved(a.T @ b, a.T @ (s - r))
+    try:
+        for body in bodies_of(m, item):
+            total += _facets(m, body)
+    except ModelError as error:
+        raise ViewError(f"{error}; {REMEDY}", item.line) from error
+    if shells and not _agrees(m, total, marker):
+        # View counts surfaces in some parts and not in others; the centre that it wrote tells which
+        raise ViewError(f"{item.path} has a shell, whose mass is not computed; {REMEDY}", item.line)
+    return total if total.volume > 0.0 else None
+
+
+def _agrees(m: Deckmaker, found: Moments, marker: Item | None) -> bool:
+    """Return whether a centre of mass that the file gives is that of the moments."""
+    if marker is None or not found.volume > 0.0:
+        return False
+    centre = found.first / found.volume
+    spread = found.second / found.volume - np.outer(centre, centre)
+    given = m.values.location(marker)
+    return float(np.abs(given - centre).max()) < 1e-6 * math.sqrt(float(np.trace(spread)))
 
 
 def mass_of_geometry(m: Deckmaker, item: Item, marker: Item | None) -> list[str | None]:
     """Return mass, centre and inertia of a part as arguments, from its solids; none of a part without any."""
-    found = moments_of(m, item)
-    if found is None or not found.volume > 0.0:
-        return []
+    found = moments_of(m, item, marker)
+    if found is None:
+        return [] if marker is None else [f"CM = {m.id(marker)}"]
     mass = density_of(m, item) * found.volume
     centre = found.first / found.volume
     spread = found.second / found.volume - np.outer(centre, centre)

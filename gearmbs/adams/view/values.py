@@ -196,7 +196,9 @@ class Values:
         if mark in self.busy:
             raise ViewError(f"{key} of {item.path} depends on itself", stored.line)
         if len(self.busy) > 150:
-            raise ViewError(f"{key} of {item.path}: expressions depend on each other through more than 150 objects", stored.line)
+            raise ViewError(
+                f"{key} of {item.path}: expressions depend on each other through more than 150 objects", stored.line
+            )
         self.busy.add(mark)
         try:
             found: list[Any] = []

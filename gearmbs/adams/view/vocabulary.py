@@ -19,7 +19,9 @@ RUB_TRANS = "friction_enabled -delta_v -maximum_deformation -mu_dyn_trans -mu_st
 IC_TRANS = "translational_ic velocity_ic -no_translational_ic -no_velocity_ic"
 IC_ROT = "rotational_ic angular_velocity_ic -no_rotational_ic -no_angular_velocity_ic"
 LOAD = "i_marker_name j_floating_marker_name j_part_name ref_marker_name -error -j_marker_id user_function routine"
-FACETS = "-side_count_for_body -segment_count_for_ends -side_count_for_perimeter -segment_count -number_of_sides -part_name"  # noqa: E501
+FACETS = (
+    "-side_count_for_body -segment_count_for_ends -side_count_for_perimeter -segment_count -number_of_sides -part_name"
+)
 ARRAYS = "x_state_array_name u_input_array_name y_output_array_name ic_array_name static_hold"
 
 TABLE = f"""
@@ -174,6 +176,7 @@ defaults coordinate_system | | | default_coordinate_system
 defaults model | | | model_name part_name -flexible_body_name -point_mass_name -marker_name -joint_name -geometry_name
 defaults orient_axis_and_plane | | | axis_and_plane_setting
 file command read | | | file_name
+file parasolid read | | | file_name -ref_markers -type -clean_on_import -explode_assemblies -model_name -assembly_retain part_name location orientation relative_to
 simulation single_run transient | | | model_name initial_static type number_of_steps step_size end_time duration forever
 simulation single_run equilibrium | | | model_name
 simulation single_run assemble | | | model_name
@@ -190,8 +193,9 @@ continue | | |
 return | | |
 """  # noqa: E501
 
-IGNORED = """view | interface | color | colors | xy_plots | plot3d | plotcurve3d | animation | undo | plugin | list_info |
-hardcopy | display_attributes | notes | report | panel | graphic_results | contour_plot | measure_display | highlight |
+IGNORED = """view | interface | color | colors | xy_plots | plot3d | plotcurve3d | animation | undo | plugin |
+list_info | hardcopy | display_attributes | notes | report | panel | graphic_results | contour_plot |
+measure_display | highlight |
 command_server | defaults attributes | defaults command_file | defaults interface | defaults geometry |
 defaults graphics | defaults results | defaults force_graphics | defaults icon_naming | defaults function_references |
 defaults name_generation | defaults solver | defaults contact | defaults view | model attributes | model display |
@@ -204,9 +208,9 @@ executive_control set equilibrium_parameters | executive_control set kinematics_
 executive_control set initial_conditions_parameters | executive_control set solver_parameters |
 simulation single_run reset | simulation single_run set | simulation single_run save | simulation set |
 simulation single_run debugger | simulation script write_acf | library | callback | check_messages | custom |
-geometry create shape plate_text | file log_file | file geometry | file parasolid read | file parasolid write | file command write |
-file adams_data_set write | file binary write | numeric_results | analysis | optimize | multi_run_analysis | ude auto_connect |
-force create graphics | output"""
+geometry create shape plate_text | file log_file | file geometry | file parasolid write | file command write |
+file adams_data_set write | file binary write | numeric_results | analysis | optimize | multi_run_analysis |
+ude auto_connect | force create graphics | output"""
 """Commands for the interface, the graphics and settings of results: nothing of the motion depends on them."""
 
 
@@ -286,7 +290,8 @@ def resolve(words: tuple[str, ...], line: int) -> Row | None:
     ViewError
         If a word is unknown or ambiguous.
     """
-    node, path = ROOT, []
+    node: _Node = ROOT
+    path: list[str] = []
     for word in words:
         if node.ignored:
             return None
@@ -337,4 +342,6 @@ def argument_of(row: Row, word: str, line: int) -> str:
     command = " ".join(row.words)
     if found:
         raise ViewError(f"{command}: {word} is ambiguous: {', '.join(found)}", line)
-    raise ViewError(f"{command}: it has no argument {word[:40]}{did_you_mean(word[:40], row.arguments, before='; ')}", line)
+    raise ViewError(
+        f"{command}: it has no argument {word[:40]}{did_you_mean(word[:40], row.arguments, before='; ')}", line
+    )
