@@ -1,6 +1,7 @@
 from .builders.mechanism import build_mechanism as build_mechanism
 from .builders.routine_calls import RoutineCall as RoutineCall
 from .builders.routines import load_routines as load_routines
+from .doors import read_deck as read_deck
 from .errors import DeckError as DeckError
 from .errors import Diagnostic as Diagnostic
 from .parse.commands import Script as Script
@@ -8,7 +9,6 @@ from .parse.commands import parse_script as parse_script
 from .parse.commands import read_script as read_script
 from .parse.deck import Deck as Deck
 from .parse.reader import parse_deck as parse_deck
-from .parse.reader import read_deck as read_deck
 from .results.res import ResultSet as ResultSet
 from .results.res import ResultsFile as ResultsFile
 from .results.res import read_results as read_results
@@ -16,4 +16,7 @@ from .results.result import AdamsResult as AdamsResult
 from .runner import linear_plant as linear_plant
 from .runner import run_deck as run_deck
 from .support import support_table as support_table
+from .view.reader import ViewModel as ViewModel
+from .view.reader import parse_view as parse_view
+from .view.reader import read_view as read_view
 from .write.deck_writer import write_deck as write_deck

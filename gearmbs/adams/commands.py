@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gearmbs._command import end_interrupted, fail, guarded
 
+if TYPE_CHECKING:
+    from gearmbs.adams import Script, ViewModel
+
 
 def adams(
-    model: Annotated[Path, typer.Argument(help="ADAMS/Solver deck (.adm).")],
+    model: Annotated[Path, typer.Argument(help="ADAMS/Solver deck (.adm), or command file of View (.cmd).")],
     script: Annotated[Path | None, typer.Argument(help="Commands (.acf).")] = None,
     end: Annotated[float | None, typer.Option(help="End time, when there is no script.")] = None,
     steps: Annotated[int | None, typer.Option(help="Output steps, when there is no script; default: 100.")] = None,
@@ -28,24 +31,39 @@ def adams(
         bool | None,
         typer.Option(help="Solve motions again at a hundredth of ERROR and compare; default: if that is quick."),
     ] = None,
+    simulation: Annotated[str | None, typer.Option(help="Which simulation of a .cmd; default: its last.")] = None,
+    variable: Annotated[
+        list[str] | None, typer.Option(help="NAME=VALUE of a design variable of a .cmd; may be given again.")
+    ] = None,
+    to_deck: Annotated[
+        Path | None, typer.Option(help="Write the deck of a .cmd here, and its simulations beside; run nothing.")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="Prefix of the files written; default: the script's, or the model's name."),
     ] = None,
 ) -> None:
-    """Run an ADAMS deck; write .req, .res, .msg and NetCDF."""
+    """Run an ADAMS deck, or a command file of View; write .req, .res, .msg and NetCDF."""
     with guarded():
         from gearmbs.adams import DeckError, load_routines, read_script, run_deck
 
         if not model.is_file():
             fail(f"there is no file '{model}'")
-        if script is None and end is None:
+        viewed = _viewed(model, variable or [], to_deck is not None or simulation is not None)
+        if viewed is not None and to_deck is not None:
+            for path in viewed.save(to_deck):
+                typer.echo(f"wrote {path}")
+            return
+        held: Script | None = None
+        if viewed is not None and script is None and end is None:
+            held = _held(viewed, simulation)
+        if script is None and end is None and held is None:
             fail(f"give a script (.acf), or --end and --steps: gearmbs adams {model} --end 5 --steps 500")
-        commands = read_script(script) if script is not None else None
-        prefix = out or (commands.output(model) if commands else model.with_suffix(""))
+        commands = read_script(script) if script is not None else held
+        prefix = out or (commands.output(model) if commands is not None and held is None else model.with_suffix(""))
         try:
             result = run_deck(
-                model,
+                model if viewed is None else viewed,
                 commands,
                 prefix,
                 end=end,
@@ -73,6 +91,37 @@ def adams(
         if not result.success:
             fail(f"{model}: the analysis did not finish; see {prefix}.msg")
         typer.echo(f"wrote {prefix}.req, .res, .msg, .nc")
+
+
+def _viewed(model: Path, variable: list[str], needed: bool) -> ViewModel | None:
+    """Return the model of a command file of View, None of a deck."""
+    from gearmbs.adams import read_view
+    from gearmbs.adams.parse.reader import is_view, read_file
+
+    if not is_view(read_file(model)):
+        if variable or needed:
+            fail(f"{model} is a deck; --variable, --simulation and --to-deck are for command files of View (.cmd)")
+        return None
+    values: dict[str, float] = {}
+    for one in variable:
+        name, equals, value = one.partition("=")
+        try:
+            values[name.strip()] = float(value)
+        except ValueError:
+            equals = ""
+        if not equals:
+            fail(f"--variable {one}: give NAME=VALUE with a number")
+    return read_view(model, values)
+
+
+def _held(viewed: ViewModel, name: str | None) -> Script | None:
+    """Return a simulation of a command file."""
+    if name is None:
+        return viewed.script
+    if name not in viewed.scripts:
+        there = ", ".join(viewed.scripts) or "none"
+        fail(f"--simulation {name}: it is not among those of the file: {there}")
+    return viewed.scripts[name]
 
 
 def plant(

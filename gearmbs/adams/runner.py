@@ -9,19 +9,20 @@ from pathlib import Path
 
 from gearmbs.adams.analysis import failed, linear, simulate
 from gearmbs.adams.builders.routines import bound
+from gearmbs.adams.doors import read_model
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.reader import read_deck
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.session import Session, change, check_script, switch
+from gearmbs.adams.view.reader import ViewModel
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.problem import ModelError
 
 
 def run_deck(
-    adm: str | Path | Deck,
+    adm: str | Path | Deck | ViewModel,
     acf: str | Path | Script | None = None,
     out: str | Path | None = None,
     *,
@@ -39,10 +40,11 @@ def run_deck(
 
     Parameters
     ----------
-    adm : path or Deck
-        The model.
+    adm : path, Deck or ViewModel
+        The model; a path may be that of a command file of View.
     acf : path or Script, optional
-        Commands; without them one dynamic analysis is run up to ``end``.
+        Commands; without them one dynamic analysis is run up to ``end``, or, without that, the simulation that a
+        command file of View holds.
     out : path, optional
         Prefix of the files to write (.req, .res, .msg, .nc).
     end : float, optional
@@ -77,7 +79,12 @@ def run_deck(
         a run can tell (a position without equilibrium, for instance) comes with the ``result`` of the commands before,
         whose files are written.
     """
-    deck = bound(adm if isinstance(adm, Deck) else read_deck(adm), routines, allow_unsupported)
+    model = read_model(Path(adm)) if isinstance(adm, (str, Path)) else adm
+    if isinstance(model, ViewModel):
+        if acf is None and (end, steps, dtout) == (None, None, None):
+            acf = model.script
+        model = model.deck
+    deck = bound(model, routines, allow_unsupported)
     script = _script(acf, end, steps, dtout)
     if script.unsupported and not allow_unsupported:
         raise DeckError(script.unsupported)

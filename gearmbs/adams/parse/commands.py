@@ -25,7 +25,14 @@ from gearmbs.adams.parse.grammar import (
     arg,
     grammar_of,
 )
-from gearmbs.adams.parse.reader import read_file, read_statement, resolve_statement, statements, unknown_statement
+from gearmbs.adams.parse.reader import (
+    read_file,
+    read_statement,
+    refuse_view,
+    resolve_statement,
+    statements,
+    unknown_statement,
+)
 from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
@@ -198,6 +205,7 @@ def parse_script(text: str, file: str = "<script>", depth: int = 0) -> Script:
     DeckError
         Naming the line of everything that is wrong.
     """
+    refuse_view(text, file)
     script = Script(file=file)
     errors: list[Diagnostic] = []
     lines = re.split(r"\r\n|\r|\n", text)

@@ -17,11 +17,16 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, remark_defaults
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import CONTINUED, ArgumentReader, RawStatement, StatementError, grammar_of
-from gearmbs.progress import waiting
 from gearmbs.wording import did_you_mean
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 
+COMMANDS_OF_VIEW = re.compile(
+    r"^\s*(?:model\s+cre\w*\b|part\s+(?:cre|mod)\w*\s+\w+|marker\s+(?:cre|mod)\w*\b|defaults?\s+(?:units|model|coord)\w*|"
+    r"constraint\s+cre\w*\s+\w+|force\s+cre\w*\s+\w+|geometry\s+cre\w*\s+\w+|variable\s+(?:set|create)\b)",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""How lines of View's command files begin; no statement and no command of the solver does."""
 _VIEW_NAME = re.compile(r"(?:adams_)?view_name\s*=\s*['\"]([^'\"]*)['\"]", re.IGNORECASE)
 _PAIR = re.compile(r"\s*gearmbs pair:(.*)")
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
@@ -30,18 +35,6 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 def _names() -> list[str]:
     """Return the names of all statements that are known."""
     return [*sorted(st.STATEMENTS), *sorted(st.IGNORED), *sorted(st.UNSUPPORTED), "END"]
-
-
-@waiting("reading the deck")
-def read_deck(path: str | Path) -> Deck:
-    """Read an .adm file.
-
-    Raises
-    ------
-    DeckError
-        Naming file and line of everything that is wrong.
-    """
-    return parse_deck(read_file(Path(path)), str(path))
 
 
 def parse_deck(text: str, file: str = "<deck>") -> Deck:
@@ -62,6 +55,7 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
     DeckError
         Naming the line of everything that is wrong.
     """
+    refuse_view(text, file)
     first = re.split(r"\r\n|\r|\n", text, maxsplit=1)[0]
     deck = Deck(file=file)
     errors: list[Diagnostic] = []
@@ -73,6 +67,28 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
     else:
         deck.title = first.strip().lstrip("!").strip()
     return _read_all(deck, statements(text, skip=0 if untitled else 1), errors)
+
+
+def is_view(text: str) -> bool:
+    """Return whether a text is a command file of ADAMS View: its commands, and no statement of a deck."""
+    found = COMMANDS_OF_VIEW.search(text)
+    return found is not None and not re.search(r"^\s*(?:PART|MARKER|UNITS)\s*/", text, re.MULTILINE)
+
+
+def refuse_view(text: str, file: str) -> None:
+    """Say of a command file of View what it is.
+
+    Raises
+    ------
+    DeckError
+        If it is one.
+    """
+    if is_view(text):
+        message = (
+            "these are commands of ADAMS View (.cmd), not of the solver; `gearmbs adams model.cmd` runs them, "
+            "`read_view` and `parse_view` read them in Python"
+        )
+        raise DeckError([Diagnostic(ERROR, message, file, 1)])
 
 
 def deck_of(raws: Iterable[RawStatement], title: str, file: str) -> Deck:

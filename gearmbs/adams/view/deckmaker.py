@@ -321,7 +321,7 @@ class Deckmaker:
 def place(a: np.ndarray, r: np.ndarray, origin: str = "QP") -> tuple[str | None, str | None]:
     """Return position and orientation as arguments, in degrees; None of what is zero."""
     at = f"{origin} = {listed(float(x) + 0.0 for x in r)}" if np.any(r) else None
-    if np.array_equal(a, frames.IDENTITY):
+    if np.allclose(a, frames.IDENTITY, rtol=0.0, atol=1e-15):
         return at, None
     degrees = [x / DEGREE + 0.0 for x in frames.angles_313(a)]
     return at, f"REULER = {', '.join(number(x) + 'D' for x in degrees)}"

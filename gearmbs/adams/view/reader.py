@@ -19,18 +19,7 @@ from gearmbs.adams.view.interpreter import Interpreter
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
 from gearmbs.adams.write.text import number
-
-SIGNS = re.compile(
-    r"^\s*(?:model\s+cre\w*\b|part\s+(?:cre|mod)\w*\s+\w+|marker\s+cre\w*\b|defaults\s+(?:units|model|coord)\w*|"
-    r"constraint\s+cre\w*\s+\w+|force\s+cre\w*\s+\w+|geometry\s+cre\w*\s+\w+|variable\s+(?:set|create)\b)",
-    re.IGNORECASE | re.MULTILINE,
-)
-"""How command files of View begin lines; no statement of a deck does."""
-
-
-def is_view(text: str) -> bool:
-    """Return whether a text is a command file of View, not a deck."""
-    return SIGNS.search(text) is not None and not re.search(r"^\s*(?:PART|MARKER|UNITS)/", text, re.MULTILINE)
+from gearmbs.files import write_whole
 
 
 @dataclass
@@ -55,6 +44,24 @@ class ViewModel:
     scripts: dict[str, Script] = field(default_factory=dict)
     variables: dict[str, float] = field(default_factory=dict)
     name: str = ""
+
+    def save(self, path: str | Path) -> list[Path]:
+        """Write the deck, and its simulations beside it as NAME.acf; return the files.
+
+        Parameters
+        ----------
+        path : str or Path
+            Of the deck (.adm).
+        """
+        path = Path(path)
+        written = [path]
+        write_whole(path, self.text)
+        for name, script in self.scripts.items():
+            stem = re.sub(r"\W+", "_", name)
+            written.append(path.with_name(f"{path.stem}_{stem}.acf"))
+            lines = [path.stem, f"{path.stem}_{stem}", *(command.text for command in script), "STOP"]
+            write_whole(written[-1], "\n".join(lines) + "\n")
+        return written
 
     @property
     def script(self) -> Script | None:
@@ -207,8 +214,11 @@ def _scripts(run: Interpreter, model: Item, file: str) -> dict[str, Script]:
 
 
 def _script(lines: list[str], file: str, line: int) -> Script:
+    if any(re.match(r"\s*FILE\b", one, re.IGNORECASE) for one in lines):
+        message = "in the simulation: FILE reads and writes elsewhere; give the commands themselves"
+        raise DeckError([Diagnostic(ERROR, message, file, line)])
     try:
-        return parse_script("\n".join(["model", "output", *lines]), file)
+        return parse_script("\n".join(lines), file)
     except DeckError as error:
         raise DeckError(
             [Diagnostic(d.severity, f"in the simulation: {d.message}", file, line) for d in error.diagnostics]

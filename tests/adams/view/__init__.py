@@ -1,0 +1,1 @@
+"""Command files of View."""

@@ -1,0 +1,173 @@
+"""Expressions of View: operators, units, texts, places and orientations; trees of any length, bounded depth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as hs
+from scipy.spatial.transform import Rotation
+
+from gearmbs.adams.view import frames
+from gearmbs.adams.view.expressions import parse
+from gearmbs.adams.view.interpreter import Interpreter
+from gearmbs.adams.view.lexer import ViewError
+
+from ...says import says
+
+MODEL = """\
+model create model_name = m
+defaults units length = mm angle = deg force = newton mass = kg time = sec
+part create rigid_body name_and_position part_name = .m.P location = 10, 20, 30 orientation = 90, 0, 0
+marker create marker_name = .m.P.A location = 11, 20, 30 orientation = 0, 90, 0
+marker create marker_name = .m.P.B location = 10, 25, 30
+point create point_name = .m.P.C location = 10, 20, 37
+variable create variable_name = .m.v real_value = 4
+variable create variable_name = .m.list real_value = 1, 2, 3
+variable create variable_name = .m.text string_value = "hello"
+"""
+
+
+@pytest.fixture(scope="module")
+def values():
+    run = Interpreter()
+    run.run(MODEL)
+    assert not run.errors
+    return run.values
+
+
+def evaluated(values, text, frame=None):
+    return values.evaluate(parse(text, values.db.units), 0, frame)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 + 2 * 3 ** 2", 19),
+        ("-2 ^ 2", -4),
+        ("7 - 2 - 1", 4),
+        ("2 ** 3 ** 2", 512),
+        ("1 + 1 == 2 && !(3 < 2)", 1),
+        ("0 || 0", 0),
+        ("7 % 4", 3),
+        (".m.v / 8", 0.5),
+        ("2.5cm", 25.0),
+        ("0.1meter", 100.0),
+        ("1(newton/meter)", 1e-3),
+        ("2(newton-mm-sec/rad)", 2.0 * np.pi / 180.0),
+        ("7.8(kg/meter**3)", 7.8e-9),
+        ("180.0d", 180.0),
+        ("1rad", 180.0 / np.pi),
+        ("SIN(30)", 0.5),
+        ("ATAN2(1, 1)", 45.0),
+        ("(3 * 2)cm", 60.0),
+        (".m.list[2] + {1, 2}[1]", 3),
+        ("{1, 2} * 3", [3, 6]),
+        ("{1, 2} + {3, 4}", [4, 6]),
+        ("MAX(1, {5, 3})", 5),
+        ('"a" // "b" // RTOI(3.9)', "ab3"),
+        ('.m.text == "hello"', 1),
+        ('DB_EXISTS(".m.P.A") + DB_EXISTS(".m.Q")', 1),
+        ('STR_LENGTH("abc") + STOI("4")', 7),
+        ("NINT(-2.5)", -3),
+        ("DM(.m.P.A, .m.P.B)", np.sqrt(26.0)),
+        ("DX(.m.P.B, .m.P.A)", -1.0),
+        ("DY(.m.P.B, .m.P.A, .m.P.A)", 0.0),
+        ("LOC_RELATIVE_TO({0, 0, 1}, .m.P.A)", [11.0, 19.0, 30.0]),
+        ("LOC_ON_AXIS(.m.P.A, 2, 'z')", [11.0, 18.0, 30.0]),
+        ("LOC_ALONG_LINE(.m.P.A, .m.P.C, 0)", [11.0, 20.0, 30.0]),
+        ("LOC_LOCAL({11, 20, 31}, .m.P.A)", [0.0, 1.0, 0.0]),
+        ("LOC_MIRROR({0, 0, 5}, .m.P.B, 'xy')", [0.0, 0.0, 55.0]),
+        ("ORI_RELATIVE_TO({0, 0, 0}, .m.P.A)", [0.0, 90.0, 0.0]),
+        ("ORI_ALL_AXES({{0, 0, 0}, {0, 1, 0}, {-1, 0, 0}}, 'xy')", [90.0, 0.0, 0.0]),
+    ],
+)
+def test_values(values, text, value):
+    found = evaluated(values, text)
+    assert found == value if isinstance(value, str) else np.allclose(found, value, rtol=1e-13, atol=1e-12)
+
+
+def test_places_come_in_the_frame_that_they_are_asked_in(values):
+    part = values.db.find(".m.P")
+    assert np.allclose(evaluated(values, "LOC_RELATIVE_TO({0, 0, 0}, .m.P.B)", part), [5.0, 0.0, 0.0])
+    assert np.allclose(values.location(values.db.find(".m.P.B")), [5.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("axis", "direction", "x", "z"),
+    [
+        # as View placed markers of public models along these directions
+        ("z", (1, 0, 0), (0, 0, -1), (1, 0, 0)),
+        ("z", (0, 0, -1), (-1, 0, 0), (0, 0, -1)),
+        ("z", (0, -1, 0), (1, 0, 0), (0, -1, 0)),
+        ("z", (-0.6402, -0.7682, 0), (0, 0, 1), (-0.6402, -0.7682, 0)),
+        ("x", (-0.7894, -0.6139, 0), (-0.7894, -0.6139, 0), (0, 0, -1)),
+        ("x", (-0.7775, -0.1728, 0.6047), (-0.7775, -0.1728, 0.6047), (-0.6139, 0, -0.7894)),
+        ("y", (-0.7071, 0.7071, 0), (0.7071, 0.7071, 0), (0, 0, 1)),
+    ],
+)
+def test_axes_along_a_direction(axis, direction, x, z):
+    a = frames.along(axis, np.array(direction, float))
+    assert np.allclose(a[:, 0], x, atol=1e-4)
+    assert np.allclose(a[:, 2], z, atol=1e-4)
+
+
+@pytest.mark.parametrize("named", ["xx", "xz", "zy", "y-z", "z-y", "z-z", "x-x"])
+def test_aligned_axes(named):
+    a = Rotation.from_euler("zxz", [0.3, 0.4, 0.5]).as_matrix()
+    sign = -1.0 if "-" in named else 1.0
+    found = frames.aligned(a, named[0], sign, named[-1])
+    assert np.allclose(found.T @ found, np.eye(3))
+    assert np.isclose(np.linalg.det(found), 1.0)
+    assert np.allclose(found[:, "xyz".index(named[0])], sign * a[:, "xyz".index(named[-1])])
+
+
+@given(hs.sampled_from(("313", "123", "321", "121", "232")), hs.tuples(*[hs.floats(-7, 7)] * 3), hs.booleans())
+@settings(max_examples=60, deadline=None)
+def test_rotations_of_any_sequence(sequence, angles, body):
+    found = frames.rotation(list(angles), ("body" if body else "space") + sequence)
+    axes = "".join("xyz"[int(c) - 1] for c in sequence)
+    assert np.allclose(found, Rotation.from_euler(axes.upper() if body else axes, angles).as_matrix(), atol=1e-12)
+    assert np.allclose(frames.rotation(frames.angles_313(found)), found, atol=1e-12)
+
+
+def test_long_sums_and_deep_brackets(values):
+    assert evaluated(values, " + ".join(["1"] * 20_000)) == 20_000
+    assert evaluated(values, "(" * 25 + "1" + ")" * 25) == 1
+    with pytest.raises(ViewError, match=says("deeper", "60")):
+        evaluated(values, "(" * 200 + "1" + ")" * 200)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1 / 0", ("zero",)),
+        ("10 ** 400", ("10",)),
+        ("SQRT(-1)", ("-1",)),
+        ("nobody", ("nobody",)),
+        ("EXECUTE(1)", ("EXECUTE",)),
+        ("SIN(1, 2)", ("SIN", "2")),
+        ("1 +", ("ends",)),
+        ("{1, 2} + {1, 2, 3}", ("2", "3")),
+        (".m.P + 1", (".m.P", "number")),
+        ("5parsec", ("parsec", "unit")),
+        ("__import__('os')", ("__IMPORT__",)),
+        ("LOC_RELATIVE_TO({1, 2}, .m.P.A)", ("three",)),
+        ("ORI_ALONG_AXIS(.m.P.A, .m.P.A, 'z')", ("direction",)),
+    ],
+)
+def test_what_has_no_value_is_named(values, text, words):
+    with pytest.raises(ViewError, match=says(*words)):
+        evaluated(values, text)
+
+
+def test_circles_are_ended_by_what_was_there_before():
+    circle = MODEL + (
+        "marker create marker_name = .m.P.D location = 1, 2, 3\n"
+        "marker modify marker_name = .m.P.D location = (LOC_RELATIVE_TO({0, 0, 1}, .m.P.E)) relative_to = .m.P\n"
+    )
+    run = Interpreter()
+    run.run(circle.replace("marker modify", "marker create marker_name = .m.P.E location = 0, 0, 0\nmarker modify"))
+    run.run("marker modify marker_name = .m.P.E location = (LOC_RELATIVE_TO({0, 0, 0}, .m.P.D)) relative_to = .m.P\n")
+    assert not run.errors
+    assert np.all(np.isfinite(run.values.location(run.database.find(".m.P.D"))))

@@ -1,0 +1,193 @@
+"""Command files of View become decks: objects, expressions that View evaluates, loops, simulations, variables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from gearmbs.adams import DeckError, parse_deck, parse_script, parse_view, read_deck, read_view, run_deck
+from gearmbs.adams.parse import statements as st
+
+from ...says import says
+from .files import CHAIN, PENDULUM, WHOLE
+
+
+def by_name(view, kind, name):
+    return next(one for one in view.deck.of(kind).values() if one.name == name)
+
+
+def test_a_pendulum_is_read():
+    view = parse_view(PENDULUM)
+    assert view.name == "swing"
+    assert view.deck.units.length == 1e-3
+    rod = by_name(view, st.Part, "ROD")
+    assert (rod.id, rod.mass, rod.ip) == (2, 2.0, (100.0, 100.0, 100.0))
+    centre = by_name(view, st.Marker, "cm")
+    assert np.allclose(centre.qp, (250.0, -500.0 * np.cos(np.pi / 6), 0.0), rtol=0, atol=1e-12)
+    assert view.deck.of(st.Marker)[11].name == "PIVOT"
+    assert view.variables == {".swing.LENGTH": 500.0, ".swing.TILT": 30.0}
+    assert [command.end for command in view.script] == [0.2]
+    assert rod.line == 7
+
+
+def test_variables_are_factors():
+    view = parse_view(PENDULUM, variables={"LENGTH": 300.0, ".swing.TILT": 90.0})
+    assert np.allclose(by_name(view, st.Marker, "cm").qp, (300.0, 0.0, 0.0), rtol=0, atol=1e-12)
+    with pytest.raises(DeckError, match=says("nothing", "variable")):
+        parse_view(PENDULUM, variables={"nothing": 1.0})
+
+
+def test_loops_and_conditions_build_a_chain():
+    view = parse_view(CHAIN)
+    parts = [part for part in view.deck.of(st.Part).values() if not part.ground]
+    assert [part.mass for part in parts] == [0.5, 1.0, 1.5, 2.0]
+    assert [part.qg for part in parts] == [(float(k), 0.0, 0.0) for k in range(4)]
+    assert len(view.deck.of(st.Joint)) == 4
+    assert by_name(view, st.Marker, "end").qp == (1.0, 0.0, 0.0)
+
+
+def test_all_kinds_are_read_and_written_as_a_deck():
+    view = parse_view(WHOLE)
+    again = parse_deck(view.text)
+    assert not view.deck.unsupported
+    for statement in view.deck:
+        other = again.items[type(statement)][statement.id]
+        assert other.name == statement.name
+        for name in statement.given:
+            assert np.all(getattr(other, name) == getattr(statement, name)), (statement.label(), name)
+    assert len(list(again)) == len(list(view.deck)) > 25
+
+
+def test_units_of_angle_become_radians():
+    view = parse_view(WHOLE)
+    bushing = view.deck.of(st.Bushing)[1]
+    assert np.allclose(bushing.kt, np.degrees([1.0, 2.0, 3.0]))
+    assert np.isclose(by_name(view, st.Part, "B").wz, np.pi / 2)
+    assert np.isclose(by_name(view, st.Joint, "J1").icrot[1], np.radians(10.0))
+    radians = parse_view(WHOLE.replace("angle = deg", "angle = rad").replace("0, 45, 0", "0, 45d, 0"))
+    assert radians.deck.of(st.Bushing)[1].kt == (1.0, 2.0, 3.0)
+
+
+def test_names_in_expressions_become_ids_and_values():
+    view = parse_view(WHOLE)
+    force = view.deck.of(st.Sforce)[1]
+    i, j = force.i, force.j
+    measure = by_name(view, st.Variable, "ME").id
+    variable = by_name(view, st.Variable, "V")
+    assert force.function.replace(" ", "") == f"STEP(time,0,0,1,(3.5))*DM({i},{j})+VARVAL({variable.id})"
+    assert variable.function.replace(" ", "") == f"AKISPL(time,0,1,0)+VARVAL({measure})"
+    assert by_name(view, st.Variable, "ME").function.startswith("RTOD * AZ(")
+
+
+def test_a_file_runs_its_own_simulation(tmp_path):
+    path = tmp_path / "swing.cmd"
+    path.write_text(PENDULUM)
+    result = run_deck(path)
+    assert result.success
+    height = result.to_dataset().request_1.sel(request_1_column="F2").values
+    # a physical pendulum from thirty degrees, solved for itself
+    inertia = 2.0 * 0.5**2 + 100e-6
+    swing = solve_ivp(
+        lambda t, y: (y[1], -2.0 * 9.80665 * 0.5 * np.sin(y[0]) / inertia), (0, 0.2), (np.pi / 6, 0.0), rtol=1e-11
+    )
+    assert np.isclose(height[-1], -500.0 * np.cos(swing.y[0, -1]), rtol=1e-6)
+
+
+def test_files_are_written_as_decks(tmp_path):
+    path = tmp_path / "swing.cmd"
+    path.write_text(PENDULUM)
+    files = read_view(path).save(tmp_path / "deck.adm")
+    assert [one.name for one in files] == ["deck.adm", "deck_Last_Sim.acf"]
+    assert read_deck(files[0]).of(st.Joint).keys() == read_deck(path).of(st.Joint).keys()
+    assert parse_script(files[1].read_text()).commands[0].steps == 20
+
+
+@pytest.mark.parametrize("door", [parse_deck, parse_script])
+def test_other_doors_say_what_it_is(door):
+    with pytest.raises(DeckError, match=says("View", "read_view", "cmd")):
+        door(PENDULUM)
+
+
+BROKEN = {
+    "marker creat marker_name": ("marker", "known", "create"),
+    "marker create marker_nam = .swing.ROD.M colour = red": ("colour",),
+    "part create rigid_body name_and_position part_name = .other.P": (".other", "no"),
+    "marker create marker_name = .swing.ROD.M location = 1, 2": ("location", "three"),
+    "marker create marker_name = .swing.ROD.M location = (1 +), 2, 3": ("1 +",),
+    "marker create marker_name = .swing.ROD.M location = 0, 0, (1 / 0)": ("zero",),
+    "marker create marker_name = .swing.ROD.M relative_to = .swing.nowhere": ("nowhere",),
+    "marker create marker_name = .swing.ROD.TOP": ("TOP", "already"),
+    "variable modify variable_name = .swing.none real_value = 3": ("none",),
+    "if condition = (1)": ("end", "if"),
+    "end": ("end",),
+    "marker create marker_name = 'x": ("quotation",),
+    "marker create marker_name = (x": ("bracket",),
+    "defaults units length = furlong": ("furlong", "MILLIMETER"),
+    "file command read file_name = ../../x.cmd": ("folder",),
+    "while condition = (1)\nvariable set variable_name = .swing.q real_value = 1\nend": ("loop",),
+    "defaults units length = meter": ("length", "changed"),
+}
+
+
+@pytest.mark.parametrize("line", BROKEN)
+def test_errors_have_a_line_and_a_reason(line):
+    with pytest.raises(DeckError, match=says(*BROKEN[line])) as caught:
+        parse_view(PENDULUM + line + "\n", "swing.cmd")
+    assert all(d.file == "swing.cmd" and d.line >= 0 for d in caught.value.diagnostics)
+
+
+LEFT_OUT = {
+    "force create direct multi_point_force multi_point_force_name = .swing.N i_marker_name = .swing.ROD.TOP": "beams",
+    "ude create instance instance_name = .swing.T definition_name = .MDI.Forces.vpg_tire": "vpg_tire",
+    "contact create contact_name = .swing.C i_geometry_name = .swing.ROD.BOB j_geometry_name = .swing.ground.NONE  &\n"
+    " stiffness = 1 damping = 1 exponent = 1 dmax = 1": "NONE",
+    "constraint create primitive_joint point_point jprim_name = .swing.P i_marker_name = .swing.ROD.TOP  &\n"
+    " j_marker_name = .swing.ground.PIVOT": "general_constraint",
+}
+
+
+@pytest.mark.parametrize("line", LEFT_OUT)
+def test_what_moves_is_never_left_out_in_silence(line):
+    deck = parse_view(PENDULUM + line + "\n").deck
+    assert len(deck.unsupported) == 1
+    assert LEFT_OUT[line] in deck.unsupported[0].message
+    with pytest.raises(DeckError, match=says(LEFT_OUT[line], "skip-unsupported")):
+        run_deck(deck, end=0.01, steps=1)
+
+
+def test_results_that_are_not_made_are_remarked():
+    deck = parse_view(PENDULUM + "measure create range measure_name = .swing.R of_measure_name = .swing.HEIGHT\n").deck
+    assert not deck.unsupported
+    assert any("left out" in str(d) for d in deck.diagnostics)
+
+
+def test_inactive_objects_are_not_there():
+    deck = parse_view(PENDULUM + "constraint attributes constraint_name = .swing.HINGE active = off\n").deck
+    assert not deck.of(st.Joint)
+
+
+def test_words_may_be_shortened():
+    short = PENDULUM.replace("marker create marker_name", "mar cre mark").replace(
+        "constraint create joint revolute", "cons cre joi rev"
+    )
+    assert parse_view(short).deck.of(st.Marker).keys() == parse_view(PENDULUM).deck.of(st.Marker).keys()
+
+
+def test_macros_are_carried_out():
+    macro = (
+        'macro create macro_name = .swing.ball user_entered_command = "make ball" commands =  &\n'
+        '  "marker create marker_name = .swing.ROD.$name location = 0, $height, 0",  &\n'
+        '  "!$name:t=string", "!$height:t=real:d=7"\n'
+        "make ball name = B1\nmake ball name = B2 height = (3 * 4)\n"
+    )
+    view = parse_view(PENDULUM + macro)
+    assert [by_name(view, st.Marker, name).qp[1] for name in ("B1", "B2")] == [7.0, 12.0]
+
+
+def test_files_beside_are_read(tmp_path):
+    (tmp_path / "inner.cmd").write_text("marker create marker_name = .swing.ROD.INNER location = 1, 2, 3\n")
+    (tmp_path / "outer.cmd").write_text(PENDULUM + "file command read file_name = inner.cmd\n")
+    assert by_name(read_view(tmp_path / "outer.cmd"), st.Marker, "INNER").qp == (1.0, 2.0, 3.0)
+    with pytest.raises(DeckError, match=says("inner.cmd", "folder")):
+        parse_view(PENDULUM + "file command read file_name = inner.cmd\n")

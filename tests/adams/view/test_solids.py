@@ -1,0 +1,159 @@
+"""Masses of View's solids: against integrals done anew over fine meshes, closed forms, and parts of whole ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.adams import parse_view
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.view import solids
+
+CELLS = 120
+"""Along each side of a box of points: sums over them are within 1 % of integrals over smooth bodies."""
+
+
+def by_points(inside, low, high):
+    """Return the moments of what lies inside, from the middles of small cells."""
+    low, high = np.array(low, float), np.array(high, float)
+    step = (high - low) / CELLS
+    axes = [low[k] + step[k] * (np.arange(CELLS) + 0.5) for k in range(3)]
+    p = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    p = p[inside(*p.T)]
+    cell = float(np.prod(step))
+    return cell * len(p), cell * p.sum(axis=0), cell * p.T @ p
+
+
+def angle_of(x, y):
+    return np.arctan2(y, x) % (2 * np.pi)
+
+
+CASES = {
+    "box": (solids.box(2, -3, 4), lambda x, y, z: (x > 0) & (y < 0) & (z > 0), (0, -3, 0), (2, 0, 4)),
+    "ellipsoid": (
+        solids.ellipsoid(1, 2, 3), lambda x, y, z: x**2 + y**2 / 4 + z**2 / 9 < 1, (-1, -2, -3), (1, 2, 3),
+    ),
+    "frustum": (
+        solids.frustum(3, 2, 1, 2 * np.pi), lambda x, y, z: np.hypot(x, y) < 2 - z / 3, (-2, -2, 0), (2, 2, 3),
+    ),
+    "sector": (
+        solids.frustum(-2, 2, 2, 2.0),
+        lambda x, y, z: (np.hypot(x, y) < 2) & (angle_of(x, y) < 2.0),
+        (-2, -2, -2),
+        (2, 2, 0),
+    ),
+    "torus": (
+        solids.torus(3, 1, 4.0),
+        lambda x, y, z: ((np.hypot(x, y) - 3) ** 2 + z**2 < 1) & (angle_of(x, y) < 4.0),
+        (-4, -4, -1),
+        (4, 4, 1),
+    ),
+    "revolution": (
+        solids.revolution(np.array([[1.0, 0.0], [3.0, 0.0], [1.0, 2.0]]), 2 * np.pi),
+        lambda x, y, z: (np.hypot(x, y) > 1) & (np.hypot(x, y) + z < 3),
+        (-3, -3, 0),
+        (3, 3, 2),
+    ),
+    "plate": (
+        solids.rounded(np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0]]), 0.5, -1, 1),
+        lambda x, y, z: _near(x, y, [(0, 0), (4, 0), (0, 3)], 0.5),
+        (-0.5, -0.5, -1),
+        (4.5, 3.5, 1),
+    ),
+    "plate that goes inwards": (
+        solids.rounded(np.array([[0.0, 0.0], [1.0, 2.0], [0.0, 4.0], [4.0, 2.0]]), 0.3, 0, 1),
+        lambda x, y, z: _near(x, y, [(0, 0), (1, 2), (0, 4), (4, 2)], 0.3),
+        (-0.5, -0.5, 0),
+        (4.5, 4.5, 1),
+    ),
+    "link": (
+        solids.rounded(np.array([[0.0, 0.0], [3.0, 4.0]]), 1.0, -1, 1),
+        lambda x, y, z: _near(x, y, [(0, 0), (3, 4)], 1.0),
+        (-1, -1, -1),
+        (4, 5, 1),
+    ),
+}  # fmt: skip
+
+
+def _near(x, y, corners, radius):
+    """Return which points are in a polygon or within a distance of its edges."""
+    inside, near = np.zeros(x.shape, bool), np.zeros(x.shape, bool)
+    for (px, py), (qx, qy) in zip(corners, [*corners[1:], corners[0]]):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crosses = (py > y) != (qy > y)
+            inside ^= crosses & (x < (qx - px) * (y - py) / np.where(qy == py, np.inf, qy - py) + px)
+        share = np.clip(((x - px) * (qx - px) + (y - py) * (qy - py)) / ((qx - px) ** 2 + (qy - py) ** 2), 0, 1)
+        near |= np.hypot(x - px - share * (qx - px), y - py - share * (qy - py)) < radius
+    return near | (inside if len(corners) > 2 else False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_moments_are_those_of_the_body(name):
+    found, inside, low, high = CASES[name]
+    volume, first, second = by_points(inside, low, high)
+    size = float(np.linalg.norm(np.subtract(high, low)))
+    assert np.isclose(found.volume, volume, rtol=0.01)
+    assert np.allclose(found.first, first, rtol=0, atol=0.01 * volume * size)
+    assert np.allclose(found.second, second, rtol=0, atol=0.01 * volume * size**2)
+
+
+def test_a_box_of_triangles_is_the_box():
+    corners = np.array([[x, y, z] for x in (0, 2.0) for y in (0, 3.0) for z in (0, 4.0)])
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = np.array([(a, b, c) for f in faces for a, b, c in (f[:3], (f[0], f[2], f[3]))])
+    found, box = solids.polyhedron(corners, triangles), solids.box(2, 3, 4)
+    assert np.isclose(found.volume, box.volume)
+    assert np.allclose(found.first, box.first)
+    assert np.allclose(found.second, box.second)
+
+
+def test_moved_moments_are_those_about_another_point():
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    moved = solids.box(2, 3, 4).moved(turn, np.array([3.0, 0, 0]))
+    assert np.allclose(moved.first, solids.box(3, 2, 4).first)
+    assert np.allclose(moved.second, solids.box(3, 2, 4).second)
+
+
+PART = """\
+model create model_name = m
+defaults units length = meter angle = deg force = newton mass = kg time = sec
+material create material_name = .m.oak density = 700
+part create rigid_body name_and_position part_name = .m.P location = 0, 0, 0
+marker create marker_name = .m.P.A location = 1, 0, 0
+"""
+MASSES = """\
+part create rigid_body mass_properties part_name = .m.P %s
+geometry create shape block block_name = .m.P.BOX corner_marker = .m.P.A diag_corner_coords = 2, 1, 1
+%s
+"""
+
+
+@pytest.mark.parametrize(
+    ("material", "density"),
+    [("material_type = .m.oak", 700.0), ("density = 5", 5.0), ("density = (5(kg/cm**3))", 5e6), ("", 7801.0)],
+)
+def test_mass_from_density(material, density):
+    part = parse_view(PART + MASSES % (material or "material_type = steel", "")).deck.of(st.Part)[2]
+    assert np.isclose(part.mass, 2.0 * density)
+    assert np.allclose(part.ip, np.array([2.0, 5.0, 5.0]) * 2.0 * density / 12.0)
+
+
+def test_a_cm_marker_goes_to_the_centre():
+    marker = "marker create marker_name = .m.P.cm location = 9, 9, 9 orientation = 90, 0, 0\n"
+    deck = parse_view(PART + marker + MASSES % ("density = 1", "")).deck
+    assert np.allclose(deck.of(st.Marker)[deck.of(st.Part)[2].cm].qp, (2.0, 0.5, 0.5))
+    assert np.allclose(deck.of(st.Part)[2].ip, np.array([5.0, 2.0, 5.0]) / 6.0)
+
+
+def test_what_has_no_formula_is_refused_and_with_a_mass_runs():
+    csg = (
+        "geometry create shape ellipsoid ellipsoid_name = .m.P.E center_marker = .m.P.A x_scale_factor = 1  &\n"
+        " y_scale_factor = 1 z_scale_factor = 1\n"
+        "geometry create shape csg csg_name = .m.P.C base_object = .m.P.BOX object = .m.P.E type = difference"
+    )
+    refused = parse_view(PART + MASSES % ("density = 1", csg)).deck
+    assert "csg" in refused.unsupported[0].message
+    assert "center_of_mass_marker" in refused.unsupported[0].message
+    given = parse_view(PART + MASSES % ("mass = 2 ixx = 1 iyy = 1 izz = 1 center_of_mass_marker = .m.P.A", csg)).deck
+    assert not given.unsupported
