@@ -12,9 +12,9 @@ from gearmbs.adams.view.lexer import ViewError
 Vector = np.ndarray
 _SEQUENCE = re.compile(r"(body|space)([123])([123])([123])\Z")
 IDENTITY = np.eye(3)
-IDENTITY.flags.writeable = False
+IDENTITY.setflags(write=False)
 ORIGIN = np.zeros(3)
-ORIGIN.flags.writeable = False
+ORIGIN.setflags(write=False)
 SMALL = 1e-12
 """Of a length or an axis: below it there is no direction; coordinates have sixteen digits."""
 

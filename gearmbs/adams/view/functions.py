@@ -38,15 +38,6 @@ class Function:
 FUNCTIONS: dict[str, Function] = {}
 
 
-def _function(names: str, least: int, most: int | None = None, placing: bool = False) -> Callable[[Run], Run]:
-    def enter(run: Run) -> Run:
-        for name in names.split():
-            FUNCTIONS[name] = Function(least, least if most is None else most, run, placing)
-        return run
-
-    return enter
-
-
 def _numeric(name: str, function: Callable[..., float], count: int = 1) -> None:
     FUNCTIONS[name] = Function(count, count, lambda values, ev, args, frame: ev.each(function, *args))
 
@@ -107,33 +98,27 @@ _fold("SSQ", lambda x: math.fsum(a * a for a in x))
 _fold("RMS", lambda x: math.sqrt(math.fsum(a * a for a in x) / len(x)))
 
 
-@_function("ROWS COUNT", 1)
 def _rows(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     return len(args[0]) if isinstance(args[0], list) else 1
 
 
-@_function("COLS", 1)
 def _cols(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     first = args[0][0] if isinstance(args[0], list) and args[0] else args[0]
     return len(first) if isinstance(first, list) else 1
 
 
-@_function("FIRST", 1)
 def _first(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> Any:
     return ev.member(args[0], [1])
 
 
-@_function("LAST", 1)
 def _last(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> Any:
     return ev.member(args[0], [len(args[0]) if isinstance(args[0], list) else 0])
 
 
-@_function("STACK APPEND", 2)
 def _stack(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[Any]:
     return [one for part in args for one in (part if isinstance(part, list) else [part])]
 
 
-@_function("SERIES", 3)
 def _series(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     start, step, count = (ev.number(one) for one in args)
     if not 0 <= count <= 10_000:
@@ -144,12 +129,10 @@ def _series(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) 
 # Texts.
 
 
-@_function("STOI", 1)
 def _stoi(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     return int(_read(ev, args[0]))
 
 
-@_function("STOR VAL", 1)
 def _stor(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> float:
     return _read(ev, args[0])
 
@@ -164,7 +147,6 @@ def _read(ev: Evaluator, text: Any) -> float:
     return value
 
 
-@_function("STOO", 1)
 def _stoo(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> Any:
     found = values.db.find(text_of(args[0]))
     if found is None:
@@ -172,56 +154,46 @@ def _stoo(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) ->
     return found
 
 
-@_function("STR_LENGTH", 1)
 def _length(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     return len(text_of(args[0]))
 
 
-@_function("STR_IS_SPACE", 1)
 def _blank(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     return int(not text_of(args[0]).strip())
 
 
-@_function("STR_CASE", 2)
 def _case(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> str:
     text, how = text_of(args[0]), int(ev.number(args[1]))
     return {1: text.upper(), 2: text.lower(), 3: text.title(), 4: text.capitalize()}.get(how, text)
 
 
-@_function("STR_COMPARE", 2)
 def _compare(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     one, other = text_of(args[0]), text_of(args[1])
     return (one > other) - (one < other)
 
 
-@_function("STR_FIND", 2)
 def _find(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     return text_of(args[0]).find(text_of(args[1])) + 1
 
 
-@_function("STR_SUBSTR", 2, 3)
 def _substr(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> str:
     start = max(int(ev.number(args[1])), 1) - 1
     count = max(int(ev.number(args[2])), 0) if len(args) > 2 else LARGEST_TEXT
     return text_of(args[0])[start : start + count]
 
 
-@_function("STR_SPLIT", 2)
 def _split(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[str]:
     return text_of(args[0]).split(text_of(args[1])[:1] or None)
 
 
-@_function("STR_REMOVE_WHITESPACE", 1)
 def _stripped(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> str:
     return "".join(text_of(args[0]).split())
 
 
-@_function("STR_PRINT STATUS_PRINT", 1)
 def _printed(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> str:
     return text_of(args[0])
 
 
-@_function("GETENV", 1)
 def _unset(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> str:
     """Return what an environment variable holds that is not set: the system is not asked."""
     return ""
@@ -230,17 +202,14 @@ def _unset(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -
 # The database.
 
 
-@_function("DB_EXISTS", 1)
 def _exists(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     return int(isinstance(args[0], Item) or values.db.find(text_of(args[0])) is not None)
 
 
-@_function("DB_TYPE", 1)
 def _type(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> str:
     return _item(values, ev, args[0]).kind
 
 
-@_function("DB_DEFAULT", 2)
 def _default(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> Any:
     what = text_of(args[1]).lower()
     found = {"model": values.db.model, "part": values.db.part}.get(what)
@@ -249,18 +218,15 @@ def _default(values: Values, ev: Evaluator, args: list[Any], frame: Item | None)
     return found
 
 
-@_function("DB_CHILDREN DB_IMMEDIATE_CHILDREN", 2)
 def _children(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[Item]:
     kind = text_of(args[1]).lower()
     return [one for one in _item(values, ev, args[0]).children.values() if kind in ("all", one.kind)]
 
 
-@_function("DB_COUNT DB_OBJECT_COUNT", 1, 2)
 def _counted(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
     return len(args[0]) if isinstance(args[0], list) else 1
 
 
-@_function("DB_ANCESTOR DB_OLDEST_ANCESTOR", 2)
 def _ancestor(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> Any:
     kind, one = text_of(args[1]).lower(), values.db.items.get(_item(values, ev, args[0]).parent.lower())
     while one is not None and one.kind != kind:
@@ -268,7 +234,6 @@ def _ancestor(values: Values, ev: Evaluator, args: list[Any], frame: Item | None
     return "" if one is None else one
 
 
-@_function("UNIQUE_NAME UNIQUE_LOCAL_NAME", 1)
 def _unique(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> str:
     stem, k = text_of(args[0]), 1
     while values.db.find(f"{stem}_{k}") is not None:
@@ -327,7 +292,6 @@ def _axis(ev: Evaluator, value: Any, among: str = "xyz") -> str:
     return axis
 
 
-@_function("LOC_RELATIVE_TO LOC_GLOBAL", 2, placing=True)
 def _relative(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     offset = _triple(ev, args[0])
     if not offset.any():
@@ -337,26 +301,22 @@ def _relative(values: Values, ev: Evaluator, args: list[Any], frame: Item | None
     return _given(values, a @ offset + r, frame)
 
 
-@_function("LOC_LOCAL", 2, placing=True)
 def _local(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     a, r = _pose(values, ev, args[1])
     return [float(x) for x in a.T @ (_triple(ev, args[0]) - r)]
 
 
-@_function("LOC_LOC", 3, placing=True)
 def _loc_loc(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     a, r = _pose(values, ev, args[1])
     into = _item(values, ev, args[2]) if isinstance(args[2], (Item, str)) and args[2] else None
     return _given(values, a @ _triple(ev, args[0]) + r, into)
 
 
-@_function("LOC_ALONG_LINE", 3, placing=True)
 def _along_line(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     start, to = (_point(values, ev, one) for one in args[:2])
     return _given(values, start + ev.number(args[2]) * frames.unit(to - start, "LOC_ALONG_LINE"), frame)
 
 
-@_function("LOC_ON_LINE", 2, placing=True)
 def _on_line(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     numbers = ev.numbers(args[0])
     if len(numbers) != 6:
@@ -365,7 +325,6 @@ def _on_line(values: Values, ev: Evaluator, args: list[Any], frame: Item | None)
     return _given(values, start + ev.number(args[1]) * frames.unit(to - start, "LOC_ON_LINE"), frame)
 
 
-@_function("LOC_ON_AXIS", 3, placing=True)
 def _on_axis(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     a, r = _pose(values, ev, args[0])
     k = "xyz".index(_axis(ev, args[2]))
@@ -385,7 +344,6 @@ for _k, _name in enumerate(("LOC_X_AXIS", "LOC_Y_AXIS", "LOC_Z_AXIS")):
     FUNCTIONS[_name] = Function(1, 2, _axis_point(_k), placing=True)
 
 
-@_function("LOC_MIRROR LOC_FRAME_MIRROR", 3, placing=True)
 def _mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     a, r = _pose(values, ev, args[1])
     normal = a[:, 3 - sum("xyz".index(c) for c in _axis(ev, args[2], "xy yx yz zy xz zx"))]
@@ -393,7 +351,6 @@ def _mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) 
     return _given(values, point - 2.0 * ((point - r) @ normal) * normal, frame)
 
 
-@_function("LOC_INLINE", 3, placing=True)
 def _inline(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     # coordinates of one frame, at the same distance along the direction in another
     a, r = _pose(values, ev, args[1])
@@ -403,43 +360,36 @@ def _inline(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) 
     return _given(values, b @ (float(np.linalg.norm(point)) * frames.unit(seen, "LOC_INLINE")) + s, frame)
 
 
-@_function("LOC_CYLINDRICAL", 3)
 def _cylindrical(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     r, theta, z = (ev.number(one) for one in args)
     theta *= values.db.units.radian
     return [r * math.cos(theta), r * math.sin(theta), z]
 
 
-@_function("LOC_SPHERICAL", 3)
 def _spherical(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     rho, theta, phi = (ev.number(one) for one in args)
     theta, phi = theta * values.db.units.radian, phi * values.db.units.radian
     return [rho * math.sin(phi) * math.cos(theta), rho * math.sin(phi) * math.sin(theta), rho * math.cos(phi)]
 
 
-@_function("ORI_RELATIVE_TO ORI_GLOBAL", 2, placing=True)
 def _ori_relative(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     return _turned(values, _pose(values, ev, args[1])[0] @ _rotation(values, ev, args[0]), frame)
 
 
-@_function("ORI_LOCAL", 2, placing=True)
 def _ori_local(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     return _turned(values, _pose(values, ev, args[1])[0].T @ _rotation(values, ev, args[0]), None)
 
 
-@_function("ORI_ORI", 3, placing=True)
 def _ori_ori(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     into = _item(values, ev, args[2]) if isinstance(args[2], (Item, str)) and args[2] else None
     return _turned(values, _pose(values, ev, args[1])[0] @ _rotation(values, ev, args[0]), into)
 
 
-@_function("ORI_ALONG_AXIS", 3, placing=True)
 def _ori_along(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     start, to = (_point(values, ev, one) for one in args[:2])
     return _turned(values, frames.along(_axis(ev, args[2]), to - start), frame)
 
 
-@_function("ORI_ONE_AXIS", 2, placing=True)
 def _ori_one(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     numbers = ev.numbers(args[0])
     if len(numbers) != 6:
@@ -447,7 +397,6 @@ def _ori_one(values: Values, ev: Evaluator, args: list[Any], frame: Item | None)
     return _turned(values, frames.along(_axis(ev, args[1]), np.array(numbers[3:]) - np.array(numbers[:3])), frame)
 
 
-@_function("ORI_ALL_AXES", 2, placing=True)
 def _ori_all(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     numbers = ev.numbers(args[0])
     if len(numbers) != 9:
@@ -457,7 +406,6 @@ def _ori_all(values: Values, ev: Evaluator, args: list[Any], frame: Item | None)
     return _turned(values, frames.in_plane(axes[0], axes[1], q - p, r - p), frame)
 
 
-@_function("ORI_IN_PLANE", 4, placing=True)
 def _ori_plane(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     p, q, r = (_point(values, ev, one) for one in args[:3])
     named = text_of(args[3]).strip().lower()
@@ -468,7 +416,6 @@ def _ori_plane(values: Values, ev: Evaluator, args: list[Any], frame: Item | Non
     return _turned(values, frames.in_plane(first, second, q - p, r - p), frame)
 
 
-@_function("ORI_ALIGN_AXIS ORI_ALIGN_AXIS_EUL", 2, placing=True)
 def _ori_align(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     a = _pose(values, ev, args[0])[0]
     named = text_of(args[1]).strip().lower()
@@ -477,7 +424,6 @@ def _ori_align(values: Values, ev: Evaluator, args: list[Any], frame: Item | Non
     return _turned(values, frames.aligned(a, named[0], -1.0 if "-" in named else 1.0, named[-1]), frame)
 
 
-@_function("ORI_MIRROR ORI_FRAME_MIRROR", 4, placing=True)
 def _ori_mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     a = _pose(values, ev, args[1])[0]
     normal = a[:, 3 - sum("xyz".index(c) for c in _axis(ev, args[2], "xy yx yz zy xz zx"))]
@@ -488,7 +434,6 @@ def _ori_mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | No
     return _turned(values, frames.in_plane(axes[0], axes[1], reflected[:, i], reflected[:, j]), frame)
 
 
-@_function("DM", 2, placing=True)
 def _distance(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> float:
     return float(np.linalg.norm(_point(values, ev, args[0]) - _point(values, ev, args[1])))
 
@@ -536,3 +481,66 @@ def _euler(k: int) -> Run:
 
 for _k, _name in enumerate(("PSI", "THETA", "PHI")):
     FUNCTIONS[_name] = Function(1, 2, _euler(_k), placing=True)
+
+
+FUNCTIONS |= {
+    "ROWS": Function(1, 1, _rows),
+    "COUNT": Function(1, 1, _rows),
+    "COLS": Function(1, 1, _cols),
+    "FIRST": Function(1, 1, _first),
+    "LAST": Function(1, 1, _last),
+    "STACK": Function(2, 2, _stack),
+    "APPEND": Function(2, 2, _stack),
+    "SERIES": Function(3, 3, _series),
+    "STOI": Function(1, 1, _stoi),
+    "STOR": Function(1, 1, _stor),
+    "VAL": Function(1, 1, _stor),
+    "STOO": Function(1, 1, _stoo),
+    "STR_LENGTH": Function(1, 1, _length),
+    "STR_IS_SPACE": Function(1, 1, _blank),
+    "STR_CASE": Function(2, 2, _case),
+    "STR_COMPARE": Function(2, 2, _compare),
+    "STR_FIND": Function(2, 2, _find),
+    "STR_SUBSTR": Function(2, 3, _substr),
+    "STR_SPLIT": Function(2, 2, _split),
+    "STR_REMOVE_WHITESPACE": Function(1, 1, _stripped),
+    "STR_PRINT": Function(1, 1, _printed),
+    "STATUS_PRINT": Function(1, 1, _printed),
+    "GETENV": Function(1, 1, _unset),
+    "DB_EXISTS": Function(1, 1, _exists),
+    "DB_TYPE": Function(1, 1, _type),
+    "DB_DEFAULT": Function(2, 2, _default),
+    "DB_CHILDREN": Function(2, 2, _children),
+    "DB_IMMEDIATE_CHILDREN": Function(2, 2, _children),
+    "DB_COUNT": Function(1, 2, _counted),
+    "DB_OBJECT_COUNT": Function(1, 2, _counted),
+    "DB_ANCESTOR": Function(2, 2, _ancestor),
+    "DB_OLDEST_ANCESTOR": Function(2, 2, _ancestor),
+    "UNIQUE_NAME": Function(1, 1, _unique),
+    "UNIQUE_LOCAL_NAME": Function(1, 1, _unique),
+    "LOC_RELATIVE_TO": Function(2, 2, _relative, placing=True),
+    "LOC_GLOBAL": Function(2, 2, _relative, placing=True),
+    "LOC_LOCAL": Function(2, 2, _local, placing=True),
+    "LOC_LOC": Function(3, 3, _loc_loc, placing=True),
+    "LOC_ALONG_LINE": Function(3, 3, _along_line, placing=True),
+    "LOC_ON_LINE": Function(2, 2, _on_line, placing=True),
+    "LOC_ON_AXIS": Function(3, 3, _on_axis, placing=True),
+    "LOC_MIRROR": Function(3, 3, _mirror, placing=True),
+    "LOC_FRAME_MIRROR": Function(3, 3, _mirror, placing=True),
+    "LOC_INLINE": Function(3, 3, _inline, placing=True),
+    "LOC_CYLINDRICAL": Function(3, 3, _cylindrical),
+    "LOC_SPHERICAL": Function(3, 3, _spherical),
+    "ORI_RELATIVE_TO": Function(2, 2, _ori_relative, placing=True),
+    "ORI_GLOBAL": Function(2, 2, _ori_relative, placing=True),
+    "ORI_LOCAL": Function(2, 2, _ori_local, placing=True),
+    "ORI_ORI": Function(3, 3, _ori_ori, placing=True),
+    "ORI_ALONG_AXIS": Function(3, 3, _ori_along, placing=True),
+    "ORI_ONE_AXIS": Function(2, 2, _ori_one, placing=True),
+    "ORI_ALL_AXES": Function(2, 2, _ori_all, placing=True),
+    "ORI_IN_PLANE": Function(4, 4, _ori_plane, placing=True),
+    "ORI_ALIGN_AXIS": Function(2, 2, _ori_align, placing=True),
+    "ORI_ALIGN_AXIS_EUL": Function(2, 2, _ori_align, placing=True),
+    "ORI_MIRROR": Function(4, 4, _ori_mirror, placing=True),
+    "ORI_FRAME_MIRROR": Function(4, 4, _ori_mirror, placing=True),
+    "DM": Function(2, 2, _distance, placing=True),
+}

@@ -25,7 +25,6 @@ MOST_COMMANDS = 300_000
 MOST_ERRORS = 50
 DEEPEST_CALLS = 20
 """Macros and files within each other."""
-MACRO_KINDS = ("real", "integer", "string", "location", "orientation", "marker", "part", "model", "object")
 _PARAMETER = re.compile(r"\$'?([A-Za-z_]\w*)'?((?::[A-Za-z]+=[^:\s]*)*)")
 
 
