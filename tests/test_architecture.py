@@ -74,7 +74,7 @@ EXCEPTIONS = {
         "adams",
         "view",
     ): "wheels written as solids are those of the 3-D scenes, and files that appear when they are whole",
-    ("adams", "solids"): "the bodies of a deck's Parasolid file, the type alone",
+    ("adams", "solids"): "the bodies of Parasolid files: of a deck's the type alone, of a command file's their masses",
     ("studies", "gearmbs"): "a result says which version made it",
     ("studies", "dae.analyses"): "the modes of a drivetrain, the type alone",
     ("studies", "dae.model"): "kernels of a run whose bodies turn about fixed axes, imported ahead of it",

@@ -21,7 +21,19 @@ from gearmbs.solids.bodies import Body
 
 PART_KEYWORDS = {"part": "PART", "point_mass": "POINT_MASS", "flexible_body": "FLEX_BODY"}
 JOINTS = frozenset(
-    "revolute translational cylindrical spherical fixed universal hooke convel planar screw rackpin".split()
+    (
+        "revolute",
+        "translational",
+        "cylindrical",
+        "spherical",
+        "fixed",
+        "universal",
+        "hooke",
+        "convel",
+        "planar",
+        "screw",
+        "rackpin",
+    )
 )
 PRIMITIVES = frozenset("atpoint inline inplane orientation parallel_axes perpendicular".split())
 MEASURES = [f"{kind}_measure" for kind in "function object point pt2pt angle orient computed range query".split()]

@@ -17,7 +17,19 @@ from gearmbs.adams.view.vocabulary import Row, argument_of
 
 VALUES = ("real_value", "integer_value", "string_value", "object_value")
 JOINTS = frozenset(
-    "revolute translational cylindrical spherical fixed universal hooke convel planar screw rackpin".split()
+    (
+        "revolute",
+        "translational",
+        "cylindrical",
+        "spherical",
+        "fixed",
+        "universal",
+        "hooke",
+        "convel",
+        "planar",
+        "screw",
+        "rackpin",
+    )
 )
 
 
@@ -246,7 +258,7 @@ class Editor:
         values = self.values
         found = self._now(stored)
         if not all(isinstance(x, (int, float)) for x in found) or len(found) not in (3, 6, 9):
-            raise ViewError(f"{key} of {item.path}: give points of three coordinates", stored.line)
+            raise ViewError(f"{key} of {item.path}: these are no points of three coordinates", stored.line)
         home = values.home(item)
         points = [values.brought(np.array(found[k : k + 3], float), frame, home) for k in range(0, len(found), 3)]
         if len(points) < (2 if key == "along_axis_orientation" else 3):

@@ -8,18 +8,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import LARGEST_TEXT, Evaluator, text_of
-from gearmbs.adams.view.model import Item
+from gearmbs.adams.view.model import Database, Item
 
-if TYPE_CHECKING:
-    from gearmbs.adams.view.values import Values
 
-Run = Callable[["Values", Evaluator, list[Any], Item | None], Any]
+class Values(Protocol):
+    """What functions ask of a model: its objects, and where they are."""
+
+    db: Database
+
+    def point(self, item: Item) -> np.ndarray:
+        """Return an object's position in the global frame."""
+
+    def pose(self, item: Item | None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rotation and the position of an object's frame in the global one."""
+
+
+Run = Callable[[Values, Evaluator, list[Any], Item | None], Any]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ def _coefficient(m: Deckmaker, item: Item, what: str) -> float:
     if mode == "none":
         return 0.0
     if mode != "linear":
-        raise ViewError(f"{what}_mode = {mode}; give linear, or a single component force with a spline")
+        raise ViewError(f"{what}_mode = {mode}; give linear, or a single_component_force with a spline")
     value = _variable(m, item, f"{what}_coefficient", 0.0)
     if not isinstance(value, (int, float)):
         raise ViewError(f"{what}_coefficient is no number")
