@@ -45,6 +45,8 @@ from .conversion import COMPONENTS as COMPONENTS
 from .conversion import convert as convert
 from .conversion import force_components as force_components
 from .conversion import force_to_acceleration as force_to_acceleration
+from .diagnosis.bearing_records import CombinedBearings as CombinedBearings
+from .diagnosis.bearing_records import combine_bearings as combine_bearings
 from .diagnosis.bearing_report import BearingLines as BearingLines
 from .diagnosis.bearing_report import BearingReport as BearingReport
 from .diagnosis.bearing_report import PartFinding as PartFinding

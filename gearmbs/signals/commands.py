@@ -220,6 +220,13 @@ def analyse(
             "--shaft", help='Speed of another shaft by that given, e.g. 0.345; "none" if there is no other; repeat.'
         ),
     ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--speed-tolerance",
+            help="Share by which the speed may be off in the diagnosis of bearings, e.g. 0.002; 0: exact.",
+        ),
+    ] = None,
     train: Annotated[
         Path | None, typer.Option(help="Drivetrain (TOML) whose bearings with rolling are looked for, with its shafts.")
     ] = None,
@@ -264,7 +271,8 @@ def analyse(
         else:
             done = _of_record(signal, shaft, wheel, harmonics, lambda f, s: move(0.3 + 0.7 * f, s))
         if not done.of_set and (bearing or train is not None):
-            done = _with_bearings(done, bearings_asked(bearing or [], shaft_texts, train), band)
+            asked = bearings_asked(bearing or [], shaft_texts, train)
+            done = _with_bearings(done, asked if tolerance is None else asked | {"tolerance": tolerance}, band)
         try:
             files = save_tables(done.tables, tables)
             if figures is not None:

@@ -161,7 +161,7 @@ def find_lines(
     spacing = step / (2.0 * fits[-1])
     half = max(slip * line, spacing)
     candidates = np.linspace(line - half, line + half, 2 * int(half / spacing) + 1)
-    ratios = np.stack([_at(spectrum, k * candidates) for k in fits])
+    ratios = np.stack([ratio_at(spectrum, k * candidates) for k in fits])
     trials = max(1.0, 2.0 * half / step * sum(fits) / len(fits))
     total = ratios.sum(axis=0)
     best = int(np.argmax(total))
@@ -170,7 +170,7 @@ def find_lines(
     return Evidence(line, float(candidates[best]), found, min(chance / math.log(10.0), 0.0), spectrum.where)
 
 
-def _at(spectrum: EnvelopeSpectrum, frequency: np.ndarray) -> np.ndarray:
+def ratio_at(spectrum: EnvelopeSpectrum, frequency: np.ndarray) -> np.ndarray:
     """Return the ratio at frequencies; 1 outside the spectrum."""
     place = np.rint(frequency / spectrum.step).astype(int)
     inside = (place >= LOWEST) & (place < spectrum.ratio.size)
@@ -200,6 +200,7 @@ def power_of(envelope: np.ndarray) -> np.ndarray:
 
 
 CLEAR, SIGNS, OPEN, FAINT, MULTIPLES, NONE = "clear", "signs", "open", "faint", "multiples", "none"
+UNCERTAIN, QUIET = "uncertain", "quiet"
 CLEAR_CHANCE, SIGNS_CHANCE, FAINT_CHANCE = -12.0, -6.0, -2.0
 """Decimal logarithm of the chance from which lines are no noise; from the last on they are told but accuse nothing."""
 LEAST_RATIO = 10.0
@@ -215,8 +216,8 @@ PARENTS = 6
 OWN, HALF, COMPARABLE = 2 / 3, 1 / 2, 0.1
 """Share of a slower family's own lines that must stand out to make it the cause, of a cage's half of the four beside
 the part's (families have gaps); and how strong by the part's."""
-SIDEBANDS = 2
-"""Sidebands on either side of a line that belong to it."""
+SIDEBANDS, MOST_SIDEBANDS = 2, 12
+"""Sidebands on either side of a line that belong to it; how many more belong to it if each of them stands out."""
 SUMS = 6
 """Multiples of two shafts are added up to so many turns in all."""
 SPARSE = 25.0
@@ -462,7 +463,18 @@ def _without_family(
     if part == CAGE:
         # all its multiples would leave little
         return spectrum.without([k * found for k in range(1, PARENTS + 1)], WIDTH_SHARE)
-    spacings = (lines.ratio * turns, lines.ratio * lines.ftf * turns)
-    beside = [m * spacing for spacing in spacings for m in range(-SIDEBANDS, SIDEBANDS + 1)]
-    places = {k * found + offset for k in range(1, int(spectrum.top / found) + 2) for offset in beside}
-    return spectrum.without(sorted(abs(place) for place in places), WIDTH_SHARE)
+    places = set()
+    for k in range(1, int(spectrum.top / found) + 2):
+        for spacing in (lines.ratio * turns, lines.ratio * lines.ftf * turns):
+            for step in (spacing, -spacing):
+                places |= {abs(k * found + m * step) for m in range(_sidebands_of(spectrum, k * found, step) + 1)}
+    return spectrum.without(sorted(places), WIDTH_SHARE)
+
+
+def _sidebands_of(spectrum: EnvelopeSpectrum, line: float, step: float) -> int:
+    """Return how many sidebands belong to a line on one side: those next to it, and all that follow without a gap."""
+    for m in range(SIDEBANDS + 1, MOST_SIDEBANDS + 1):
+        place = round(abs(line + m * step) / spectrum.step)
+        if spectrum.ratio[max(place - 1, 0) : place + 2].max(initial=0.0) < LEAST_RATIO:
+            return m - 1
+    return MOST_SIDEBANDS

@@ -134,10 +134,11 @@ class PartFinding:
         Power of the first sidebands by that of the line; NaN for parts that have none.
     where : str
         Band in which they are clearest.
-    grade : {"clear", "signs", "open", "faint", "multiples", "none"}
+    grade : {"clear", "signs", "open", "faint", "multiples", "uncertain", "quiet", "none"}
         "open": lines that may also be another shaft's; "faint": hardly above noise, but as strong at no other place of
-        the record; "multiples": no noise, and as strong at no other place, but without the fundamental. None of these
-        accuses.
+        the record; "multiples": no noise, and as strong at no other place, but without the fundamental; "uncertain":
+        named at some of the speeds that the record leaves open, while at others another part is or none; "quiet": as
+        sound bearings make them, too. None of these accuses.
     beside : bool
         Whether there are lines, but another part, or another cause, explains more of them.
     stronger, places : int
@@ -147,6 +148,11 @@ class PartFinding:
     needed : float, optional
         If the level of the fundamental could not be measured, as it lies on a known shaft's line or at the lower end
         of the spectrum: the length of record that tells them apart, s; infinite if none does.
+    modulated : float
+        RMS, m/s^2, of what the lines modulate far above their own rate; NaN of parts that are not named, and of
+        channels that are no acceleration.
+    multiple : int, optional
+        m if a family of m turns of the shaft stands where the part's lines would be.
     """
 
     bearing: str
@@ -164,6 +170,8 @@ class PartFinding:
     places: int = 0
     fraction: tuple[int, int] | None = None
     needed: float | None = None
+    modulated: float = math.nan
+    multiple: int | None = None
 
     @property
     def slip(self) -> float:
@@ -216,6 +224,26 @@ class PartFinding:
                 f"{_chance(self.log_chance)}, but {self.found:.2f} Hz itself does not, or is a known shaft's line: "
                 "they name no part; another band (band=, --band), direction or speed may show it."
             )
+        if self.grade == "uncertain":
+            return (
+                f"Not certain: lines at {self.found:.2f} Hz {place} are those of {WORDS[self.part]} of bearing "
+                f"{self.bearing} at some of the speeds that the record leaves open, at others they are another part's "
+                "or none's. Give a tacho, a measured speed (speed=, --speed; tolerance=0, --speed-tolerance 0 if it is "
+                "exact) or a longer record."
+            )
+        if self.grade == "quiet":
+            kind = "the stiffness that varies as elements pass through the load" if self.part == OUTER else "waves"
+            return (
+                f"Lines of {WORDS[self.part]} of bearing {self.bearing} stand {place} at {self.found:.2f} Hz, but what "
+                f"they modulate is quiet, {self.modulated:.2g} m/s^2: a sound bearing makes as much by {kind}, and "
+                "they name no part."
+            )
+        if self.multiple is not None:
+            return (
+                f"Lines {place} at {self.multiple} times the shaft's turns, near those of {WORDS[self.part]} of "
+                f"bearing {self.bearing} ({self.kinematic:.2f} Hz), are such as blades, the jaws of a coupling or a "
+                "loose fit make; they name no part."
+            )
         if self.fraction is not None:
             k, m = self.fraction
             return (
@@ -252,6 +280,9 @@ class BearingReport(Shown):
     shafts : tuple of float, optional
         Ratios of the other shafts; None: not known.
     notes : list of str
+    stability : DataFrame
+        What would be named of speeds told within the tolerance: told and used turns (Hz), whether these were found in
+        the record, bearing, part and grade.
     """
 
     source: str
@@ -265,6 +296,7 @@ class BearingReport(Shown):
     levels: pd.DataFrame
     shafts: tuple[float, ...] | None = None
     notes: list[str] = field(default_factory=list)
+    stability: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def accused(self) -> list[PartFinding]:
@@ -305,19 +337,20 @@ class BearingReport(Shown):
         return [remark for finding in self.findings if (remark := finding.remark()) is not None]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The numbers as tables: bearing_evidence, bearing_lines, bearing_levels."""
+        """The numbers as tables: bearing_evidence, bearing_lines, bearing_levels, bearing_stability."""
         rows = [
             (f.bearing, f.channel, f.part, f.kinematic, f.found, 100 * f.slip, f.level, f.log_chance, f.sidebands,
-             f.where, f.stronger, f.places, "beside" if f.beside else f.grade)
+             f.where, f.stronger, f.places, f.modulated, "beside" if f.beside else f.grade)
             for f in self.findings
         ]  # fmt: skip
         columns = ["bearing", "channel", "part", "kinematic", "found", "slip_percent", "level_db", "log10_chance",
-                   "sidebands", "where", "stronger", "places", "grade"]  # fmt: skip
+                   "sidebands", "where", "stronger", "places", "modulated", "grade"]  # fmt: skip
         kinematic = pd.concat([lines.table(self.shaft) for lines in self.bearings], ignore_index=True)
         return {
             "bearing_evidence": pd.DataFrame(rows, columns=columns),
             "bearing_lines": kinematic,
             "bearing_levels": self.levels,
+            "bearing_stability": self.stability,
         }
 
     def to_markdown(self) -> str:
@@ -326,7 +359,8 @@ class BearingReport(Shown):
             f"# Bearings in {self.source}",
             "",
             f"- Record: {', '.join(self.bands)}; {self.duration:.3f} s at {self.rate:g} Hz",
-            f"- Shaft: {60 * self.shaft:.1f} rpm ({self.shaft:.4f} Hz)",
+            f"- Shaft: {60 * self.shaft:.1f} rpm ({self.shaft:.4f} Hz){self._speed_source()}",
+            *(f"- {line}" for line in self._margin()),
             *(f"- Band for {name}: {low:.0f} to {high:.0f} Hz" for name, (low, high) in self.bands.items()),
             *(f"- {note}" for note in self.notes),
             "",
@@ -357,6 +391,36 @@ class BearingReport(Shown):
             ),
         ]
         return "\n".join(parts)
+
+    def _speed_source(self) -> str:
+        """Return where the speed comes from, if it was looked for."""
+        if len(self.stability) < 2:
+            return ""
+        told = self.stability.iloc[len(self.stability) // 2]
+        if not told["found"]:
+            return ", as told: its own line is not found"
+        off = told["used"] / told["told"] - 1.0
+        return f", from its own lines; told were {60 * told['told']:.1f} rpm, {100 * -off:+.2f} % beside"
+
+    def _margin(self) -> list[str]:
+        """Return for which told speeds the answer is the same, and what it would be at the others."""
+        if len(self.stability) < 2:
+            return []
+        table = self.stability
+        answers = [
+            "none" if part is None else f"{part} of {bearing}" for bearing, part in zip(table.bearing, table.part)
+        ]
+        own = answers[len(answers) // 2]
+        others = [
+            f"at {60 * told:.1f} rpm {answer}"
+            for told, answer in zip(table.told, answers, strict=True)
+            if answer != own
+        ]
+        low, high = 60 * table.told.iloc[0], 60 * table.told.iloc[-1]
+        span = f"told speeds of {low:.1f} to {high:.1f} rpm"
+        if not others:
+            return [f"Margin: the answer is the same for {span}"]
+        return [f"Margin: of {span} the part named first is {own}, but {'; '.join(others)}"]
 
     def _evidence(self) -> str:
         head = [

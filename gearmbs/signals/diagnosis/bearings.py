@@ -15,23 +15,30 @@ from gearmbs.progress import staged
 from gearmbs.signals.diagnosis.bearing_judgement import (
     CLEAR,
     HARMONICS,
+    NONE,
+    QUIET,
     SIGNS,
+    SIGNS_CHANCE,
     SLIP,
+    SPEED_SHARE,
     EnvelopeSpectrum,
     Judged,
+    find_lines,
     judge,
     needed_length,
     power_of,
     squared_envelope,
 )
-from gearmbs.signals.diagnosis.bearing_report import BearingLines, BearingReport, PartFinding, bearing_lines
+from gearmbs.signals.diagnosis.bearing_margins import LEAST_LEVEL, Answer, answers_at, modulated_level, verdicts_of
+from gearmbs.signals.diagnosis.bearing_report import CAGE, BearingLines, BearingReport, PartFinding, bearing_lines
+from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE, tried_speeds
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.separation import level_lines, prewhiten
 from gearmbs.signals.rotation.shaft import shaft_phase
 from gearmbs.signals.signal.arguments import takes_data
-from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, units_of
+from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, unit_dimension, units_of
 from gearmbs.signals.spectra import kurtogram
 from gearmbs.units import to_si
 
@@ -169,13 +176,17 @@ def diagnose_bearing(
     shafts: Sequence[float] | None = None,
     slip: float = SLIP,
     harmonics: int = HARMONICS,
+    tolerance: float = TOLERANCE,
+    level: float = LEAST_LEVEL,
     progress: Callable[[float, str], None] | None = None,
 ) -> BearingReport:
     """Look for the lines of one or several bearings in a record and say what they mean.
 
-    Lines are looked for in three spectra of the squared envelope (`gearmbs.signals.diagnosis.bearings`). A part is
-    named if its lines are no noise, not those of known shafts, and stronger than families of lines at hardly any other
-    place of the record (`gearmbs.signals.diagnosis.bearing_judgement`).
+    The shaft's own line is looked for near the told speed first (`gearmbs.signals.diagnosis.bearing_speed`). Lines of
+    bearings are looked for in three spectra of the squared envelope (`gearmbs.signals.diagnosis.bearings`). A part is
+    named if its lines are no noise, not those of known shafts, stronger than families of lines at hardly any other
+    place of the record (`gearmbs.signals.diagnosis.bearing_judgement`), at whatever speed the tolerance allows, and
+    louder than a sound bearing (`gearmbs.signals.diagnosis.bearing_margins`).
 
     Parameters
     ----------
@@ -192,7 +203,8 @@ def diagnose_bearing(
         Hz or texts; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's
         edge.
     phase : xarray.DataArray, optional
-        Angle of the shaft over time, rad, where the speed varies: envelopes are then followed in angle.
+        Angle of the shaft over time, rad, where the speed varies: envelopes are then followed in angle, and the speed
+        is taken for exact.
     shafts : sequence of float, optional
         Speeds of the machine's other shafts by that of the reference shaft; empty if there is none. Their lines and the
         sums of these are left out. Default: those of ``bearing`` and the ratio of the signal's ``teeth``; without any,
@@ -201,6 +213,11 @@ def diagnose_bearing(
         Share by which lines may lie beside their kinematic place.
     harmonics : int
         How many harmonics count.
+    tolerance : float
+        Share by which the told speed may be off; 0 if it is exact. The shaft's line is looked for within twice as much.
+    level : float
+        m/s^2 RMS that a part's lines must modulate far above their own rate; 0 to accuse quieter ones, too. It is not
+        asked of channels that are no acceleration.
     progress : callable, optional
         Called as progress(fraction, channel); without it a bar is shown where somebody watches.
 
@@ -216,26 +233,38 @@ def diagnose_bearing(
         If a bearing cannot be read, or the record is too short for its lines.
     """
     known = _distinct(_all_lines(bearing))
-    _check_search(slip, harmonics)
+    _check_search(slip, harmonics, tolerance, level)
     if phase is None and speed is not None and not isinstance(speed, (int, float, str)):
         phase = phase_from_speed(signal, speed)
     elif phase is None and speed is None and shaft_coords(signal):
         phase = shaft_phase(signal)
-    shaft, notes = _shaft(signal, speed, phase)
+    told, notes = _shaft(signal, speed, phase)
     rate = rate_of(signal)
-    highest = max(order for lines in known for order in lines.orders.values()) * shaft
-    _check_record(signal.sizes["time"], rate, shaft, None if phase is not None else highest)
+    highest = max(order for lines in known for order in lines.orders.values()) * told
+    _check_record(signal.sizes["time"], rate, told, None if phase is not None else highest)
     others = _other_shafts(signal, known, shafts)
-    turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
-    bands, findings, spectra = {}, [], {}
-    for c in range(signal.sizes["channel"]):
-        name = str(signal["channel"].values[c])
+    names = [str(name) for name in signal["channel"].values]
+    bands, found = {}, []
+    for c, name in enumerate(names):
         if progress is not None:
-            progress((c + 0.5) / signal.sizes["channel"], name)
-        bands[name], found = envelope_spectra(signal.isel(channel=[c]), shaft, highest, band=band, phase=phase)
-        judged = judge(found, known, shaft, others, slip=slip, harmonics=harmonics, looks=signal.sizes["channel"])
-        findings += [_finding(name, one, found, shaft, turning) for one in judged]
-        spectra[name] = _table(_clearest_spectrum(found, judged), highest * (harmonics + 1))
+            progress((c + 0.5) / len(names), name)
+        bands[name], spectra = envelope_spectra(signal.isel(channel=[c]), told, highest, band=band, phase=phase)
+        found.append(spectra)
+
+    def judge_at(turns: float) -> Iterator[list[Judged]]:
+        for spectra in found:
+            yield judge(spectra, known, turns, others, slip=slip, harmonics=harmonics, looks=len(names))
+
+    own = [] if phase is not None else [channel_spectrum(values, rate, told) for values in signal.values.T]
+    speeds = tried_speeds([*own, *(s[-1] for s in found)], told, 0.0 if phase is not None else tolerance)
+    answers = answers_at(speeds, judge_at, SPEED_SHARE)
+    shaft = answers[len(answers) // 2].speed.turns
+    turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
+    findings, tables = [], {}
+    for c, judged in enumerate(verdicts_of(answers)):
+        one = signal.isel(channel=[c])
+        findings += [_finding(one, each, found[c], shaft, turning, slip, level, highest) for each in judged]
+        tables[names[c]] = _table(_clearest_spectrum(found[c], judged), highest * (harmonics + 1))
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
         rate=rate,
@@ -244,15 +273,35 @@ def diagnose_bearing(
         bearings=known,
         findings=findings,
         bands=bands,
-        spectra=spectra,
+        spectra=tables,
         levels=_levels(signal),
         shafts=others,
         notes=notes,
+        stability=_stability(answers),
     )
 
 
-def _check_search(slip: float, harmonics: int) -> None:
+def channel_spectrum(values: np.ndarray, rate: float, turns: float) -> EnvelopeSpectrum:
+    """Return the spectrum of a channel itself by its neighbourhood."""
+    return EnvelopeSpectrum.of(power_of(values), rate / values.size, turns)
+
+
+def _stability(answers: Sequence[Answer]) -> pd.DataFrame:
+    """Return what would be named of each told speed."""
+    leaders = [(answer.speed, answer.leading) for answer in answers]
+    rows = [
+        (s.told, s.turns, s.found, *((one.lines.name, one.part, one.grade) if one else (None, None, NONE)))
+        for s, one in leaders
+    ]
+    return pd.DataFrame(rows, columns=["told", "used", "found", "bearing", "part", "grade"])
+
+
+def _check_search(slip: float, harmonics: int, tolerance: float, level: float) -> None:
     """Refuse settings of the search that make no sense."""
+    if not 0.0 <= tolerance <= 0.05:
+        raise SignalError(f"tolerance: must lie between 0 and 0.05, a share of the told speed, got {tolerance!r}")
+    if not 0.0 <= level < math.inf:
+        raise SignalError(f"level: must be 0 or more, in m/s^2, got {level!r}")
     if not 0.0 < slip < 0.2:
         raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
     if not 1 <= harmonics <= 20:
@@ -332,16 +381,51 @@ def _other_shafts(
 
 
 def _finding(
-    channel: str, judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float, turns: Sequence[float]
+    signal: xr.DataArray,
+    judged: Judged,
+    spectra: Sequence[EnvelopeSpectrum],
+    shaft: float,
+    turns: Sequence[float],
+    slip: float,
+    level: float,
+    highest: float,
 ) -> PartFinding:
-    lines, part, evidence = judged.lines, judged.part, judged.evidence
+    """Return what is to be told of a part in one channel."""
+    lines, part, evidence, grade = judged.lines, judged.part, judged.evidence, judged.grade
     spectrum = next(s for s in spectra if s.where == evidence.where)
     sides = _sidebands(spectrum, evidence.found, lines.sidebands[part] * shaft * lines.ratio)
+    modulated = _modulated(signal, evidence.found, highest) if grade in (CLEAR, SIGNS) else math.nan
+    if modulated < level:
+        grade = QUIET
+    step = None if grade != NONE else _multiple_of_turns(judged, spectra, shaft, slip)
     return PartFinding(
-        lines.name, part, channel, evidence.kinematic, evidence.found, evidence.ratios, evidence.log_chance, sides,
-        evidence.where, judged.grade, judged.beside, judged.stronger, judged.places, judged.fraction,
-        needed_length(evidence, spectrum, turns),
+        lines.name, part, str(signal["channel"].values[0]), evidence.kinematic, evidence.found, evidence.ratios,
+        evidence.log_chance, sides, evidence.where, grade, judged.beside, judged.stronger, judged.places,
+        judged.fraction, needed_length(evidence, spectrum, turns), modulated, step,
     )  # fmt: skip
+
+
+def _modulated(signal: xr.DataArray, line: float, highest: float) -> float:
+    """Return the level that a line modulates, m/s^2; NaN for what is no acceleration."""
+    try:
+        dimension, factor = unit_dimension(units_of(signal)[0])
+    except SignalError:
+        return math.nan
+    if dimension != "acceleration":
+        return math.nan
+    rate = rate_of(signal)
+    bands = lambda values, limits: _narrow_bands(values, rate, limits, highest)  # noqa: E731
+    return factor * modulated_level(signal.values[:, 0], rate, line, bands, EDGE * rate / 2)
+
+
+def _multiple_of_turns(judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float, slip: float) -> int | None:
+    """Return m if lines at m turns of the bearing's shaft, near those of a part, stand in the record as a family."""
+    turns, place = shaft * judged.lines.ratio, judged.evidence.kinematic
+    m = round(place / turns)
+    if judged.part == CAGE or abs(m * turns / place - 1.0) > slip:
+        return None
+    families = [find_lines(spectrum, m * turns, slip=SPEED_SHARE) for spectrum in spectra]
+    return m if min(family.log_chance for family in families) <= SIGNS_CHANCE else None
 
 
 def _sidebands(spectrum: EnvelopeSpectrum, line: float, spacing: float) -> float:

@@ -1,0 +1,238 @@
+"""Verdicts on bearings when the told speed is off, on sound bearings that move, and of several records together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearmbs.bearings import Bearing, Spall
+from gearmbs.signals import SignalError, bearing_lines, combine_bearings, diagnose_bearing, make_signal
+from gearmbs.signals.diagnosis.bearing_judgement import Evidence, Judged
+from gearmbs.signals.diagnosis.bearing_margins import agreed, answers_at, verdicts_of
+from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, find_shaft
+from gearmbs.signals.diagnosis.bearings import channel_spectrum
+from tests.says import says
+from tests.signals.test_bearing_diagnosis import LINES, RATE, SHAFT, TIME, pulses, record
+
+SIX203 = bearing_lines({"name": "6203", "FTF": 0.3817, "BSF": 1.9937, "BPFO": 3.053, "BPFI": 4.9469})
+RUNNING = sum(0.05 * np.cos(2 * np.pi * k * SHAFT * TIME + k) for k in range(1, 13))
+"""Twelve orders of the shaft, each 14 dB below noise of unit variance, as an unbalanced machine has them."""
+
+
+def spectrum_of(*parts, noise=0.3):
+    values = record(*parts, noise=noise).values[:, 0]
+    return [channel_spectrum(values, RATE, SHAFT)]
+
+
+def rpm(share):
+    return f"{60.0 * SHAFT * (1.0 + share)} rpm"
+
+
+@pytest.mark.parametrize("share", [-0.008, -0.005, 0.0, 0.002, 0.007])
+def test_the_shafts_line_is_found_near_a_told_speed(share):
+    mains = sum(2.0 * np.cos(2 * np.pi * k * 1.003 * SHAFT * TIME) for k in (2, 4, 8))
+    found = find_shaft(spectrum_of(RUNNING, mains), SHAFT * (1.0 + share))
+    assert found.found
+    assert found.turns == pytest.approx(SHAFT, rel=2e-4)
+    assert found.deviation == pytest.approx(1.0 / (1.0 + share) - 1.0, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (),
+        (0.5 * np.cos(2 * np.pi * 2.0 * SHAFT * TIME),),
+        (pulses(3.0 * SHAFT),),
+        (RUNNING, sum(0.05 * np.cos(2 * np.pi * k * 1.004 * SHAFT * TIME) for k in range(1, 13))),
+    ],
+    ids=["noise", "one line", "every third", "two shafts"],
+)
+def test_no_shaft_is_found_where_none_or_two_are(parts):
+    found = find_shaft(spectrum_of(*parts), SHAFT * 1.002)
+    assert not found.found
+    assert found.turns == found.told
+
+
+@pytest.mark.parametrize("share", [-0.005, -0.002, 0.0, 0.002, 0.005])
+def test_an_answer_does_not_depend_on_the_told_speed(share):
+    report = diagnose_bearing(record(pulses(LINES.bpfo * SHAFT, 0.002), RUNNING), "6205", rpm(share), shafts=())
+    assert report.fault == "outer race"
+    assert report.clear
+    assert report.shaft == pytest.approx(SHAFT, rel=2e-4)
+    assert report.accused[0].slip == pytest.approx(0.002, abs=5e-4)
+    assert set(report.stability["part"]) == {"outer race"}
+    assert "from its own lines" in report.to_markdown()
+    assert "the answer is the same" in report.to_markdown()
+
+
+@pytest.mark.parametrize("share", [-0.004, 0.0, 0.004])
+def test_lines_in_step_with_the_shaft_name_no_part_at_any_told_speed(share):
+    """All multiples of a fifth of the turns, 18/5 being 0.4 % from an outer race of 6205."""
+    step = pulses(SHAFT / 5.0, jitter=0.0)
+    report = diagnose_bearing(record(step, RUNNING, noise=0.1), "6205", rpm(share), shafts=())
+    assert report.fault is None
+
+
+@pytest.mark.parametrize("share", [-0.005, 0.0, 0.005])
+def test_the_jaws_of_a_coupling_are_no_outer_race(share):
+    """Three jaws, or blades, lie 1.7 % from the outer race of a 6203, within its slip if the speed is off."""
+    jaws = record(pulses(3.0 * SHAFT, jitter=0.0), RUNNING)
+    report = diagnose_bearing(jaws, SIX203, rpm(share), shafts=())
+    assert report.fault is None
+    spalled = diagnose_bearing(record(pulses(SIX203.bpfo * SHAFT), RUNNING), SIX203, rpm(share), shafts=())
+    assert spalled.fault == "outer race"
+
+
+def test_blades_within_slip_of_a_race_are_told_as_what_they_are():
+    near = bearing_lines({"name": "near", "FTF": 0.4, "BSF": 2.3, "BPFO": 3.03, "BPFI": 4.9})
+    report = diagnose_bearing(record(pulses(3.0 * SHAFT, jitter=0.0), RUNNING), near, rpm(0.0), shafts=())
+    assert report.fault is None
+    assert any("3 times the shaft's turns" in remark and "blades" in remark for remark in report.remarks)
+
+
+def verdict(**grades):
+    """One channel: the parts of a 6205 with these grades, clearer the earlier they are given."""
+    parts = ("outer race", "inner race", "rolling element", "cage")
+    order = list(grades)
+    return (
+        tuple(
+            Judged(LINES, part, Evidence(100.0, 100.0, (50.0,), -30.0 + order.index(key)), grades[key], 0, 90)
+            if (key := part.split()[0]) in grades
+            else Judged(LINES, part, Evidence(100.0, 100.0, (1.0,), 0.0), "none", 9, 90)
+            for part in parts
+        ),
+    )
+
+
+NOTHING, OUTER_CLEAR = verdict(), verdict(outer="clear")
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "outer"),
+    [
+        ([OUTER_CLEAR] * 3, "clear"),
+        ([NOTHING, OUTER_CLEAR, OUTER_CLEAR], "clear"),
+        ([verdict(outer="signs"), OUTER_CLEAR, verdict(outer="signs")], "signs"),
+        ([NOTHING, OUTER_CLEAR, NOTHING], "uncertain"),
+        ([OUTER_CLEAR, NOTHING, NOTHING], "uncertain"),
+        ([verdict(cage="signs"), OUTER_CLEAR, OUTER_CLEAR], "uncertain"),
+        ([verdict(inner="clear", outer="clear"), OUTER_CLEAR, OUTER_CLEAR], "uncertain"),
+        ([verdict(outer="clear", inner="clear")] * 3, "clear"),
+        ([NOTHING] * 3, "none"),
+    ],
+)
+def test_what_stands_at_several_speeds(verdicts, outer):
+    assert agreed(verdicts)[0][0].grade == outer
+
+
+def test_lines_in_step_at_one_speed_are_not_certain():
+    ((own, *others),) = NOTHING
+    in_step = ((replace(own, fraction=(18, 5), beside=True), *others),)
+    (judged, *_), *_ = agreed([OUTER_CLEAR, OUTER_CLEAR, in_step])
+    assert judged.grade == "uncertain"
+
+
+def test_a_speed_that_was_found_is_judged_at_what_it_may_be_off():
+    asked = []
+
+    def judge_at(turns):
+        asked.append(turns)
+        yield OUTER_CLEAR[0] if turns >= SHAFT else NOTHING[0]
+
+    found = ShaftSpeed(1.002 * SHAFT, SHAFT, -20.0, True, 0.004)
+    answers = answers_at([found, replace(found, told=SHAFT), replace(found, told=0.99 * SHAFT)], judge_at, 3e-4)
+    assert asked == pytest.approx([SHAFT - 0.004, SHAFT, SHAFT + 0.004])
+    assert verdicts_of(answers)[0][0].grade == "clear"
+    assert [answer.speed.told for answer in answers] == pytest.approx([1.002 * SHAFT, SHAFT, 0.99 * SHAFT])
+
+
+def test_quiet_lines_accuse_nothing_unless_asked_to():
+    loud = record(pulses(LINES.bpfo * SHAFT, jitter=0.0), noise=1e-4)
+    quiet = loud.copy(data=1e-3 * loud.values)
+    assert diagnose_bearing(loud, "6205", rpm(0.0)).fault == "outer race"
+    report = diagnose_bearing(quiet, "6205", rpm(0.0))
+    assert report.fault is None
+    assert "quiet" in report.verdict
+    assert "stiffness that varies" in report.verdict
+    assert report.tables()["bearing_evidence"]["modulated"].max() < 0.03
+    assert diagnose_bearing(quiet, "6205", rpm(0.0), level=0.0).fault == "outer race"
+    volts = make_signal(quiet.values, RATE, channels=["case"], units="V")
+    assert diagnose_bearing(volts, "6205", rpm(0.0)).fault == "outer race"
+
+
+def test_a_level_counts_carriers_far_above_the_line():
+    """A modulated carrier of 1 m/s^2 amplitude: RMS 0.71, of which the depth of a full modulation counts."""
+    wave = np.sqrt(2.0) * (1.0 + np.cos(2 * np.pi * LINES.bpfo * SHAFT * TIME)) * np.cos(2 * np.pi * 4000.0 * TIME)
+    high = diagnose_bearing(record(wave, noise=0.01), "6205", rpm(0.0))
+    assert high.accused[0].modulated == pytest.approx(np.sqrt(1.5), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"tolerance": -0.1}, ("tolerance", "-0.1", "0.05")),
+        ({"tolerance": 0.5}, ("tolerance", "0.5", "share")),
+        ({"level": -1.0}, ("level", "-1.0", "m/s^2")),
+    ],
+)
+def test_says_what_is_wrong_with_margins(settings, words):
+    with pytest.raises(SignalError, match=says(*words)):
+        diagnose_bearing(record(), "6205", rpm(0.0), **settings)
+
+
+def test_faint_lines_of_several_records_add_up():
+    reports = {
+        f"load {k}": diagnose_bearing(
+            record(1.2 * pulses(LINES.bpfo * SHAFT, 0.004, seed=k), noise=1.0, seed=k), "6205", rpm(0.0), tolerance=0.0
+        )
+        for k in range(4)
+    }
+    together = combine_bearings(reports)
+    assert together.fault == "outer race"
+    assert together.table.loc[0, "slip_percent"] == pytest.approx(0.4, abs=0.1)
+    assert sum(report.fault is None for report in reports.values()) == 2
+    assert "heard in 3 of 4 records" in together.verdict
+    assert "load 3" in together.to_markdown()
+
+
+def test_records_of_noise_name_nothing_together_and_bearings_must_be_the_same():
+    noise = [diagnose_bearing(record(seed=k), "6205", rpm(0.0)) for k in range(3)]
+    assert combine_bearings(noise).fault is None
+    with pytest.raises(SignalError, match=says("reports", "none", "give")):
+        combine_bearings([])
+    other = diagnose_bearing(record(), SIX203, rpm(0.0))
+    with pytest.raises(SignalError, match=says("record 2", "other bearings", "combine")):
+        combine_bearings([noise[0], other])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("defect", "part"),
+    [
+        (None, None),
+        (Spall(part="outer", width="0.3 mm"), "outer race"),
+        (Spall(part="element", width="0.5 mm"), "ball"),
+    ],
+    ids=["sound", "outer", "ball"],
+)
+def test_a_simulated_bearing_without_noise(defect, part):
+    """The stiffness of a sound one varies and is told as such; a ball's sidebands are no outer race."""
+    from gearmbs.studies import bearing_rig, housing_signal
+
+    bearing = Bearing.from_designation("6205/CN")
+    rig = bearing_rig(
+        bearing, speed="1800 rpm", radial_load="2500 N", cage_slip=0.005, defects=[] if defect is None else [defect]
+    )
+    signal = housing_signal(rig.simulate(1.2, rate=12800), start=0.2).sel(channel=["x"])
+    report = diagnose_bearing(signal, bearing, "1800 rpm", shafts=())
+    named = {finding.part for finding in report.accused}
+    if part is None:
+        assert not named
+        assert "quiet" in report.verdict
+    elif part == "ball":
+        assert named <= {"rolling element", "cage"}
+        assert named
+    else:
+        assert named == {part}
