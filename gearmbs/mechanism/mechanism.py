@@ -248,8 +248,7 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
             Body that feels the opposite torque.
         """
         self._check_name(name)
-        marker = on if isinstance(on, Marker) else on.marker(name=f"{name}.I")
-        self._check_body(f"torque '{name}'", marker.body)
+        marker = self._own_marker(f"torque '{name}'", on, f"{name}.I")
         against = reaction or self.ground
         self._check_body(f"torque '{name}'", against)
         frame = frame_along(axis, f"torque '{name}': axis")
@@ -273,10 +272,8 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
             If the wheels stand in each other. Wheels out of reach give a warning.
         """
         self._check_name(name)
-        i = wheel_1 if isinstance(wheel_1, Marker) else wheel_1.marker(name=f"{name}.I")
-        j = wheel_2 if isinstance(wheel_2, Marker) else wheel_2.marker(name=f"{name}.J")
-        for marker in (i, j):
-            self._check_body(f"gear contact '{name}'", marker.body)
+        i = self._own_marker(f"gear contact '{name}'", wheel_1, f"{name}.I")
+        j = self._own_marker(f"gear contact '{name}'", wheel_2, f"{name}.J")
         return self.add(pair.contact_element(name, i, j))
 
     def add(self, element: E) -> E:

@@ -52,6 +52,14 @@ def test_names_are_unique_and_belong():
         m.fixed("weld", stranger, m.ground)
 
 
+def test_names_of_bodies_in_the_place_of_bodies():
+    m = pendulum()
+    for call in (lambda: m.torque("t", "rod", 1.0), lambda: m.revolute("r", "rod", m.ground)):
+        with pytest.raises(ModelError, match=says("'rod'", "body or a marker", "bodies['rod']")):
+            call()
+    m.torque("t", m.bodies["rod"], 1.0)
+
+
 def test_bad_joints():
     m = pendulum()
     rod = m.bodies["rod"]

@@ -456,9 +456,15 @@ class JointMethods:
         if joint.kind not in kinds:
             raise ModelError(f"motion '{name}': joint '{joint.name}' is {joint.kind}; it must be {' or '.join(kinds)}")
 
+    def _own_marker(self, label: str, part: Body | Marker, name: str) -> Marker:
+        """Return a marker of this mechanism; a body gets one at its own frame."""
+        self._check_body(label, part.body if isinstance(part, Marker) else part)
+        return part if isinstance(part, Marker) else part.marker(name=name)
+
     def _check_body(self, label: str, body: Body) -> None:
         if not isinstance(body, Body):
-            raise ModelError(f"{label}: {body!r} is not a body or a marker")
+            named = f"; its name stands for bodies[{body!r}]" if isinstance(body, str) and body in self.bodies else ""
+            raise ModelError(f"{label}: {body!r} is not a body or a marker{named}")
         if body is not self.ground and self.bodies.get(body.name) is not body:
             raise ModelError(f"{label}: body '{body.name}' does not belong to mechanism '{self.name}'")
 

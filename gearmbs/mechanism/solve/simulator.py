@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import time
+from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -174,6 +176,7 @@ class Simulator(OwnAttributes):
         self._cells = cells_of(self.numbers)
         # the same numbers where these cells alone are a table
         self._own = {name: number.moved_to(self._cells) for name, number in self.numbers.items()}
+        self._inputs = [name for name, number in self.numbers.items() if number.kind == INPUT]
         self._set: dict[str, tuple[float, int]] = {}
         self._clock = [0.0, 0.0]
         self._begin(initial)
@@ -194,8 +197,7 @@ class Simulator(OwnAttributes):
         nothing = np.empty((0, problem.n))
         held = (self._cells, np.empty((0, self._cells.size)))
         empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "", held=held)
-        now = self._run.state.rdata[self._cells]
-        self._led = {name: problem.t0 for name, own in self._own.items() if own.slope(now) != 0.0}
+        self._led = self._on_lines(float(problem.t0))
         """Inputs on a line, and when it ends: of a state where the state is."""
         self._row = Solution(self._system, problem, empty, self._members)
         self._row.inside = just_inside(np.array([problem.t0, self.t_end]))
@@ -550,7 +552,7 @@ class Simulator(OwnAttributes):
         run = self._run
         if not self._equations:
             self._equations = equations_of(self._base)
-        history = replace(run.history(), equations=self._equations) if run.started else None
+        history = run.history(self._equations) if run.started else None
         return State.of(self._base, t, y, yp, (idata, run.state.rdata), history)
 
     def restore(self, state: State) -> None:
@@ -574,18 +576,47 @@ class Simulator(OwnAttributes):
                 f"state: its model was assembled for t = {state.t_model:g} s, this one for {self._base.t0:g} s; "
                 "start both simulators at the same time"
             )
-        own = [k for k, (t, y, *_) in enumerate(self._points) if t == state.t and np.array_equal(y, state.y)]
-        kept = self._points[: own[0] + 1] if own else []
-        first = self._problem, self._origin
+        first, origin = self._own_point(state), (self._problem, self._origin)
         self._set.clear()
-        self._begin(state)
+        if (first is not None or not self._records) and self._go_back(state):
+            if first is not None:
+                del self._points[first + 1 :]
+        else:
+            kept = self._points[: first + 1] if first is not None else []
+            self._begin(state)
+            if kept:
+                # what stood there up to the state, which a jump may follow
+                self._problem, self._origin = origin
+                self._points[:] = kept
         for control in self._controls:
             control.go_back(self.t)
-        if kept:
-            # what stood there up to the state, which a jump may follow
-            self._points.clear()
-            self._problem, self._origin = first
-            self._points[:0] = kept
+
+    def _own_point(self, state: State) -> int | None:
+        """Return which of the points a state is, or None."""
+        at = bisect_left(self._points, state.t, key=itemgetter(0))
+        while at < len(self._points) and self._points[at][0] == state.t:
+            if np.array_equal(self._points[at][1], state.y):
+                return at
+            at += 1
+        return None
+
+    def _go_back(self, state: State) -> bool:
+        """Go to a state of the present run in place, as a new run from it would; return whether it is one of it."""
+        history = state.history
+        if history is None or history.equations != self._equations or not self._run.go_back(history):
+            return False
+        self._failed, self._counted, self._led = None, {}, {}
+        self._next_look = state.t if self._system.has_dropped_rows else np.inf
+        self._led = self._on_lines(state.t)
+        self._stand_at(state.t, state.y, state.yp, state.tables(self._base)[0], record=False)
+        return True
+
+    def _on_lines(self, t: float) -> dict[str, float]:
+        """Return the inputs that stand on a line, each with the time at which it is to end."""
+        if not self._inputs:
+            return {}
+        now = self._run.state.rdata[self._cells].tolist()
+        return {name: t for name in self._inputs if self._own[name].slope(now) != 0.0}
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"

@@ -7,6 +7,7 @@ that was told all times ahead: what is asked does not change the steps.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RUNNING, RunState
 from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.integrators.stepping.jumps import TERMS, pass_jump
-from gearmbs.dae.integrators.stepping.memory import LastStep, put_memory, record_window, take_memory, value_in
+from gearmbs.dae.integrators.stepping.memory import Held, LastStep, put_memory, record_window, value_in
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
@@ -41,7 +42,11 @@ class LastRecords:
         self.state = st
         for name in ("record_t", "record_h", "record_order", "record_y"):
             setattr(st, name, getattr(st, name)[:ROWS])
-        self.table = self.before = st.idata.copy()
+        self.forget_changes()
+
+    def forget_changes(self) -> None:
+        """Take the present integer table for that of the last step."""
+        self.table = self.before = self.state.idata.copy()
         self.changed_at = -1
 
     def drain(self) -> None:
@@ -96,6 +101,7 @@ class HeldRun(Run):
         self.records = self.last_records  # type: ignore[assignment]
         self._given: tuple[int, LastStep] | None = None
         self._scratch: np.ndarray | None = None
+        self.layout: dict[str, Any] | None = None
         if options.history is not None:
             self.put_back(options.history)
 
@@ -163,26 +169,38 @@ class HeldRun(Run):
             self.functions, st, self.plan, self.factors, t, y, yp, cells, values, leads, kept, self._scratch
         )
         if not kept:
-            self.last_records = LastRecords(st)
-            self.records = self.last_records  # type: ignore[assignment]
+            self.last_records.forget_changes()
         self._given = int(st.steps), LastStep(np.array([t]), y[None, :], y, yp, self.last_records.table)
 
-    def history(self) -> History:
-        """Return what the next steps depend on; a run that has not been started remembers nothing yet."""
-        assert self.pivots is not None
-        return take_memory(self, self.pivots, self._last_step())
+    def history(self, equations: str) -> History:
+        """Return what the next steps of these equations depend on; a run that has not been started has nothing yet."""
+        st = self.state
+        given = self._given is not None and self._given[0] == st.steps
+        told = given or self.last_records.changed_at == st.steps
+        return History(self.options.method, Held(self, self._last_step() if told else None), self.plan, equations)
 
     def put_back(self, history: History) -> None:
         """Go on with a history; the tables are those of its state."""
-        st = self.state
         self.pivots, last = put_memory(self, history)
+        self._stand_behind(last)
+
+    def go_back(self, history: History) -> bool:
+        """Go on with a history of this run, in place and with its tables; return whether it is one that can be."""
+        held = history.numbers
+        if not (isinstance(held, Held) and held.belongs_to(self)):
+            return False
+        self._stand_behind(held.put_back(self))
+        return True
+
+    def _stand_behind(self, last: LastStep) -> None:
+        """Keep the window as records, behind the last step."""
+        st = self.state
         st.n_records, st.next_output = 0, 1
         record_window(st)
         self._at[0] = np.nan
         self._looked = st.steps
         self.stall = StallWatch(st.steps, st.t)
-        records = self.last_records = LastRecords(st)
-        self.records = records  # type: ignore[assignment]
+        self.last_records.forget_changes()
         self._given = int(st.steps), last
 
     def _last_step(self) -> LastStep:

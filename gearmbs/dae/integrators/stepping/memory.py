@@ -8,7 +8,11 @@ its own.
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
+from weakref import ref
 
 import numpy as np
 from numba import float64, int64, types
@@ -94,33 +98,135 @@ class Continued(Remembers, Protocol):
     stall: Any
 
 
-def take_memory(run: Remembers, pivots: Pivots, last: LastStep) -> History:
-    """Return copies of all that the next steps of a run depend on; no step is open.
+class Laid(Continued, Protocol):
+    """The same, and where its arrays lie, found once."""
+
+    layout: dict[str, Any] | None
+
+
+class Held(Mapping[str, np.ndarray]):
+    """What a run remembers, as its memory lay: copied in one go, and taken apart by name where somebody asks.
+
+    Copies of seventy arrays one by one take longer than some steps of a small model do.
 
     Parameters
     ----------
-    run : Run
-    pivots : Pivots
-        Of its plan.
-    last : LastStep
+    run : HeldRun
+        No step of it is open.
+    given : LastStep or None
+        Its last step where that cannot be told from its window.
     """
-    st, part, factors = run.state, run.algebraic.part, run.factors
-    numbers: dict[str, np.ndarray] = {
-        "run": np.array([getattr(st, name) for name in SCALARS], dtype=float),
-        "part": np.array([getattr(part, name) for name in PART_SCALARS], dtype=float),
-        "counts": np.array([run.repivots, run.first_pivots]),
-        "counted": run.counted.copy(),
-        "pivots": np.array([pivots.drop, pivots.negligible]),
-        "pivots matrix": pivots.matrix,
-        "pivots counted": np.zeros(0, dtype=bool) if pivots.counted is None else pivots.counted,
-    }
-    numbers |= {f"run {name}": getattr(st, name).copy() for name in ARRAYS}
-    numbers |= {f"part {name}": getattr(part, name).copy() for name in PART_ARRAYS}
-    numbers |= {f"factors {name}": getattr(factors, name).copy() for name in FACTORS}
-    numbers |= {"last nodes": last.nodes, "last rows": last.rows, "last y": last.y, "last yp": last.yp}
-    changed = np.flatnonzero(last.idata != st.idata)
-    numbers |= {"table at": changed, "table": st.idata[changed]}
-    return History(run.options.method, numbers, run.plan)
+
+    def __init__(self, run: Laid, given: LastStep | None) -> None:
+        st, factors, part = run.state, run.factors, run.algebraic.part
+        assert factors is not None
+        assert run.pivots is not None
+        self._run, self._plan, self._factors = ref(run), run.plan, factors
+        self.record, self.block, self.factor_block = bytes(st), _block(st.y).copy(), _block(factors.x).copy()
+        self.part_scalars = [getattr(part, name) for name in PART_SCALARS]
+        self.part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else []
+        self.counts, self.counted, self.pivots = (run.repivots, run.first_pivots), run.counted.copy(), run.pivots
+        self.layout = _layout(run)
+        self.given = given
+
+    def belongs_to(self, run: Continued) -> bool:
+        """Whether it is of this very run."""
+        return self._run() is run
+
+    def put_back(self, run: Continued) -> LastStep:
+        """Let the run it is of remember what it did then, and return its last step."""
+        st, part, factors = run.state, run.algebraic.part, self._factors
+        run.plan, run.factors = self._plan, factors
+        ctypes.memmove(ctypes.addressof(st), self.record, len(self.record))
+        _block(st.y)[:] = self.block
+        _block(factors.x)[:] = self.factor_block
+        for name, value in zip(PART_SCALARS, self.part_scalars, strict=True):
+            setattr(part, name, value)
+        for name, array in zip(PART_ARRAYS, self.part_arrays, strict=False):
+            getattr(part, name)[...] = array
+        run.counted[:] = self.counted
+        run.repivots, run.first_pivots = self.counts
+        run.pivots = self.pivots
+        return self.last
+
+    def _array(self, name: str) -> np.ndarray:
+        """Return a copy of an array of the state of the run."""
+        shape, kind, offset = self.layout[name]
+        return np.ndarray(shape, kind, self.block, offset).copy()
+
+    @cached_property
+    def last(self) -> LastStep:
+        """The last step, from the window."""
+        if self.given is not None:
+            return self.given
+        st, n = RunState.from_buffer_copy(self.record), self.layout["y"][0][0]
+        first, count = int(st.newest), int(self._array("record_order")[st.n_records - 1]) + 1
+        rows = self._array("window_y")[first * n : (first + count) * n].reshape(count, n)
+        nodes = self._array("window_t")[first : first + count]
+        return LastStep(nodes, rows, self._array("y"), self._array("yp"), self._array("idata"))
+
+    @cached_property
+    def _numbers(self) -> dict[str, np.ndarray]:
+        st, last, pivots, idata = RunState.from_buffer_copy(self.record), self.last, self.pivots, self._array("idata")
+        factors, start = self._factors, _address(_block(self._factors.x))
+        numbers: dict[str, np.ndarray] = {
+            "run": np.array([getattr(st, name) for name in SCALARS], dtype=float),
+            "part": np.array(self.part_scalars, dtype=float),
+            "counts": np.array(self.counts),
+            "counted": self.counted,
+            "pivots": np.array([pivots.drop, pivots.negligible]),
+            "pivots matrix": pivots.matrix,
+            "pivots counted": np.zeros(0, dtype=bool) if pivots.counted is None else pivots.counted,
+        }
+        numbers |= {f"run {name}": self._array(name) for name in ARRAYS}
+        numbers |= {f"part {name}": array for name, array in zip(PART_ARRAYS, self.part_arrays, strict=False)}
+        if not self.part_arrays:
+            numbers |= {f"part {name}": np.zeros(shape, kind) for name, (shape, kind) in self.layout["part"].items()}
+        for name in FACTORS:
+            array = getattr(factors, name)
+            offset = _address(array) - start if array.size else 0
+            numbers[f"factors {name}"] = np.ndarray(array.shape, array.dtype, self.factor_block, offset).copy()
+        numbers |= {"last nodes": last.nodes, "last rows": last.rows, "last y": last.y, "last yp": last.yp}
+        changed = np.flatnonzero(last.idata != idata)
+        return numbers | {"table at": changed, "table": idata[changed]}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._numbers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __reduce__(self) -> tuple:
+        return dict, (self._numbers,)
+
+
+def _block(array: np.ndarray) -> np.ndarray:
+    """Return the memory in which all arrays of a struct stand (`gearmbs.kernels.structs.BlockLayout`)."""
+    base = array.base
+    assert isinstance(base, np.ndarray)
+    return base
+
+
+def _address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def _layout(run: Laid) -> dict[str, Any]:
+    """Return shape, type and place in the block of each array of the state of a run, found once."""
+    if run.layout is None:
+        st, part = run.state, run.algebraic.part
+        start = _address(_block(st.y))
+        places: dict[str, Any] = {}
+        for name in (*ARRAYS, "record_order", "idata"):
+            array = getattr(st, name)
+            assert array.base is _block(st.y)
+            places[name] = array.shape, array.dtype, _address(array) - start
+        places["part"] = {name: (getattr(part, name).shape, getattr(part, name).dtype) for name in PART_ARRAYS}
+        run.layout = places
+    return run.layout
 
 
 def put_memory(run: Remembers, history: History) -> tuple[Pivots, LastStep]:
@@ -221,12 +327,13 @@ def continue_run(run: Continued, history: History) -> None:
 
 def record_window(st: RunState) -> None:
     """Append the points of the history, oldest first, as records of order 0."""
-    n, first = len(st.y), int(st.newest)
-    for row in range(first + min(st.n_past, HISTORY - 1) - 1, first - 1, -1):
-        p = st.n_records
-        st.record_t[p], st.record_h[p], st.record_order[p] = st.window_t[row], 0.0, 0
-        st.record_y[p, :n] = st.window_y[row * n : (row + 1) * n]
-        st.n_records = p + 1
+    n, first, p = len(st.y), int(st.newest), int(st.n_records)
+    count = min(int(st.n_past), HISTORY - 1)
+    rows = slice(p, p + count)
+    st.record_t[rows] = st.window_t[first : first + count][::-1]
+    st.record_h[rows] = st.record_order[rows] = 0.0
+    st.record_y[rows, :n] = st.window_y[first * n : (first + count) * n].reshape(count, n)[::-1]
+    st.n_records = p + count
 
 
 # --- values inside the last step --------------------------------------------------------------------------
