@@ -2,7 +2,7 @@
 
 Parts are ``planted`` (2000 cases, 42 of which go wrong in four ways), ``disk`` (a disk of 2 MB that is given more room
 later; it is mounted, which takes root's rights) and ``worker`` (memory of a process over thousands of cases of the gear
-pair).
+pair). What happens at random is in `benchmarks.campaign_faults`.
 """
 
 from __future__ import annotations

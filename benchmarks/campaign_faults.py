@@ -1,5 +1,7 @@
 """Random faults of campaigns, and what came of them: ``python -m benchmarks.campaign_faults FOLDER [count [seed]]``.
 
+After them ten times as many single bits are flipped in all kinds of files, and all that can be read is read.
+
 A campaign over a cheap function is carried out by processes to which something happens, or whose files something
 happens to, and then once more by a sound one. What may come of it:
 
@@ -34,6 +36,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from gearmbs.campaigns import Campaign, CampaignError, Factor, FunctionSubject, make_plan
 from gearmbs.studies.run import engine
@@ -148,10 +151,13 @@ def until_under_way(place: Path, child: Child, chance: random.Random) -> None:
 
 def half_done(place: Path, chance: random.Random) -> None:
     """Carry out a part of the campaign, and end it."""
-    child = Child(place, slow(0.01))
-    until_under_way(place, child, chance)
-    child.process.kill()
-    child.process.join()
+    while True:
+        child = Child(place, slow(0.01))
+        until_under_way(place, child, chance)
+        child.process.kill()
+        child.process.join()
+        if (place / "c" / "plan.json").exists():
+            return
 
 
 # What happens. Each returns what the sound run after it is given, and words of which an error must name one.
@@ -302,8 +308,7 @@ def missing_module(place: Path, chance: random.Random) -> Any:
 def edited_plan(place: Path, chance: random.Random) -> Any:
     """An entry of plan.json is edited."""
     path = place / "c" / "plan.json"
-    while not path.exists():
-        half_done(place, chance)
+    half_done(place, chance)
     tree = json.loads(path.read_text())
     entry, value = chance.choice([("seed", 77), ("constraints", ["a < 0"]), ("unit", 3), ("keep", ["numbers"])])
     tree["plan"][entry] = value
@@ -396,7 +401,74 @@ def faults(folder: Path, count: int, seed: int) -> dict[str, list[str]]:
     return found
 
 
+# Single bits.
+
+
+def recorded(x1: float, x2: float, x3: float) -> xr.Dataset:
+    """Return a record; at some places there is none."""
+    if x1 > 3.0:
+        raise ValueError("x1: beyond")
+    wave = np.sin(x1 * np.arange(1500.0))
+    return xr.Dataset({"y": x1 + x2 * x3, "wave": ("t", wave[:50]), "long": ("s", wave)})
+
+
+WAYS: list[Callable[[Campaign], Any]] = [
+    lambda c: c.table.to_json(double_precision=15),
+    lambda c: c.read(["y", "x1"], "status == 'done'").to_json(double_precision=15),
+    lambda c: c.open().wave.values.tobytes(),
+    lambda c: str(c.open().wave.attrs) + str(c.open().wave_time.values),
+    lambda c: f"{c.status()} {c.status().processor_seconds}",
+    lambda c: c.failed().to_json(),
+    lambda c: str([c.record(k).to_dict(data="array") for k in range(c.folder.case_count)]),
+    lambda c: str([c.case(k) for k in range(0, c.folder.case_count, 3)]),
+    lambda c: str(c.plan),
+]
+"""Ways in which something is read of a campaign."""
+
+
+def read(path: Path) -> list[Any]:
+    """Return all that is read of a campaign; None where that is refused."""
+    found = []
+    for way in WAYS:
+        try:
+            found.append(way(Campaign(path)))
+        except (ValueError, OSError, AttributeError, KeyError, TypeError, RuntimeError):
+            found.append(None)
+    return found
+
+
+def flips(folder: Path, count: int, seed: int) -> tuple[dict[str, int], list[str]]:
+    """Flip single bits of all kinds of files, one at a time; return how often by kind, and what was read wrongly."""
+    subject = FunctionSubject(recorded, dict.fromkeys(("x1", "x2", "x3"), 0.0), signals={"wave": (50, 10.0)})
+    factors = [Factor(name, -np.pi, np.pi) for name in ("x1", "x2", "x3")]
+    plan = make_plan(subject, factors, "sobol", n=12, seed=1, keep=["numbers", "record", "signal:wave"], unit=4)
+    one = Campaign(folder / "flips", plan)
+    one.run(workers=0)
+    truth, chance = read(one.path), random.Random(seed)
+    kinds: dict[str, list[Path]] = {}
+    for path in sorted(p for p in one.path.rglob("*") if p.is_file()):
+        kinds.setdefault(path.relative_to(one.path).parts[0], []).append(path)
+    hit, wrong = Counter[str](), []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for k in range(count):
+            kind = list(kinds)[k % len(kinds)]
+            path = chance.choice(kinds[kind])
+            whole = path.read_bytes()
+            flipped(path, chance)
+            answers = read(one.path)
+            hit[kind] += 1
+            wrong += [f"{path.relative_to(one.path)}: {way}" for way, (a, b) in enumerate(zip(truth, answers))
+                      if a is not None and b is not None and a != b]  # fmt: skip
+            path.write_bytes(whole)
+    return dict(hit), wrong
+
+
 if __name__ == "__main__":
     place, count, seed = Path(sys.argv[1]), *(int(text) for text in [*sys.argv[2:], "100", "20"][:2])
     ends = Counter(end.partition(":")[0] for list_ in faults(place, count, seed).values() for end in list_)
     print(dict(ends))
+    hit, wrong = flips(place, 10 * count, seed)
+    print(
+        f"single bits flipped: {hit}; answers that were wrong: {len(wrong)} {Counter(w.partition('/')[0] for w in wrong)}"
+    )

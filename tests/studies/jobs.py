@@ -1,7 +1,10 @@
-"""Jobs for worker processes, in a module that imports nothing else."""
+"""Jobs for worker processes, in a module that imports little else."""
 
 import os
+import signal
 import threading
+
+from gearmbs.studies.run.engine import Refused
 
 
 def square(job, report):
@@ -40,3 +43,19 @@ def square_or_die(job, report):
     if job == "die":
         os._exit(3)
     return job**2
+
+
+def refuse_at_first(job, report):
+    if not job or not os.path.exists(job):
+        if job:
+            open(job, "w").close()
+        raise Refused("host x: no module", lasting=True)
+    return job
+
+
+def stop_at_first(job, report):
+    if not os.path.exists(job):
+        with open(job, "w") as file:
+            file.write(str(os.getpid()))
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return job

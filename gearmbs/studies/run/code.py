@@ -323,8 +323,7 @@ class _Memory:
         raw = hashlib.sha256(content).hexdigest()[:32]
         if path.suffix != ".py":
             return raw, []
-        # syntax trees are those of a version of Python
-        key = f"{raw} {sys.version_info[0]}.{sys.version_info[1]}"
+        key = f"{raw} {_made_by()}"
         if key not in self.known:
             self.known[key] = self.new[key] = what_counts(content)
         return self.known[key], [] if name.startswith("gearmbs") else _imports(name, path, content)
@@ -335,6 +334,13 @@ class _Memory:
             kept = self.known if len(self.known) <= MOST_KNOWN else self.new
             with suppress(OSError):
                 write_whole(self.path, json.dumps({**kept, "check": _check(kept)}))
+
+
+@functools.cache
+def _made_by() -> str:
+    """Return what digests of sources depend on beside them: this module, and the version of Python for syntax trees."""
+    own = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
+    return f"{own} {sys.version_info[0]}.{sys.version_info[1]}"
 
 
 def _check(known: Mapping[str, str]) -> str:
@@ -388,15 +394,18 @@ def _installed_as(name: str) -> str:
 # Whether a process runs what stands in the files.
 
 
-@functools.cache
 def _began() -> float:
-    """Return when this process began, in seconds since 1970; where that is not known, when it came here."""
+    """Return when this process began, in seconds since 1970; where that is not known, now."""
     try:
         ticks = float(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
         since_boot = float(Path("/proc/uptime").read_text().split()[0]) - ticks / os.sysconf("SC_CLK_TCK")
         return time.clock_gettime(time.CLOCK_REALTIME) - since_boot
     except (OSError, ValueError, IndexError):
         return time.time()
+
+
+BEGAN = _began()
+"""When this process began, or the one that it was forked from: what that had loaded, it has."""
 
 
 def _as_loaded(source: _Source) -> None:
@@ -407,7 +416,7 @@ def _as_loaded(source: _Source) -> None:
     CodeChanged
     """
     module = sys.modules.get(source.name)
-    if module is None or source.path.suffix != ".py" or source.stamp[1] / 1e9 < _began() + CLOCK_TICKS:
+    if module is None or source.path.suffix != ".py" or source.stamp[1] / 1e9 < BEGAN + CLOCK_TICKS:
         return
     if not _same(module, source.path.read_bytes(), str(source.path)):
         raise CodeChanged(f"{source.name} was edited after this process had loaded it")
