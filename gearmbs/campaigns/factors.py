@@ -241,6 +241,10 @@ class Choice:
             set_path(data, self.path, table)
 
 
+TEETH = "fault.teeth"
+"""Field of a case that holds the faults of its teeth."""
+
+
 @dataclass(frozen=True)
 class Specimens:
     """Seeded draws of manufacturing errors: the physical individuals of a plan, and the groups of every split.
@@ -252,9 +256,9 @@ class Specimens:
     errors : dict
         Range by field, as ``{"fault.backlash": ("60 um", "140 um")}``, drawn uniformly for each specimen.
     faults : sequence of dict
-        Tables added to ``fault.teeth``; entries that are ranges are drawn, and an entry ``"seed": "drawn"`` gets a
-        seed of the
-        specimen's own: ``{"kind": "manufacturing grade", "grade": 6, "wheel": "driver", "seed": "drawn"}``.
+        Tables added to ``fault.teeth``, or to the field that an entry ``path`` names, as "meshes.stage.faults"; entries
+        that are ranges are drawn, and an entry ``"seed": "drawn"`` gets a seed of the specimen's own:
+        ``{"kind": "manufacturing grade", "grade": 6, "wheel": "driver", "seed": "drawn"}``.
     seed : int
     name : str
         Of the column with the specimen's number.
@@ -292,7 +296,7 @@ class Specimens:
             table = dict(table)
             for key, value in table.items():
                 if _is_range(value):
-                    unit = subject.table_unit("fault.teeth", table, key)
+                    unit = subject.table_unit(table.get("path", TEETH), table, key)
                     table[key] = _range_in_si(value, unit, f"specimens.{key}")
             faults.append(table)
         return Specimens(self.draws, errors, tuple(faults), self.seed, self.name)
@@ -306,7 +310,6 @@ class Specimens:
         generator = np.random.default_rng([self.seed, int(row[self.name])])
         for path, (low, high) in self.errors.items():
             set_path(data, path, float(generator.uniform(low, high)))
-        added = []
         for table in self.faults:
             drawn = dict(table)
             for key, value in table.items():
@@ -314,10 +317,8 @@ class Specimens:
                     drawn[key] = int(generator.integers(1 << 31))
                 elif _is_range(value):
                     drawn[key] = float(generator.uniform(*value))
-            added.append(drawn)
-        if added:
-            section = data.setdefault("fault", {})
-            section["teeth"] = [*section.get("teeth", ()), *added]
+            path = drawn.pop("path", TEETH)
+            set_path(data, path, [*(get_path(data, path) or ()), drawn])
 
 
 AnyFactor = Factor | Choice | Specimens
@@ -354,6 +355,14 @@ def choose(path: str, *, crossed: bool = False, **options: Any) -> Choice:
     2
     """
     return Choice(path, options, crossed)
+
+
+def get_path(data: Mapping[str, Any], path: str) -> Any:
+    """Return a field of nested data by its path; None where there is none."""
+    *sections, name = path.split(".")
+    for section in sections:
+        data = data.get(section, {})
+    return data.get(name)
 
 
 def set_path(data: dict[str, Any], path: str, value: Any) -> None:

@@ -162,7 +162,8 @@ class Plan:
             elif self.design == "morris":
                 yield start * each, designs.morris(count, self.dimensions, self.seed, levels, start)
             else:
-                yield start, designs.sequence(self.design, count, self.dimensions, self.seed, start)
+                points = designs.sequence(self.design, count, self.dimensions, self.seed, start)
+                yield start, self._dealt(points, start)
 
     def points(self, n: int | None = None) -> np.ndarray:
         """Return the points of the design in the unit cube, shape (points, dimensions)."""
@@ -186,7 +187,22 @@ class Plan:
             return 0.5 + 0.5 * designs.box_behnken(d, int(o.get("centre", 1)))
         if self.design == "list":
             return np.zeros((len(o["rows"]), 0))
-        return designs.sequence(self.design, n, d, self.seed)
+        return self._dealt(designs.sequence(self.design, n, d, self.seed))
+
+    def _dealt(self, u: np.ndarray, first: int = 0) -> np.ndarray:
+        """Return points, from a number on, with specimens dealt out in rounds, so that each is met once a round.
+
+        A coordinate of a sequence meets some of few specimens several times and others never.
+        """
+        at = 0
+        for factor in self.factors:
+            if isinstance(factor, Specimens):
+                rounds = range(first // factor.draws, -(-(first + len(u)) // factor.draws))
+                order = [np.random.default_rng([factor.seed, self.seed, k]).permutation(factor.draws) for k in rounds]
+                numbers = np.concatenate(order)[first % factor.draws :][: len(u)]
+                u[:, at] = (numbers + 0.5) / factor.draws
+            at += factor.width
+        return u
 
     def count(self, factor: AnyFactor) -> int:
         """Return how many values of a factor a grid takes."""

@@ -178,3 +178,27 @@ def test_kinds_of_subjects_are_listed():
     assert make_subject("pair", {}).base() == Case().as_one_of_many().settings()
     with pytest.raises(CampaignError, match=says("'wheel'", "pair", "choose")):
         make_subject("wheel", {})
+
+
+@pytest.mark.parametrize("design", ["sobol", "halton", "random", "latin hypercube"])
+def test_exactly_the_specimens_asked_for_are_drawn(design):
+    """Twelve of them by a coordinate of 24 points would be nine or so."""
+    factors = [Factor("operation.torque", 50.0, 200.0), Specimens(12, {"fault.backlash": ("60 um", "140 um")})]
+    plan = make_plan(SHORT, factors, design, n=24)
+    numbers = table(plan)["specimen"]
+    assert np.bincount(numbers).tolist() == [2] * 12
+    assert sorted(numbers[:12]) == sorted(numbers[12:]) == list(range(12))
+    assert not np.array_equal(numbers[:12], numbers[12:])
+    np.testing.assert_array_equal(plan.columns(plan.points(12))["specimen"], numbers[:12])
+
+
+def test_errors_of_a_specimen_go_where_their_path_says():
+    tables = {"meshes": {"stage": {"faults": [{"kind": "wear", "depth": 1e-5}]}, "other": {}}}
+    grades = [
+        {"path": f"meshes.{name}.faults", "kind": "manufacturing grade", "seed": "drawn"} for name in ("stage", "other")
+    ]
+    Specimens(3, faults=grades, seed=1).apply(tables, {"specimen": 2})
+    stage, other = (tables["meshes"][name]["faults"] for name in ("stage", "other"))
+    assert [fault["kind"] for fault in stage] == ["wear", "manufacturing grade"]
+    assert list(other[0]) == ["kind", "seed"]
+    assert stage[1]["seed"] != other[0]["seed"]
