@@ -372,7 +372,10 @@ def one_fault(place: Path, kind: str, seed: int, truth: tuple[bytes, bytes]) -> 
         return f"silent: {last['end']}"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        same = content(campaign(place, **after.get("settings", {}))) == truth
+        try:
+            same = content(campaign(place, **after.get("settings", {}))) == truth
+        except (CampaignError, OSError, KeyError) as error:
+            return f"silent: said to be complete, and cannot be read: {error}"
     return "complete" if same else "silent: other numbers"
 
 
@@ -469,6 +472,5 @@ if __name__ == "__main__":
     ends = Counter(end.partition(":")[0] for list_ in faults(place, count, seed).values() for end in list_)
     print(dict(ends))
     hit, wrong = flips(place, 10 * count, seed)
-    print(
-        f"single bits flipped: {hit}; answers that were wrong: {len(wrong)} {Counter(w.partition('/')[0] for w in wrong)}"
-    )
+    kinds = Counter(answer.partition("/")[0] for answer in wrong)
+    print(f"single bits flipped: {hit}; answers that were wrong: {len(wrong)} {dict(kinds)}")

@@ -272,7 +272,7 @@ def dask_client(address: str, workers: int | None = None, **settings: Any) -> It
     if address == "local":
         with (
             one_thread(),
-            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
+            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0") as cluster,
             Client(cluster) as client,
         ):
             yield client

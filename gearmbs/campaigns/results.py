@@ -297,6 +297,11 @@ def _readme(campaign: Campaign, target: Path, files: Sequence[Path]) -> Path:
         "row is a case with its settings, results in SI units, and signals as lists.",
         "",
     ]
+    if (codes := campaign.status().codes) > 1:
+        lines += [
+            f"The results come from {codes} different codes; `gearmbs campaign check` says in what they differ.",
+            "",
+        ]
     lines += [f"* `{factor.name}`: varied" for factor in plan.factors]
     for spec in campaign.folder.specs:
         lines.append(f"* `signal.*` of {spec.name}: {spec.rate:g} Hz, {spec.units}, {', '.join(spec.channels)}")

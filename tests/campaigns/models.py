@@ -26,6 +26,13 @@ def burning(x1: float, x2: float, x3: float) -> dict:
     return ishigami(x1, x2, x3)
 
 
+def leaning(x1: float, x2: float, x3: float) -> dict:
+    """Return the same with the help of a module that is imported late."""
+    import colorsys
+
+    return ishigami(x1, x2, x3) | {"hue": colorsys.rgb_to_hsv(0.2, 0.4, 0.6)[0]}
+
+
 def moody(x1: float, x2: float, x3: float, mood: str = "good") -> dict:
     """Return the same, or go wrong in the way that ``mood`` says."""
     if mood == "impossible":
@@ -35,6 +42,8 @@ def moody(x1: float, x2: float, x3: float, mood: str = "good") -> dict:
     if mood == "endless":
         while True:
             pass
+    if mood == "asleep":
+        time.sleep(1e6)
     if mood == "hungry":
         return {"y": float(np.ones(1 << 31).sum())}
     if mood == "deadly":

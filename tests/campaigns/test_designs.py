@@ -7,8 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import CampaignError
+from gearmbs.campaigns import CampaignError, Specimens, make_plan
 from gearmbs.campaigns import factors as designs
+from tests.campaigns.support import function, ranges
 
 
 @pytest.mark.parametrize("design", designs.SEQUENCES)
@@ -78,3 +79,15 @@ def test_grids_and_single_factors():
     rows = designs.one_at_a_time([3, 2], [0.5, 0.2])
     assert len(rows) == 6
     assert all(np.sum(row != rows[0]) <= 1 for row in rows)
+
+
+@pytest.mark.parametrize("design", ["sobol", "halton", "random", "saltelli", "morris"])
+def test_points_that_are_drawn_in_blocks_are_the_same(design):
+    factors = ranges() if design in designs.ANALYSES else [*ranges(), Specimens(5)]
+    plan = make_plan(function(), factors, design, n=37)
+    whole = plan.points()
+    assert len(whole) == plan.size
+    first = 5 * plan.points_a_base
+    blocks = list(plan.blocks(37, first, 16))
+    assert [start for start, _ in blocks] == [first + sum(len(b) for _, b in blocks[:k]) for k in range(len(blocks))]
+    np.testing.assert_array_equal(np.vstack([points for _, points in blocks]), whole[first:])

@@ -15,7 +15,8 @@ import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError
 from gearmbs.campaigns.cluster import batch_cluster, job_script
-from gearmbs.campaigns.work import TimeLimitReached, limited
+from gearmbs.campaigns.limits import TimeLimitReached, limited
+from gearmbs.studies.run.engine import WorkerReplaced
 from tests.campaigns.support import digest, small
 from tests.says import says
 
@@ -123,6 +124,28 @@ def test_dask_with_a_worker_killed(tmp_path, undisturbed):
         campaign.run(client=client, progress=kill_once)
     assert digest(campaign) == undisturbed
     assert Campaign(campaign.path).status().failed == 0
+
+
+def _without_a_module() -> None:
+    sys.modules["colorsys"] = None  # type: ignore[assignment]
+
+
+@pytest.mark.slow
+def test_a_dask_worker_that_lacks_a_module_is_left_out(tmp_path):
+    """Its cases are not to blame, and the others do them; where none is left the run ends with the reason."""
+    distributed = pytest.importorskip("distributed")
+    campaign = small(tmp_path / "c", "leaning", n=32, unit=2)
+    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+    with cluster, distributed.Client(cluster) as client:
+        broken, sound = client.scheduler_info()["workers"]
+        client.run(_without_a_module, workers=[broken])
+        with pytest.warns(WorkerReplaced, match=says(broken, "colorsys")):
+            status = campaign.run(client=client)
+        assert (status.done, status.failed) == (32, 0)
+        client.run(_without_a_module, workers=[sound])
+        with pytest.warns(WorkerReplaced), pytest.raises(CampaignError, match=says("colorsys", "host")):
+            campaign.extend(64).run(client=client)
+    assert campaign.status().failed == 0
 
 
 def test_job_scripts_of_both_systems():

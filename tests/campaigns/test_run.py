@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import errno
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, make_plan
+from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, FunctionSubject, make_plan
 from gearmbs.campaigns.folder import sealed, unsealed
+from gearmbs.campaigns.work import work_unit
 from gearmbs.files import write_whole
+from gearmbs.studies.run import claims
+from gearmbs.studies.run.engine import run_jobs, threads
+from tests.campaigns.models import PLACES
 from tests.campaigns.support import digest, function, ranges, small
+from tests.says import says
 
 
 def test_results_are_those_of_the_function(tmp_path):
@@ -74,13 +80,14 @@ def test_equal_cases_of_another_campaign_are_taken_over(tmp_path):
         small(tmp_path / "fourth", reuse=[str(wrong.path)]).run(workers=0)
 
 
-def moody(tmp_path, **moods) -> Campaign:
+def moody(tmp_path, wall_limit=None, **moods) -> Campaign:
     """A campaign in which one case goes wrong in each of the given ways."""
     kinds = ["good"] * 9 + list(moods)
     rows = [{"x1": 0.1 * k, "x2": 0.0, "x3": 0.0, "mood": mood} for k, mood in enumerate(kinds)]
     subject = function("moody")
     subject.parameters["mood"] = "good"
     settings = {"options": {"rows": rows, "corners": "ignore"}, "unit": 5, "time_limit": 0.3, "memory_limit": 2e9}
+    settings["wall_limit"] = wall_limit
     return Campaign(tmp_path / "c", make_plan(subject, (), "list", **settings))
 
 
@@ -202,3 +209,78 @@ def test_crossed_choices_run(tmp_path):
     campaign.run(workers=0)
     assert list(campaign.table["x3"]) == ["low", "high"] * 4
     assert campaign.case(1)["x3"] == 2.0
+
+
+def test_columns_and_conditions(tmp_path):
+    """As of the whole table, whatever is read; names with dots are also found with underscores."""
+    campaign = small(tmp_path / "c")
+    campaign.run(workers=0)
+    whole = campaign.table
+    found = campaign.read(["y", "x2"])
+    assert list(found.columns) == ["y", "x2"]
+    assert found.equals(whole[["y", "x2"]])
+    some = campaign.read(["index"], "status == 'done' and x1 > 0.5")
+    assert list(some["index"]) == list(whole["index"][whole.x1 > 0.5])
+    assert campaign.read(where="x1 > 9").empty
+    assert campaign.failed().empty
+    with pytest.raises(CampaignError, match=says("columns", "nope", "x1")):
+        campaign.read(["nope"])
+    with pytest.raises(CampaignError, match=says("column", "'nope'")):
+        campaign.read(where="nope > 1")
+
+
+def test_results_that_are_no_numbers_are_counted(tmp_path):
+    rows = [{"x1": x, "x2": 0.0, "x3": 0.0} for x in (0.0, np.inf, 1.0)]
+    plan = make_plan(function(), (), "list", options={"rows": rows, "corners": "ignore"}, unit=2)
+    campaign = Campaign(tmp_path / "c", plan)
+    with np.errstate(invalid="ignore"):
+        status = campaign.run(workers=0)
+    assert (status.done, status.failed, status.not_numbers) == (3, 0, 1)
+    assert "1 with results that are no numbers" in str(status)
+
+
+def test_a_case_that_sleeps_is_ended_by_the_clock(tmp_path):
+    campaign = moody(tmp_path, wall_limit=0.2, asleep=1)
+    status = campaign.run(workers=0)
+    assert (status.done, status.failed) == (10, 1)
+    assert "more than 0.2 s by the clock" in campaign.failed().message[0]
+
+
+@pytest.mark.slow
+def test_a_case_that_sleeps_in_a_thread_is_ended_with_its_process(tmp_path):
+    """As those of Dask's workers are threads."""
+    campaign = moody(tmp_path, wall_limit=0.2, asleep=1)
+    run_jobs(partial(work_unit, str(campaign.path), False), [1], where=threads)
+    assert list(campaign.failed().mood) == ["asleep"]
+    assert "by the clock" in campaign.failed().message[0]
+
+
+def test_limits_by_the_clock_follow_from_those_of_processor_time():
+    assert make_plan(function(), ranges(), n=4).longest is None
+    assert make_plan(function(), ranges(), n=4, time_limit="6 s").longest == 120.0
+    assert make_plan(function(), ranges(), n=4, time_limit=6, wall_limit="1 min").longest == 60.0
+
+
+@pytest.mark.parametrize(("n", "keep", "unit"), [(3, "numbers", 1), (1000, "numbers", 8), (1000, "signal:wave", 2)])
+def test_units_follow_from_the_cases(tmp_path, n, keep, unit):
+    """Work for a hundred workers, and no unit of more signals than some megabytes."""
+    subject = FunctionSubject("tests.campaigns.models:ishigami", PLACES, signals={"wave": (7_000_000, 10.0)})
+    assert Campaign(tmp_path / "c", make_plan(subject, ranges(), n=n, keep=[keep])).folder.unit_size == unit
+
+
+def test_nobody_at_work_is_no_remaining_time(tmp_path):
+    campaign = small(tmp_path / "c")
+    campaign.work(1, 5)
+    status = campaign.status()
+    assert status.eta is None
+    assert str(status) == "8 of 40 cases done, nobody at work"
+    claims.take(campaign.folder.claim(3))
+    status = campaign.status()
+    assert status.running == 8
+    assert status.eta > 0.0
+    # it takes much longer than the first one
+    claim = json.loads(campaign.folder.claim(3).read_text())
+    campaign.folder.claim(3).write_text(json.dumps(claim | {"taken": claim["taken"] - 3600.0}))
+    status = campaign.status()
+    assert status.eta is None
+    assert f"unit 3: host {claim['host']}, process {claim['pid']}, for 36" in str(status)

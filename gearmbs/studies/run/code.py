@@ -194,10 +194,12 @@ def _read(names: Iterable[str]) -> tuple[Code, list[_Source]]:
             if path is None:
                 continue
             top = name.partition(".")[0]
-            if top not in own and top != "gearmbs" and _installed(path):
-                if not path.is_relative_to(sysconfig.get_path("stdlib")) or "site-packages" in path.parts:
+            if top not in own and top != "gearmbs":
+                if not {"site-packages", "dist-packages"}.isdisjoint(path.parts):
                     packages.add(top)
-                continue
+                    continue
+                if path.is_relative_to(sysconfig.get_path("stdlib")):
+                    continue
             waiting.append((name, path))
         name, path = waiting.pop()
         files.append(_Source(name, path, _stamp(path)))
@@ -238,11 +240,6 @@ def _file_of(module: str, required: bool) -> Path | None:
             raise ModuleNotFoundError(f"No module named {module!r}", name=module)
         return None
     return Path(spec.origin) if spec.origin not in (None, "built-in", "frozen") else None
-
-
-def _installed(path: Path) -> bool:
-    """Return whether a module is of the standard library or was put where packages are installed."""
-    return any(path.is_relative_to(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
 
 
 # What counts of a source.
