@@ -87,6 +87,9 @@ from .files.formats import write_signal as write_signal
 from .filters import bandpass as bandpass
 from .filters import decimate as decimate
 from .filters import resample as resample
+from .optical import point_track as point_track
+from .optical import repair_vibrometer as repair_vibrometer
+from .optical import turn_floor as turn_floor
 from .resampling import even_signal as even_signal
 from .rotation.angular import angular_resample as angular_resample
 from .rotation.angular import difference_signal as difference_signal
@@ -114,11 +117,14 @@ from .sensors import ModalPath as ModalPath
 from .sensors import Mode as Mode
 from .sensors import accelerometer as accelerometer
 from .sensors import add_noise as add_noise
+from .sensors import camera as camera
+from .sensors import drop_outs as drop_outs
 from .sensors import joint_force as joint_force
 from .sensors import laser_vibrometer as laser_vibrometer
 from .sensors import measure as measure
 from .sensors import quantise as quantise
 from .sensors import sample as sample
+from .sensors import speckle as speckle
 from .signal.given import SpeedCurve as SpeedCurve
 from .signal.given import speed_curve as speed_curve
 from .signal.given import with_speed as with_speed

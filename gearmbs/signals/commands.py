@@ -422,6 +422,13 @@ def compare(
     reference: Annotated[str, typer.Option(help="State the others are held against.")] = "healthy",
     scope: Annotated[str, typer.Option(help="What sets the scaling: load, all or each.")] = "load",
     wheel: Annotated[int, typer.Option(help="Whose shaft the indicators follow: 1, or 2 for the mate.")] = 1,
+    quantity: Annotated[
+        str | None, typer.Option("--as", help="Convert the measured files: displacement, velocity or acceleration.")
+    ] = None,
+    band: Annotated[str | None, typer.Option(help='For it, e.g. "100 Hz, 5 kHz".')] = None,
+    repair: Annotated[bool, typer.Option(help="Bridge drop-outs of a laser vibrometer.")] = False,
+    full_scale: Annotated[str | None, typer.Option(help='With it: range of the laser, e.g. "0.5 m/s".')] = None,
+    pixel: Annotated[str | None, typer.Option(help='Camera tracks: length of a pixel, e.g. "20 um".')] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the bars as PNG and SVG.")] = None,
     out: ReportFile = None,
@@ -430,6 +437,7 @@ def compare(
     with guarded(), stage_bar("comparison") as move:
         check_targets(out, tables=tables, figures=figures)
         from gearmbs.signals import compare as compare_signals
+        from gearmbs.signals import point_track, repair_vibrometer
         from gearmbs.signals.files.simulated import parse_models, parse_states, read_any
 
         for item in (*experiment, *(model or ())):
@@ -441,8 +449,15 @@ def compare(
             "units": units,
             "gaps": gaps,
         }
+
+        def record(path: Path) -> xr.DataArray:
+            signal = read_any(path, **known)
+            if pixel is not None:
+                signal = point_track(signal, pixel)
+            return repair_vibrometer(signal, full_scale=full_scale) if repair else signal
+
         measured = {
-            load: {state: read_any(path, **known) for state, path in states.items()}
+            load: {state: record(path) for state, path in states.items()}
             for load, states in parse_states(experiment).items()
         }
         report = compare_signals(
@@ -452,6 +467,8 @@ def compare(
             scope=scope,  # type: ignore[arg-type]
             channel=channel,
             wheel=wheel,
+            quantity=quantity,  # type: ignore[arg-type]
+            band=None if band is None else pair_of(band),
             progress=move,
         )
         files = save_tables(report.tables(), tables)

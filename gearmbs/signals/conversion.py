@@ -25,6 +25,8 @@ TAPER = 0.25
 EDGE_PERIODS = 6.0
 """Periods of the lowest frequency that are lost at either end: the fall there, `TAPER` wide, rings over 1.5 reciprocal
 widths."""
+TOLD_LOSS = 0.01
+"""Share of the RMS from which what a conversion loses below its band is told: a tenth of a decibel is a hundredth."""
 COMPONENTS = ("line_of_centres", "tangential", "line_of_action", "resultant")
 """Components of a force between gear and shaft; see `force_components`."""
 
@@ -59,7 +61,8 @@ def convert(
     Returns
     -------
     xarray.DataArray
-        In SI units, attribute `band`.
+        In SI units, attributes `band` and `lost_below`: of each channel the share of its RMS, before the conversion,
+        that lay below the band and is lost. A line of ``notes`` says so where it is a hundredth or more.
 
     Raises
     ------
@@ -83,12 +86,13 @@ def convert(
             "raise band[0] or pass edges='keep'"
         )
     pad = min(n - 1, margin)
-    columns = []
+    columns, lost = [], []
     for column, unit in zip(signal.values.T, units_of(signal)):
         dimension, factor = unit_dimension(unit)
         if dimension not in DERIVATIVE:
             raise SignalError(f"units: {unit!r} is a unit of {dimension}, which cannot be converted to {to}")
         column = factor * (column - column.mean())
+        lost.append(_share_below(column, rate, low))
         power = DERIVATIVE[to] - DERIVATIVE[dimension]
         if edges == "trim":
             fade = _fade(margin // 2)
@@ -100,13 +104,29 @@ def convert(
             extended = np.concatenate((fade * column[pad:0:-1], column, fade[::-1] * column[-2 : -pad - 2 : -1]))
             columns.append(_multiply(extended, rate, power, low, high, 0)[pad : pad + n])
     first = margin if edges == "trim" else 0
-    return like(
+    result = like(
         signal,
         np.stack(columns, axis=1),
         t0=float(signal["time"].values[first]),
         units=DIMENSIONS[to],
         band=(low, high),
+        lost_below=lost,
     )
+    told = [
+        f"{name}: below {low:g} Hz, where {100 * share:.2g} % of its RMS in {unit} lay, nothing is left of the {to}."
+        for name, share, unit in zip(signal["channel"].values, lost, units_of(signal))
+        if share >= TOLD_LOSS
+    ]
+    return result.assign_attrs(notes=[*signal.attrs.get("notes", ()), *told]) if told else result
+
+
+def _share_below(column: np.ndarray, rate: float, low: float) -> float:
+    """Return the part of the RMS of a column without its mean that lies below a frequency."""
+    from scipy.fft import next_fast_len, rfft
+
+    length = next_fast_len(column.size, real=True)
+    power = np.abs(rfft(column, length)) ** 2
+    return float(np.sqrt(power[: math.ceil(low * length / rate)].sum() / power.sum())) if power.any() else 0.0
 
 
 def _multiply(column: np.ndarray, rate: float, power: int, low: float, high: float, zeros: int) -> np.ndarray:

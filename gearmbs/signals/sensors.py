@@ -269,6 +269,105 @@ def quantise(signal: xr.DataArray, *, bits: int, full_scale: float) -> xr.DataAr
     return like(signal, np.clip(counts, low, high) * step, bits=int(bits), clipped=clipped)
 
 
+def drop_outs(
+    signal: xr.DataArray, *, per_second: float, longest: float = 1e-3, full_scale: float, seed: int
+) -> xr.DataArray:
+    """Lose a laser's signal now and then, where speckles are dark: to the range, to a spike, or to a value held.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel), sampled.
+    per_second : float
+        How often, on average; at random times.
+    longest : float
+        Longest, s; lengths are even between one sample and this.
+    full_scale : float
+        Range, in the signal's unit.
+    seed : int
+
+    Returns
+    -------
+    xarray.DataArray
+        Attribute ``lost_truly``: the samples that were lost.
+    """
+    rng, rate, values = np.random.default_rng(seed), rate_of(signal), signal.values.copy()
+    n = values.shape[0]
+    lost = np.zeros(n, dtype=bool)
+    for start in np.sort(rng.integers(1, n - 1, rng.poisson(per_second * n / rate))):
+        stop = min(n, start + 1 + int(rng.integers(0, max(1, round(longest * rate)))))
+        sign, kind = rng.choice([-1.0, 1.0]), rng.integers(3)
+        ends = (sign * full_scale, sign * full_scale * rng.uniform(0.3, 0.9, (stop - start, 1)), values[start - 1])
+        values[start:stop] = ends[kind]
+        lost[start:stop] = True
+    return like(signal, values, lost_truly=np.flatnonzero(lost).tolist())
+
+
+def speckle(
+    signal: xr.DataArray, angle: xr.DataArray, *, rms: float, seed: int, recurring: float = 1.0, orders: int = 200
+) -> xr.DataArray:
+    """Add a laser's pseudo-vibration: speckles that pass the beam again with each turn of the shaft.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    angle : xarray.DataArray
+        Of the shaft, rad, at the signal's times.
+    rms : float
+        In the signal's unit.
+    seed : int
+    recurring : float
+        Share of the power that recurs with each turn; the rest, from speckles that move sideways, is noise.
+    orders : int
+        Orders of the shaft over which it is even.
+    """
+    rng = np.random.default_rng(seed)
+    turned = np.asarray(angle.values, dtype=float)
+    if turned.shape != (signal.sizes["time"],):
+        raise SignalError(f"angle: has the shape {turned.shape}, the signal {signal.sizes['time']} samples")
+    pattern = np.zeros(turned.size)
+    for k in range(1, orders + 1):
+        pattern += rng.standard_normal() * np.cos(k * turned) + rng.standard_normal() * np.sin(k * turned)
+    pattern *= rms * math.sqrt(recurring / orders)
+    noise = rms * math.sqrt(1.0 - recurring) * rng.standard_normal(signal.shape)
+    return like(signal, signal.values + pattern[:, None] + noise)
+
+
+def camera(
+    displacement: xr.DataArray, rate: float, *, scale: float, noise: float = 0.0, exposure: float = 0.5, seed: int = 0
+) -> xr.DataArray:
+    """Track of a point by a camera, in pixels: the mean over each exposure, with the noise of the tracking.
+
+    Parameters
+    ----------
+    displacement : xarray.DataArray
+        m, dimensions (time, channel).
+    rate : float
+        Frames a second. There is no filter but the exposure: faster motion is folded down.
+    scale : float
+        Length of a pixel, m.
+    noise : float
+        RMS, pixels.
+    exposure : float
+        Share of the time between frames.
+    seed : int
+    """
+    own = rate_of(displacement)
+    if not 0.0 < check_rate(rate) <= own or not 0.0 < exposure <= 1.0:
+        raise SignalError(f"rate, exposure: must be positive, up to {own:g} Hz and 1, got {rate!r} and {exposure!r}")
+    n = displacement.sizes["time"]
+    sums = np.concatenate((np.zeros((1, displacement.sizes["channel"])), np.cumsum(displacement.values, axis=0)))
+    open_at = np.arange(0.0, n - exposure * own / rate, own / rate)
+    at = np.arange(n + 1)
+    seen = np.stack(
+        [np.interp(open_at + exposure * own / rate, at, s) - np.interp(open_at, at, s) for s in sums.T], axis=1
+    ) / (exposure * own / rate)
+    pixels = seen / scale + noise * np.random.default_rng(seed).standard_normal(seen.shape)
+    t0 = float(displacement["time"].values[0]) + 0.5 * exposure / rate
+    return like(displacement, pixels, t0=t0, rate=rate, units="pixel")
+
+
 def measure(
     signal: xr.DataArray,
     *,

@@ -15,9 +15,12 @@ from gearmbs.signals.analysis.analysis import analyse
 from gearmbs.signals.analysis.bands import HALF_WIDTH
 from gearmbs.signals.analysis.comparison_report import ComparisonReport
 from gearmbs.signals.analysis.report import AnalysisReport
+from gearmbs.signals.conversion import Dimension, convert
 from gearmbs.signals.errors import SignalError
+from gearmbs.signals.optical import turn_floor
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
 from gearmbs.signals.signal.signal import like, require
+from gearmbs.units import to_si
 
 Progress = Callable[[float, str], None]
 States = Mapping[str, Mapping[str, Any]]
@@ -43,6 +46,8 @@ def compare(
     harmonics: int = 3,
     half_width: float = HALF_WIDTH,
     wheel: int = 1,
+    quantity: Dimension | None = None,
+    band: tuple[Any, Any] | None = None,
     progress: Progress | None = None,
 ) -> ComparisonReport:
     """Compare the gear mesh harmonics of states and loads, measured and simulated.
@@ -74,6 +79,10 @@ def compare(
         As for `gmf_rms`.
     wheel : int
         Whose shaft the indicators follow (`analyse`).
+    quantity : {"displacement", "velocity", "acceleration"}, optional
+        To convert the experiment to (`convert`), as the paper did with the velocity of its laser.
+    band : (float or str, float or str), optional
+        For it, Hz: outside nothing is left.
     progress : callable, optional
         Called as progress(fraction, stage); without it a bar is shown where somebody watches, see `gearmbs.progress`.
 
@@ -94,6 +103,8 @@ def compare(
     if way not in ("band", "orders"):
         raise SignalError(f"way: must be 'band' or 'orders', got {way!r}")
     experiment = _signals(experiment, rate=rate, units=units, teeth=teeth, speed=speed, gaps=gaps)
+    if quantity is not None:
+        experiment = _converted(experiment, quantity, band)
     model = None if model is None else _signals(model)
     loads, states, left_out = _common_cases(experiment, model, reference)
     sides = [("experiment", experiment, channel)] + ([] if model is None else [("model", model, model_channel)])
@@ -117,7 +128,13 @@ def compare(
         data = _with_model(data, _tabulate(found["model"], loads, states, "model"), reference, scope)
     data = data.rename(rms="experiment")
     data.attrs.update(reference=reference, scope=scope, way=way, half_width=half_width)
-    return ComparisonReport(data, reference, left_out)
+    notes = [
+        f"{state} at load {load}: {note}"
+        for load, state in kept
+        for note in experiment[load][state].attrs.get("notes", ())
+        if quantity is not None or "drop-outs" in note
+    ]
+    return ComparisonReport(data, reference, left_out, notes)
 
 
 def _signals(cases: Mapping[str, Any], **known: Any) -> dict[str, dict[str, xr.DataArray]]:
@@ -129,6 +146,22 @@ def _signals(cases: Mapping[str, Any], **known: Any) -> dict[str, dict[str, xr.D
     return {
         str(load): {str(state): to_signal(data, **known) for state, data in states.items()}
         for load, states in loads.items()
+    }
+
+
+def _converted(
+    experiment: States, quantity: Dimension, band: tuple[Any, Any] | None
+) -> dict[str, dict[str, xr.DataArray]]:
+    """Return the records as one quantity, each channel that is of motion."""
+    if band is None:
+        raise SignalError(
+            f"band: {quantity} of records in other quantities needs the band in which it is wanted; give for instance "
+            "band=('100 Hz', '5 kHz')"
+        )
+    low, high = (to_si(edge, "frequency", "band") for edge in band)
+    return {
+        load: {state: convert(signal, quantity, band=(low, high)) for state, signal in states.items()}
+        for load, states in experiment.items()
     }
 
 
@@ -226,6 +259,11 @@ def _features(
             "ask for fewer"
         )
     data = xr.Dataset({"rms": report.harmonics[way].drop_vars(["frequency", "channel_units"])})
+    floor = None if report.average is None else turn_floor(report.average, _teeth(signal, wheel), harmonics)
+    for name, end in (("least", "low"), ("most", "high")):
+        # of the line alone; what is in the band beside it moves as it does
+        share = np.full(data["rms"].shape, np.nan) if floor is None else (floor[end] / floor["rms"]).T
+        data[name] = data["rms"].copy(data=data["rms"].values * share.reshape(data["rms"].shape))
     data["level"] = report.levels["rms"]
     data["gmf"] = report.gmf
     for name in FEATURES:
@@ -235,6 +273,12 @@ def _features(
             data[name] = ("channel", np.full(signal.sizes["channel"], np.nan))
     data.attrs["units"] = report.harmonics["band"].attrs["units"]
     return data
+
+
+def _teeth(signal: xr.DataArray, wheel: int) -> int:
+    """Return the teeth of the wheel that averages follow."""
+    counts = require(signal, "teeth", needed_for="the gear mesh frequency")
+    return counts[min(wheel, len(counts)) - 1]
 
 
 def _tabulate(found: dict[tuple[str, str], xr.Dataset], loads: list[str], states: list[str], side: str) -> xr.Dataset:

@@ -210,11 +210,14 @@ class ComparisonReport(Shown):
         The state the others are held against.
     left_out : list of str
         Cases that only one side has.
+    notes : list of str
+        What was done to the records: conversions, drop-outs bridged.
     """
 
     data: xr.Dataset
     reference: str
     left_out: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def has_model(self) -> bool:
@@ -361,6 +364,38 @@ class ComparisonReport(Shown):
         """What repeats at every load, and whether it was expected: two plain sentences a fault."""
         return summary(self, CHANGE_DB)
 
+    def uncertain(self) -> list[str]:
+        """Changes that speckle, marks or whatever else recurs with the shaft may have made or hidden.
+
+        A mesh order has as much of it as the orders beside (`turn_floor`); where the ends of what that leaves would be
+        told differently, the change is not certain.
+        """
+        if "least" not in self.data:
+            return []
+        found = []
+        least, most = (self.data[name] for name in ("least", "most"))
+        for state in self.faults:
+            for load in self.data["load"].values:
+                for k in self.data["harmonic"].values:
+                    at = {"load": load, "harmonic": k}
+                    with np.errstate(divide="ignore", invalid="ignore"):
+                        low, high = (
+                            20.0
+                            * np.log10(
+                                np.atleast_1d((a.sel(state=state, **at) / b.sel(state=self.reference, **at)).values)
+                            )
+                            for a, b in ((least, most), (most, least))
+                        )
+                    open_ones = [c for c in range(low.size) if _moves(low[c]) != _moves(high[c])]
+                    if open_ones and np.isfinite(high[open_ones[0]]):
+                        c = open_ones[0]
+                        where = f" on {len(open_ones)} of {low.size} channels" if low.size > 1 else ""
+                        found.append(
+                            f"{state} at load {load}: {k} x GMF may have moved by {low[c]:+.1f} to {high[c]:+.1f} dB"
+                            f"{where}; what recurs with the shaft beside it leaves that open."
+                        )
+        return found
+
     def cautions(self) -> list[str]:
         """Where channels contradict each other so much that the sensors, not the gears, may differ between records."""
         if "channel" not in self.data["experiment"].dims or self.data.sizes["channel"] < 2:
@@ -393,6 +428,11 @@ class ComparisonReport(Shown):
         parts += ["## In short", "", *(f"- {line}" for line in self.summary()), ""]
         if self.left_out:
             parts += ["Left out, because only one side has it: " + "; ".join(self.left_out) + ".", ""]
+        if self.notes:
+            parts += ["## The records", "", *(f"- {note}" for note in self.notes), ""]
+        open_ones = self.uncertain()
+        if open_ones:
+            parts += ["## Not certain", "", *(f"- {line}" for line in open_ones), ""]
         parts += ["## Harmonics", "", self._harmonic_table(), "", "## What the states do", ""]
         parts += [f"- {s}" for s in self.sentences() + self.cautions()] + [""]
         expected = self.expectations()

@@ -1,0 +1,319 @@
+"""Records of instruments that do not touch: drop-outs of lasers bridged and told, tracks of cameras as motion.
+
+A vibrometer loses its signal where speckles go dark: for a few samples it shows its range, a spike or its last value.
+What lies between is bridged by linear prediction from both sides. What recurs with each turn of the shaft, because the
+same speckles pass the beam again, cannot be told from vibration at whole orders by one record; `turn_floor` says how
+large it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.linalg
+import scipy.ndimage
+import scipy.signal as ss
+import xarray as xr
+
+from gearmbs.progress import waiting
+from gearmbs.signals.encoders.estimate import amplitude_interval
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.signal import DIMENSIONS, like, rate_of, unit_dimension, units_of
+from gearmbs.units import Quantity, to_si
+
+MEMORY = 100
+"""Samples from which the next is predicted: three periods of a mesh line at 30 samples each."""
+ROUNDS = 3
+"""Predictions from the bridged record: after the third the bridges change by less than a thousandth."""
+MOST_LOST = 0.2
+"""Share of a record that may be bridged: above, the prediction has too little to learn from."""
+SPIKE = 10.0
+"""Robust standard deviations of the prediction's error from which a sample is a spike: of noise one in 1e23 is. Shocks
+of bearings and of broken teeth ring, so that only their first samples come near."""
+CLEAR_OF_VIBRATION = 3.0
+"""Robust standard deviations of the record itself by which a spike must surprise, too."""
+LARGE = 5.0
+"""Robust standard deviations of the record from which a sample that one side does not predict is a spike: vibration of
+gears has peaks of two to three."""
+RING = 2
+"""Samples to either side of a lost one that are bridged with it: filters behind the demodulator smear it."""
+PASSES = 6
+"""Searches for spikes, each in the record with those before bridged."""
+HELD = 8
+"""Equal samples in a row that are a value held, where the record otherwise changes from sample to sample."""
+ISLAND = 3
+"""Half the samples between two lost ones that are bridged with them: a bridge that has to lead through one wrong sample
+follows it."""
+AT_RANGE = 0.98
+"""Share of the range from which a sample is over it."""
+REGULARISED = 1e-9
+"""White noise by the record's power with which prediction is learnt: a pure tone would leave it open."""
+BESIDE = 2
+"""Shaft orders next to a mesh order that are left out of the floor: modulation by the shaft is there."""
+FEWEST_ORDERS = 8
+"""Orders beside a mesh order whose median says something of chance."""
+
+
+@takes_data()
+@waiting("bridging drop-outs")
+def repair_vibrometer(
+    signal: xr.DataArray,
+    *,
+    full_scale: Quantity | None = None,
+    level: str | None = None,
+    least_level: float | None = None,
+    spikes: float | None = SPIKE,
+) -> xr.DataArray:
+    """Bridge the drop-outs of a laser vibrometer, and say how many there were.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
+    full_scale : float or str, optional
+        Range of the instrument, in the signal's unit or with one: samples at it are lost.
+    level : str, optional
+        Channel with the strength of the light, which is left out of the result; samples at which it is below
+        `least_level`, by default a fifth of its median, are lost.
+    least_level : float, optional
+    spikes : float, optional
+        Robust standard deviations of the error of linear prediction from which a sample is a spike; None for none, as
+        in records of shocks.
+
+    Returns
+    -------
+    xarray.DataArray
+        The channels but `level`; attribute ``lost``, the share of samples bridged by channel, and a line of ``notes``.
+
+    Raises
+    ------
+    SignalError
+        If more than a fifth of a channel is lost.
+    """
+    names = [str(c) for c in signal["channel"].values]
+    if level is not None and (level not in names or len(names) < 2):
+        raise SignalError(f"level: there is no channel {level!r} beside others, only {names}")
+    kept = [name for name in names if name != level]
+    dark = np.zeros(signal.sizes["time"], dtype=bool)
+    if level is not None:
+        strength = signal.values[:, names.index(level)]
+        dark = strength < (0.2 * float(np.median(strength)) if least_level is None else least_level)
+    rate, notes, shares = rate_of(signal), list(signal.attrs.get("notes", ())), []
+    columns = []
+    for name in kept:
+        column = signal.values[:, names.index(name)]
+        bound = None if full_scale is None else _in_unit(full_scale, units_of(signal)[names.index(name)])
+        found = {
+            "dark": dark,
+            "over the range": np.zeros_like(dark) if bound is None else np.abs(column) >= AT_RANGE * bound,
+            "held": _held(column),
+        }
+        told = np.any(list(found.values()), axis=0)
+        lost = _widened(told)
+        found["spikes"] = np.zeros_like(dark)
+        for _ in range(PASSES if spikes is not None else 0):
+            # those beside what is lost are told from one side: from the other a bridge leads up to them
+            both, either = _spikes(_bridged(column, lost), spikes)
+            more = (both | (either & _widened(_widened(lost)))) & ~lost
+            if not more.any():
+                break
+            found["spikes"] |= more
+            told |= more
+            lost = _widened(told)
+        share = float(lost.mean())
+        if share > MOST_LOST:
+            raise SignalError(
+                f"signal: {100 * share:.3g} % of {name!r} is lost, more than {100 * MOST_LOST:g} % can be bridged; "
+                "focus the laser, use reflecting tape or a larger range"
+            )
+        shares.append(share)
+        columns.append(_bridged(column, lost))
+        if lost.any():
+            longest = max(b - a for a, b in _stretches(lost)) / rate
+            kinds = ", ".join(f"{len(_stretches(where))} {kind}" for kind, where in found.items() if where.any())
+            notes.append(
+                f"{name}: {len(_stretches(lost))} drop-outs ({kinds}), {100 * share:.3g} % of the record, the longest "
+                f"{1e3 * longest:.3g} ms, bridged by linear prediction."
+            )
+    at = [names.index(name) for name in kept]
+    result = like(
+        signal, np.stack(columns, axis=1), channels=kept, units=[units_of(signal)[k] for k in at], lost=shares
+    )
+    return result.assign_attrs(notes=notes) if notes else result
+
+
+def _in_unit(bound: Quantity, unit: str) -> float:
+    """Return a bound in a channel's unit."""
+    if not isinstance(bound, str):
+        return float(bound)
+    dimension, factor = unit_dimension(unit)
+    return to_si(bound, DIMENSIONS[dimension], "full_scale") / factor
+
+
+def _held(column: np.ndarray) -> np.ndarray:
+    """Return which samples repeat the one before, `HELD` and more in a row."""
+    same = np.concatenate(([False], np.diff(column) == 0.0))
+    if same.mean() > MOST_LOST:
+        return np.zeros(column.size, dtype=bool)
+    out = np.zeros(column.size, dtype=bool)
+    for first, last in _stretches(same):
+        if last - first >= HELD - 1:
+            out[first:last] = True
+    return out
+
+
+def _widened(lost: np.ndarray) -> np.ndarray:
+    """Return what is lost with its neighbours, and what few samples lie between two of them."""
+    wide = scipy.ndimage.binary_dilation(lost, iterations=RING)
+    return wide | scipy.ndimage.binary_closing(wide, iterations=ISLAND)
+
+
+def _stretches(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return first and last (exclusive) of the stretches that are set."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
+
+
+def _prediction(column: np.ndarray) -> np.ndarray:
+    """Return the filter that leaves of a column what its past does not tell, by the Yule-Walker equations."""
+    x = column - column.mean()
+    memory = min(MEMORY, x.size // 4)
+    spectrum = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
+    correlation = np.fft.irfft(spectrum)[: memory + 1] / x.size
+    if correlation[0] == 0.0:
+        return np.ones(1)
+    correlation[0] *= 1.0 + REGULARISED
+    return np.concatenate(([1.0], -scipy.linalg.solve_toeplitz(correlation[:-1], correlation[1:])))
+
+
+def _spikes(column: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return samples that are spikes, and those whose prediction fails from one side at least."""
+    taps = _prediction(np.clip(column, *np.percentile(column, [0.1, 99.9])))
+    x = column - column.mean()
+    errors = []
+    for forth in (True, False):
+        error = np.abs(ss.lfilter(taps, [1.0], x if forth else x[::-1]))
+        error[: taps.size] = 0.0
+        errors.append(error if forth else error[::-1])
+    # a step of the vibration itself surprises one side only, and in records without noise all that is not a tone does
+    both = np.minimum(*errors)
+    own = 1.4826 * float(np.median(np.abs(x - np.median(x))))
+    least = max(bound * 1.4826 * float(np.median(both)), CLEAR_OF_VIBRATION * own)
+    either = np.maximum(*errors) > least
+    # within a burst the samples before and behind are wrong as well: there it is the size that tells
+    return (both > least) | (either & (np.abs(x) > LARGE * own)), either
+
+
+def _bridged(column: np.ndarray, lost: np.ndarray) -> np.ndarray:
+    """Return a column with lost samples such that the error of linear prediction is least.
+
+    References
+    ----------
+    .. [1] A. Janssen, R. Veldhuis, L. Vries, Adaptive interpolation of discrete-time signals that can be modeled as
+       autoregressive processes, IEEE Trans. Acoustics, Speech, and Signal Processing 34 (1986) 317-330.
+    """
+    if not lost.any():
+        return column
+    mean = float(column[~lost].mean())
+    at, known = np.flatnonzero(lost), np.flatnonzero(~lost)
+    x = column - mean
+    x[at] = np.interp(at, known, x[known])
+    for _ in range(ROUNDS):
+        taps = _prediction(x)
+        memory = taps.size - 1
+        b = np.correlate(taps, taps, mode="full")
+        rest = np.where(lost, 0.0, x)
+        pull = ss.oaconvolve(rest, b, mode="same")[at]
+        # gaps farther apart than the memory do not know of each other
+        groups = np.split(np.arange(at.size), np.flatnonzero(np.diff(at) > memory) + 1)
+        for group in groups:
+            apart = np.abs(at[group][:, None] - at[group][None, :])
+            matrix = np.where(apart <= memory, b[np.minimum(apart, memory) + memory], 0.0)
+            x[at[group]] = scipy.linalg.solve(matrix, -pull[group], assume_a="pos")
+    return x + mean
+
+
+# What recurs with each turn, and tracks of points.
+
+
+def turn_floor(
+    average: xr.DataArray, teeth: int, harmonics: int = 3, probability: float = 0.95
+) -> dict[str, np.ndarray]:
+    """RMS of mesh harmonics in an average over one turn, with the interval that the orders beside them leave.
+
+    Speckle, marks and whatever else recurs with the shaft is at mesh orders as large as beside them, by chance with or
+    against the vibration.
+
+    Parameters
+    ----------
+    average : xarray.DataArray
+        Over one turn (`time_synchronous_average`), dimensions (angle, channel).
+    teeth : int
+    harmonics : int
+    probability : float
+
+    Returns
+    -------
+    dict
+        "rms", "low", "high", "floor" (RMS of a line beside), each of shape (harmonics, channels); NaN where the average
+        has too few orders.
+    """
+    count = average.sizes["angle"]
+    lines = 2.0 * np.abs(np.fft.rfft(average.values, axis=0)) / count
+    shape = (harmonics, average.sizes["channel"])
+    out = {name: np.full(shape, np.nan) for name in ("rms", "low", "high", "floor")}
+    for h in range(1, harmonics + 1):
+        mesh = h * teeth
+        beside = np.arange(math.ceil((h - 0.5) * teeth), math.floor((h + 0.5) * teeth) + 1)
+        beside = beside[(np.abs(beside - mesh) > BESIDE) & (beside < 0.4 * count) & (beside > BESIDE)]
+        if beside.size < FEWEST_ORDERS or mesh >= 0.4 * count:
+            continue
+        for c in range(shape[1]):
+            # squares of lines of chance have the median 2 ln 2 times the variance of each part
+            variance = float(np.median(lines[beside, c] ** 2)) / (2.0 * math.log(2.0))
+            size = float(lines[mesh, c])
+            low, high = amplitude_interval(size, variance, float(beside.size), probability)
+            values = (size, low, high, math.sqrt(2.0 * variance))
+            for name, value in zip(out, values):
+                out[name][h - 1, c] = value / math.sqrt(2.0)
+    return out
+
+
+@takes_data()
+def point_track(
+    signal: xr.DataArray, scale: Quantity, *, direction: Sequence[float] | None = None, name: str = "camera"
+) -> xr.DataArray:
+    """Displacement of a point that a camera has followed.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Places in pixels, dimensions (time, channel), a frame each.
+    scale : float or str
+        Length of a pixel in the plane of the point, m.
+    direction : sequence of float, optional
+        Components along the channels of the direction that is wanted; default: all channels as they are.
+    name : str
+        Of the channel along it.
+
+    Returns
+    -------
+    xarray.DataArray
+        m, without the mean. Frames are taken at instants: what moves faster than half their rate is folded down, which
+        a light exposure does not prevent.
+    """
+    length = to_si(scale, "length", "scale")
+    if not 0.0 < length < math.inf:
+        raise SignalError(f"scale: must be the positive length of a pixel in m, got {scale!r}")
+    values = length * (signal.values - signal.values.mean(axis=0))
+    if direction is None:
+        return like(signal, values, units="m")
+    along = np.asarray(direction, dtype=float)
+    size = float(np.linalg.norm(along)) if along.shape == (values.shape[1],) else 0.0
+    if not (math.isfinite(size) and size > 0.0):
+        raise SignalError(f"direction: must have a component for each of {values.shape[1]} channels, got {direction!r}")
+    return like(signal, (values @ along / size)[:, None], channels=[name], units="m")
