@@ -115,7 +115,9 @@ def repair_vibrometer(
         told = np.any(list(found.values()), axis=0)
         lost = _widened(told)
         found["spikes"] = np.zeros_like(dark)
-        for _ in range(PASSES if spikes is not None else 0):
+        for _ in range(PASSES):
+            if spikes is None:
+                break
             # those beside what is lost are told from one side: from the other a bridge leads up to them
             both, either = _spikes(_bridged(column, lost), spikes)
             more = (both | (either & _widened(_widened(lost)))) & ~lost
