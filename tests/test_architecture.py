@@ -94,7 +94,8 @@ CIRCLES = {
      "mechanism.solve.plants", "mechanism.solve.points", "mechanism.solve.simulate", "mechanism.solve.simulator",
      "mechanism.solve.led"):
         "methods of Mechanism, and the functions that carry them out",
-    ("campaigns.campaign", "campaigns.results", "campaigns.sensitivity", "campaigns.surrogates"):
+    ("campaigns.campaign", "campaigns.figures", "campaigns.report", "campaigns.results", "campaigns.sensitivity",
+     "campaigns.surrogates"):
         "methods of Campaign, and the functions that carry them out",
 }  # fmt: skip
 """Groups of modules that may know each other, and why."""

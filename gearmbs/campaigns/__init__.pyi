@@ -4,6 +4,8 @@ from .factors import Choice as Choice
 from .factors import Factor as Factor
 from .factors import Specimens as Specimens
 from .factors import choose as choose
+from .figures import condition_figure as condition_figure
+from .figures import condition_map as condition_map
 from .plan import Plan as Plan
 from .plan import load_plan as load_plan
 from .plan import make_plan as make_plan
@@ -31,7 +33,5 @@ from .subjects import make_subject as make_subject
 from .subjects import subject_kinds as subject_kinds
 from .surrogates import PolynomialChaos as PolynomialChaos
 from .surrogates import ResponseSurface as ResponseSurface
-from .surrogates import condition_figure as condition_figure
-from .surrogates import condition_map as condition_map
 from .surrogates import fit_chaos as fit_chaos
 from .surrogates import fit_surface as fit_surface

@@ -1,10 +1,7 @@
-"""A campaign: a plan, the folder it is carried out in, what came of it, and its report as one HTML page."""
+"""A campaign: a plan, the folder it is carried out in, and what came of it."""
 
 from __future__ import annotations
 
-import base64
-import html
-import io
 import os
 import random
 import time
@@ -16,18 +13,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from gearmbs.campaigns.factors import Factor
 from gearmbs.campaigns.folder import Folder, check_folder, extend_folder, litter, make_folder
 from gearmbs.campaigns.plan import Plan
-from gearmbs.campaigns.results import factor_names, result_names
-from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, limit, whole
-from gearmbs.campaigns.sobol_bounds import first_indices, probability
 from gearmbs.campaigns.status import CampaignStatus, read_status
-from gearmbs.campaigns.surrogates import PolynomialChaos
-from gearmbs.files import write_whole
 from gearmbs.progress import alone, bars, watched
 from gearmbs.schema.described import chosen
 from gearmbs.studies.run.claims import owner, told
@@ -37,6 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.campaigns.surrogates import ResponseSurface
+    from gearmbs.view.figures.style import Picture
 
 OTHER_CODE = ("refuse", "mix", "again")
 """What may become of units that other code has done."""
@@ -231,8 +221,7 @@ class Campaign:
         columns : sequence of str, optional
             Names; default all. Others are not read: of a million cases three columns take some seconds.
         where : str, optional
-            A condition such as ``"status == 'done' and operation.torque > 100"``, as constraints are written; where a
-            name holds blanks or the like, underscores stand for them.
+            A condition such as ``"status == 'done' and orders.line_of_action.2 > 30"``, as constraints are written.
 
         Raises
         ------
@@ -286,9 +275,50 @@ class Campaign:
 
         return export(self, target, format, **settings)
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the columns of factors and results that have one."""
+        from gearmbs.campaigns.results import column_units
+
+        return column_units(self.folder)
+
+    def figure(
+        self,
+        kind: str = "main effects",
+        results: str | Sequence[str] | None = None,
+        factors: str | Sequence[str] | None = None,
+    ) -> Picture:
+        """Draw results over factors.
+
+        Parameters
+        ----------
+        kind : {"main effects", "tornado", "scatter matrix", "parallel coordinates"}
+            Means of the results over the values of each factor; those at both ends of each, the strongest on top; every
+            column over every other; each case as a line through all columns, coloured by the first result.
+        results : str or sequence of str, optional
+            Columns; default the three that vary most, each for what the others do not tell.
+        factors : str or sequence of str, optional
+            Columns; default all that vary and that every case has.
+
+        Raises
+        ------
+        CampaignError
+            For an unknown kind or column, with the nearest ones.
+        """
+        from gearmbs.campaigns.figures import figure
+
+        return figure(self, kind, results, factors)
+
     def report(self, path: str | Path, results: list[str] | None = None) -> Path:
-        """Write one HTML page with plan, results, what decides them, and failures."""
-        pass
+        """Write one HTML page with plan, results, what decides them, and failures.
+
+        Parameters
+        ----------
+        path : path-like
+        results : list of str, optional
+            Columns to look at; default those that vary most, each for what the others do not tell.
+        """
+        from gearmbs.campaigns.report import write_report
 
         return write_report(self, path, results)
 
@@ -409,176 +439,3 @@ def _needed() -> None:
             f"campaigns need {' and '.join(missing)}; install the extra: pip install 'gearmbs[campaigns]', "
             "in a checkout pip install '.[campaigns]'"
         )
-
-
-STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em;color:#222}
-table{border-collapse:collapse;margin:1em 0;font-size:14px}td,th{border-bottom:1px solid #ddd;padding:3px
-10px;text-align:right}
-td:first-child,th:first-child{text-align:left}img{max-width:100%}h2{margin-top:2em}small{color:#666}"""
-MOST_RESULTS = 4
-SHOWN_FAILURES = 50
-
-
-def write_report(campaign: Campaign, path: str | Path, results: list[str] | None = None) -> Path:
-    """Write the report of a campaign.
-
-    Parameters
-    ----------
-    path : path-like
-    results : list of str, optional
-        Columns to look at; default the first few that vary.
-    """
-    table = campaign.table
-    known = result_names(campaign.folder, table)
-    if results is None:
-        results = [name for name in known if table[name].std() > 0.0][:MOST_RESULTS]
-    for name in results:
-        if name not in known:
-            raise CampaignError(f"report: result {name!r} is unknown; known are {', '.join(known[:12])} ...")
-    parts = [f"<h1>{html.escape(campaign.path.name)}</h1>", _plan(campaign)]
-    for name in results:
-        parts += [f"<h2>{html.escape(name)}</h2>", _numbers(table[name]), _scatter(campaign, table, name)]
-        parts.append(_decides(campaign, name))
-    parts.append(_failures(campaign))
-    head = f"<meta charset='utf-8'><title>{html.escape(campaign.path.name)}</title><style>{STYLE}</style>"
-    return write_whole(path, f"<!doctype html><html><head>{head}</head><body>{''.join(parts)}</body></html>\n")
-
-
-def _plan(campaign: Campaign) -> str:
-    plan, status = campaign.plan, campaign.status()
-    units = _units(campaign)
-    spans = ((f.name, f"{_span(f)} {units.get(f.name, '')}".strip()) for f in plan.factors)
-    rows = "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(span)}</td></tr>" for name, span in spans)
-    about = (
-        f"<p>{html.escape(plan.subject.kind)}, {html.escape(plan.design)} design, seed {plan.seed}. "
-        f"{html.escape(str(status))}. "
-        f"{status.processor_seconds:.4g} s of processor time.</p>"
-    )
-    return f"{about}<table><tr><th>factor</th><th>range</th></tr>{rows}</table>"
-
-
-def _units(campaign: Campaign) -> dict[str, str]:
-    """Return the SI units of the columns of those factors that have one."""
-    plan = campaign.plan
-    units = {f.name: plan.subject.unit_of(f.path) for f in plan.factors if isinstance(f, Factor)}
-    return {name: unit for name, unit in units.items() if unit not in ("1", "dimensionless")}
-
-
-def _span(factor: Any) -> str:
-    if getattr(factor, "values", ()):
-        return ", ".join(str(v) for v in factor.values)
-    if hasattr(factor, "low"):
-        return f"{factor.low:.5g} to {factor.high:.5g}" + (", logarithmic" if factor.scale == "log" else "")
-    return ", ".join(factor.options) if hasattr(factor, "options") else f"{factor.draws} specimens"
-
-
-def _numbers(values: pd.Series) -> str:
-    q = values.quantile([0.0, 0.05, 0.5, 0.95, 1.0])
-    cells = "".join(f"<td>{v:.5g}</td>" for v in (values.mean(), values.std(), *q))
-    heads = "".join(f"<th>{n}</th>" for n in ("mean", "deviation", "least", "5 %", "median", "95 %", "largest"))
-    return f"<table><tr>{heads}</tr><tr>{cells}</tr></table>"
-
-
-def _scatter(campaign: Campaign, table: pd.DataFrame, result: str) -> str:
-    """Return a picture of the result over each factor."""
-    from gearmbs.view.figures.style import new_figure
-
-    names = [n for n in factor_names(campaign.folder) if not n.endswith("severity")][:8]
-    rows = -(-len(names) // 4)
-    figure, units = new_figure(10.0, 2.6 * rows), _units(campaign)
-    for k, name in enumerate(names):
-        ax = figure.add_subplot(rows, min(4, len(names)), k + 1)
-        x = table[name]
-        if x.dtype.kind in "fi":
-            ax.plot(x, table[result], ".", ms=3, alpha=0.5)
-        else:
-            levels = sorted(x.astype(str).unique())
-            ax.boxplot([table[result][x.astype(str) == level].dropna() for level in levels], tick_labels=levels)
-        ax.set_xlabel(f"{name}, {units[name]}" if name in units else name, fontsize=8)
-        ax.tick_params(labelsize=7)
-    return _picture(figure, f"{result} over the factors")
-
-
-def _decides(campaign: Campaign, result: str) -> str:
-    """Return what decides the result, where the design tells, else a response surface."""
-    try:
-        found = sensitivity(campaign, result)
-    except CampaignError:
-        return _at_hand(campaign, result) + _surface(campaign, result)
-    if isinstance(found, PolynomialChaos):
-        note = (
-            f"<p><small>A sum of polynomials of degree {found.degrees.sum(axis=1).max()}; of points left out it "
-            f"explains {found.q_squared:.1%} of the variance.</small></p>"
-        )
-        heading = "<h3>Sobol' indices from a polynomial chaos</h3>"
-        return _at_hand(campaign, result) + heading + _table(found.table()) + note + _surface(campaign, result)
-    if isinstance(found, SobolIndices):
-        if campaign.plan.design == "grid":
-            return "<h3>Parts of the grid's variance</h3>" + _table(found.table()[["first", "total"]])
-        note = f"<p><small>{found.base_points} base points, {found.left_out} left out for want of results; "
-        note += f"control variates explain {found.explained:.1%} of the variance of points left out.</small></p>"
-        return "<h3>Sobol' indices</h3>" + _table(found.table()) + note
-    if campaign.plan.design == "one at a time":
-        return "<h3>One factor after the other</h3>" + _table(found)
-    return "<h3>Effects</h3>" + _table(found.head(20))
-
-
-def _at_hand(campaign: Campaign, result: str) -> str:
-    """Return first indices from the points at hand, and for a condition how probable it is."""
-    table = campaign.table
-    values = table[result].to_numpy(dtype=float)
-    text = ""
-    if set(np.unique(values[np.isfinite(values)])) <= {0.0, 1.0}:
-        p, low, high = probability(values)
-        text = f"<p>Holds in {p:.1%} of the points (95 % interval {low:.1%} to {high:.1%}).</p>"
-    found = first_indices({name: table[name].to_numpy() for name in factor_names(campaign.folder)}, values)
-    return f"{text}<h3>First Sobol' indices from the points at hand</h3>" + _table(found)
-
-
-def _surface(campaign: Campaign, result: str) -> str:
-    from gearmbs.campaigns.surrogates import response_surface
-
-    for degree in (2, 1):
-        try:
-            surface = response_surface(campaign, result, degree)
-        except CampaignError:
-            continue
-        table = surface.table()
-        table = table.reindex(table["coefficient"].abs().sort_values(ascending=False).index).head(12)
-        note = (
-            f"<p>R<sup>2</sup> = {surface.r_squared:.3f}, of points left out {surface.q_squared:.3f}, RMS error there "
-            f"{surface.error:.3g}.</p>"
-        )
-        return f"<h3>Response surface of degree {degree}, factors from -1 to 1</h3>{note}" + _table(table)
-    return ""
-
-
-def _failures(campaign: Campaign) -> str:
-    failed = campaign.failed()
-    if failed.empty:
-        return "<h2>Failures</h2><p>none</p>"
-    shown = failed[["index", "status", "message", "advice"]].head(SHOWN_FAILURES)
-    rows = "".join("<tr>" + "".join(f"<td>{html.escape(str(v))}</td>" for v in row) + "</tr>" for row in shown.values)
-    return f"<h2>Failures</h2><p>{len(failed)} cases</p><table>{rows}</table>"
-
-
-def _table(table: pd.DataFrame) -> str:
-    index = ", ".join(str(name) for name in table.index.names)
-    heads = "".join(f"<th>{html.escape(str(c))}</th>" for c in (index, *table.columns))
-    rows = "".join(
-        f"<tr><td>{html.escape(_label(name))}</td>" + "".join(f"<td>{v:.4g}</td>" for v in row) + "</tr>"
-        for name, row in zip(table.index, np.asarray(table, dtype=float))
-    )
-    return f"<table><tr>{heads}</tr>{rows}</table>"
-
-
-def _label(name: Any) -> str:
-    parts = name if isinstance(name, tuple) else (name,)
-    return ", ".join(f"{part:.5g}" if isinstance(part, float) else str(part) for part in parts)
-
-
-def _picture(figure: Any, text: str) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    data = base64.b64encode(buffer.getvalue()).decode()
-    return f"<img alt='{html.escape(text)}' src='data:image/png;base64,{data}'>"

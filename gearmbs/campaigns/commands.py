@@ -219,10 +219,28 @@ def sensitivity(folder: Place, result: Annotated[str, typer.Argument(help="Colum
             typer.echo(f"from a polynomial that explains {found.q_squared:.1%} of the variance of points left out")
 
 
+@app.command()
+def figure(
+    folder: Place,
+    kind: Annotated[
+        str, typer.Argument(help="main effects, tornado, scatter matrix or parallel coordinates.")
+    ] = "main effects",
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture: PNG, SVG or PDF.")] = Path("figure.png"),
+    result: Annotated[list[str] | None, typer.Option(help="Column; repeat; default: what varies most.")] = None,
+    factor: Annotated[list[str] | None, typer.Option(help="Column; repeat; default: all that vary.")] = None,
+) -> None:
+    """Draw results over factors."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        Campaign(folder).figure(kind, result or None, factor or None).savefig(out, dpi=120)
+        typer.echo(f"wrote {out}")
+
+
 @app.command("map")
 def condition(
     folder: Place,
-    holds: Annotated[str, typer.Argument(help='Condition, as "orders_line_of_action_2 > 30".')],
+    holds: Annotated[str, typer.Argument(help='Condition, as "orders.line_of_action.2 > 30".')],
     across: Annotated[str, typer.Option(help="Factor of the horizontal axis.")],
     along: Annotated[str, typer.Option(help="Factor of the vertical axis.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Picture: PNG, SVG or PDF.")],

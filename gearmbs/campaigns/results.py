@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.campaigns.factors import Choice, Factor
 from gearmbs.campaigns.folder import REMEDY, Folder
-from gearmbs.campaigns.settings import CampaignError, local, names_in, satisfied, spelt, texts
+from gearmbs.campaigns.settings import CampaignError, local, names_in, satisfied, texts
 from gearmbs.files import whole_file, write_whole
 
 if TYPE_CHECKING:
@@ -45,17 +46,19 @@ def read_table(
     if not done:
         raise CampaignError(f"{folder.path}: no unit is finished yet; run the campaign")
     wanted = None if columns is None else list(dict.fromkeys(texts(columns, "columns")))
-    asked = [] if where is None else names_in(where)
-    # of what is not wanted nothing is read; a condition may name a column with underscores, which only all columns tell
+    asked = []
+    if where is not None:
+        first = folder.unit_table(done[0])
+        asked = names_in(where, first.column_names)
+        # names that are none are told with all that there are
+        satisfied(where, {name: first[name].to_numpy() for name in first.column_names})
+    # of what is not wanted nothing is read
     read = None if wanted is None else ["index", *wanted, *asked]
-    if read is not None and any("_" in name for name in asked):
-        read += [n for n in folder.unit_table(done[0]).column_names if spelt(n) in asked]
     tables = []
     for unit in done[:1] if units is not None and not units else done if units is None else units:
         table = folder.unit_table(unit, read)
         if where is not None:
-            known = {name: table[name].to_numpy() for name in table.column_names}
-            held = satisfied(where, {**{spelt(name): values for name, values in known.items()}, **known})
+            held = satisfied(where, {name: table[name].to_numpy() for name in table.column_names})
             table = table.filter(pa.array(held))
         tables.append(table)
     table = pa.concat_tables(tables, promote_options="permissive")
@@ -97,6 +100,21 @@ def result_names(folder: Folder, table: pd.DataFrame) -> list[str]:
     """Return the names of the columns that simulations gave."""
     known = {*ABOUT, *factor_names(folder)}
     return [str(name) for name in table.columns if name not in known]
+
+
+def column_units(folder: Folder) -> dict[str, str]:
+    """Return the units of the columns of factors and results that have one."""
+    subject, found = folder.plan.subject, {}
+    for factor in folder.plan.factors:
+        if isinstance(factor, Factor):
+            found[factor.name] = subject.unit_of(factor.path)
+        if isinstance(factor, Choice):
+            for option, keys in factor.ranges.items():
+                table = factor.options[option]
+                found |= {f"{factor.name}.{key}": subject.table_unit(factor.path, table, key) for key in keys}
+    if folder.done():
+        found |= {name: subject.unit_of_result(name) for name in result_names(folder, read_table(folder))}
+    return {name: unit for name, unit in found.items() if unit not in ("", "1", "dimensionless")}
 
 
 def open_dataset(folder: Folder) -> xr.Dataset:

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.factors import SEQUENCES
+from gearmbs.campaigns.factors import SEQUENCES, Choice
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.schema.described import chosen
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -290,12 +291,27 @@ def grid_indices(values: np.ndarray, counts: Sequence[int], names: list[str]) ->
 
 
 def coordinates(campaign: Campaign) -> tuple[list[str], np.ndarray]:
-    """Return the names of the coordinates of a campaign's plan and its points in the unit cube."""
+    """Return the names of the coordinates of a campaign's plan and its points in the unit cube.
+
+    They are those of the table's columns. A coordinate of a choice that is a range of several options, as the lost part
+    of a tooth and the depth of wear, is ``NAME.severity`` if it is the first of each, else ``NAME.ONE/OTHER``.
+    """
     plan = campaign.plan
     names = []
     for factor in plan.factors:
-        names += [factor.name] + [f"{factor.name}[{k}]" for k in range(1, factor.width)]
+        names += _of_choice(factor) if isinstance(factor, Choice) else [factor.name]
     return names, plan.points()
+
+
+def _of_choice(choice: Choice) -> list[str]:
+    """Return the names of a choice's coordinates."""
+    names = [] if choice.crossed else [choice.name]
+    ranges = list(choice.ranges.values())
+    for k in range(choice.width - len(names)):
+        keys = list(dict.fromkeys(found[k] for found in ranges if len(found) > k))
+        first = "severity" if choice.name == choice.path else f"{choice.name}.severity"
+        names.append(first if len(keys) > 1 and k == 0 else f"{choice.name}.{'/'.join(keys)}")
+    return names
 
 
 def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
@@ -304,8 +320,7 @@ def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
     if result not in table.columns:
         from gearmbs.campaigns.results import result_names
 
-        known = ", ".join(result_names(campaign.folder, table)[:12])
-        raise CampaignError(f"result {result!r} is unknown; known are {known or 'none, since no case has results'}")
+        chosen(result_names(campaign.folder, table), result, "", CampaignError, "result")
     if table[result].dtype.kind not in "biuf":
         raise CampaignError(f"result {result!r} is a column of texts, not of numbers")
     values = np.full(campaign.folder.case_count, np.nan)
@@ -328,7 +343,7 @@ def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -
 
 def _levels(plan: Plan) -> list[int]:
     """Return the number of values of each coordinate that has but a few, 0 for a range."""
-    from gearmbs.campaigns.factors import Choice, Factor
+    from gearmbs.campaigns.factors import Factor
 
     levels: list[int] = []
     for factor in plan.factors:

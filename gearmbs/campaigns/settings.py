@@ -10,7 +10,8 @@ import math
 import operator
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from keyword import iskeyword
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ import numpy as np
 
 from gearmbs.schema.described import check_keys
 from gearmbs.schema.quantities import Measure
+from gearmbs.wording import did_you_mean
 
 # The error of campaigns.
 
@@ -148,7 +150,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def satisfied(text: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def satisfied(text: str, given: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return which rows of a table satisfy a constraint.
 
     Raises
@@ -156,10 +158,14 @@ def satisfied(text: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     CampaignError
         For a text that is no comparison of the columns.
     """
+    written, columns = _as_names(text, given)
     try:
-        tree = ast.parse(text, mode="eval").body
+        tree = ast.parse(written, mode="eval").body
     except SyntaxError as error:
-        raise CampaignError(f"constraint {text!r}: {error.msg}; write for instance operation.torque <= 100") from None
+        raise CampaignError(
+            f"constraint {text!r}: {error.msg}; write for instance operation.torque <= 100, with columns as the table "
+            f"has them: {', '.join(map(str, given))}"
+        ) from None
     result = np.asarray(_value(tree, columns, text))
     if result.dtype != bool:
         raise CampaignError(f"constraint {text!r}: is no comparison; write for instance operation.torque <= 100")
@@ -167,21 +173,29 @@ def satisfied(text: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.broadcast_to(result, (size,))
 
 
-def names_in(text: str) -> list[str]:
-    """Return the names of columns that a condition holds; none of a text that is no condition."""
-    try:
-        tree = ast.parse(text, mode="eval").body
-    except SyntaxError:
-        return []
-    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    named = (n for n in ast.walk(tree) if isinstance(n, (ast.Name, ast.Attribute)) and id(n) not in called | inner)
-    return list(dict.fromkeys(ast.unparse(node) for node in named))
+def names_in(text: str, columns: Iterable[str]) -> list[str]:
+    """Return those of some columns that a condition names."""
+    return [name for name in columns if re.search(_alone(name), text)]
 
 
-def spelt(name: str) -> str:
-    """Return the name by which an expression can hold a column's: with underscores for dots and blanks."""
-    return name.replace(".", "_").replace(" ", "_")
+def _alone(name: str) -> str:
+    """Return the pattern of a name that is no part of a longer one."""
+    return rf"(?<![\w.]){re.escape(name)}(?![\w.])"
+
+
+STAND_IN = "_column_"
+"""What names in an expression begin with that stand for those that Python does not take."""
+
+
+def _as_names(text: str, columns: Mapping[str, np.ndarray]) -> tuple[str, dict[str, np.ndarray]]:
+    """Return a text with names that Python takes for those it does not, as orders.line_of_action.2, and the columns."""
+    found = dict(columns)
+    odd = [name for name in columns if not all(part.isidentifier() and not iskeyword(part) for part in name.split("."))]
+    for k, name in enumerate(sorted(odd, key=len, reverse=True)):
+        text, count = re.subn(_alone(name), f"{STAND_IN}{k}", text)
+        if count:
+            found[f"{STAND_IN}{k}"] = columns[name]
+    return text, found
 
 
 def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
@@ -193,7 +207,9 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
     if isinstance(node, (ast.Name, ast.Attribute)):
         name = ast.unparse(node)
         if name not in columns:
-            raise CampaignError(f"constraint {text!r}: no column {name!r}; columns are {', '.join(columns)}")
+            hint = did_you_mean(name, columns, before="; ")
+            known = ", ".join(column for column in columns if not column.startswith(STAND_IN))
+            raise CampaignError(f"constraint {text!r}: no column {name!r}; columns are {known}{hint}")
         return columns[name]
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
         return OPERATORS[type(node.op)](sub(node.left), sub(node.right))

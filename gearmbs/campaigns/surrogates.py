@@ -17,13 +17,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.campaigns.results import factor_names
 from gearmbs.campaigns.sensitivity import coordinates, results_in_order
-from gearmbs.campaigns.settings import CampaignError, whole
+from gearmbs.campaigns.settings import CampaignError
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from gearmbs.campaigns.campaign import Campaign
 
@@ -468,69 +466,3 @@ def response_surface(campaign: Campaign, result: str, degree: int = 2) -> Respon
             "response surface: constraints have left points out; fit the table's columns by fit_surface"
         )
     return fit_surface(points, values, names, degree)
-
-
-def condition_map(
-    campaign: Campaign, condition: str, across: str, along: str, bins: int = 8
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return over two factors in which part of the cases a condition holds.
-
-    Parameters
-    ----------
-    condition : str
-        A comparison of columns of the table, as a constraint is written; a column's name may hold what no name in an
-        expression does, then write it with underscores: ``orders_line_of_action_2 > 10``.
-    across, along : str
-        Columns of the horizontal and the vertical axis.
-    bins : int
-        Of equal numbers of cases along each.
-
-    Returns
-    -------
-    share, counts : ndarray, shape (bins, bins)
-        Part of the cases and how many there are, rows along the vertical axis.
-    edges_across, edges_along : ndarray, shape (bins + 1,)
-    """
-    from gearmbs.campaigns.settings import satisfied, spelt
-
-    table = campaign.table
-    table = table[table["status"] == "done"]
-    columns = {str(name): table[name].to_numpy() for name in table.columns}
-    columns |= {spelt(str(name)): table[name].to_numpy() for name in table.columns}
-    held = satisfied(condition, columns)
-    bins = whole(bins, "bins", 1)
-    for name in (across, along):
-        if name not in table.columns or table[name].dtype.kind not in "biuf":
-            known = ", ".join(str(n) for n in factor_names(campaign.folder) if table[n].dtype.kind in "biuf")
-            raise CampaignError(f"map: {name!r} is no column of numbers; factors that are one: {known}")
-    x, y = (table[name].to_numpy(dtype=float) for name in (across, along))
-    edges_x, edges_y = (np.quantile(v, np.linspace(0.0, 1.0, bins + 1)) for v in (x, y))
-    i = np.clip(np.searchsorted(edges_y, y, side="right") - 1, 0, bins - 1)
-    j = np.clip(np.searchsorted(edges_x, x, side="right") - 1, 0, bins - 1)
-    counts, hits = np.zeros((bins, bins)), np.zeros((bins, bins))
-    np.add.at(counts, (i, j), 1.0)
-    np.add.at(hits, (i, j), held.astype(float))
-    with np.errstate(all="ignore"):
-        return hits / counts, counts, edges_x, edges_y
-
-
-def condition_figure(campaign: Campaign, condition: str, across: str, along: str, bins: int = 8) -> Figure:
-    """Draw a `condition_map`: in which part of the cases a condition holds, over two factors."""
-    from gearmbs.view.figures.style import new_figure
-
-    share, counts, edges_x, edges_y = condition_map(campaign, condition, across, along, bins)
-    figure = new_figure(5.6, 4.2)
-    ax = figure.subplots()
-    mesh = ax.pcolormesh(edges_x, edges_y, share, vmin=0.0, vmax=1.0)
-    figure.colorbar(mesh, ax=ax, label="part of the cases")
-    ax.set_xlabel(across)
-    ax.set_ylabel(along)
-    ax.set_title(
-        f"{condition}: {np.nansum(share * counts) / counts.sum():.0%} of {counts.sum():.0f} cases", fontsize=10
-    )
-    logarithmic = {f.name for f in campaign.plan.factors if getattr(f, "scale", "") == "log"}
-    if across in logarithmic:
-        ax.set_xscale("log")
-    if along in logarithmic:
-        ax.set_yscale("log")
-    return figure

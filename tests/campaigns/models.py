@@ -49,3 +49,9 @@ def moody(x1: float, x2: float, x3: float, mood: str = "good") -> dict:
     if mood == "deadly":
         os.kill(os.getpid(), signal.SIGKILL)
     return ishigami(x1, x2, x3)
+
+
+def several(x1: float, x2: float, x3: float) -> dict[str, float]:
+    """Return a result, what tells the same, what tells something else, and what hardly varies."""
+    y = x1 + 0.3 * x2 + 0.2 * x3
+    return {"steady": 100.0 + x1 - 0.5 * x2 * x3, "y": y, "double": 2.0 * y + 1e-3, "square": x2 * x2}

@@ -43,6 +43,9 @@ def test_from_plan_to_end(tmp_path):
     assert "x1" in call("show", folder, 3)
     assert "8 of 16" in call("extend", folder, "--to", 16)
     assert "all is as" in call("check", folder)
+    assert "wrote" in call("figure", folder, "tornado", "--result", "y", "--out", tmp_path / "t.svg")
+    assert "<svg" in (tmp_path / "t.svg").read_text()
+    assert "result 'z'" in call("figure", folder, "--result", "z", code=1)
     assert "--part $SLURM_ARRAY_TASK_ID/50" in call("slurm", folder, "--elements", 50)
 
 

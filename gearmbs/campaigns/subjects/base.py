@@ -118,6 +118,10 @@ class Subject(ABC):
         """Return the SI unit of an entry of a table that stands in a field, as the depth of a fault."""
         return "1"
 
+    def unit_of_result(self, name: str) -> str:
+        """Return the unit of a number that is kept, "" where it has none or the subject does not know it."""
+        return ""
+
     @abstractmethod
     def check(self, data: dict[str, Any], name: str) -> Any:
         """Return the validated thing that nested data describe.

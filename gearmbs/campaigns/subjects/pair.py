@@ -53,6 +53,13 @@ SETTINGS = {
 it, and the
 dynamic friction is half the static one."""
 
+RESULT_UNITS = {
+    **dict.fromkeys(("band", "orders", "rms", "peak_to_peak", "sideband_index"), "m/s^2"),
+    **dict.fromkeys(("penetration", "error"), "m"),
+    "force": "N",
+}
+"""Units of numbers that are kept, by the beginnings of their names."""
+
 PERIODS = 40
 """Least length of a record in mesh periods, for the band-pass filters."""
 
@@ -112,6 +119,11 @@ class PairSubject(Subject):
     def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
         """Return the SI unit of a parameter of a fault of a tooth."""
         return tooth_fault_unit(table, key) if path == "fault.teeth" else "1"
+
+    def unit_of_result(self, name: str) -> str:
+        """Return the unit of a number that is kept."""
+        kind = name.partition(".")[0]
+        return RESULT_UNITS.get(kind, "")
 
     def check(self, data: dict[str, Any], name: str) -> Case:
         """Return the validated case, whose record can be evaluated."""

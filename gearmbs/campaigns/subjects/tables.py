@@ -114,6 +114,11 @@ class TablesSubject(Subject):
             )
         return specs
 
+    def unit_of_result(self, name: str) -> str:
+        """Return the unit of a number that is kept, by the parts of its name."""
+        parts = name.split(".")
+        return next((unit for part, unit in RESULT_UNITS.items() if part in parts or name.startswith(part)), "")
+
     def explain(self, error: Exception) -> Outcome:
         """Return how a case that raised has ended."""
         from gearmbs.studies import SimulationFailed
@@ -121,6 +126,15 @@ class TablesSubject(Subject):
         if isinstance(error, SimulationFailed):
             return Outcome(FAILED, str(error)[:2000], "Loosen the tolerance, or make run_up and settling longer.")
         return super().explain(error)
+
+
+RESULT_UNITS = {
+    "transmission_error": "m",
+    "normal_force": "N",
+    "force": "N",
+    "ring_sensor": "N",
+}
+"""Units of numbers that are kept, by a part of their names or what these begin with."""
 
 
 def progress_by_time(progress: Callable[[float], None], span: float) -> Callable[[float], None]:
@@ -186,6 +200,15 @@ class DrivetrainSubject(TablesSubject):
     def span_and_rate(self, thing: Any) -> tuple[float, float]:
         """Return the length of a record, s, and its sampling rate, Hz."""
         return float(thing.run.duration), float(thing.run.output_rate(thing.train))
+
+    def unit_of_result(self, name: str) -> str:
+        """Return the unit of a number that is kept: harmonics of a sensor have its own."""
+        from gearmbs.drivetrain.parts import SENSORS
+
+        for sensor, table in self.tables.get("sensors", {}).items():
+            if name.startswith(f"{sensor}."):
+                return SENSORS[table.get("kind", "speed")].unit
+        return super().unit_of_result(name)
 
     def channels(self, thing: Any) -> dict[str, str]:
         """Return the sensors and their units."""
@@ -367,6 +390,10 @@ class BearingSubject(TablesSubject):
     def span_and_rate(self, thing: BearingCase) -> tuple[float, float]:
         """Return the length of a record, s, and its sampling rate, Hz."""
         return thing.run["duration"], thing.run["rate"]
+
+    def unit_of_result(self, name: str) -> str:
+        """Return the unit of a number that is kept."""
+        return "m/s^2" if name.startswith("rms.") else ""
 
     def channels(self, thing: BearingCase) -> dict[str, str]:
         """Return the directions of the housing's acceleration."""

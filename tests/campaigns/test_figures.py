@@ -1,0 +1,141 @@
+"""Names and units of columns, what a report chooses, figures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.campaigns import Campaign, CampaignError, DrivetrainSubject, Factor, PairSubject, choose, make_plan
+from gearmbs.campaigns.figures import KINDS, varied_results
+from gearmbs.campaigns.sensitivity import coordinates
+from gearmbs.campaigns.settings import satisfied
+from tests.campaigns.support import function, ranges
+from tests.says import says
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """Return a campaign of a function of three numbers, one of which has few values, that is done."""
+    factors = [*ranges()[:2], Factor("x3", values=(-1.0, 0.5, 2.0))]
+    found = Campaign(tmp_path_factory.mktemp("figures") / "c", make_plan(function("several"), factors, n=64, unit=64))
+    found.run(workers=0)
+    return found
+
+
+COLUMNS = {
+    "orders.line_of_action.2": np.array([1.0, 2.0, 3.0]),
+    "orders.line_of_action.20": np.array([5.0, 5.0, 5.0]),
+    "force of mesh.mesh.1": np.array([3.0, 2.0, 1.0]),
+    "operation.torque": np.array([10.0, 20.0, 30.0]),
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "held"),
+    [
+        ("orders.line_of_action.2 > 1.5", [False, True, True]),
+        ("orders.line_of_action.20 > orders.line_of_action.2 + 2.5", [True, True, False]),
+        ("force of mesh.mesh.1 >= 2 and operation.torque < 15", [True, False, False]),
+        ("2 * force of mesh.mesh.1 > abs(orders.line_of_action.2)", [True, True, False]),
+    ],
+)
+def test_conditions_take_the_names_of_the_table(text, held):
+    assert satisfied(text, COLUMNS).tolist() == held
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("orders_line_of_action_2 > 1", says("orders_line_of_action_2", "did you mean orders.line_of_action.2")),
+        ("orders.line_of_action.7 > 1", says("orders.line_of_action.7", "force of mesh.mesh.1")),
+        ("operation.torq > 1", says("operation.torq", "did you mean operation.torque")),
+    ],
+)
+def test_conditions_name_the_columns_there_are(text, message):
+    with pytest.raises(CampaignError, match=message) as told:
+        satisfied(text, COLUMNS)
+    assert "_column_" not in str(told.value)
+
+
+def test_coordinates_of_choices_have_the_names_of_columns():
+    one = choose("fault.teeth", none=(), broken={"kind": "broken tooth", "lost": (0.2, 0.8), "tooth": (0, 28)})
+    several = choose(
+        "fault.teeth",
+        broken={"kind": "broken tooth", "lost": (0.2, 0.8), "tooth": (0, 28)},
+        worn={"kind": "wear", "depth": ("1 um", "2 um")},
+    )
+    for choice, names in ((one, ["lost", "tooth"]), (several, [None, "tooth"])):
+        plan = make_plan(None, [choice], n=4)
+        found = coordinates(type("Planned", (), {"plan": plan}))[0]
+        wanted = [f"fault.teeth.{name}" if name else "severity" for name in names]
+        assert found == ["fault.teeth", *wanted]
+        assert set(found) <= set(plan.columns(plan.points()))
+
+
+def test_units_of_results():
+    pair, train = PairSubject(), DrivetrainSubject({"sensors": {"lid": {"kind": "accelerometer"}, "n": {}}})
+    units = {
+        "orders.line_of_action.1": "m/s^2",
+        "error.peak_to_peak": "m",
+        "force.max": "N",
+        "two_flanks": "",
+        "fm4.x": "",
+    }
+    assert {name: pair.unit_of_result(name) for name in units} == units
+    units = {"mesh.normal_force.max": "N", "force of mesh.mesh.1": "N", "mesh.transmission_error.rms": "m",
+             "mesh.pairs_back.mean": "", "lid.mesh.2": "m/s^2", "n.mesh.1": "rad/s"}  # fmt: skip
+    assert {name: train.unit_of_result(name) for name in units} == units
+
+
+def test_a_report_chooses_what_varies_and_tells_something_new(campaign):
+    """`double` is twice `y`, `steady` varies by a hundredth."""
+    assert varied_results(campaign) == ["y", "square", "steady"]
+    assert varied_results(campaign, 1) == ["y"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.slow
+def test_figures_show_all_columns_with_units(campaign, kind):
+    picture = campaign.figure(kind)
+    texts = [text.get_text() for text in picture.findobj(lambda item: hasattr(item, "get_text"))]
+    text = "\n".join(texts).replace(",\n", ", ")
+    for name in ("x1", "x2", "x3", "y", "square", "steady"):
+        assert name in text
+    with pytest.raises(CampaignError, match=says("result 'z'")):
+        campaign.figure(kind, "z")
+    with pytest.raises(CampaignError, match=says("factor 'x9'", "x1")):
+        campaign.figure(kind, "y", "x9")
+
+
+@pytest.mark.slow
+def test_main_effects_are_means_over_the_values(campaign):
+    table = campaign.table
+    (ax,) = campaign.figure("main effects", "y", "x3").axes
+    line = next(line for line in ax.lines if len(line.get_xdata()) == 3)
+    np.testing.assert_allclose(line.get_ydata(), table.groupby("x3").y.mean())
+    # of a range each point is the mean of a sixth of the cases
+    (ax,) = campaign.figure("main effects", "y", "x1").axes
+    line = next(line for line in ax.lines if len(line.get_xdata()) == 6)
+    sixths = np.array_split(table.sort_values("x1").y.to_numpy(), 6)
+    np.testing.assert_allclose(line.get_ydata()[0], sixths[0].mean(), rtol=0.2)
+
+
+@pytest.mark.slow
+def test_a_tornado_has_the_strongest_factor_on_top(campaign):
+    (ax,) = campaign.figure("tornado", "steady").axes
+    assert [text.get_text() for text in ax.get_yticklabels()][-1] == "x1"
+
+
+def test_unknown_figures_are_refused(campaign):
+    with pytest.raises(CampaignError, match=says("figure 'pie'", "tornado")):
+        campaign.figure("pie")
+
+
+@pytest.mark.slow
+def test_the_report_has_units_and_figures(campaign, tmp_path):
+    page = campaign.report(tmp_path / "r.html").read_text()
+    assert page.count("data:image/png;base64") == 2 + 2 * 3
+    assert "<b>square</b>" in page
+    assert "<b>double</b>" not in page
+    with pytest.raises(CampaignError, match=says("report", "result 'z'")):
+        campaign.report(tmp_path / "r.html", ["z"])
