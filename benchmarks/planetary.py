@@ -1,7 +1,7 @@
 """What a planetary set costs beside a gear pair: processor seconds of both, one after the other in one process.
 
 Compared are the two front doors, `run_case` and `run_planetary`, with all they evaluate, and the integration alone of
-both mechanisms by `Mechanism.simulate`, whose settings (``rate_scale`` above all) are others than those of `run_case`.
+both mechanisms by `Mechanism.simulate`, which takes its rate scale from their meshes as `run_case` does.
 """
 
 from __future__ import annotations

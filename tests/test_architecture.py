@@ -92,7 +92,7 @@ CIRCLES = {
     ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.plant_names",
      "mechanism.solve.plants", "mechanism.solve.points", "mechanism.solve.simulate", "mechanism.solve.simulator",
-     "mechanism.solve.led"):
+     "mechanism.solve.led", "mechanism.solve.accuracy"):
         "methods of Mechanism, and the functions that carry them out",
     ("campaigns.campaign", "campaigns.figures", "campaigns.report", "campaigns.results", "campaigns.sensitivity",
      "campaigns.surrogates"):

@@ -261,6 +261,8 @@ def _solve(
     output_step = float(np.diff(times).max())
     options.setdefault("first_step", FIRST_STEP * output_step)
     options.setdefault("max_step", output_step)
+    # ERROR is that of positions and velocities alike
+    options.setdefault("rate_scale", 1.0)
     solution = model.mechanism.simulate(
         float(times[-1]),
         t_start=session.time * scale,

@@ -250,6 +250,7 @@ def build(train: Drivetrain) -> Mechanism:
     """Return the mechanism of a drivetrain; see :meth:`gearmbs.drivetrain.Drivetrain.build`."""
     layout = train.layout
     m = Mechanism(train.name, gravity=train.gravity)
+    m.rate_scale = train.rate_scale
     builder = _Builder(train, layout, m)
     for shaft in train.shafts:
         builder.shaft(shaft)

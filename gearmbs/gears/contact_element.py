@@ -60,6 +60,12 @@ class GearContact(ForceElement):
         Diagnostic("normal_force", "N"),
     )
 
+    @property
+    def periods(self) -> tuple[int, int]:
+        """Teeth of both wheels."""
+        one, two = self.pair.geometry.wheels
+        return one.teeth, two.teeth
+
     def compiled(self) -> Compiled:
         force, contact = contact_kernels()
         integers, reals, scratch = pack(self.pair)

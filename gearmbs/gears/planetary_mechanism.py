@@ -130,6 +130,9 @@ def planetary_mechanism(
     turning = gears.speeds(**known) if over == 0 and len(known) == 2 else dict.fromkeys((*MEMBERS, "planet"), 0.0)
     m = Mechanism(gears.name, gravity=gravity)
     m.lump = True
+    if len(known) == 2:
+        frequencies = gears.frequencies(**known)
+        m.rate_scale = 2.0 * np.pi * max(frequencies["mesh"], frequencies["mesh_ring"]) or None
     start = gears.start_angles()
     masses = _masses(gears, masses or {})
     turns = {"sun": 0.0, "carrier": 0.0, "ring": start["ring"]}

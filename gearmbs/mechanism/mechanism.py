@@ -65,6 +65,9 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         `gearmbs.mechanism.checks`. Only their reactions depend on it.
     lump : bool
         Whether `simulate` integrates bodies fixed to each other as one unless told otherwise; default False.
+    rate_scale : float or None
+        Angular frequency of interest, rad/s, where `simulate` is given none; default None: that of the fastest mesh, as
+        far as motions and initial speeds tell it.
     turns : dict of (str, str, str) to float
         About which angle, in rad, AX, AY and AZ start to count, by function and names of the markers:
         ``m.turns["AZ", "shaft.I", "shaft.J"] = 4 * np.pi`` winds a torsion spring twice. Default: 0.
@@ -103,6 +106,7 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         self.reads_units = True
         self.redundancy = "declared"
         self.lump = False
+        self.rate_scale: float | None = None
         self.turns: dict[tuple[str, str, str], float] = {}
         self.given: dict[str, dict[str, Any]] = {}
 

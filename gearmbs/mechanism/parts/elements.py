@@ -119,6 +119,11 @@ class ForceElement(OwnAttributes):
         return (self.i, self.j)
 
     @property
+    def periods(self) -> tuple[int, int]:
+        """How often it repeats itself in a turn of I's and of J's body, as teeth in mesh do; 0: not."""
+        return (0, 0)
+
+    @property
     def wrenches(self) -> int:
         """How many wrenches it has: one a marker if there are more than two markers, else one."""
         return len(self.markers) if len(self.markers) > 2 else 1

@@ -26,6 +26,7 @@ from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.simulate import ADVICE, checked, just_inside, prepared, start_time, with_brief_changes
 from gearmbs.wording import any_of, did_you_mean
 
@@ -139,8 +140,8 @@ class Simulator(OwnAttributes):
         t_start: float = 0.0,
         integrator: str = DEFAULT,
         formulation: str = "SI2",
-        tol: float = 1e-6,
-        rate_scale: float = 1.0,
+        tol: float | None = None,
+        rate_scale: float | None = None,
         lump: bool | None = None,
         initial: State | None = None,
         records: bool = True,
@@ -151,6 +152,7 @@ class Simulator(OwnAttributes):
         self.t_end = quantity(t_end, "time", "t_end")
         if not (np.isfinite(self.t_end) and self.t_end > t_start):
             raise ModelError(f"t_end = {self.t_end} s; it must be later than the start {t_start} s")
+        tol, rate_scale = chosen_accuracy(mechanism, (t_start, self.t_end), tol, rate_scale)
         name = checked(integrator, tol, options)
         if not INTEGRATORS[name].compiled:
             raise ModelError(f"integrator: {name} cannot be held between calls; take {any_of(those_that('history'))}")
