@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
@@ -151,6 +152,17 @@ def test_the_command_reads_what_virtual_encoders_write(tmp_path):
     out = CliRunner().invoke(app, [*words, "--columns", "a,b"])
     assert out.exit_code != 0
     assert "--columns" in out.output
+
+
+def test_angles_of_records_with_speeds_are_their_integrals():
+    times = np.arange(4000) / 8000.0
+    speed = np.column_stack([100.0 + 5.0 * np.cos(700.0 * times), -np.full(times.size, 25.0)])
+    record = xr.Dataset({"speed": (("time", "member"), speed)}, coords={"time": times, "member": ["sun", "carrier"]})
+    sun, carrier = shaft_angles(record, "sun", "carrier")
+    assert np.allclose(sun, 100.0 * times + np.sin(700.0 * times) / 140.0, atol=1e-8)
+    assert np.allclose(carrier, 25.0 * times, atol=1e-10)
+    with pytest.raises(SignalError, match=says("shafts", "ring", "sun")):
+        shaft_angles(record, "ring")
 
 
 def test_what_is_no_train_is_refused():

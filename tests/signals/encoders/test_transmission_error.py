@@ -44,8 +44,8 @@ def test_marks_known_from_free_runs_leave_the_mesh_harmonics_within_two_percent(
     lines = np.fft.rfft(error.error)
     lines[0] = lines[18:] = 0.0
     off = found.mesh_cycle(points=400)[1] - np.fft.irfft(lines, 400)
-    assert np.sqrt(np.mean(off**2)) < 0.06e-6
-    assert np.abs(off).max() < 0.17e-6
+    assert np.sqrt(np.mean(off**2)) < 0.04e-6
+    assert np.abs(off).max() < 0.1e-6
     pair = found.single_flank().set_index("of").loc["pair"]
     assert pair["f_l"] < pair["within"]
     assert abs(pair["F_i"] - error.peak_to_peak) < pair["within"] + 0.5e-6
