@@ -51,6 +51,8 @@ UNITS, MOST_CASES, MOST_BYTES = 128, 1024, 64e6
 """Units that cases are divided into where the plan does not say, so that as many workers are busy; but no unit has more
 cases than the second, which a kill would cost, nor more bytes of signals than the third."""
 
+FOLDERS = ("units", "table", "cases", "codes")
+
 REMEDY = "gearmbs campaign run puts it right"
 
 LITTER_AFTER = 60.0
@@ -392,7 +394,7 @@ def _taken_up(path: Path, plan: Plan) -> Folder:
 def _fill(path: Path, plan: Plan) -> None:
     """Write the files of a new campaign."""
     specs = plan.check()
-    for name in ("units", "table", "cases", "codes"):
+    for name in FOLDERS:
         (path / name).mkdir(parents=True, exist_ok=True)
     unit = plan.unit or _unit_size(plan, specs)
     extent, digests = _write_cases(path, plan, unit, plan.n, [])
@@ -520,6 +522,11 @@ def check_folder(folder: Folder, units: Iterable[int] | None = None, *, sweep: b
 def _check_plan(folder: Folder, sweep: bool) -> list[str]:
     """Return what is wrong with plan, cases and the descriptions of arrays."""
     found, path, unit = [], folder.path, folder.unit_size
+    gone = [name for name in FOLDERS if not (path / name).is_dir()]
+    if gone:
+        found.append(f"{', '.join(gone)}: missing")
+        for name in gone if sweep else ():
+            (path / name).mkdir()
     contents = [_look(place) for place in (path / "plan.json", path / "cases" / "plan.json")]
     if any(wrong for _, wrong in contents) or contents[0][0] != contents[1][0]:
         found.append("plan.json or its copy: missing, damaged or not the same")

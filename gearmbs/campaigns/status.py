@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -134,7 +135,8 @@ def read_status(folder: Folder) -> CampaignStatus:
         If a ledger is damaged.
     """
     rows, done, claims = [], set(), []
-    with os.scandir(folder.path / "units") as files:
+    units = folder.path / "units"
+    with os.scandir(units) if units.is_dir() else nullcontext(()) as files:
         for file in files:
             stem, _, kind = file.name.partition(".")
             if not stem.isdigit() or int(stem) >= folder.unit_count:

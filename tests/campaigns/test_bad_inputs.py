@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -293,6 +294,19 @@ def test_a_plan_is_what_it_was_made_as(tmp_path):
     with pytest.warns(CampaignWarning, match="cases/000-00000.parquet"):
         Campaign(campaign.path).run(workers=0)
     assert cases.read_bytes() == drawn
+
+
+@pytest.mark.parametrize("name", ["units", "table", "cases", "codes"])
+def test_folders_that_are_gone_are_made_again(tmp_path, name):
+    campaign = small(tmp_path / "c", n=16)
+    campaign.run(workers=0)
+    before = campaign.table
+    shutil.rmtree(campaign.path / name)
+    assert campaign.status().done == (0 if name == "units" else 16)
+    with pytest.warns(CampaignWarning, match=says(name, "missing")):
+        campaign.run(workers=0)
+    assert campaign.table.equals(before)
+    assert campaign.check() == []
 
 
 @pytest.mark.parametrize("place", ["s3://bucket/c", Path("gs://bucket/c"), "https://host/c"])
