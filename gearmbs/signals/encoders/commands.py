@@ -37,6 +37,7 @@ def transmission_error(
         str | None, typer.Option(help='Columns of driver and driven, "A,B"; default: the first two encoders.')
     ] = None,
     clock: Annotated[str | None, typer.Option(help='Clock of columns that count ticks, "20 MHz".')] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of times in columns that name none: s, ms, us or ns.")] = None,
     rate: Annotated[str | None, typer.Option(help="Sampling rate of sampled voltages, if the file is silent.")] = None,
     free_driver: Annotated[list[Path] | None, typer.Option(help="Pulses of the driver running free; repeat.")] = None,
     free_driven: Annotated[list[Path] | None, typer.Option(help="Pulses of the driven shaft alone; repeat.")] = None,
@@ -56,7 +57,7 @@ def transmission_error(
         texts = [_run(text) for text in runs]
         for path in [*(path for _, path, _ in texts), *(free_driver or ()), *(free_driven or ())]:
             check_kind(path, "record")
-        known = {"lines": lines, "columns": columns, "clock": clock, "rate": rate}
+        known = {"lines": lines, "columns": columns, "clock": clock, "unit": unit, "rate": rate}
         coupled = []
         for k, (load, path, shift) in enumerate(texts):
             coupled.append(CoupledRun(*_both(path, **known), load=load, shift=shift))
@@ -112,7 +113,7 @@ def _split(text: str | None, option: str) -> list[str] | None:
     return parts
 
 
-def _read(path: Path, lines: Any, columns: Any, clock: str | None, rate: str | None) -> dict[str, PulseTrain]:
+def _read(path: Path, lines: Any, columns: Any, **known: Any) -> dict[str, PulseTrain]:
     from gearmbs.signals.encoders.files import read_pulses
 
     counts, names = _split(lines, "--lines"), _split(columns, "--columns")
@@ -121,12 +122,12 @@ def _read(path: Path, lines: Any, columns: Any, clock: str | None, rate: str | N
     except ValueError:
         raise ValueError(f"--lines is {lines!r}; give whole numbers, for instance 1024,1024") from None
     if whole is not None and names is not None:
-        return read_pulses(path, dict(zip(names, whole)), clock=clock, rate=rate)
+        return read_pulses(path, dict(zip(names, whole)), **known)
     if whole is not None:
         if whole[0] != whole[1]:
             raise ValueError(f"--lines {lines}: name the columns that have them with --columns driver,driven")
-        return read_pulses(path, whole[0], clock=clock, rate=rate)
-    found = read_pulses(path, clock=clock, rate=rate)
+        return read_pulses(path, whole[0], **known)
+    found = read_pulses(path, **known)
     return found if names is None else {name: found[name] for name in names if name in found}
 
 

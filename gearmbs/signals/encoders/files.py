@@ -66,6 +66,7 @@ def read_pulses(
     lines: int | Mapping[str, int] | None = None,
     *,
     clock: Quantity | None = None,
+    unit: str | None = None,
     rate: Any = None,
     progress: Any = None,
     **known: Any,
@@ -81,6 +82,8 @@ def read_pulses(
         mapping only its columns are read.
     clock : float or str, optional
         Frequency of the clock, Hz or "20 MHz", of columns that count its ticks.
+    unit : {"s", "ms", "us", "ns"}, optional
+        Of times in columns that name none.
     rate : float, optional
         Sampling rate of sampled voltages, Hz, where the file does not say it.
     **known
@@ -93,7 +96,8 @@ def read_pulses(
     Raises
     ------
     MissingMetadataError
-        If the lines of a column are not known, or the clock of counts.
+        If the lines of a column are not known, the clock of counts, or what a column without a unit that rises
+        throughout holds.
     SignalFileError
         If a column is not there.
     """
@@ -118,7 +122,11 @@ def read_pulses(
                 "lines", f"the pulses in {path.name}", f"pass lines={{{name!r}: ...}}, the marks of a turn"
             )
         more = {"name": name, "tooth_at_zero": about.get("tooth_at_zero"), **known}
-        factor = _factor(units[name], clock, path)
+        factor = _factor(units[name], clock, unit, path)
+        if factor is None and np.all(np.diff(_present(table[name])) > 0.0):
+            raise MissingMetadataError(
+                "unit", f"{name!r} in {path.name} (it rises throughout)", "pass unit='s' of times, or clock='20 MHz'"
+            )
         once = name + INDEX if name + INDEX in table else None
         if factor is None:
             signal = read_signal(path, rate=rate, channels=[name, once] if once else [name])
@@ -133,9 +141,13 @@ def _present(column: np.ndarray) -> np.ndarray:
     return column[np.isfinite(column)]
 
 
-def _factor(unit: str, clock: Quantity | None, path: Path) -> float | None:
+def _factor(unit: str, clock: Quantity | None, given: str | None, path: Path) -> float | None:
     """Return the seconds of a unit of a column, or None of a sampled voltage."""
     key = unit.strip().lower()
+    if given is not None and key in ("", "unknown"):
+        if given not in SECONDS:
+            raise SignalError(f"unit: must be one of s, ms, us and ns, got {given!r}")
+        key = given
     if key in SECONDS and key:
         return SECONDS[key]
     if key in COUNTS or (clock is not None and key in ("", "unknown")):

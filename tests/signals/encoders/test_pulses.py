@@ -117,6 +117,12 @@ def test_counts_and_voltages_are_read_as_pulses(tmp_path):
     assert np.allclose(found.times, train.times, atol=5e-8)
     with pytest.raises(MissingMetadataError, match=says("clock", "MHz")):
         read_pulses(tmp_path / "counts.csv", 32)
+    pd.DataFrame({"A": train.times * 1e3}).to_csv(tmp_path / "bare.csv", index=False)
+    with pytest.raises(MissingMetadataError, match=says("unit", "A", "clock")):
+        read_pulses(tmp_path / "bare.csv", 32)
+    assert np.allclose(read_pulses(tmp_path / "bare.csv", 32, unit="ms")["A"].times, train.times)
+    with pytest.raises(SignalError, match=says("unit", "min")):
+        read_pulses(tmp_path / "bare.csv", 32, unit="min")
     with pytest.raises(MissingMetadataError, match=says("lines", "A")):
         read_pulses(tmp_path / "counts.csv", clock="20 MHz")
     with pytest.raises(SignalFileError, match=says("no column", "B")):
