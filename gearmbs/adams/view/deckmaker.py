@@ -14,7 +14,7 @@ from gearmbs.adams.parse.grammar import RawStatement
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import DEGREE, PARTS, Item
-from gearmbs.adams.view.values import Values
+from gearmbs.adams.view.values import Values, is_ground
 from gearmbs.adams.view.vocabulary import ROWS
 from gearmbs.adams.write.text import listed, number, wrapped
 from gearmbs.solids.bodies import Body
@@ -146,7 +146,9 @@ class Deckmaker:
     def _number(self) -> None:
         """Give every object its own id, those that have one first."""
         waiting = []
-        for item in self.items:
+        # the ground is PART/1 in View's own decks
+        grounds = [item for item in self.items if is_ground(item)]
+        for item in [*grounds, *(one for one in self.items if not is_ground(one))]:
             keyword = KEYWORDS.get(item.kind)
             if keyword is None:
                 continue
@@ -162,7 +164,9 @@ class Deckmaker:
             else:
                 waiting.append((item, space))
         for item, space in waiting:
-            self.ids[id(item)] = self.fresh(space)
+            first = item in grounds and 1 not in self.taken[space]
+            self.ids[id(item)] = 1 if first else self.fresh(space)
+            self.taken[space].add(self.ids[id(item)])
 
     def fresh(self, space: str) -> int:
         """Return an id that no statement of a kind has."""

@@ -227,7 +227,8 @@ class Editor:
             if stored.live:
                 fields["location"] = Stored(stored.values, stored.line, frame, before=_fixed_before(item, "location"))
             else:
-                point = np.array(self._triple(stored, f"the location of {item.path}"))
+                given = self._triple(stored, f"the location of {item.path}")
+                point = frames.COORDINATES[self.database.coordinates](given, self.database.units.radian)
                 here = values.brought(point, frame, home)
                 fields["location"] = fixed(*(float(x) for x in here), line=stored.line)
         for key in ORIENTATIONS:
@@ -333,10 +334,11 @@ class Editor:
                     numbers = any(item.kind not in ("model", "variable", "part") for item in db)
                     if db.units.names[quantity] != before and numbers:
                         raise ViewError(f"the unit of {quantity} is changed after numbers were given in it", line)
-            if words.get("coordinate_system_type", "cartesian")[:4].lower() != "cart":
-                raise ViewError(
-                    f"coordinate_system_type = {words['coordinate_system_type'][:30]}; give cartesian", line
-                )
+            if "coordinate_system_type" in words:
+                given_type = words["coordinate_system_type"][:30].lower()
+                if given_type[:3] not in frames.COORDINATES:
+                    raise ViewError(f"coordinate_system_type = {given_type}; cartesian, cylindrical, spherical", line)
+                db.coordinates = given_type[:3]
             if "orientation_type" in words:
                 frames.rotation([0.0, 0.0, 0.0], words["orientation_type"], line)
                 db.sequence = words["orientation_type"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 
 import numpy as np
 
@@ -124,3 +125,20 @@ def in_plane(first: str, second: str, direction: np.ndarray, towards: np.ndarray
     k = 3 - i - j
     a[:, k] = np.cross(e, f) if (j - i) % 3 == 1 else np.cross(f, e)
     return a
+
+
+def _cylindrical(c: list[float], radian: float) -> np.ndarray:
+    return np.array([c[0] * math.cos(c[1] * radian), c[0] * math.sin(c[1] * radian), c[2]])
+
+
+def _spherical(c: list[float], radian: float) -> np.ndarray:
+    theta, phi = c[1] * radian, c[2] * radian
+    return c[0] * np.array([math.cos(theta) * math.sin(phi), math.sin(theta) * math.sin(phi), math.cos(phi)])
+
+
+COORDINATES: dict[str, Callable[[list[float], float], np.ndarray]] = {
+    "car": lambda c, radian: np.array(c),
+    "cyl": _cylindrical,
+    "sph": _spherical,
+}
+"""Three coordinates and the radians in their unit of angle, to x, y and z."""

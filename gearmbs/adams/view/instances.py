@@ -37,7 +37,7 @@ def _coefficient(m: Deckmaker, item: Item, what: str) -> float:
 
 
 def _spring(turning: bool) -> Callable[[Deckmaker, Item], None]:
-    """Return what makes a SPRINGDAMPER of a translational or a torsion spring."""
+    """Return what makes the SFORCE of a translational or a torsion spring, as View's own decks have it."""
 
     def make(m: Deckmaker, item: Item) -> None:
         i, j = _pair(m, item)
@@ -48,17 +48,17 @@ def _spring(turning: bool) -> Callable[[Deckmaker, Item], None]:
             call = m.values.evaluate(("call", "AZ" if turning else "DM", (("value", i), ("value", j))))
             free = float(call)
         preload = float(_variable(m, item, "preload", 0.0))
-        names, per = (("KT", "CT", "ANGLE", "TORQUE"), m.radian) if turning else (("K", "C", "LENGTH", "FORCE"), 1.0)
+        per = m.radian if turning else 1.0
+        ends = f"{m.id(i)}, {m.id(j)}"
+        place, speed = (f"AZ({ends})", f"WZ({ends}, {m.id(j)})") if turning else (f"DM({ends})", f"VR({ends})")
         m.add(
             item,
-            f"SPRINGDAMPER/{m.fresh('SPRINGDAMPER')}",
+            f"SFORCE/{m.fresh('SFORCE')}",
+            "ROTATIONAL" if turning else "TRANSLATIONAL",
             f"I = {m.id(i)}",
             f"J = {m.id(j)}",
-            "ROTATIONAL" if turning else "TRANSLATIONAL",
-            f"{names[0]} = {number(stiffness / per)}",
-            f"{names[1]} = {number(damping / per)}",
-            f"{names[2]} = {number(free * per)}",
-            f"{names[3]} = {number(preload)}",
+            f"FUNCTION = -{number(stiffness / per)} * ({place} - ({number(free * per)})) "
+            f"- {number(damping / per)} * {speed} + ({number(preload)})",
         )
 
     return make

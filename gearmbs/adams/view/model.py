@@ -128,6 +128,8 @@ class Database:
         The coordinate system in which places are given; None is the global one.
     sequence : str
         How orientations are written, such as body313.
+    coordinates : str
+        How places are written, a key of `gearmbs.adams.view.frames.COORDINATES`.
     axis : str
         Which axis an orientation along a line turns, and which plane.
     version : int
@@ -145,6 +147,7 @@ class Database:
         self.part: Item | None = None
         self.frame: Item | None = None
         self.sequence = "body313"
+        self.coordinates = "car"
         self.axis = "z_axis_xz_plane"
         self.version = 0
 

@@ -45,6 +45,10 @@ class Moments:
         second = a @ self.second @ a.T + cross + cross.T + self.volume * np.outer(r, r)
         return Moments(self.volume, first + self.volume * r, second)
 
+    def times(self, factor: float) -> Moments:
+        """Return those of the solid counted so many times."""
+        return Moments(factor * self.volume, factor * self.first, factor * self.second)
+
     def __add__(self, other: Moments) -> Moments:
         return Moments(self.volume + other.volume, self.first + other.first, self.second + other.second)
 
@@ -73,27 +77,20 @@ def ellipsoid(x: float, y: float, z: float) -> Moments:
     return Moments(volume, np.zeros(3), volume * np.diag([x**2, y**2, z**2]) / 5.0)
 
 
-def sector(angle: float) -> tuple[float, float, float, float, float, float]:
-    """Return area, first and second moments of a sector of the unit circle that begins at x."""
-    s, c = math.sin(angle), math.cos(angle)
-    if abs(angle - 2.0 * math.pi) < 1e-12:
-        s, c = 0.0, 1.0
-    return (
-        angle / 2.0,
-        s / 3.0,
-        (1.0 - c) / 3.0,
-        (angle / 2.0 + s * c / 2.0) / 4.0,
-        (angle / 2.0 - s * c / 2.0) / 4.0,
-        s * s / 8.0,
-    )
+def chords(angle: float, sides: int) -> np.ndarray:
+    """Return the corners of a sector of the unit circle from x, with so many chords, or of the whole circle."""
+    whole = abs(angle - 2.0 * math.pi) < 1e-12
+    at = angle * np.arange(sides if whole else sides + 1) / sides
+    arc = np.column_stack([np.cos(at), np.sin(at)])
+    return arc if whole else np.vstack([np.zeros(2), arc])
 
 
-def frustum(length: float, bottom: float, top: float, angle: float) -> Moments:
-    """Return the moments of a frustum, or of a sector of one, along z from the origin.
+def frustum(length: float, bottom: float, top: float, angle: float, sides: int = 0) -> Moments:
+    """Return the moments of a frustum, or of a sector of one, along z from the origin; with so many flat sides, if any.
 
     Radii go linearly with z, so that the integrands are polynomials of fourth order: three points of Gauss are exact.
     """
-    area, sx, sy, sxx, syy, sxy = sector(angle)
+    area, sx, sy, sxx, syy, sxy = polygon(chords(angle, sides)) if sides else sector(angle)
     total = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
     for point, weight in zip(*np.polynomial.legendre.leggauss(3)):
         share = (point + 1.0) / 2.0
@@ -215,14 +212,29 @@ def _radius(m: Deckmaker, item: Item) -> float:
     return math.hypot(seen[0], seen[1])
 
 
+SIDES = 20
+"""Chords of a circle at the ends of links: View computes masses from these, as decks that it exported show."""
+FLAT_SIDES = 4
+"""Up to so many sides View takes a cylinder or a frustum for a prism, with more it is round: by its masses in exported
+decks (3 and 4 sides) and its centres of mass (16 and more)."""
+
+
+def _sides(m: Deckmaker, item: Item) -> int:
+    """Return the number of flat sides of a solid, 0 of a round one."""
+    given = m.values.number(item, "side_count_for_body")
+    return int(given) if given is not None and 3 <= given <= FLAT_SIDES else 0
+
+
 def _cylinder(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
     r = _radius(m, item)
-    return _marker(m, item, "center_marker"), frustum(_need(m, item, "length"), r, r, _angle(m, item))
+    length = _need(m, item, "length")
+    return _marker(m, item, "center_marker"), frustum(length, r, r, _angle(m, item), _sides(m, item))
 
 
 def _frustum(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
-    radii = _need(m, item, "bottom_radius"), _need(m, item, "top_radius")
-    return _marker(m, item, "center_marker"), frustum(_need(m, item, "length"), *radii, _angle(m, item))
+    bottom, top = _need(m, item, "bottom_radius"), _need(m, item, "top_radius")
+    length = _need(m, item, "length")
+    return _marker(m, item, "center_marker"), frustum(length, bottom, top, _angle(m, item), _sides(m, item))
 
 
 def _ellipsoid(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
@@ -241,51 +253,8 @@ def _torus(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
     return _marker(m, item, "center_marker"), torus(*radii, _angle(m, item))
 
 
-def rounded(points: np.ndarray, radius: float, low: float, high: float) -> Moments:
-    """Return the moments of a plate: a polygon, or a line, widened by a radius all around."""
-    total = _prism(*polygon(points), low, high) if len(points) > 2 else Moments(0.0, np.zeros(3), np.zeros((3, 3)))
-    if radius == 0.0:
-        return total
-    if len(points) > 2 and sum(area for area, _ in _triangles(points)) < 0.0:
-        points = points[::-1]
-    count, thin = len(points), 1e-12 * float(np.ptp(points))
-    for k in range(count):
-        p, edge, last = points[k], points[(k + 1) % count] - points[k], points[k] - points[k - 1]
-        length, before = float(np.hypot(*edge)), float(np.hypot(*last))
-        if not min(length, before) > thin:
-            raise ViewError("two corners of a plate or link are one")
-        x, w = edge / length, last / before
-        a = np.eye(3)
-        a[:2, 0], a[:2, 1] = x, (-x[1], x[0])
-        # a strip along the edge, then the sector that closes the gap at its first corner
-        total += _prism(*_plane(box(length, -radius, 1.0)), low, high).moved(a, np.array([*p, 0.0]))
-        turn = math.pi if count == 2 else math.atan2(w[0] * x[1] - w[1] * x[0], float(w @ x))
-        if turn >= 0.0:
-            b = np.eye(3)
-            b[:2, 0], b[:2, 1] = (w[1], -w[0]), w
-            area, sx, sy, sxx, syy, sxy = sector(turn)
-            r = radius
-            cap = _prism(area * r**2, sx * r**3, sy * r**3, sxx * r**4, syy * r**4, sxy * r**4, low, high)
-            total += cap.moved(b, np.array([*p, 0.0]))
-        else:
-            # at a corner that goes inwards two strips have a kite in common
-            n, o = radius * np.array([w[1], -w[0]]), radius * np.array([x[1], -x[0]])
-            kite = np.array([p, p + n, p + (n + o) / (1.0 + math.cos(turn)), p + o])
-            twice = _prism(*polygon(kite), low, high)
-            total += Moments(-twice.volume, -twice.first, -twice.second)
-    return total
-
-
-def _plane(solid: Moments) -> tuple[float, float, float, float, float, float]:
-    """Return the integrals of the plane figure of a prism of height 1."""
-    s, t = solid.first, solid.second
-    return solid.volume, s[0], s[1], t[0, 0], t[1, 1], t[0, 1]
-
-
 Outline = tuple[Item, np.ndarray, float, float]
 """A marker, points in its xy plane, and where along its z axis the solid begins and ends."""
-ARC = 16
-"""Chords for half a circle where a rounded solid touches: they are at most 0.5 % of the radius inside."""
 
 
 def _spine(m: Deckmaker, item: Item) -> tuple[Outline, float]:
@@ -312,31 +281,85 @@ def _corners(m: Deckmaker, item: Item) -> tuple[Outline, float]:
     return (markers[0], corners[:, :2], -width / 2.0, width / 2.0), m.values.number(item, "radius", 0.0) or 0.0
 
 
-def _link(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
-    (marker, points, low, high), radius = _spine(m, item)
-    return marker, rounded(points, radius, low, high)
+Turn = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]
 
 
-def _plate(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
-    (marker, points, low, high), radius = _corners(m, item)
-    return marker, rounded(points, radius, low, high)
+def _turns(points: np.ndarray) -> Iterator[Turn]:
+    """Yield the corners of a polygon that goes round to the left: corner, edge after it, the directions of the edges
+    before and after it, and the angle between these, negative where the corner goes inwards.
+
+    Raises
+    ------
+    ViewError
+        If two corners are one.
+    """
+    thin = 1e-12 * float(np.ptp(points))
+    for k in range(len(points)):
+        edge, last = points[(k + 1) % len(points)] - points[k], points[k] - points[k - 1]
+        length, before = float(np.hypot(*edge)), float(np.hypot(*last))
+        if not min(length, before) > thin:
+            raise ViewError("two corners of a plate or link are one")
+        w, x = last / before, edge / length
+        turn = math.pi if len(points) == 2 else math.atan2(w[0] * x[1] - w[1] * x[0], float(w @ x))
+        yield points[k], edge, w, x, turn
+
+
+def _leftwards(points: np.ndarray) -> np.ndarray:
+    return points[::-1] if sum(area for area, _ in _triangles(points)) < 0.0 else points
 
 
 def _widened(points: np.ndarray, radius: float) -> np.ndarray:
-    """Return the outline of a convex polygon, or a line, widened by a radius: chords for its arcs."""
+    """Return the outline of a polygon, or a line, widened by a radius: arcs as chords, fillets at inner corners."""
     if radius == 0.0:
         return points
-    if len(points) > 2 and sum(area for area, _ in _triangles(points)) < 0.0:
-        points = points[::-1]
     found = []
-    for before, p, after in zip(np.roll(points, 1, axis=0), points, np.roll(points, -1, axis=0)):
-        start = math.atan2(-(p - before)[0], (p - before)[1])
-        end = math.atan2(-(after - p)[0], (after - p)[1])
-        turn = (end - start) % (2.0 * math.pi)
-        count = max(1, math.ceil(ARC * turn / math.pi))
-        angles = start + turn * np.arange(count + 1) / count
-        found.append(p + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+    for p, _, w, x, turn in _turns(_leftwards(points)):
+        n, o = np.array([w[1], -w[0]]), np.array([x[1], -x[0]])
+        centre = p if turn >= 0.0 else p + 2.0 * radius * (n + o) / (1.0 + math.cos(turn))
+        start = math.atan2(*(n if turn >= 0.0 else -n)[::-1])
+        count = max(1, round(SIDES * abs(turn) / (2.0 * math.pi)))
+        at = start + turn * np.arange(count + 1) / count
+        found.append(centre + radius * np.column_stack([np.cos(at), np.sin(at)]))
     return np.concatenate(found)
+
+
+def rounded(points: np.ndarray, radius: float, low: float, high: float) -> Moments:
+    """Return the moments of a plate: a polygon widened by a radius, with arcs at corners and fillets at inner ones."""
+    total = _prism(*polygon(points), low, high)
+    if radius == 0.0:
+        return total
+
+    def cap(angle: float, start: np.ndarray, centre: np.ndarray, sign: float) -> Moments:
+        a = np.eye(3)
+        a[:2, 0], a[:2, 1] = start, (-start[1], start[0])
+        area, sx, sy, sxx, syy, sxy = sector(angle)
+        r = radius
+        solid = _prism(area * r**2, sx * r**3, sy * r**3, sxx * r**4, syy * r**4, sxy * r**4, low, high)
+        return solid.moved(a, np.array([*centre, 0.0])).times(sign)
+
+    for p, edge, w, x, turn in _turns(_leftwards(points)):
+        n, o = np.array([w[1], -w[0]]), np.array([x[1], -x[0]])
+        strip = np.array([p, p + radius * o, p + edge + radius * o, p + edge])
+        total += _prism(*polygon(strip), low, high)
+        if turn >= 0.0:
+            total += cap(turn, n, p, 1.0)
+            continue
+        # two strips have a kite in common; the fillet fills the kite beyond it but for a sector
+        out = radius * (n + o) / (1.0 + math.cos(turn))
+        total += _prism(*polygon(np.array([p, p + radius * n, p + out, p + radius * o])), low, high).times(-1.0)
+        centre = p + 2.0 * out
+        beyond = np.array([p + out, centre - radius * n, centre, centre - radius * o])
+        total += _prism(*polygon(beyond), low, high) + cap(-turn, -o, centre, -1.0)
+    return total
+
+
+def sector(angle: float) -> tuple[float, float, float, float, float, float]:
+    """Return area, first and second moments of a sector of the unit circle that begins at x."""
+    s, c = math.sin(angle), math.cos(angle)
+    if abs(angle - 2.0 * math.pi) < 1e-12:
+        s, c = 0.0, 1.0
+    half, squares = angle / 2.0, s * c / 2.0
+    return half, s / 3.0, (1.0 - c) / 3.0, (half + squares) / 4.0, (half - squares) / 4.0, s * s / 8.0
 
 
 def link_outline(m: Deckmaker, item: Item) -> Outline:
@@ -375,20 +398,31 @@ def extrusion_outline(m: Deckmaker, item: Item) -> Outline:
     return _marker(m, item, "reference_marker"), points[:, :2], min(z, z + length), max(z, z + length)
 
 
-def _extrusion(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
-    marker, points, low, high = extrusion_outline(m, item)
-    return marker, _prism(*polygon(points), low, high)
-
-
 def _revolution(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
     points = _profile(m, item)
     rho = np.hypot(points[:, 0], points[:, 1])
     return _marker(m, item, "reference_marker"), revolution(np.column_stack([rho, points[:, 2]]), _angle(m, item))
 
 
+def _drawn_out(outline: Callable[[Deckmaker, Item], Outline]) -> Shape:
+    """Return the shape of an outline that is drawn out along z."""
+
+    def shape(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+        marker, points, low, high = outline(m, item)
+        return marker, _prism(*polygon(points), low, high)
+
+    return shape
+
+
+def _plate(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    (marker, points, low, high), radius = _corners(m, item)
+    return marker, rounded(points, radius, low, high)
+
+
 SHAPES: dict[str, Shape] = {
     "block": _block, "cylinder": _cylinder, "frustum": _frustum, "ellipsoid": _ellipsoid, "sphere": _sphere,
-    "torus": _torus, "link": _link, "plate": _plate, "extrusion": _extrusion, "revolution": _revolution,
+    "torus": _torus, "link": _drawn_out(link_outline), "plate": _plate,
+    "extrusion": _drawn_out(extrusion_outline), "revolution": _revolution,
 }  # fmt: skip
 """Shapes whose moments are known exactly."""
 UNKNOWN = frozenset("csg solid feature".split())
@@ -481,6 +515,8 @@ def moments_of(m: Deckmaker, item: Item, marker: Item | None) -> Moments | None:
     a, r = m.values.pose(item)
     shells = False
     for one in item.children.values():
+        if not one.active:
+            continue
         if one.kind in UNKNOWN:
             raise ViewError(f"{one.path} is a {one.kind}, whose mass is not computed; {REMEDY}", item.line)
         shells |= one.kind == "shell"
