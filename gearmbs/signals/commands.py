@@ -113,7 +113,8 @@ def parse_speed(text: str | None) -> Any:
         return to_si(text, "angular speed", "--speed")
     from gearmbs.signals import SignalError, read_signal
     from gearmbs.signals.rotation.shaft import speed_of_channel
-    from gearmbs.signals.signal.record import SHAFT_FREQUENCIES, SPEED_NAMES, key_of, name_and_unit
+    from gearmbs.signals.signal.labels import key_of, name_and_unit
+    from gearmbs.signals.signal.record import SHAFT_FREQUENCIES, SPEED_NAMES
 
     signal = read_signal(text)
     names = [str(c) for c in signal["channel"].values]
@@ -248,6 +249,7 @@ def analyse(
         check_kind(file, "record")
         check_targets(out, tables=tables, figures=figures)
         from gearmbs.signals.files.simulated import read_any
+        from gearmbs.signals.signal.labels import measured
 
         helpers = [name for name in (tacho, speed_channel) if name and name not in (channel or ())]
         signal = read_any(
@@ -266,6 +268,9 @@ def analyse(
             "speed_channel": speed_channel,
             "pulses_per_rev": pulses,
         }
+        told = any(shaft[name] is not None for name in ("speed", "tacho", "speed_channel"))
+        signal, own_speed = measured(signal, channel or (), helpers, told)
+        shaft["speed_channel"] = speed_channel if own_speed is None else own_speed
         if planetary is not None or (teeth is None and "planetary" in signal.attrs):
             done = _of_set(signal, shaft, planetary, planets, member)
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, overload
 
@@ -33,6 +33,7 @@ from gearmbs.signals.rotation.angular import angular_resample, samples_per_revol
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, mesh_shaft
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
+from gearmbs.signals.signal.labels import measured
 from gearmbs.signals.signal.signal import check_teeth, common_unit, make_signal, rate_of, units_of, with_metadata
 from gearmbs.signals.spectra import spectrum
 
@@ -180,6 +181,10 @@ def analyse(
     )
     if said:
         data = with_metadata(data, notes=[*own.get("notes", ()), *said])
+    known = any(value is not None for value in (options.speed, options.phase, options.tacho, options.speed_channel))
+    data, own_speed = measured(data, channels or (), helpers, known)
+    if own_speed is not None:
+        options = replace(options, speed_channel=own_speed)
     counts = options.teeth if options.teeth is not None else data.attrs.get("teeth")
     if options.planetary is not None or (counts is None and "planetary" in data.attrs):
         return _planetary(data, options)

@@ -30,6 +30,7 @@ from gearmbs.signals.files.text_tables import (
     COMMENT,
     GAP_CELLS,
     HEAD_LINES,
+    INDEX_NAMES,
     CsvLayout,
     Times,
     cell_kind,
@@ -38,6 +39,7 @@ from gearmbs.signals.files.text_tables import (
     index_meaning,
     split_cells,
 )
+from gearmbs.signals.signal.labels import FEWEST_EVEN
 from gearmbs.signals.signal.record import (
     REMEDY,
     Progress,
@@ -262,7 +264,9 @@ def _blocks(
                 numbers = block.drop(columns=list(layout.stamps)) if layout.stamps else block
                 values = np.full((len(block), width), np.nan)
                 values[:, numbers.columns] = numbers.to_numpy()
-                wanted = [i for i in range(width) if i not in layout.stamps and i not in layout.empty]
+                wanted = [i for i in range(width) if i not in {*layout.stamps, *layout.empty, *layout.slow}]
+                for i in layout.slow:
+                    values[:, [i]] = _filled(values[:, [i]])
                 if refuse and not np.isfinite(values[:, wanted]).all():
                     raise ValueError("missing values")
                 yield values, stamped, min(1.0, raw.tell() / size)
@@ -281,7 +285,9 @@ def _record(
     notes = list(layout.notes)
     dropped = {*layout.stamps, *layout.empty, *([] if layout.clock is None else [layout.clock])}
     if layout.index is not None:
-        meaning, seconds = index_meaning(values[:, layout.index], clock)
+        # a heading that means rows is believed sooner than none or any other
+        fewest = 2 if layout.names[layout.index].strip().lower() in INDEX_NAMES else FEWEST_EVEN
+        meaning, seconds = index_meaning(values[:, layout.index], clock, fewest)
         if meaning is not None:
             dropped.add(layout.index)
             notes.append(meaning)
@@ -375,7 +381,7 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
                 if column in layout.stamps or column in layout.empty:
                     continue
                 kind = cell_kind(cell, layout.decimal)
-                if kind == "gap" and refuse:
+                if kind == "gap" and refuse and column not in layout.slow:
                     shown = f"{cell[:40]!r}" if cell else "nothing"
                     return f"line {number} holds {shown} in column {layout.names[column]!r}; {REMEDY}"
                 if kind not in ("number", "gap"):

@@ -11,17 +11,14 @@ import pandas as pd
 
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.table import Content, Format, begins_with
+from gearmbs.signals.signal.labels import is_clock, key_of, name_and_unit, unique_names
 from gearmbs.signals.signal.record import (
     STEP_NAMES,
     Record,
     chosen_rate,
-    is_clock,
-    key_of,
-    name_and_unit,
     rate_candidates,
     rate_from_times,
     speed_of,
-    unique_names,
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 

@@ -16,6 +16,7 @@ from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.files.text_tables import decoded
+from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, role_of
 from gearmbs.signals.signal.record import Record, chosen_rate, rate_candidates, rate_from_times, same_rate, speed_of
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 
@@ -176,10 +177,10 @@ def _read(
     try:
         with open(path, "rb") as raw, nptdms.TdmsFile.open(raw) as file:
             kept, names = _chosen(path, file, channels)
-            count = len(kept[0])
+            count = max(len(c) for c in kept)
             for start in range(0, count, block or count):
                 stop = min(start + (block or count), count)
-                values = np.stack([np.asarray(c[start:stop], dtype=float) for c in kept], axis=1)
+                values = np.stack([_stretch(c, start, stop, count) for c in kept], axis=1)
                 yield _record(path, values, kept, names, file, rate), stop / count
     except SignalFileError:
         raise
@@ -208,7 +209,8 @@ def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list
     if not kept:
         listed = f"; it holds {', '.join(names) or 'none'}"
         raise SignalFileError(path, f"holds no samples{'' if channels is None else f' in {list(channels)}'}{listed}")
-    if len({len(c) for _, c in kept}) > 1:
+    longest = max(len(c) for _, c in kept)
+    if any(len(c) < longest and not _is_slow(c) for _, c in kept):
         listed = ", ".join(f"{name} ({len(c)})" for name, c in kept)
         raise SignalFileError(
             path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
@@ -219,6 +221,20 @@ def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list
     ]
 
 
+def _is_slow(channel: Any) -> bool:
+    """Return whether a channel may have fewer samples than those it stands beside."""
+    unit = str(channel.properties.get("unit_string") or UNKNOWN_UNITS)
+    return role_of(channel.name, unit) in SLOW_ROLES
+
+
+def _stretch(channel: Any, start: int, stop: int, count: int) -> np.ndarray:
+    """Return samples of a channel, those of a slow one interpolated."""
+    if len(channel) == count:
+        return np.asarray(channel[start:stop], dtype=float)
+    own = np.asarray(channel[:], dtype=float)
+    return np.interp(np.arange(start, stop) / (count - 1), np.linspace(0.0, 1.0, own.size), own)
+
+
 def _record(
     path: Path, values: np.ndarray, kept: Sequence[Any], names: list[str], file: Any, given: float | None
 ) -> Record:
@@ -226,7 +242,12 @@ def _record(
     notes: list[str] = []
     rates: dict[str, float | None] = {}
     speed = float(root["speed"]) if isinstance(root.get("speed"), (int, float)) else None
+    longest = max(len(c) for c in kept)
+    slow = [name for name, c in zip(names, kept, strict=True) if len(c) < longest]
+    notes += [SLOW_SAID.format(name=name, size=longest) for name in slow]
     for name, channel in zip(names, kept):
+        if name in slow:
+            continue
         rates[name], said = _rate(path, file, channel, root, given)
         notes += [note for note in said if note not in notes]
     if speed is None:

@@ -15,14 +15,19 @@ import numpy as np
 import pandas as pd
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.signal.record import is_clock, name_and_unit, unique_names
-from gearmbs.signals.signal.signal import UNKNOWN_UNITS, is_usual
+from gearmbs.signals.signal.labels import (
+    is_clock,
+    is_unit_of_column,
+    name_and_unit,
+    rises_evenly,
+    role_of,
+    unique_names,
+)
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 
 HEAD_LINES = 400
 COMMENT = re.compile(r"^\s*[#%]")
-KEY_VALUE = re.compile(
-    r"^\s*[#%]*\s*[\"']?([A-Za-z_ÄÖÜäöü][^:=;,\t\"']*?)[\"']?\s*(?:[:=][\s,;]*|[,;\t]\s*)(.*?)[\s,;\"']*$"
-)
+KEY_VALUE = re.compile(r"^\s*[#%]*\s*[\"']?([^\W\d][^:=;,\t\"]*?)[\"']?\s*(?:[:=][\s,;]*|[,;\t]\s*)(.*?)[\s,;\"']*$")
 GAP_CELLS = frozenset(
     {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf"}
 )
@@ -36,6 +41,7 @@ STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
 SEPARATIONS: tuple[tuple[str | None, str], ...] = (
     (";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ","),
 )  # fmt: skip
+TIME_UNITS = frozenset(("s", "sec", "ms", "us", "µs", "ns"))
 INDEX_NAMES = frozenset(
     {"", "unnamed: 0", "index", "idx", "sample", "samples", "nr", "no", "no.", "#", "row", "level_0"}
 )
@@ -62,7 +68,7 @@ class CsvLayout:
     stamps : tuple of int
         Columns that hold dates or times of day as text; `clock` is the first of them.
     index : int or None
-        Column that may only number the rows.
+        Column that may only number the rows, or hold times.
     """
 
     first: int
@@ -76,6 +82,12 @@ class CsvLayout:
     index: int | None = None
     empty: tuple[int, ...] = ()
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def slow(self) -> tuple[int, ...]:
+        """Columns of speeds, pulses and temperatures, which may be written in some rows only."""
+        named = zip(self.names, self.units, strict=True)
+        return tuple(i for i, (name, unit) in enumerate(named) if role_of(name, unit) is not None and i != self.clock)
 
 
 def find_layout(head: list[str], path: Path) -> CsvLayout:
@@ -100,10 +112,12 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         units = [unit for _, unit in bare] or [UNKNOWN_UNITS] * width
     stamps = tuple(i for i, kind in enumerate(kinds) if kind in ("stamp", "date", "clock"))
     empty = tuple(i for i, kind in enumerate(kinds) if kind == "gap" and i == width - 1 and not names[i].strip())
-    index = None
-    if labels and not stamps and names[0].strip().lower() in INDEX_NAMES and width > 1:
-        index = 0
     clock = stamps[0] if stamps else next((i for i, n in enumerate(names) if is_clock(n)), None)
+    if clock is None and width > 1 and units[0].lower() in TIME_UNITS and role_of(names[0], units[0]) is None:
+        # an abscissa, whatever it is called
+        clock = 0
+    numbers = bool(labels) and names[0].strip().lower() in INDEX_NAMES
+    index = 0 if width > 1 and not stamps and (numbers or clock is None) else None
     clock = clock if width - len(stamps) > (0 if stamps else 1) else None
     return CsvLayout(
         first,
@@ -225,7 +239,8 @@ def _units_row(
     ):
         return upper, [(m.group(1).strip() if m else "") or UNKNOWN_UNITS for m in in_brackets]
     plain = [label.strip() for label in labels]
-    if len(upper) == width and is_clock(upper[0]) and plain[0] and all(not unit or is_usual(unit) for unit in plain):
+    stated = plain[0] and all(not unit or is_unit_of_column(unit) for unit in plain)
+    if len(upper) == width and is_clock(upper[0]) and stated:
         return upper, [unit or UNKNOWN_UNITS for unit in plain]
     return None
 
@@ -369,20 +384,22 @@ def _iso(texts: pd.Series) -> pd.Series:
     return year + "-" + month.str.zfill(2) + "-" + day.str.zfill(2) + rest
 
 
-def index_meaning(column: np.ndarray, clock: np.ndarray | None) -> tuple[str | None, np.ndarray | None]:
-    """What a first column without a name is: words for the reader, and seconds if it holds times; (None, None) if
-    neither.
+def index_meaning(
+    column: np.ndarray, clock: np.ndarray | None, fewest: int = 2
+) -> tuple[str | None, np.ndarray | None]:
+    """What a first column that is not called time is: words for the reader, and seconds if it holds times.
 
-    0, 1, 2 ... number the rows; other numbers that rise evenly are times in s, where there is no other column of times.
+    Both are None if it is neither, or has too few rows to tell. 0, 1, 2 ... number the rows; other numbers that rise
+    evenly are times in s, where there is no other column of times.
     """
-    if len(column) < 2 or not np.isfinite(column).all():
+    if len(column) < fewest or not np.isfinite(column).all():
         return None, None
     steps = np.diff(column)
     if np.all(steps == 1.0) and column[0] == np.rint(column[0]):
         return "The first column only numbers the rows and is left out.", None
     even = np.all(steps > 0.0) and np.allclose(steps, steps.mean(), rtol=0.05)
-    if even and clock is None:
-        return "The first column has no name and rises evenly; it is taken for the time in s.", column
+    if (even or rises_evenly(column)) and clock is None:
+        return "The first column rises evenly; it is taken for the time in s.", column
     return None, None
 
 
@@ -395,18 +412,24 @@ MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-FALLBACK = "cp1252"
+FALLBACK, CENTRAL = "cp1252", "cp1250"
+CENTRAL_VOWELS, CENTRAL_CONSONANTS = frozenset(b"\xe1\xed\xfd"), frozenset(b"\xe8\xec\xf8\xf9")
+"""Czech a, i, y with an acute, which Western languages at home in 1252 hardly have, and beside them c, e, r, u."""
+CENTRAL_CAPITAL = re.compile(rb"\xc8[a-z]")
+"""A Czech C at the begin of a word."""
 
 
 def encoding_of(head: bytes) -> str:
-    """The encoding of a text from its first bytes: by its mark, UTF-8 if it is valid, else Windows' Western code."""
+    """The encoding of a text from its first bytes: by its mark, UTF-8 if it is valid, else Windows' Western code, or
+    its Central European one where letters of Czech stand."""
     for mark, name in MARKS:
         if head.startswith(mark):
             return name
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
     except UnicodeDecodeError:
-        return FALLBACK
+        central = not CENTRAL_VOWELS.isdisjoint(head) and not CENTRAL_CONSONANTS.isdisjoint(head)
+        return CENTRAL if central or CENTRAL_CAPITAL.search(head) else FALLBACK
     return "utf-8"
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
+from gearmbs.signals.signal.labels import HERTZ, RPM_UNITS
 from gearmbs.signals.signal.signal import SHAFT, STEADY, check_teeth, with_metadata
 from gearmbs.units import to_si
 
@@ -176,8 +177,9 @@ def _of_points(speed: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def unit_factor(unit: str) -> float:
     """Factor from a unit of rotation to rad/s: rpm, Hz, rad/s, deg/s, 1/min ..."""
-    text = {"1/min": "rpm", "min^-1": "rpm", "min-1": "rpm", "1/s": "Hz", "rps": "Hz", "r/min": "rpm"}
-    return _quantity(f"1 {text.get(unit.strip(), unit.strip())}", "angular speed", "speed")
+    clean = unit.strip()
+    text = "rpm" if clean.lower() in RPM_UNITS else "Hz" if clean.lower() in HERTZ else clean
+    return _quantity(f"1 {text}", "angular speed", "speed")
 
 
 def _checked(times: np.ndarray, values: np.ndarray) -> SpeedCurve:

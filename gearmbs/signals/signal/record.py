@@ -15,6 +15,7 @@ import xarray as xr
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
+from gearmbs.signals.signal.labels import RPM_UNITS, SLOW_ROLES, SLOW_SAID, is_clock, key_of, rises_evenly, role_of
 from gearmbs.signals.signal.signal import (
     SHAFT,
     UNKNOWN_UNITS,
@@ -33,7 +34,8 @@ RATE_NAMES = frozenset(
     (
         "samplingrate samplerate samplingfrequency samplefrequency samplingfreq samplefreq sampfreq samprate fs fsamp "
         "fsample fsampling sr sf scanrate acquisitionrate daqrate samplespersecond samplespersec sps abtastrate "
-        "abtastfrequenz frequencysampling samplehz samplerateinhz ratehz hz"
+        "abtastfrequenz frequencysampling samplehz samplerateinhz ratehz hz messrate vzorkovacifrekvence vzorkovani "
+        "frequencedechantillonnage frequencedechant fech tauxdechantillonnage"
     ).split()
 )
 WEAK_RATE_NAMES = frozenset({"rate"})
@@ -41,11 +43,15 @@ WEAK_RATE_NAMES = frozenset({"rate"})
 STEP_NAMES = frozenset(
     (
         "xinc xincrement xincr xdelta dx deltax dt deltat deltatime timestep timeincrement timeinterval wfincrement "
-        "sampleinterval samplinginterval sampleperiod samplingperiod samplingtime tsample tsamp abtastintervall"
+        "sampleinterval samplinginterval sampleperiod samplingperiod samplingtime tsample tsamp abtastintervall "
+        "abtastzeit abtastschritt zeitschritt periodavzorkovani vzorkovaciperioda periodedechantillonnage pasdetemps"
     ).split()
 )
 SPEED_NAMES = frozenset(
-    "speed rpm shaftspeed rotationalspeed rotationspeed rotatingspeed motorspeed inputspeed drehzahl n shaftrpm".split()
+    (
+        "speed rpm shaftspeed rotationalspeed rotationspeed rotatingspeed motorspeed inputspeed drehzahl n shaftrpm "
+        "wellendrehzahl motordrehzahl otacky otackymotoru otackyhridele vitesse vitessederotation vitessearbre"
+    ).split()
 )
 SHAFT_FREQUENCIES = frozenset(
     "shaftrate shaftfrequency rotationfrequency rotationalfrequency rotfreq fr shafthz".split()
@@ -55,8 +61,7 @@ PER_SECOND = {
     "samples/sec": 1.0, "samples/second": 1.0, "sps": 1.0, "ksps": 1e3, "s^-1": 1.0,
 }  # fmt: skip
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-NUMBER = re.compile(r"^\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*[\[(]?\s*([A-Za-zµ/^\-0-9]*)")
-BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+NUMBER = re.compile(r"^\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*[\[(]?\s*([A-Za-zµ/^\-0-9.]*)")
 AGREE = 1e-3
 """Relative difference up to which two rates or speeds in a file are one: headers round to three or four digits."""
 PLAUSIBLE_RPM = (1.0, 200_000.0)
@@ -73,14 +78,6 @@ class RateCandidate:
 
     def __str__(self) -> str:
         return f"{self.name} = {self.rate:g} Hz"
-
-
-def key_of(name: str) -> tuple[str, str]:
-    """A header's name without case, blanks and path, and the unit in its brackets ("" without one)."""
-    last = re.split(r"[./\\]", name.strip().rstrip(":"))[-1] if not BRACKETS.search(name) else name
-    unit = BRACKETS.search(last)
-    bare = re.sub(r"[^a-z0-9äöü]", "", BRACKETS.sub("", last).lower())
-    return bare, unit.group(1).strip() if unit else ""
 
 
 def number_of(value: Any) -> tuple[float, str] | None:
@@ -190,7 +187,7 @@ def speed_of(header: Mapping[str, Any]) -> tuple[float | None, list[str]]:
         unit = (number[1] or unit).lower()
         if key in SHAFT_FREQUENCIES and unit in ("", "hz", "1/s"):
             found.append((str(name), number[0] * math.tau))
-        elif key.endswith("rpm") or (key in SPEED_NAMES and unit in ("rpm", "1/min", "u/min", "r/min", "rev/min")):
+        elif key.endswith("rpm") or (key in SPEED_NAMES and unit in RPM_UNITS):
             found.append((str(name), number[0] * math.pi / 30.0))
         elif key in SPEED_NAMES and unit in ("hz", "1/s"):
             found.append((str(name), number[0] * math.tau))
@@ -221,36 +218,6 @@ def same_rate(path: Path, rates: Mapping[str, float | None]) -> float | None:
             path, f"its channels have different sampling rates: {listed}; choose with channels=[...] (--channel)"
         )
     return next((rate for rate in rates.values() if rate is not None), None)
-
-
-# Labels of columns as people write them: a name and its unit, times among them, no two alike.
-
-
-NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
-SUFFIX = re.compile(r"[_\s](s|sec|ms|us|µs|ns|min)$", re.IGNORECASE)
-CLOCK_NAMES = frozenset(
-    "time t times timesec timeseconds timestamp timestamps zeit zeitpunkt datetime elapsedtime relativetime "
-    "xvalue sampletime tempo temps timems timeus".split()
-)
-
-
-def name_and_unit(label: str) -> tuple[str, str]:
-    """The name and the unit of a label such as "acc [m/s^2]" or "acc (g)"; the unit is "unknown" without one."""
-    found = NAME_UNIT.match(label)
-    if found and found.group(1):
-        return found.group(1), found.group(2).strip() or UNKNOWN_UNITS
-    return label, UNKNOWN_UNITS
-
-
-def is_clock(name: str) -> bool:
-    """True for the names that columns of times have."""
-    return key_of(SUFFIX.sub("", name))[0] in CLOCK_NAMES
-
-
-def unique_names(names: Sequence[str]) -> list[str]:
-    """Names made different by a number where they are not; empty ones become ch1, ch2 ..."""
-    named = [name or f"ch{i + 1}" for i, name in enumerate(names)]
-    return [n if named.count(n) == 1 else f"{n}_{named[:i].count(n) + 1}" for i, n in enumerate(named)]
 
 
 # Samples that are missing or not finite: refused, interpolated, or cut out, and said.
@@ -443,7 +410,9 @@ def signal_from(
         )
     found = record.rate if record.rate is not None else rate
     if found is None:
-        raise MissingMetadataError("rate", str(path), "the file does not hold it; pass rate=... in Hz")
+        raise MissingMetadataError(
+            "rate", str(path), f"the file does not hold it, its columns are {record.names[:8]}; pass rate=... in Hz"
+        )
     if record.speed is not None and speed is not None:
         record.notes = [note for note in record.notes if not note.startswith("The speed, ")]
     try:
@@ -531,6 +500,8 @@ def assemble(
     columns: dict[str, np.ndarray] = {}
     column_units: dict[str, str] = {}
     owner: dict[str, str] = {}
+    notes: list[str] = []
+    abscissa: np.ndarray | None = None
     for key, array in arrays.items():
         if key in clocks or array.size < 2:
             continue
@@ -539,28 +510,39 @@ def assemble(
             continue
         table = flat[:, None] if flat.ndim == 1 else (flat if flat.shape[0] >= flat.shape[1] else flat.T)
         names = [key] if table.shape[1] == 1 else [f"{key}_{i + 1}" for i in range(table.shape[1])]
+        first = table[:, 0]
+        counts_rows = table.shape[1] > 1 and (channels is None or names[0] not in channels) and rises_evenly(first)
+        if counts_rows:
+            numbered = bool(np.all(np.diff(first) == 1.0))
+            abscissa = abscissa if numbered or clocks else first
+            said_of = "numbers the rows and is left out" if numbered else "rises evenly; it is taken for the time in s"
+            notes.append(f"The first column of {key} {said_of}.")
         for i, name in enumerate(names):
-            if channels is None or name in channels:
+            if (channels is None or name in channels) and not (counts_rows and i == 0):
                 columns[name] = table[:, i]
                 column_units[name] = units.get(key, UNKNOWN_UNITS)
                 owner[name] = key
-    lengths = {name: column.size for name, column in columns.items()}
     if not columns:
         raise SignalFileError(path, f"holds no numeric record{_among(arrays, channels)}")
+    slow, said = _slow_ones_stretched(columns, column_units)
+    notes += said
+    lengths = {name: column.size for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{name} ({size})" for name, size in lengths.items())
         raise SignalFileError(
             path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
         )
-    notes: list[str] = []
     rates: dict[str, float | None] = {}
     for name, key in owner.items():
+        if name in slow:
+            continue
         rates[name], said = chosen_rate(path, rate_candidates(own_header(scalars, key)), given)
         notes += [note for note in said if note not in notes]
     rate = same_rate(path, rates)
     count = next(iter(lengths.values()))
     t0 = 0.0
-    times = next((arrays[k].ravel() for k in clocks if arrays[k].size == count), None)
+    times = next((arrays[k].ravel() for k in clocks if arrays[k].size == count), abscissa)
+    times = times if times is None or times.size == count else None
     if times is not None and np.asarray(times).dtype.kind in "fiu":
         t0 = float(times[0])
         if rate is None:
@@ -588,6 +570,22 @@ def assemble(
         checked,
         notes=notes + said,
     )
+
+
+def _slow_ones_stretched(columns: dict[str, np.ndarray], units: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Bring speeds and temperatures of fewer samples to the length of all others in place; which, and what to say."""
+    slow = {name for name in columns if role_of(name, units[name]) in SLOW_ROLES}
+    sizes = {column.size for name, column in columns.items() if name not in slow}
+    if len(sizes) != 1:
+        return [], []
+    (size,) = sizes
+    shorter = [name for name in columns if name in slow and 1 < columns[name].size < size]
+    notes = []
+    for name in shorter:
+        own = np.asarray(columns[name], dtype=float)
+        notes.append(SLOW_SAID.format(name=name, size=size))
+        columns[name] = np.interp(np.linspace(0.0, 1.0, size), np.linspace(0.0, 1.0, own.size), own)
+    return shorter, notes
 
 
 def rate_from_times(times: np.ndarray, path: Path) -> float:

@@ -1,0 +1,215 @@
+"""Labels of columns as laboratories write them: names, units, and what a column is if it is no vibration.
+
+Labels hold a name and a unit in one of the ways of standards and instruments: ``a [m/s^2]``, ``a (g)``, DIN 461's
+``a / (m/s²)`` and ``a in m/s²``, ``t_ms``; in English, German, French and Czech. Names, units and values tell which
+columns hold times, speeds, pulses of a tacho, temperatures or counts: what is no vibration is not analysed as one.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.signals.errors import MissingMetadataError
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, is_usual, shaft_coords, units_of, with_metadata
+
+BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
+QUOTIENT = re.compile(r"^(.*?\S)\s*/\s*(?:\((.+)\)|(\S.*?))\s*$")
+"""DIN 461: a quantity by its unit."""
+IN_WORDS = re.compile(r"^(.*?\S)\s+(?:in|en|v)\s+(?:\((.+)\)|(\S+))\s*$", re.IGNORECASE)
+"""``t in ms``, in French and Czech ``en`` and ``v``."""
+SUFFIX = re.compile(r"[_\s](s|sec|ms|us|µs|ns|min)$", re.IGNORECASE)
+CLOCK_NAMES = frozenset(
+    "time t times timesec timeseconds timestamp timestamps zeit zeitpunkt datetime elapsedtime relativetime "
+    "xvalue sampletime tempo temps timems timeus cas".split()
+)
+RPM_UNITS = frozenset(
+    "rpm 1/min min-1 min^-1 u/min umin r/min rev/min tr/min t/min tpm ot/min ot./min otmin 1/minute".split()
+)
+HERTZ = frozenset("hz 1/s s-1 s^-1 rps".split())
+OF_ROTATION = HERTZ | {"rad/s"}
+SPEED_COLUMN = re.compile(
+    r"speed|rpm|drehzahl|umdrehung|otack|otacek|vitesse(?!vib)|regimemoteur|^n$|^n\d$|^omega$|shaftfreq|rotationfreq"
+)
+TACHO_COLUMN = re.compile(
+    r"tach|keyph|trigger|pulse|impuls|encoder|drehgeber|zeroindex|indexpuls|toptour|otackomer|znacka|codeur|^tac$"
+)
+TEMPERATURE_COLUMN = re.compile(r"^temp(?!s$|o$|s\d)|temperatur|teplota|^oil$|^t(oil|amb|lager|lozisk)")
+TEMPERATURE_UNITS = frozenset(("degc", "°c", "°f", "degf", "celsius", "deg c", "° c", "℃"))
+COUNT_COLUMN = re.compile(r"^(index|idx|samples?|nr|no|row|cislo|vzorek|echantillon|point|punkt|count(er)?)$")
+EVEN = 1e-3
+"""Part of its span by which a column that counts or tells time may leave a straight line."""
+FEWEST_EVEN = 16
+STEADY = 0.2
+"""Standard deviation by mean up to which a column named n, without a unit, is a speed."""
+
+Role = Literal["time", "speed", "tacho", "temperature", "count"]
+SLOW_ROLES = ("speed", "temperature")
+"""Columns of these may have fewer samples than the others, and are interpolated."""
+SLOW_SAID = "{name} has fewer samples than the {size} of the others; between them it is interpolated."
+WORDS: dict[str, str] = {
+    "time": "holds times",
+    "speed": "holds the speed",
+    "tacho": "holds the pulses of a tacho",
+    "temperature": "holds a temperature",
+    "count": "counts or tells time: it rises evenly",
+}
+
+
+def folded(text: str) -> str:
+    """Return a text in lower case without accents: "Otáčky" as "otacky"."""
+    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
+    return "".join(c for c in plain if not unicodedata.combining(c)).lower()
+
+
+def key_of(name: str) -> tuple[str, str]:
+    """A header's name without case, accents, blanks and path, and the unit in its brackets ("" without one)."""
+    last = re.split(r"[./\\]", name.strip().rstrip(":"))[-1] if not BRACKETS.search(name) else name
+    unit = BRACKETS.search(last)
+    bare = re.sub(r"[^a-z0-9]", "", folded(BRACKETS.sub("", last)))
+    return bare, unit.group(1).strip() if unit else ""
+
+
+def name_and_unit(label: str) -> tuple[str, str]:
+    """The name and the unit of a label; the unit is "unknown" without one.
+
+    Examples
+    --------
+    >>> name_and_unit("acc [m/s^2]"), name_and_unit("a / (m/s²)"), name_and_unit("Drehzahl in 1/min")
+    (('acc', 'm/s^2'), ('a', 'm/s²'), ('Drehzahl', '1/min'))
+    >>> name_and_unit("left/right")
+    ('left/right', 'unknown')
+    """
+    for pattern in (QUOTIENT, IN_WORDS):
+        found = pattern.match(label)
+        unit = (found.group(2) or found.group(3) or "").strip() if found else ""
+        if found and is_unit_of_column(unit):
+            return found.group(1).strip(), unit
+    found = NAME_UNIT.match(label)
+    if found and found.group(1):
+        return found.group(1), found.group(2).strip() or UNKNOWN_UNITS
+    return label, UNKNOWN_UNITS
+
+
+def is_unit_of_column(text: str) -> bool:
+    """Return whether a text is a unit that columns of recordings have."""
+    low = text.lower()
+    return is_usual(text) or low in RPM_UNITS or low in OF_ROTATION or low in TEMPERATURE_UNITS or low in ("us", "µs")
+
+
+def is_clock(name: str) -> bool:
+    """True for the names that columns of times have."""
+    return key_of(SUFFIX.sub("", name))[0] in CLOCK_NAMES
+
+
+def unique_names(names: Sequence[str]) -> list[str]:
+    """Names made different by a number where they are not; empty ones become ch1, ch2 ..."""
+    named = [name or f"ch{i + 1}" for i, name in enumerate(names)]
+    return [n if named.count(n) == 1 else f"{n}_{named[:i].count(n) + 1}" for i, n in enumerate(named)]
+
+
+def rises_evenly(values: np.ndarray) -> bool:
+    """Return whether a column is a straight line up, as times are, also rounded ones, and counts of rows."""
+    if values.size < FEWEST_EVEN or not np.isfinite(values[[0, -1]]).all():
+        return False
+    span = float(values[-1] - values[0])
+    if not span > 0.0 or not np.all(np.diff(values) >= 0.0):
+        return False
+    straight = values[0] + span * np.linspace(0.0, 1.0, values.size)
+    return float(np.abs(values - straight).max()) <= max(EVEN, 1.0 / values.size) * span
+
+
+def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | None:
+    """Return what a column is, if it is no vibration.
+
+    Parameters
+    ----------
+    name, unit : str
+    values : ndarray, optional
+        Where they are known, columns that rise evenly are counts or times, and one that is called n and has no unit is
+        a speed only if it is positive and nearly constant.
+    """
+    key, low = key_of(name)[0], unit.strip().lower()
+    unknown = low in ("", UNKNOWN_UNITS)
+    timed = low in ("s", "ms", "us", "µs", "sec")
+    if low in RPM_UNITS or (SPEED_COLUMN.search(key) and low in OF_ROTATION):
+        return "speed"
+    if is_clock(name) and (unknown or timed):
+        return "time"
+    if low in TEMPERATURE_UNITS or (TEMPERATURE_COLUMN.search(key) and (unknown or low in ("k", "c", "f"))):
+        return "temperature"
+    if TACHO_COLUMN.search(key) and (unknown or low in ("v", "mv", "1", "-")):
+        return "tacho"
+    if values is not None and rises_evenly(values) and (unknown or timed or COUNT_COLUMN.match(key)):
+        return "count"
+    if SPEED_COLUMN.search(key) and unknown:
+        steady = values is None or (values.min() >= 0.0 and float(values.std()) <= STEADY * float(values.mean()))
+        return "speed" if steady or len(key) > 2 else None
+    return None
+
+
+def measured(
+    signal: xr.DataArray, named: Iterable[str] = (), used: Iterable[str] = (), speed_known: bool = False
+) -> tuple[xr.DataArray, str | None]:
+    """Return a signal without the channels that are no vibration, noting them, and the one that holds the speed.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    named : iterable of str
+        Channels that the caller asks for; they stay.
+    used : iterable of str
+        Channels that the caller uses otherwise, as tacho or speed; they stay, and nothing is said of them.
+    speed_known : bool
+        Whether the caller knows the speed; if neither he nor the signal does, the channel of it stays, too.
+
+    Returns
+    -------
+    signal : xarray.DataArray
+        All of it, if nothing else would be left.
+    speed : str or None
+        Channel of the speed, if it is to be used.
+
+    Raises
+    ------
+    MissingMetadataError
+        If several channels hold speeds and nothing else tells the shaft's.
+    """
+    names = [str(name) for name in signal["channel"].values]
+    stay = {*named, *used}
+    columns = zip(names, units_of(signal), signal.values.T, strict=True)
+    told = {n: role for n, unit, values in columns if n not in stay and (role := role_of(n, unit, values)) is not None}
+    if not told or {*names} == {*told} | {*used}:
+        return signal, None
+    known = speed_known or signal.attrs.get("speed") is not None or bool(shaft_coords(signal))
+    speeds = [name for name, role in told.items() if role == "speed"]
+    units = dict(zip(names, units_of(signal), strict=True))
+    usable = [name for name in speeds if units[name] != UNKNOWN_UNITS or "rpm" in name.lower()]
+    used_speed, notes = None, []
+    if not known and len(usable) > 1:
+        say = f"say which: speed_channel={usable[0]!r} (--speed-channel {usable[0]!r})"
+        raise MissingMetadataError("speed", "the analysis", f"the columns {usable} hold speeds; {say}")
+    if not known and usable:
+        used_speed = usable[0]
+        notes.append(f"The speed is that of the column {used_speed!r}; speed=... (--speed) says another.")
+    elif not known and speeds:
+        column = speeds[0]
+        notes.append(
+            f"The unit of the speed in {column!r} is missing; say it to use it: units={{{column!r}: 'rpm'}} "
+            f"(--units '{column}=rpm')."
+        )
+    elif not known:
+        pulses = [name for name, role in told.items() if role == "tacho"][:1]
+        notes += [f"{p!r} gives the speed: tacho={p!r} and pulses_per_rev (--tacho, --pulses)." for p in pulses]
+    notes += [
+        f"{name!r} {WORDS[role]} and is not analysed as vibration." for name, role in told.items() if name != used_speed
+    ]
+    left = signal.sel(channel=[name for name in names if name not in told or name == used_speed])
+    return with_metadata(left, notes=[*left.attrs.get("notes", ()), *notes]), used_speed
