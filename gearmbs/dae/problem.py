@@ -139,6 +139,9 @@ class DAEProblem:
     small_entries : bool
         Whether many entries of the Jacobian are small beside others, as second derivatives by modal coordinates beside
         the stiffness of the modes, so that a corrector converges without them.
+    finite_rates : bool
+        Whether no equation makes a rate infinite: steps are not looked at for poles that they have got over then, which
+        costs two evaluations wherever an unknown turns against its prediction.
     solved_at_outputs : ndarray of bool, optional
         Algebraic unknowns that are solved for at outputs, where the rest of the algebraic ones is evaluated elsewhere;
         default all, as far as they are not under error control. See `gearmbs.dae.integrators.algebraic`.
@@ -183,6 +186,7 @@ class DAEProblem:
     restart_rates: Callable | None = None
     jacobian_residuals: int = 0
     small_entries: bool = False
+    finite_rates: bool = False
     solved_at_outputs: np.ndarray | None = None
     solved_if_needed: np.ndarray | None = None
     advice: Mapping[Any, str] = field(default_factory=dict)

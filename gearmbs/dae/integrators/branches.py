@@ -275,7 +275,7 @@ def passes_pole(functions, st):
     rates of its unknown have to satisfy their equations too. Equations that are not linear in y' need not be defined
     for y' = 0, and are not looked at.
     """
-    if st.nonlinear_rates:
+    if not st.watches_poles:
         return False
     old = rows_from(st, 1)[0]
     suspected = st.pole >= 0 or st.leapt >= 0

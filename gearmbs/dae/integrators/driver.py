@@ -106,13 +106,14 @@ class Run:
         if options.history is not None:
             continue_run(self, options.history)
 
-    def repivot(self, exactly: bool = False) -> tuple[Status, str] | None:
+    def repivot(self, stricter: int = 0) -> tuple[Status, str] | None:
         """Choose new pivots for the current Newton matrix; return a failure or None.
 
-        Unless it has to be ``exactly`` that matrix, entries without which the corrector converges are left out.
+        Entries without which the corrector converges are left out, ``stricter`` by as many sizes of them.
         """
         st, problem = self.state, self.problem
-        negligible = NEGLIGIBLE_IN_NEWTON if st.left_out and not exactly else NEGLIGIBLE
+        sizes = (*(NEGLIGIBLE_IN_NEWTON if st.left_out else ()), NEGLIGIBLE)
+        negligible = sizes[stricter]
         t = st.t
         self.repivots += 1
         bad = np.flatnonzero(~np.isfinite(st.matrix))
@@ -126,6 +127,9 @@ class Run:
             )
         try:
             drop, counted = DROP_TOLERANCES[st.drop_level], self._entries_to_leave()
+            if stricter and counted is not None:
+                # what counts in one matrix does not in all that follow
+                counted = counted.copy()
             self.pivots = Pivots(st.matrix.copy(), drop, negligible, None if counted is None else counted.copy())
             self.plan = analyse(
                 self.indptr, self.indices, st.matrix, self.scale, drop, counted, negligible,
@@ -153,7 +157,7 @@ class Run:
         st.factorizations += 1
         st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
         if negligible > NEGLIGIBLE and not self._converges_without(self.plan, self.factors):
-            return self.repivot(exactly=True)
+            return self.repivot(stricter + 1)
         return None
 
     def _converges_without(self, plan: LUPlan, factors: LUFactors) -> bool:

@@ -225,6 +225,8 @@ def _set_tolerances(st: RunState, problem: DAEProblem, options: Options, span: f
     st.gamma_large = LARGE_GAMMA / span
     st.has_index_one = bool(st.index_one.any())
     st.nonlinear_rates = problem.nonlinear_rates
+    # equations that are not linear in y' need not be defined for y' = 0, at which poles are looked for
+    st.watches_poles = not (problem.finite_rates or problem.nonlinear_rates)
     st.tested[:] = np.maximum(st.controlled, st.index_one) if options.corrector == "modified" else 1.0
     st.differential[:] = problem.differential
     st.coupled[:] = np.maximum(np.maximum(st.controlled, st.differential), st.index_one)

@@ -127,6 +127,7 @@ class RunState(Struct):
     has_hook: bool
     has_index_one: bool
     nonlinear_rates: bool  # whether G is not linear in y'
+    watches_poles: bool  # whether rates may be infinite, see `branches.passes_pole`
     watches_pencil: bool  # whether the sign of the determinant is watched, see `branches.keeps_its_index`
     constrained: bool  # whether there are multipliers, or what is like them: unknowns of index two and more
     keep_rows: bool  # whether y of every step is recorded

@@ -163,8 +163,9 @@ def entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_s
 
 NEGLIGIBLE = 1e-13
 """Size up to which an entry of the equilibrated matrix may stay left out of a plan: it is rounding."""
-NEGLIGIBLE_IN_NEWTON = 1e-4
-"""The same of a Newton matrix with many small entries, if the corrector converges without them, see `RATE_ALLOWED`."""
+NEGLIGIBLE_IN_NEWTON = (1e-4, 1e-5, 1e-6)
+"""The same of a Newton matrix with many small entries: the first with which the corrector converges without them, see
+`RATE_ALLOWED`."""
 WHEN_PLANNED = 0.01
 """Share of that size from which on an entry counts when a plan is made."""
 RATE_ALLOWED = 0.02

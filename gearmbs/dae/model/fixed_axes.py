@@ -175,6 +175,7 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
         t0=system.t0,
         names=[*names, *(f"z({name})" for name in system.state_names)],
         solved_at_outputs=~mask & ~differential,
+        finite_rates=model.has_finite_forces,
         hook=fx.axes_hook if counted else None,
         hook_interval=_hook_interval(omega, model, axes, (idata, rdata, size)) if counted else None,
         numbers=model.numbers_in(idata),

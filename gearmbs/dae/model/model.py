@@ -204,6 +204,13 @@ class Model:
         return found
 
     @cached_property
+    def has_finite_forces(self) -> bool:
+        """Whether no load grows beyond bounds anywhere: there are none but those of this package's own kernels."""
+        functions = [*self.kernels.values(), *(function for function, _ in self.own_functions.values())]
+        homes = [str(getattr(function, "py_func", function).__module__) for function in functions]
+        return not self.tapes and all(home.startswith("gearmbs.") for home in homes)
+
+    @cached_property
     def counts(self) -> Counts:
         """What the length of y depends on."""
         return Counts(

@@ -31,8 +31,8 @@ from gearmbs.kernels.pointers import FUNCTIONS_TYPE, direct
 
 ASKED = {
     "t_end", "h_max", "rtol", "max_order", "max_iterations", "max_steps", "n_events", "most_crossings", "fixed_leading",
-    "interpolate", "has_hook", "has_index_one", "nonlinear_rates", "watches_pencil", "constrained", "keep_rows",
-    "step_in_weights", "t_pause", "code", "next_output", "next_stop", "n_records", "n_crossings",
+    "interpolate", "has_hook", "has_index_one", "nonlinear_rates", "watches_pencil", "watches_poles", "constrained",
+    "keep_rows", "step_in_weights", "t_pause", "code", "next_output", "next_stop", "n_records", "n_crossings",
 }  # fmt: skip
 """Scalars of a run that are its own."""
 SCALARS = tuple(name for name in RunState.scalar_members if name not in ASKED)
