@@ -310,6 +310,9 @@ class SolverStats:
         Steps taken at the level of rounding, near singular positions, where no step could satisfy the tolerance.
     wall_time : float
         Seconds spent in the integrator.
+    processor_times : dict of float
+        Processor seconds of the thread by part: ``"steps"`` in compiled code, ``"pivots"`` chosen anew, ``"consumer"``
+        of the steps that are handed over (empty when the integrator does not tell).
     t_steps, h_steps, orders : ndarray, shape (steps,)
         End time, size and order of each accepted step (empty when the integrator does not tell).
     """
@@ -324,6 +327,7 @@ class SolverStats:
     repivots: int = 0
     noise_limited: int = 0
     wall_time: float = 0.0
+    processor_times: dict[str, float] = field(default_factory=dict)
     t_steps: np.ndarray = field(default_factory=lambda: np.empty(0))
     h_steps: np.ndarray = field(default_factory=lambda: np.empty(0))
     orders: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))

@@ -75,6 +75,7 @@ class Run:
         self.problem = problem
         self.options = options
         self.wall_time = 0.0
+        self.processor_times = {"steps": 0.0, "pivots": 0.0}
         self.repivots = 0
         self.first_pivots = 0
         self.planned_step = 0.0
@@ -247,7 +248,9 @@ class Run:
             tic = time.perf_counter()
             few = 1 if self.stall.looking else chunk
             if st.code == s.RUNNING:
+                begin_steps = time.thread_time()
                 direct(advance)(self.functions, st, self.algebraic.part, self.plan, self.factors, few)
+                self.processor_times["steps"] += time.thread_time() - begin_steps
             code, st.code = st.code, s.RUNNING
             ending = self.user_failure() if self.user_exception() is not None else self._heed(code)
             if ending is not None:
@@ -326,7 +329,9 @@ class Run:
         if code == s.PAUSED:
             self.records.change_table()
         elif code == s.REPIVOT:
+            begin_pivots = time.thread_time()
             failure = self.repivot()
+            self.processor_times["pivots"] += time.thread_time() - begin_pivots
             return self.user_failure() if self.user_exception() is not None else failure
         elif code == s.BUFFER_FULL:
             self.records.drain()
@@ -443,6 +448,7 @@ class Run:
             repivots=max(0, self.repivots - self.first_pivots),
             noise_limited=st.noise_limited,
             wall_time=self.wall_time,
+            processor_times={**self.processor_times, "consumer": self.records.processor_time},
         )
 
 

@@ -118,6 +118,8 @@ class Records:
         self.options = options
         self.every_step = every_step
         self.consumed_time = 0.0
+        self.processor_time = 0.0
+        """Of the consumer, s."""
         self.steps: list[tuple[np.ndarray, ...]] = []
         self.row_blocks: list[np.ndarray] = []
         self.crossings: list[tuple[float, int, np.ndarray]] = []
@@ -150,8 +152,9 @@ class Records:
             return
         whole = bool(is_step.all())
         t, y = (st.record_t[:m], st.record_y[:m]) if whole else (st.record_t[:m][is_step], st.record_y[:m][is_step])
-        begin = time.perf_counter()
+        begin, busy = time.perf_counter(), time.thread_time()
         self.options.consumer(t, y, self.epochs[-1][1])
+        self.processor_time += time.thread_time() - busy
         self.consumed_time += time.perf_counter() - begin
         self.row_blocks = [y[-1:].copy()]
 

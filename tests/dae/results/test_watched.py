@@ -102,3 +102,11 @@ def test_what_cannot_be_watched_is_refused():
         pendulum().simulate(1.0, watch=[("reaction_force", "pin")])
     with pytest.raises(ModelError, match=says("watch", "com_position", "reaction_force")):
         pendulum().simulate(1.0, every_step=True, consumer=print, watch=[("com_position", "bob")])
+
+
+def test_a_run_tells_where_its_processor_time_went():
+    parts = []
+    solution = pendulum().simulate(1.0, tol=1e-8, every_step=True, consumer=lambda part: parts.append(part.t.size))
+    assert list(solution.stats.processor_times) == ["steps", "pivots", "consumer"]
+    assert all(seconds >= 0.0 for seconds in solution.stats.processor_times.values())
+    assert sum(parts) == solution.stats.steps + 1

@@ -36,7 +36,7 @@ class LastRecords:
     It stands in for `gearmbs.dae.integrators.records.Records`, which keeps all.
     """
 
-    consumed_time = 0.0
+    consumed_time = processor_time = 0.0
 
     def __init__(self, st: RunState) -> None:
         self.state = st
