@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import public_bearings as recordings
+
 from gearmbs.dae.methods import formulations_table, integrators_table
 from gearmbs.signals.files.table import formats_table
 
@@ -29,3 +31,8 @@ def integrators() -> Table:
 def formulations() -> Table:
     """Return the formulations."""
     return Table(formulations_table())
+
+
+def public_bearings(table: str) -> Table:
+    """Return one of the tables of bearings in public recordings: summary, sound or hard."""
+    return Table(getattr(recordings, table)())

@@ -40,11 +40,15 @@ from .analysis.sections import sections as sections
 from .analysis.sections import trend as trend
 from .analysis.sections import trend_table as trend_table
 from .analysis.series import series as series
+from .analysis.severity import vibration_zones as vibration_zones
 from .analysis.vibration import VibrationReport as VibrationReport
 from .conversion import COMPONENTS as COMPONENTS
 from .conversion import convert as convert
 from .conversion import force_components as force_components
 from .conversion import force_to_acceleration as force_to_acceleration
+from .cyclostationary import spectral_correlation as spectral_correlation
+from .deconvolution import maximum_correlated_kurtosis as maximum_correlated_kurtosis
+from .deconvolution import minimum_entropy as minimum_entropy
 from .diagnosis.bearing_records import CombinedBearings as CombinedBearings
 from .diagnosis.bearing_records import combine_bearings as combine_bearings
 from .diagnosis.bearing_report import BearingLines as BearingLines

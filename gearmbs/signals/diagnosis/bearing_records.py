@@ -164,10 +164,10 @@ def _together(found: Sequence[tuple[PartFinding, int]]) -> tuple[int, int, int, 
     scatter = float(slips.std()) if slips.size else math.nan
     steady = slips.size >= 2 and scatter <= SAME_SLIP and 2 * slips.size >= len(found)
     accused = steady and chance <= SIGNS_CHANCE and share <= math.log10(MOST_ELSEWHERE)
-    grade = (
-        NONE if not accused else CLEAR if share <= math.log10(CLEAR_ELSEWHERE) and chance <= 2 * SIGNS_CHANCE else SIGNS
-    )
     grades = [one.grade for one, _ in found]
+    sure = share <= math.log10(CLEAR_ELSEWHERE) and chance <= 2 * SIGNS_CHANCE
+    clear = sure or 2 * grades.count(CLEAR) >= len(found)
+    grade = NONE if not accused else CLEAR if clear else SIGNS
     mean = float(slips.mean()) if slips.size else math.nan
     return (
         grades.count(CLEAR), grades.count(SIGNS), len(heard), chance, share, 100 * mean, 100 * scatter, grade

@@ -1,0 +1,102 @@
+"""Zones of vibration severity of industrial machines by ISO 20816-3, from the record of a bearing housing.
+
+The limits are those of its tables for measurements on parts that do not rotate, which have been the same since ISO
+10816-3: RMS values over 10 to 1000 Hz, or from 2 Hz on below 600 rpm.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from gearmbs.signals.conversion import convert
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.given import given_speed
+
+ZONES = "ABCD"
+MEANING = {
+    "A": "as of machines newly put into service",
+    "B": "acceptable without restriction",
+    "C": "not acceptable for long: until it can be mended",
+    "D": "severe enough to do damage",
+}
+
+
+class Limits(NamedTuple):
+    """Upper ends of zones A, B and C: velocity in m/s and displacement in m, RMS."""
+
+    velocity: tuple[float, float, float]
+    displacement: tuple[float, float, float]
+
+
+LIMITS: dict[tuple[int, str], Limits] = {
+    (1, "rigid"): Limits((2.3e-3, 4.5e-3, 7.1e-3), (29e-6, 57e-6, 90e-6)),
+    (1, "flexible"): Limits((3.5e-3, 7.1e-3, 11.0e-3), (45e-6, 90e-6, 140e-6)),
+    (2, "rigid"): Limits((1.4e-3, 2.8e-3, 4.5e-3), (22e-6, 45e-6, 71e-6)),
+    (2, "flexible"): Limits((2.3e-3, 4.5e-3, 7.1e-3), (37e-6, 71e-6, 113e-6)),
+}
+"""By group (1: above 300 kW, or shafts 315 mm high and more; 2: 15 to 300 kW, or 160 to 315 mm) and support."""
+TOP = 1000.0
+"""Hz."""
+SLOW, SLOWEST = 600.0, 120.0
+"""rpm: below the first the band begins at 2 Hz instead of 10; below the second the standard does not apply."""
+
+
+@takes_data()
+def vibration_zones(
+    signal: Any, speed: Any, *, group: Literal[1, 2] = 2, support: Literal["rigid", "flexible"] = "rigid"
+) -> pd.DataFrame:
+    """Return the zone of ISO 20816-3 of each channel.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel) in units of displacement, velocity or acceleration, measured on bearing housings; or
+        whatever `to_signal` makes a signal of, with ``rate``, ``units``, ``channels`` and ``gaps`` as there.
+    speed : float or str
+        Of the shaft, rad/s or text.
+    group : {1, 2}
+        2: 15 to 300 kW, or shafts 160 to 315 mm high; 1: larger ones.
+    support : {"rigid", "flexible"}
+        Rigid if the lowest natural frequency of machine and support in the direction measured is a quarter above the
+        speed.
+
+    Returns
+    -------
+    DataFrame
+        A row for each channel: ``velocity`` (m/s) and ``displacement`` (m), RMS over the band; their zones and the
+        worse of the two, ``zone``; ``meaning``.
+
+    Raises
+    ------
+    SignalError
+        If there are no such tables, the speed is below 120 rpm, or a unit is none of motion.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(100000) / 10000.0
+    >>> table = vibration_zones(3.0 * np.sqrt(2) * np.cos(2 * np.pi * 25 * t), "1500 rpm", rate=10000, units="mm/s")
+    >>> str(table["zone"][0]), round(float(table["velocity"][0]), 4)
+    ('C', 0.003)
+    """
+    if (group, support) not in LIMITS:
+        raise SignalError(f"group, support: there are no limits for {group!r}, {support!r}; give one of {[*LIMITS]}")
+    turning = given_speed(speed)
+    if turning is None:
+        raise SignalError("speed: is not given; pass the shaft's, such as '1500 rpm'")
+    rpm = float(turning) * 30.0 / np.pi
+    if rpm < SLOWEST:
+        raise SignalError(f"speed: {rpm:g} rpm is below {SLOWEST:g} rpm, from which ISO 20816-3 applies")
+    limits, band = LIMITS[group, support], (10.0 if rpm >= SLOW else 2.0, TOP)
+    rows = []
+    for c, name in enumerate(signal["channel"].values):
+        one = signal.isel(channel=[c])
+        levels = {to: float(convert(one, to, band=band, edges="keep").std()) for to in ("velocity", "displacement")}
+        zones = [ZONES[int(np.searchsorted(getattr(limits, to), level))] for to, level in levels.items()]
+        rows.append((str(name), *levels.values(), *zones, max(zones), MEANING[max(zones)]))
+    columns = ["channel", "velocity", "displacement", "velocity_zone", "displacement_zone", "zone", "meaning"]
+    return pd.DataFrame(rows, columns=columns)
