@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,7 +75,9 @@ def measured(campaign: Campaign, layers: SensorLayers) -> Measured:
     data = campaign.open().sel(case=kept["index"].to_numpy())
     first = data[source.places[0][0]].isel(case=0).values[source.places[0][1]]
     duration = layers.longest(int(np.isfinite(first).sum()), source.rate)
-    owners, records = kept[source.group].to_numpy(), kept["index"].to_numpy()
+    # records of equal number in several gearboxes have equal states, and must not have equal noise or drift
+    other = zlib.crc32(source.name.encode()) << 32
+    owners, records = ([other + int(number) for number in kept[name]] for name in (source.group, "index"))
     clean = np.empty((len(kept), len(source.places), round(duration * source.rate)), dtype=np.float32)
     speeds, pulses = [], []
     for k, (specimen, record) in enumerate(zip(owners, records, strict=True)):
