@@ -42,6 +42,29 @@ def test_a_stiffness_is_set():
     np.testing.assert_allclose(sim.solution().input("spring.stiffness"), [400.0, 400.0, 1600.0])
 
 
+def test_a_bushing_is_set_axis_by_axis():
+    """The same as one made with these numbers; what is zero has no name."""
+
+    def held(stiffness, torsional_stiffness, damping):
+        m = Mechanism("block on a bushing")
+        block = m.body("block", mass=4.0, inertia=(1.0, 2.0, 3.0), velocity=(0.1, 0.2, 0.3))
+        block.angular_velocity = (0.0, 0.02, 0.01)
+        i, j = block.marker(name="i"), m.ground.marker(name="j")
+        m.bushing("bush", i, j, stiffness=stiffness, torsional_stiffness=torsional_stiffness, damping=damping)
+        return m
+
+    sim = gm.Simulator(held((100.0, 200.0, 300.0), (50.0, 60.0, 70.0), (0.0, 5.0, 0.0)), 0.5, tol=1e-9)
+    sim.set("bush.stiffness_z", "1 N/mm")
+    sim.set("bush.torsional_stiffness_y", 600.0)
+    sim.set("bush.damping_y", 50.0)
+    sim.advance(0.5)
+    other = held((100.0, 200.0, 1000.0), (50.0, 600.0, 70.0), (0.0, 50.0, 0.0)).simulate(0.5, tol=1e-9)
+    np.testing.assert_allclose(sim.get("com_position", "block"), other.com_position("block")[-1], atol=1e-9)
+    np.testing.assert_allclose(sim.get("orientation", "block"), other.orientation("block")[-1], atol=1e-9)
+    with pytest.raises(ModelError, match=says("bush.damping_x", "bush.damping_y")):
+        sim.set("bush.damping_x", 1.0)
+
+
 def test_a_mesh_is_that_of_a_pair_with_the_same_numbers():
     """What stands in the tables for a stiffness that is set is what a pair made with it has there."""
     m = case_mechanism(gm.Case())

@@ -156,9 +156,12 @@ class MatrixForce(ForceElement):
         used = [axis for axis in range(3) if np.any(self.stiffness[:, 3 + axis])]
         places = [used.index(axis) if axis in used else -1 for axis in range(3)]
         reals = np.concatenate([self.stiffness.ravel(), self.damping.ravel(), self.free, self.preload])
-        return Compiled(
-            matrix_force, places, reals, angles=tuple((axis, self.i, self.j) for axis in used), scratch=WORK
-        )
+        angles = tuple((axis, self.i, self.j) for axis in used)
+        return Compiled(matrix_force, places, reals, angles=angles, scratch=WORK, settings=self._settings())
+
+    def _settings(self) -> dict[str, Setting]:
+        """Return the numbers that have a name of their own."""
+        return {}
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, {self.i.name!r} in the axes of {self.j.name!r})"
@@ -169,9 +172,26 @@ class Field(MatrixForce):
 
 
 class Bushing(MatrixForce):
-    """Springs and dampers along and about the axes of J, BUSHING."""
+    """Springs and dampers along and about the axes of J, BUSHING.
+
+    Its numbers that are not zero are set as ``stiffness_x`` to ``torsional_damping_z``.
+    """
 
     kind = "bushing"
+
+    def _settings(self) -> dict[str, Setting]:
+        units = {
+            "stiffness": "N/m", "torsional_stiffness": "N*m/rad", "damping": "N*s/m", "torsional_damping": "N*m*s/rad",
+        }  # fmt: skip
+        found = {}
+        for k, (name, unit) in enumerate(units.items()):
+            matrix, first = ((self.stiffness, 0), (self.damping, self.stiffness.size))[k // 2]
+            for axis in range(3):
+                place = 3 * (k % 2) + axis
+                if matrix[place, place] != 0.0:
+                    # the diagonal of a matrix of six rows
+                    found[f"{name}_{'xyz'[axis]}"] = Setting(first + 7 * place, unit)
+        return found
 
 
 class Beam(MatrixForce):
