@@ -44,6 +44,7 @@ CONSTANTS = {
         "INDICATORS": "gearmbs.signals.analysis.indicators",
     },
     "gearmbs.bearings": {"DEFECTS": "gearmbs.bearings.defects"},
+    "gearmbs.campaigns.datasets": {"GEARBOXES": "gearmbs.campaigns.datasets.gearboxes"},
     "gearmbs.view": {"COLOURS": "gearmbs.view.figures.style"},
 }
 """Exported values that are no functions or classes, with the module that defines and describes them."""
