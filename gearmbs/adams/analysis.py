@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 
 from gearmbs.adams.builders.mechanism import build_model, part_states, with_initial_motions
 from gearmbs.adams.builders.scopes import MODES, AdamsModel, Present, hold_states
-from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
+from gearmbs.adams.errors import ERROR, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Linear, Simulate
 from gearmbs.adams.parse.deck import Deck
@@ -20,7 +21,7 @@ from gearmbs.adams.results.remarks import Doubt, assembly_of, doubt, faceted_tou
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.sensors import Watch, act, after, equilibria_to_passage, in_unit, parts, renew, take_samples, up_to
-from gearmbs.adams.session import Session, active_sensors, check_linear, is_sequence, output_times
+from gearmbs.adams.session import Session, active_sensors, check_linear, is_sequence, output_times, remark
 from gearmbs.dae.analyses import plant as _plant
 from gearmbs.dae.analyses.kinematics import kinematic
 from gearmbs.dae.analyses.modes import Modes
@@ -289,7 +290,12 @@ def linear(session: Session, command: Linear) -> Modes | LinearPlant:
         if command.statemat:
             return plant_of(session, command, build)
         model = _model(session, (session.time, session.time), MODES["LINEAR"])
-        return linear_modes(model.mechanism, t=time)
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            modes = linear_modes(model.mechanism, t=time)
+        for warning in warned:
+            remark(session, Diagnostic(WARNING, f"LINEAR: {warning.message}", command.file, command.line))
+        return modes
     except (ModelError, ArithmeticError) as error:
         raise failed(session, command, model, error) from error
 

@@ -209,13 +209,14 @@ def _left_out(session: Session, command: Change, messages: list[str], allow_unsu
     if messages and not allow_unsupported:
         raise DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line) for message in messages])
     for message in messages:
-        _remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
+        remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
     return bool(messages)
 
 
-def _remark(session: Session, remark: Diagnostic) -> None:
-    if remark not in session.deck.diagnostics:
-        session.deck.diagnostics.append(remark)
+def remark(session: Session, said: Diagnostic) -> None:
+    """Add a remark to the deck, once."""
+    if said not in session.deck.diagnostics:
+        session.deck.diagnostics.append(said)
 
 
 def output_times(session: Session, command: Simulate) -> np.ndarray:
@@ -296,7 +297,7 @@ def expression_errors(deck: Deck, session: Session, scope: Scope) -> list[Diagno
             message = f"{statement.label()}: {spec.keyword}: {what}"
             if unread:
                 message += "; nothing that is computed here reads it, so it is left out"
-                _remark(session, Diagnostic(WARNING, message, file, line))
+                remark(session, Diagnostic(WARNING, message, file, line))
                 continue
             told |= {what, said}
             found.append(Diagnostic(ERROR, message, file, line))
@@ -324,7 +325,7 @@ def _leave_out(session: Session, request: st.Request, need: str) -> None:
     """Say that a REQUEST is left out with what it asks for."""
     session.unasked.add(request.id)
     message = f"{request.label()}: it needs {need}, which is left out"
-    _remark(session, Diagnostic(UNSUPPORTED, message, session.deck.file, request.line))
+    remark(session, Diagnostic(UNSUPPORTED, message, session.deck.file, request.line))
 
 
 def _absent_data(deck: Deck, text: str) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import os
 import random
 import signal
 import sys
@@ -18,7 +19,9 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from functools import cache
+from pathlib import Path
 
+import gearmbs
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.session import check_script
@@ -60,6 +63,50 @@ SMALL = 3000
 """Characters of a deck that is built and run in some hundredths of a second."""
 RUNNING = 3
 """Place in the corpus of the deck with most kinds of statements that can be run."""
+
+
+TOUCHING = ("open", "os.remove", "os.rename", "os.mkdir", "os.system", "subprocess.Popen", "os.exec", "socket.connect")
+"""What a program does to the world, as Python tells its auditors."""
+_touched: list[str] = []
+_watching = False
+
+
+def _audit(event: str, arguments: tuple) -> None:
+    """Note what is run, and which file is opened, while a deck is carried through.
+
+    Python's own files and the folder of kernels are excepted, and what the deck's folder holds may be read.
+    """
+    if not _watching or event not in TOUCHING or isinstance(arguments[0], int):
+        return
+    own = [sys.prefix, sys.base_prefix, Path(gearmbs.__file__).parent, "/proc", "/dev/null"]
+    own += [os.environ["NUMBA_CACHE_DIR"]] if "NUMBA_CACHE_DIR" in os.environ else []
+    if event == "open" and "w" not in str(arguments[1]):
+        own.append(Path.cwd())
+    place = Path(os.fsdecode(arguments[0])).absolute()
+    if event in TOUCHING[4:] or not any(place.is_relative_to(folder) for folder in own):
+        _touched.append(f"{event} {arguments[0]}")
+
+
+sys.addaudithook(_audit)
+
+
+@contextlib.contextmanager
+def watched() -> Iterator[None]:
+    """Refuse that a deck touches a file, a process or a connection.
+
+    Raises
+    ------
+    AssertionError
+    """
+    global _watching
+    _touched.clear()
+    _watching = True
+    try:
+        yield
+    finally:
+        _watching = False
+    if _touched:
+        raise AssertionError(f"a deck touches {', '.join(_touched)}")
 
 
 class Slow(Exception):
@@ -201,7 +248,7 @@ def outcome(seed: int, share: float, seconds: float = SECONDS, mild: bool = Fals
     """Carry the deck of a seed through; return what came of it, a traceback if it failed."""
     deck, script, rng, run = case(seed, share, mild)
     try:
-        with limited(seconds), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        with watched(), limited(seconds), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("error")
             return carried_through(deck, script, rng, run)
     except Slow as late:

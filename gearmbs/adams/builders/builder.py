@@ -341,7 +341,11 @@ class Builder:
             if acts(system, self.inactive):
                 self.attempt(system, self.add_state_system)
         for sensor in self.active(st.Sensor):
-            m.algebraic_state(sensor_state(sensor.id), self.text(sensor.function or "0"))
+            self.attempt(sensor, self.add_sensor)
+
+    def add_sensor(self, sensor: st.Sensor) -> None:
+        """SENSOR: its function is followed as a state of its own."""
+        self.mechanism.algebraic_state(sensor_state(sensor.id), self.text(sensor.function or "0"))
 
     def add_curve(self, curve: st.CurveStatement) -> None:
         """Add a curve by its length, and one by a routine by its own parameter, too."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.builders.flexible import LOADS, flexible_body
+from gearmbs.adams.builders.machinery import add_gears
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
@@ -60,7 +61,10 @@ def add_vtorque(b: Builder, s: st.Vtorque) -> None:
 
 
 def add_gforce(b: Builder, s: st.Gforce) -> None:
-    """GFORCE."""
+    """GFORCE; a gear force becomes the contact of the pair that was given for it."""
+    if s.gears is not None:
+        add_gears(b, s, s.gears)
+        return
     _components(b, s, "gforce")
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.forces import bind_mforce
+from gearmbs.adams.builders.machinery import is_gear_force, is_pair
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall, callable_with_call
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -213,6 +214,8 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
         if missing:
             word, are = ("routine", "is") if len(missing) == 1 else ("routines", "are")
             message = f"{statement.label()}: its {word} {', '.join(missing)} {are} missing; give it in routines"
+            if is_gear_force(statement):
+                message += f', as a gear force of ADAMS/Machinery its wheels: {{"{statement.label()}": GearPair(...)}}'
             problems.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.line))
             if group.pop(statement.id, None) is not None:
                 gone.append(statement)
@@ -239,8 +242,10 @@ def _wrong(deck: Deck, statement: st.Statement, error: ValueError) -> Diagnostic
     return Diagnostic(ERROR, f"{statement.label()}: its routine {error}", deck.file, statement.line)
 
 
-def load_routines(path: str | Path) -> dict[str, Routine]:
-    """Return the functions that a Python file defines, by name, as routines; it may import what stands beside it.
+def load_routines(path: str | Path) -> dict[str, Any]:
+    """Return what a Python file defines for USER(...), by name: functions, and pairs for gear forces.
+
+    It may import what stands beside it.
 
     Raises
     ------
@@ -255,7 +260,7 @@ def load_routines(path: str | Path) -> dict[str, Routine]:
         raise ValueError(f"{path}: {type(error).__name__}: {error}") from error
     finally:
         sys.path.remove(str(path.resolve().parent))
-    found: dict[str, Routine] = {k: v for k, v in space.items() if k[0] != "_" and _defined_here(v)}
+    found = {k: v for k, v in space.items() if k[0] != "_" and (_defined_here(v) or is_pair(v))}
     if not found:
         raise ValueError(f"{path}: it defines no functions; write for example def sfosub(call): ...")
     return found
@@ -281,7 +286,9 @@ class _Use:
         """Return the names under which the routine is looked for."""
         own = [self.given.strip("\"' ").rpartition("::")[2].upper()] if self.given else []
         label = self.statement.label()
-        return [f"{label}/EVALUATE" if self.routine == EVALUATED else label, *own, self.routine]
+        if self.routine == EVALUATED:
+            return [f"{label}/EVALUATE", *own, self.routine]
+        return [label, *own, self.routine, label.replace("/", "_")]
 
 
 def _uses(s: st.Statement) -> Iterator[_Use]:
@@ -311,9 +318,9 @@ def _user_call(text: str | None) -> Call | None:
     return node if isinstance(node, Call) and node.name == "USER" else None
 
 
-def _found(use: _Use, known: Mapping[str, Any]) -> tuple[dict[str, Routine], list[str]]:
+def _found(use: _Use, known: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Return the routines of a statement by part ("" for the only one), and the names of those that are missing."""
-    found: dict[str, Routine] = {}
+    found: dict[str, Any] = {}
     missing = []
     s = use.statement
     wanted: Iterable[tuple[str, list[str]]] = [("", use.names())]
@@ -324,6 +331,8 @@ def _found(use: _Use, known: Mapping[str, Any]) -> tuple[dict[str, Routine], lis
             known = {**known, **{f"{s.label()}.{part}".upper(): routine for part, routine in own.items()}}
     for part, names in wanted:
         routine = next((known[name] for name in names if name in known), None)
+        if isinstance(s, st.Gforce) and is_pair(routine):
+            return {"": routine}, []
         if routine is not None and not callable(routine):
             raise ValueError(f"is {routine!r}, which cannot be called")
         if routine is not None:
@@ -333,8 +342,10 @@ def _found(use: _Use, known: Mapping[str, Any]) -> tuple[dict[str, Routine], lis
     return found, missing
 
 
-def _with_function(deck: Deck, s: st.Statement, use: _Use, found: Mapping[str, Routine]) -> Any:
+def _with_function(deck: Deck, s: st.Statement, use: _Use, found: Mapping[str, Any]) -> Any:
     """Return a statement whose results are calls of functions that the deck then has."""
+    if isinstance(s, st.Gforce) and is_pair(found[""]):
+        return replace(s, function=None, fx="0", gears=found[""])
     parameters = tuple(_number(a) for a in use.call.args)
     if type(s) in BINDERS:
         return BINDERS[type(s)](deck, s, parameters, found)

@@ -14,6 +14,7 @@ is left, so that nothing moves differently. With the force F and the torque N of
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -498,7 +499,10 @@ def split_off(mechanism: Mechanism, name: str, marker: Marker) -> tuple[Joint, f
     inertia = SHARE * least
     rest = body.mass - mass
     shift = -mass / rest * arm
-    body.inertia = body.inertia - inertia * np.eye(3) - steiner(mass, arm) - steiner(rest, shift)
+    with warnings.catch_warnings():
+        # of a thin plate the rest may be thinner still; the body as it was has been looked at
+        warnings.simplefilter("ignore")
+        body.inertia = body.inertia - inertia * np.eye(3) - steiner(mass, arm) - steiner(rest, shift)
     body.mass = rest
     body.com = body.com + shift
     origin = marker.global_position()

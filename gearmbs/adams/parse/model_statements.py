@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from gearmbs.adams.parse.grammar import (
     CHOICE,
@@ -20,6 +21,9 @@ from gearmbs.adams.parse.grammar import (
     Statement,
     arg,
 )
+
+if TYPE_CHECKING:
+    from gearmbs.gears import GearPair
 
 # `arg` returns a dataclass field; the linter takes it for a default value
 # ruff: noqa: RUF009
@@ -260,7 +264,9 @@ class Vtorque(Acting, entity="VTorque", subroutine="VTOSUB", results="tx ty tz")
 
 @dataclass(frozen=True)
 class Gforce(Vtorque, Vforce, entity="GForce", subroutine="GFOSUB", results="fx fy fz tx ty tz"):
-    """GFORCE: force and torque components along the axes of RM."""
+    """GFORCE: force and torque components along the axes of RM; ``gears`` is a pair in place of a gear force."""
+
+    gears: GearPair | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -189,7 +189,7 @@ def _unresisted(reduced: Reduced, values: np.ndarray, vectors: np.ndarray) -> np
             force = force + reduced.state_force @ np.linalg.lstsq(rates, driven, rcond=None)[0]
         kinetic = float(x @ inertia)
         # forces at right angles to the motion have no energy; rounding of stiff parts is larger in them
-        beside = float(np.abs(force).max()) <= np.sqrt(UNRESISTED) * float(np.abs(inertia).max())
+        beside = float(np.abs(force).max(initial=0.0)) <= np.sqrt(UNRESISTED) * float(np.abs(inertia).max(initial=0.0))
         out[k] = kinetic > 0.0 and abs(float(x @ force)) <= UNRESISTED * kinetic and beside
     return out
 
