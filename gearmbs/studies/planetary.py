@@ -64,7 +64,7 @@ class PlanetaryRun(Described):
     settling: Time = 0.03
     duration: Annotated[Quantity, Measure("time", above=0)] = 0.2
     rate: Annotated[Quantity, Measure("frequency", above=0)] = 12_800.0
-    tolerance: Annotated[Quantity, Measure(above=0)] = 3e-7
+    tolerance: Annotated[Quantity, Measure(above=0)] = 3e-8
     supports: Mapping[str, Any] = field(default_factory=dict)
     pins: Support | PinBearing | None = None
     rim: ElasticRim | None = None

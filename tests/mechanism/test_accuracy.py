@@ -5,7 +5,7 @@ import pytest
 
 from gearmbs.gears import GearPair, planetary, planetary_mechanism
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.solve.accuracy import DEFORMING, MESHING, TOLERANCE, chosen_accuracy, meshing_rate
+from gearmbs.mechanism.solve.accuracy import JOINED, MESHING, TOLERANCE, chosen_accuracy, meshing_rate
 from gearmbs.studies import Case
 from gearmbs.studies.run.rig import flexible_rig, gear_rig
 from gearmbs.studies.run.simulation import case_mechanism, simulate_case
@@ -23,7 +23,7 @@ def test_the_scale_is_that_of_the_mesh_by_every_door():
     mesh = 29 * 1000 * np.pi / 30
     assert chosen(gear_rig(pair, **rig)) == (MESHING, pytest.approx(mesh))
     # the wheels are on bodies that deform
-    assert chosen(flexible_rig(pair, **rig)) == (DEFORMING, pytest.approx(mesh))
+    assert chosen(flexible_rig(pair, **rig)) == (JOINED, pytest.approx(mesh))
     # of a curve the highest speed
     curve = gear_rig(pair, speed=[("0 s", "300 rpm"), ("0.1 s", "1000 rpm")], torque="100 N m", run_up=0.02)
     assert chosen(curve)[1] == pytest.approx(mesh, rel=1e-2)
@@ -33,7 +33,7 @@ def test_planets_know_the_frequency_of_their_meshes():
     gears = planetary((24, 30, 84), "1.5 mm", 3)
     driven = planetary_mechanism(gears, speeds={"carrier": 10.0}, torques={"sun": "-11 N m"})
     # the ring is held: its teeth pass the carrier's planets at 84 times its speed, as those of the sun do
-    assert chosen(driven) == (MESHING, pytest.approx(840.0))
+    assert chosen(driven) == (JOINED, pytest.approx(840.0))
     free = planetary_mechanism(gears, speeds={"carrier": 10.0}, torques={"sun": "-11 N m"}, held=None)
     assert chosen(free) == (TOLERANCE, 1.0)
 

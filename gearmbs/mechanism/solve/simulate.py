@@ -183,8 +183,8 @@ def simulate(
     formulation : {"SI2", "SI1", "I3"}
     tol : float
         Local error allowed a step: in metres or radians and their rates for lengths of the order of 1 m; lengths are
-        scaled by the size of the mechanism. Default 1e-6, with wheels in mesh whose speed is known 1e-7, on
-        bodies that deform 3e-8.
+        scaled by the size of the mechanism. Default 1e-6, with wheels in mesh whose speed is known 1e-7, with
+        several meshes or bodies that deform 3e-8.
     rate_scale : float
         Velocities are allowed an error this many times larger (1/s) than positions: the angular frequency of the
         motion one is interested in; 1 is ADAMS's practice. Default the mechanism's, or that of its fastest mesh as far
