@@ -321,3 +321,15 @@ def test_a_tacho_beside_a_speed_is_no_vibration_and_alone_is_named():
     report = gm.analyse(signal.sel(channel=["a", "tacho"]))
     assert list(report.levels["channel"].values) == ["a"]
     assert any("--tacho" in note for note in report.notes)
+
+
+def test_a_ramp_with_a_unit_of_its_own_is_no_clock(tmp_path):
+    """A torque that rises evenly in the first column: the rate is asked for; without a unit it would be the time."""
+    path = tmp_path / "ramp.csv"
+    rows = [f"{5.0 * k / COUNT:.6f},{a}" for k, a in enumerate(A1)]
+    path.write_text("\n".join(["torque [N m],a [m/s^2]", *rows]))
+    with pytest.raises(MissingMetadataError, match=says("rate", "ramp.csv")):
+        read_signal(path)
+    signal = read_signal(path, rate=RATE)
+    assert list(signal["channel"].values) == ["torque", "a"]
+    assert signal.attrs["sampling_rate"] == RATE

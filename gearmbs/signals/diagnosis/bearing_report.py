@@ -408,7 +408,7 @@ class BearingReport(Shown):
             return []
         table = self.stability
         answers = [
-            "none" if part is None else f"{part} of {bearing}" for bearing, part in zip(table.bearing, table.part)
+            "none" if pd.isna(part) else f"{part} of {bearing}" for bearing, part in zip(table.bearing, table.part)
         ]
         own = answers[len(answers) // 2]
         others = [

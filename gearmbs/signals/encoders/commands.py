@@ -132,10 +132,18 @@ def _read(path: Path, lines: Any, columns: Any, **known: Any) -> dict[str, Pulse
 
 
 def _both(path: Path, **known: Any) -> tuple[PulseTrain, PulseTrain]:
-    trains = list(_read(path, **known).values())
-    if len(trains) < 2:
-        raise ValueError(f"{path}: holds {len(trains)} of the two encoders; name their columns with --columns A,B")
-    return trains[0], trains[1]
+    from gearmbs.signals.encoders.result import SHAFTS
+
+    trains = _read(path, **known)
+    if known.get("columns") is None and set(SHAFTS) <= trains.keys():
+        return trains[SHAFTS[0]], trains[SHAFTS[1]]
+    if len(trains) != 2:
+        raise ValueError(
+            f"{path}: holds {len(trains)} columns of pulses, {list(trains)}; name the driver's and the driven shaft's "
+            "with --columns A,B"
+        )
+    first, second = trains.values()
+    return first, second
 
 
 def _one(path: Path, name: str, shaft: int, **known: Any) -> PulseTrain:

@@ -105,16 +105,17 @@ def read_pulses(
     format, content = checked_format(path, None)
     with damage_named(path, format):
         # empty cells end columns that are shorter: they are kept here
-        record = format_of(format).read(path, Asked(content=content, rate=1.0, gaps="longest", progress=progress))
+        asked = Asked(content=content, rate=1.0, gaps="longest", progress=progress, pulses=True)
+        record = format_of(format).read(path, asked)
     table = dict(zip(record.names, record.values.T))
     units = dict(zip(record.names, record.units))
     told: dict[str, dict[str, Any]] = record.attrs.get(KNOWN, {})
-    asked = list(lines) if isinstance(lines, Mapping) else list(told) or [n for n in table if not n.endswith(INDEX)]
-    missing = [name for name in asked if name not in table]
+    wanted = list(lines) if isinstance(lines, Mapping) else list(told) or [n for n in table if not n.endswith(INDEX)]
+    missing = [name for name in wanted if name not in table]
     if missing:
         raise SignalFileError(path, f"has no column {missing[0]!r}; it holds {record.names}")
     found = {}
-    for name in asked:
+    for name in wanted:
         about = told.get(name, {})
         count = lines[name] if isinstance(lines, Mapping) else lines or about.get("lines")
         if count is None:
@@ -144,6 +145,8 @@ def _present(column: np.ndarray) -> np.ndarray:
 def _factor(unit: str, clock: Quantity | None, given: str | None, path: Path) -> float | None:
     """Return the seconds of a unit of a column, or None of a sampled voltage."""
     key = unit.strip().lower()
+    if given is not None and clock is not None:
+        raise SignalError(f"unit: {given!r} is one of times, clock={clock!r} one of counts; give one of them")
     if given is not None and key in ("", "unknown"):
         if given not in SECONDS:
             raise SignalError(f"unit: must be one of s, ms, us and ns, got {given!r}")

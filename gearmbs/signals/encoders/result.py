@@ -318,9 +318,11 @@ class MeasuredTransmissionError(Shown):
                 out = teeth[teeth["stands_out"]]
                 words = ", ".join(f"{t} ({1e6 * e:+.2f} um)" for t, e in zip(out["tooth"], out["error"]))
                 within = 1e6 * float(teeth["within"].iloc[0])
+                counted = "" if self.referenced[_shaft(shaft)] else ", counted from where the record begins"
                 parts += [
                     "",
-                    f"Teeth of the {shaft} that stand out{title}: {words or 'none'} (known to {within:.2g} um).",
+                    f"Teeth of the {shaft} that stand out{title}{counted if words else ''}: {words or 'none'} (known to "
+                    f"{within:.2g} um).",
                 ]
         if self.refused:
             parts += ["", "## What these encoders cannot show", "", *(f"- {text}" for text in self.refused)]

@@ -87,9 +87,16 @@ def _open_text(path: Path, packed: bool):
 
 
 def read_csv(
-    path: Path, packed: bool, progress: Progress | None = None, rate: float | None = None, gaps: str | None = None
+    path: Path,
+    packed: bool,
+    progress: Progress | None = None,
+    rate: float | None = None,
+    gaps: str | None = None,
+    pulses: bool = False,
 ) -> Record:
     """Read a text table; `packed` for gzip. A known `rate` (Hz) stands in for times that are only rounded.
+
+    Of ``pulses`` a first column that rises evenly is one as the others.
 
     Raises
     ------
@@ -99,6 +106,8 @@ def read_csv(
     """
     with _damage_named(path):
         layout = _layout(path, packed)
+        if pulses and layout.index is not None and layout.names[layout.index].strip().lower() not in INDEX_NAMES:
+            layout = replace(layout, index=None)
         times = Times(layout, path)
         blocks: list[np.ndarray] = []
         clocks: list[np.ndarray | None] = []
@@ -405,7 +414,7 @@ def _format(packed: bool, contents: dict[str, Content], also: tuple[str, ...] = 
     def read(path: Path, asked: Asked) -> Record:
         if asked.content == "lvm":
             return read_lvm(path, asked.rate)
-        return read_csv(path, packed, asked.progress, asked.rate, asked.gaps)
+        return read_csv(path, packed, asked.progress, asked.rate, asked.gaps, asked.pulses)
 
     def pieces(path: Path, asked: Asked) -> Iterator[tuple[Record, float]] | None:
         return None if asked.content == "lvm" else csv_pieces(path, packed, asked.rate, asked.gaps)

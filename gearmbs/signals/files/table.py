@@ -102,6 +102,8 @@ class Asked:
         "refuse", "interpolate" or "longest"; see `read_signal`.
     progress : callable, optional
         Called as progress(fraction, "reading").
+    pulses : bool
+        Whether columns hold times of pulses: then one that rises evenly is no time of the others.
     """
 
     content: str
@@ -109,6 +111,7 @@ class Asked:
     rate: float | None = None
     gaps: str | None = None
     progress: Progress | None = None
+    pulses: bool = False
 
 
 @dataclass(frozen=True)

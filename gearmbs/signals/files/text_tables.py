@@ -113,11 +113,13 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
     stamps = tuple(i for i, kind in enumerate(kinds) if kind in ("stamp", "date", "clock"))
     empty = tuple(i for i, kind in enumerate(kinds) if kind == "gap" and i == width - 1 and not names[i].strip())
     clock = stamps[0] if stamps else next((i for i, n in enumerate(names) if is_clock(n)), None)
-    if clock is None and width > 1 and units[0].lower() in TIME_UNITS and role_of(names[0], units[0]) is None:
-        # an abscissa, whatever it is called
+    times = [unit.lower() in TIME_UNITS for unit in units]
+    if clock is None and width > 1 and times[0] and sum(times) == 1 and role_of(names[0], units[0]) is None:
+        # an abscissa, whatever it is called; several columns of times are those of pulses
         clock = 0
     numbers = bool(labels) and names[0].strip().lower() in INDEX_NAMES
-    index = 0 if width > 1 and not stamps and (numbers or clock is None) else None
+    unnamed = units[0].lower() in ("", UNKNOWN_UNITS) and sum(times) < 2
+    index = 0 if width > 1 and not stamps and (numbers or (clock is None and unnamed)) else None
     clock = clock if width - len(stamps) > (0 if stamps else 1) else None
     return CsvLayout(
         first,

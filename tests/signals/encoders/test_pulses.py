@@ -109,6 +109,44 @@ def test_files_give_the_trains_back(ending, tmp_path):
         assert found[name].referenced
 
 
+@pytest.mark.parametrize("unit", ["s", "ms", "us"])
+def test_pulses_at_a_steady_speed_are_no_clock(unit, tmp_path):
+    """Times that rise evenly, in one, two or three columns of text: each is a train of its own."""
+    scale = {"s": 1.0, "ms": 1e3, "us": 1e6}[unit]
+    even = {f"shaft {k}": 0.01 * k + np.arange(64 * 40) / (64.0 * (20.0 + k)) for k in range(3)}
+    for count in (1, 2, 3):
+        names = list(even)[:count]
+        table = pd.DataFrame({f"{name} [{unit}]": scale * even[name] for name in names})
+        table.to_csv(tmp_path / "even.csv", index=False)
+        found = read_pulses(tmp_path / "even.csv", 64)
+        assert list(found) == names
+        for name in names:
+            np.testing.assert_allclose(found[name].times, even[name], rtol=1e-12)
+    assert len(read_pulses(tmp_path / "even.csv", {"shaft 1": 64})) == 1
+    table.columns = list(even)
+    table.to_csv(tmp_path / "bare.csv", index=False)
+    np.testing.assert_allclose(read_pulses(tmp_path / "bare.csv", 64, unit=unit)["shaft 0"].times, even["shaft 0"])
+    with pytest.raises(SignalError, match=says("'ms'", "'20 MHz'", "clock")):
+        read_pulses(tmp_path / "bare.csv", 64, unit="ms", clock="20 MHz")
+
+
+def test_encoders_are_taken_by_their_names(tmp_path):
+    """Of three columns two have to be named; driver and driven are taken by name, whatever their order."""
+    even = {name: np.arange(64 * 60) / (64.0 * speed) for name, speed in (("driven", 15.0), ("driver", 20.0))}
+    for extra in ({}, {"far end": even["driven"]}):
+        table = pd.DataFrame({f"{name} [s]": column for name, column in {**even, **extra}.items()})
+        table.to_csv(tmp_path / "run.csv", index=False)
+        words = ["transmission-error", str(tmp_path / "run.csv"), "--teeth", "15,20", "--base-radius", "20 mm"]
+        done = CliRunner().invoke(app, [*words, "--lines", "64,64"])
+        assert done.exit_code == 0, done.output
+        assert "Driver 1200.0 rpm" in done.output
+    table.columns = ["a [s]", "b [s]", "c [s]"]
+    table.to_csv(tmp_path / "run.csv", index=False)
+    done = CliRunner().invoke(app, [*words, "--lines", "64,64"])
+    assert done.exit_code != 0
+    assert "--columns" in done.output
+
+
 def test_counts_and_voltages_are_read_as_pulses(tmp_path):
     train = encoder(steady(), 32, index=True)
     counts = pd.DataFrame({"A [ticks]": np.round(train.times * 20e6)})
