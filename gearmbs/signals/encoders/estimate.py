@@ -93,4 +93,5 @@ def amplitude_interval(size: float, variance: float, freedom: float, probability
         far = x + 4.0 * reach
         low_enough = beyond(0.0, target) <= 0.0
         ends.append(0.0 if low_enough else sd * optimize.brentq(beyond, 0.0, far, args=(target,), xtol=1e-6))
-    return ends[0], ends[1]
+    # of a line weaker than noise would be in all but few records the upper end is zero: it holds the measured one still
+    return ends[0], max(ends[1], size)
