@@ -222,6 +222,7 @@ class Campaign:
             Names; default all. Others are not read: of a million cases three columns take some seconds.
         where : str, optional
             A condition such as ``"status == 'done' and orders.line_of_action.2 > 30"``, as constraints are written.
+            Rows of the cases that fit have the numbers of these cases as their index.
 
         Raises
         ------

@@ -221,6 +221,7 @@ def test_columns_and_conditions(tmp_path):
     assert found.equals(whole[["y", "x2"]])
     some = campaign.read(["index"], "status == 'done' and x1 > 0.5")
     assert list(some["index"]) == list(whole["index"][whole.x1 > 0.5])
+    assert campaign.read(["y"], "x1 > 0.5").equals(whole.loc[whole.x1 > 0.5, ["y"]])
     assert campaign.read(where="x1 > 9").empty
     assert campaign.failed().empty
     with pytest.raises(CampaignError, match=says("columns", "nope", "x1")):

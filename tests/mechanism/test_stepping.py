@@ -141,6 +141,24 @@ def test_branches_from_states_of_one_run(model, records):
     np.testing.assert_array_equal(other.state().y, passed[19])
 
 
+def test_a_state_brings_no_tolerance_and_no_order():
+    """A run that goes on from a loose one has its own tolerance and largest order, as one that began with them."""
+    state = advanced(slider_crank(), (0.0, 0.3), tol=1e-4).state()
+    exact = slider_crank().simulate(1.0, t_eval=[0.3, 1.0], tol=1e-11, initial=state)
+
+    def error(run):
+        off = run.com_position("block") - exact.com_position("block")
+        return float(np.abs(off[-1]).max())
+
+    loose, tight = (slider_crank().simulate(1.0, t_eval=[0.3, 1.0], tol=tol, initial=state) for tol in (1e-4, 1e-9))
+    assert tight.stats.steps > 2 * loose.stats.steps
+    assert error(tight) < 1e-2 * error(loose)
+    low, usual = (
+        slider_crank().simulate(1.0, t_eval=[0.3, 1.0], tol=1e-7, initial=state, max_order=k) for k in (1, 6)
+    )
+    assert low.stats.steps > 5 * usual.stats.steps
+
+
 def test_branches_with_inputs():
     """A branch with another input leaves nothing behind in the state that it began in."""
     m = disc(0.0)

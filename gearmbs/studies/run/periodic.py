@@ -296,9 +296,14 @@ class PeriodicRecorder:
 
 
 def signal_stop(case: Case, span: Span) -> float:
-    """Return until when the acceleration of a record that repeats itself is told, s."""
-    turn = case.gears.teeth[0] / case.mesh_frequency
-    return span.start + max(SIGNAL_TURNS, math.ceil((span.stop - span.start) / turn - 1e-9)) * turn
+    """Return until when the acceleration of a record that repeats itself is told, s.
+
+    These are whole records, lest one fault more than its share were among them, and whole turns of the driver too where
+    that takes no more than twice as many.
+    """
+    teeth, length = case.gears.teeth[0], max(1, round((span.stop - span.start) * case.mesh_frequency))
+    meshes, both = (math.ceil(SIGNAL_TURNS * teeth / step) * step for step in (length, math.lcm(length, teeth)))
+    return span.start + (both if both <= 2 * meshes else meshes) / case.mesh_frequency
 
 
 def reach(case: Case, span: Span) -> float:

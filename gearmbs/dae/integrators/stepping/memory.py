@@ -40,7 +40,7 @@ OWN = {
     "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one", "entry_row", "entry_col", "idata",
     "rdata", "stops", "outputs", "y_out", "yp_out", "kept", "kept_out", "record_t", "record_h", "record_order",
     "record_y", "g_new", "g_between", "event_direction", "event_action", "crossing_t", "crossing_event", "crossing_y",
-    "watched",
+    "watched", "w_error", "w_newton",
 }  # fmt: skip
 """Arrays of a run that are its own, or scratch, or follow from the state."""
 ARRAYS = tuple(name for name in RunState.array_members if name not in OWN)
@@ -269,6 +269,7 @@ def put_memory(run: Remembers, history: History) -> tuple[Pivots, LastStep]:
         setattr(st, name, int(value) if RunState.scalar_members[name] != "f8" else value)
     for name, value in zip(PART_SCALARS, numbers["part"].tolist(), strict=True):
         setattr(part, name, int(value) if type(part).scalar_members[name] != "f8" else value)
+    st.order = min(int(st.order), int(st.max_order))
     st.next_stop = int(np.searchsorted(st.stops, st.t, side="right"))
     run.repivots, run.first_pivots = map(int, numbers["counts"])
     run.plan, run.factors, run.started = plan, factors, True
