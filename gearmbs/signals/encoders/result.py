@@ -321,8 +321,8 @@ class MeasuredTransmissionError(Shown):
                 counted = "" if self.referenced[_shaft(shaft)] else ", counted from where the record begins"
                 parts += [
                     "",
-                    f"Teeth of the {shaft} that stand out{title}{counted if words else ''}: {words or 'none'} (known to "
-                    f"{within:.2g} um).",
+                    f"Teeth of the {shaft} that stand out{title}{counted if words else ''}: {words or 'none'} "
+                    f"(known to {within:.2g} um).",
                 ]
         if self.refused:
             parts += ["", "## What these encoders cannot show", "", *(f"- {text}" for text in self.refused)]
