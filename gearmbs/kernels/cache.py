@@ -51,6 +51,12 @@ _parts: dict[str, Any] = {}
 # what a kernel is made of
 
 
+def target() -> tuple[str, str]:
+    """Return name and instructions of the processor that kernels are made for."""
+    _, name, features = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+    return name, features
+
+
 @functools.cache
 def setting() -> str:
     """Return what all kernels of a process depend on."""

@@ -16,13 +16,13 @@ CASES = {
     "skew": Case(operation=SHORT, fault={"misalignment": "1 deg", "plane": "skew"}),
     "inclination": Case(operation=SHORT, fault={"misalignment": "1 deg", "plane": "inclination"}),
 }
-"""The cases whose levels are stored; other friction and tolerances stand for the same case."""
+"""The cases whose levels are stored; other friction and tolerances, and lumped bodies, stand for the same case."""
 
 
 def with_friction(case: Case, node: float) -> Case:
     """Return a case with the friction of a node: from -1, the lowest, to 1, the highest."""
     dynamic = FRICTION[1] * (FRICTION[2] / FRICTION[1]) ** node
-    return case.changed(friction={"static": 2.0 * dynamic, "dynamic": dynamic}, solver={"tolerance": 1e-8})
+    return case.changed(friction={"static": 2.0 * dynamic, "dynamic": dynamic}, solver={"tolerance": 1e-8, "lump": False})
 
 
 def run_stored(case: Case, *args, **kwargs) -> xr.Dataset:

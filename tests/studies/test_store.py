@@ -246,6 +246,8 @@ def test_a_record_on_bearings_is_told_from_one_on_joints(tmp_path):
     assert told["bearing 1 a"]["defects"] == []
     assert told["bearing 2 b"]["defects"][0]["width"] == pytest.approx(1e-3)
     write_dataset(tmp_path / "one.nc", run_case(case, False))
+    assert stored_record(tmp_path, case) is None  # nothing says what code it is of
+    RecordFolder(tmp_path).enter(case, run_case(case, False))
     assert stored_record(tmp_path, case) is not None
     # a solution does not know its mechanism; whoever evaluates it says so
     solution = simulate_case(case, False, mechanism=m)

@@ -350,13 +350,14 @@ def _check(known: Mapping[str, str]) -> str:
 @functools.cache
 def processor() -> str:
     """Return the processor that kernels are made for, with its instructions as a digest."""
-    try:
-        from llvmlite import binding
+    from gearmbs.kernels import PLAIN
 
-        name = os.environ.get("NUMBA_CPU_NAME") or binding.get_host_cpu_name()
-        features = os.environ.get("NUMBA_CPU_FEATURES") or binding.get_host_cpu_features().flatten()
-    except (ImportError, RuntimeError):
+    if PLAIN:
+        # what the compiler finds out is told by private parts only
         return platform.processor() or platform.machine()
+    from gearmbs.kernels.cache import target
+
+    name, features = target()
     return f"{name} {hashlib.sha256(features.encode()).hexdigest()[:8]}"
 
 
