@@ -67,7 +67,7 @@ def read_table(
         known_names = folder.unit_table(done[0]).column_names
         raise CampaignError(f"columns: {', '.join(missing)} unknown; the table has {', '.join(known_names)}")
     found = table.to_pandas(self_destruct=True).sort_values("index", ignore_index=True)
-    if where is not None:
+    if where is not None and units is None:
         # rows go by the numbers of their cases, so that they join with those of other columns
         found = found.set_axis(found["index"].to_numpy(), axis=0)
     return found if wanted is None else found[wanted]

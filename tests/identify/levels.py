@@ -22,7 +22,8 @@ CASES = {
 def with_friction(case: Case, node: float) -> Case:
     """Return a case with the friction of a node: from -1, the lowest, to 1, the highest."""
     dynamic = FRICTION[1] * (FRICTION[2] / FRICTION[1]) ** node
-    return case.changed(friction={"static": 2.0 * dynamic, "dynamic": dynamic}, solver={"tolerance": 1e-8, "lump": False})
+    solver = {"tolerance": 1e-8, "lump": False}
+    return case.changed(friction={"static": 2.0 * dynamic, "dynamic": dynamic}, solver=solver)
 
 
 def run_stored(case: Case, *args, **kwargs) -> xr.Dataset:
