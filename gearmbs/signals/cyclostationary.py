@@ -31,7 +31,7 @@ FEWEST_BLOCKS = 16
 
 @takes_data(highest="frequency")
 def spectral_correlation(signal: Any, highest: float, *, segment: int = 256, channel: str | None = None) -> xr.Dataset:
-    """Return the spectral correlation and coherence of one channel by the fast algorithm of Antoni et al. [1]_.
+    """Return the spectral correlation and coherence of one channel by the fast algorithm of Antoni et al.
 
     Parameters
     ----------

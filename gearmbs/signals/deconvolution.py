@@ -34,7 +34,7 @@ LOADING = 1e-9
 
 @takes_data()
 def minimum_entropy(signal: Any, *, length: int = LENGTH, rounds: int = ROUNDS) -> xr.DataArray:
-    """Return each channel through the filter that makes its kurtosis highest [1]_.
+    """Return each channel through the filter that makes its kurtosis highest (Endo and Randall).
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def minimum_entropy(signal: Any, *, length: int = LENGTH, rounds: int = ROUNDS) 
 def maximum_correlated_kurtosis(
     signal: Any, period: float, *, shifts: int = 1, length: int = LENGTH, rounds: int = ROUNDS
 ) -> xr.DataArray:
-    """Return each channel through the filter that makes its correlated kurtosis at a period highest [2]_.
+    """Return each channel through the filter that makes its correlated kurtosis at a period highest (McDonald et al.).
 
     Parameters
     ----------
