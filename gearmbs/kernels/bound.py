@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from itertools import count
+from threading import Lock
 from typing import Any, NamedTuple
 from uuid import uuid4
 
@@ -138,6 +139,9 @@ def _bind(residual, jacobian, hook, events):
     return Functions(residual, jacobian, hook, events)
 
 
+_binding = Lock()
+
+
 class FourFunctions(NamedTuple):
     """The functions themselves: what is bound is counted by each compiled function that is handed it."""
 
@@ -156,7 +160,9 @@ def unbound(functions):
 @lru_cache(maxsize=BOUND)
 def bind(residual, jacobian, hook, events):
     """Return the four compiled functions bound together, the same object for the same functions."""
-    return _bind(residual, jacobian, hook, events)
+    # numba finds out types of functions with tables that only one thread at a time may fill
+    with _binding:
+        return _bind(residual, jacobian, hook, events)
 
 
 @njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
