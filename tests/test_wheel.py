@@ -128,7 +128,7 @@ def test_every_command(environment):
     """The script is installed, and every command of it can tell what it does."""
     script = environment / "venv" / "bin" / "gearmbs"
     listed = "from gearmbs.cli import app; print(*(c.name or c.callback.__name__ for c in app.registered_commands))"
-    commands = run(script.with_name("python"), "-c", listed, folder=environment).split()
+    commands = run(script.with_name("python"), "-c", listed, folder=environment).replace("_", "-").split()
     assert {"paper", "run", "analyse", "compare", "adams"} <= set(commands)
     assert run(script, "--version", folder=environment).startswith("gearmbs ")
     for command in commands:
