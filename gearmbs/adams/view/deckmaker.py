@@ -13,28 +13,13 @@ from gearmbs.adams.errors import UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse.grammar import RawStatement
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.model import DEGREE, PARTS, Item
+from gearmbs.adams.view.model import DEGREE, JOINTS, PARTS, Item
 from gearmbs.adams.view.values import Values, is_ground
 from gearmbs.adams.view.vocabulary import ROWS
 from gearmbs.adams.write.text import listed, number, wrapped
 from gearmbs.solids.bodies import Body
 
 PART_KEYWORDS = {"part": "PART", "point_mass": "POINT_MASS", "flexible_body": "FLEX_BODY"}
-JOINTS = frozenset(
-    (
-        "revolute",
-        "translational",
-        "cylindrical",
-        "spherical",
-        "fixed",
-        "universal",
-        "hooke",
-        "convel",
-        "planar",
-        "screw",
-        "rackpin",
-    )
-)
 PRIMITIVES = frozenset("atpoint inline inplane orientation parallel_axes perpendicular".split())
 MEASURES = [f"{kind}_measure" for kind in "function object point pt2pt angle orient computed range query".split()]
 KEYWORDS = {

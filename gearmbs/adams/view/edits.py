@@ -11,26 +11,11 @@ import numpy as np
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.lexer import Command, ViewError
-from gearmbs.adams.view.model import PARTS, PLACED, Database, Item
+from gearmbs.adams.view.model import JOINTS, PARTS, PLACED, Database, Item
 from gearmbs.adams.view.values import ORIENTATIONS, Stored, Values, fixed, is_ground
 from gearmbs.adams.view.vocabulary import Row, argument_of
 
 VALUES = ("real_value", "integer_value", "string_value", "object_value")
-JOINTS = frozenset(
-    (
-        "revolute",
-        "translational",
-        "cylindrical",
-        "spherical",
-        "fixed",
-        "universal",
-        "hooke",
-        "convel",
-        "planar",
-        "screw",
-        "rackpin",
-    )
-)
 
 
 class Editor:

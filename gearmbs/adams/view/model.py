@@ -110,6 +110,10 @@ class Item:
 
 
 PARTS = ("part", "point_mass", "flexible_body")
+JOINTS = frozenset(
+    "revolute translational cylindrical spherical fixed universal hooke convel planar screw rackpin".split()
+)
+"""Commands that make joints."""
 PLACED = (*PARTS, "marker", "floating_marker", "point", "model")
 """Kinds that have a place, and may be what others are placed relative to."""
 

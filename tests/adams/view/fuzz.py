@@ -31,7 +31,7 @@ SPICE = (
     "(eval(", "))", "{0, 0, 0}", "LOC_RELATIVE_TO", ".swing.ROD.cm", "&", "!", '"', "1e308", "**", "[9]", "//", "0.5d",
     "for variable_name = k start_value = 1 end_value = 9\n", "end\n", "if condition = (1)\n", "else\n",
     "while condition = (1)\n",
-    "file command read file_name = ../x.cmd\n", 'system command = "touch /tmp/x"\n', "model create model_name = q\n",
+    "file command read file_name = ../x.cmd\n", 'system command = "touch started"\n', "model create model_name = q\n",
     "macro create macro_name = .m.z user_entered_command = z commands = 'z'\nz\n",
     "\x00", "\\", "-", "RTOI(", "mm", ", ",
 )  # fmt: skip
