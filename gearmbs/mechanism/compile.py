@@ -17,8 +17,7 @@ from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.model.builder import TableBuilder
 from gearmbs.dae.model.model import STATE_IMPLICIT, Configuration, Names
 from gearmbs.dae.model.system import System
-from gearmbs.dae.numbers import INPUT, PARAMETER, Place
-from gearmbs.dae.problem import ModelError
+from gearmbs.dae.problem import INPUT, PARAMETER, ModelError, Place
 from gearmbs.mechanism.checks import row_order
 from gearmbs.mechanism.language.syntax import NamedNumber, Scope
 from gearmbs.mechanism.parts import elements as el

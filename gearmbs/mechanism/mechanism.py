@@ -18,15 +18,14 @@ from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.language.user_functions import UserFunction
 from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.parts import joints as jt
-from gearmbs.mechanism.parts.attributes import OwnAttributes
-from gearmbs.mechanism.parts.bodies import Body, Marker, make_body
+from gearmbs.mechanism.parts.bodies import Body, Marker, OwnAttributes, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 from gearmbs.mechanism.parts.inputs import Input, Output, Parameter, make_input, make_output, make_parameter
 from gearmbs.mechanism.parts.joints import JointMethods
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
-from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
+from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, reader, vector
 from gearmbs.units import truth
 
 E = TypeVar("E", bound=ForceElement)
@@ -80,7 +79,7 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
     """
 
     reads: ClassVar = {
-        "gravity": lambda value, field: vector(value, field, "acceleration"),
+        "gravity": reader("acceleration", vector),
         "lump": truth,
     }
 

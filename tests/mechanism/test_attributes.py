@@ -10,7 +10,7 @@ from gearmbs.adams import write_deck
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism, Simulator
 from gearmbs.mechanism.language.syntax import Units
-from gearmbs.mechanism.parts.attributes import OwnAttributes
+from gearmbs.mechanism.parts.bodies import OwnAttributes
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement
 from tests.says import says
 

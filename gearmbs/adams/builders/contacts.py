@@ -14,6 +14,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import curve_points
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
+from gearmbs.mechanism.contacts.meshes import READERS, SUFFIXES, body_of, read_mesh, shape_of
 from gearmbs.mechanism.contacts.shapes import (
     Box,
     Cylinder,
@@ -27,7 +28,6 @@ from gearmbs.mechanism.contacts.shapes import (
     extruded,
     revolved,
 )
-from gearmbs.mechanism.contacts.solid_files import READERS, SUFFIXES, body_of, read_mesh, shape_of
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.solids import read_bodies
 

@@ -17,7 +17,7 @@ from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.loads.forces import FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.equations.unknowns import Counts
 from gearmbs.dae.model.model import Model, Names
-from gearmbs.dae.numbers import INPUT, PARAMETER, Number, Place
+from gearmbs.dae.problem import INPUT, PARAMETER, Number, Place
 
 
 class TableBuilder:

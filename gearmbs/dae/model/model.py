@@ -22,7 +22,7 @@ from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.loads.forces import FORCE_SIG, Diagnostic
 from gearmbs.dae.equations.rotation import KIN_COLUMNS, POSE_A, POSE_COLUMNS, POSE_R, POSE_V
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
-from gearmbs.dae.numbers import Number
+from gearmbs.dae.problem import Number
 from gearmbs.kernels.pointers import address
 
 

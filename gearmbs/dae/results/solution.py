@@ -7,7 +7,7 @@ of the integrator's noise.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -115,7 +115,7 @@ class Solution(Shown):
     """
 
     inside: Mapping[float, float] = MappingProxyType({})
-    at_steps: Mapping[tuple[str, str], Callable[[], Any]] = MappingProxyType({})
+    at_steps: Mapping[tuple[str, str], Any] = MappingProxyType({})
     """What is read of the integrator's own steps instead of evaluated, by method and name; see `watched.Watch`."""
 
     def __init__(
@@ -417,7 +417,7 @@ class Solution(Shown):
     def orientation(self, body: str) -> np.ndarray:
         """Return the rotation matrices over time, shape (m, 3, 3)."""
         if ("orientation", body) in self.at_steps:
-            return self.at_steps["orientation", body]()
+            return self.at_steps["orientation", body]
         return self._pose[:, self._body(body), POSE_A:POSE_V].reshape(-1, 3, 3)
 
     def com_velocity(self, body: str) -> np.ndarray:
@@ -451,7 +451,7 @@ class Solution(Shown):
     def reaction_force(self, joint: str) -> np.ndarray:
         """Return the force of a joint on I's body, shape (m, 3), N, global, without its moment."""
         if ("reaction_force", joint) in self.at_steps:
-            return self.at_steps["reaction_force", joint]()
+            return self.at_steps["reaction_force", joint]
         return _sum_of_rows(self._records.force, self._rows_of_joint(joint))
 
     def _rows_of_joint(self, joint: str) -> list[int]:
@@ -477,7 +477,7 @@ class Solution(Shown):
     def diagnostics(self, element: str) -> dict[str, np.ndarray]:
         """Return what a force element tells beside its wrench, over time, by name; units are in :meth:`to_dataset`."""
         if ("diagnostics", element) in self.at_steps:
-            return self.at_steps["diagnostics", element]()
+            return self.at_steps["diagnostics", element]
         k = self._element(element)
         return {d.name: self._loads[:, k, 6 + c] for c, d in enumerate(self.system.model.diagnostics[k])}
 

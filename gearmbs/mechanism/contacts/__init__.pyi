@@ -2,6 +2,8 @@ from .element import Coulomb as Coulomb
 from .element import Impact as Impact
 from .element import Poisson as Poisson
 from .element import SolidContact as SolidContact
+from .meshes import read_mesh as read_mesh
+from .meshes import read_solid as read_solid
 from .shapes import Box as Box
 from .shapes import Cylinder as Cylinder
 from .shapes import Ellipsoid as Ellipsoid
@@ -13,7 +15,5 @@ from .shapes import Sphere as Sphere
 from .shapes import Torus as Torus
 from .shapes import extruded as extruded
 from .shapes import revolved as revolved
-from .solid_files import read_mesh as read_mesh
-from .solid_files import read_solid as read_solid
 from .tracks import ContactTracks as ContactTracks
 from .tracks import contact_tracks as contact_tracks

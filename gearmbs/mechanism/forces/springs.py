@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.mechanism.parts.attributes import Reader
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting
-from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.mechanism.parts.quantities import Reader, reader
 from gearmbs.units import shown
 
 SI_UNITS = {
@@ -22,10 +21,6 @@ SI_UNITS = {
 
 def readers(dimensions: Mapping[str, str]) -> dict[str, Reader]:
     """Return what reads the numbers of attributes, SI or texts with a unit, from their dimensions."""
-
-    def reader(unit: str) -> Reader:
-        return lambda value, field: quantity(value, unit, field)
-
     return {name: reader(SI_UNITS[dimension]) for name, dimension in dimensions.items()}
 
 

@@ -1,7 +1,13 @@
-"""Bodies and markers."""
+"""Bodies, markers, and what all parts of a mechanism share: they have the attributes they are made with.
+
+Whoever assigns to an attribute of what has been made is told if nothing would come of it, as of a slip in a name, and
+has the value read as it is where the object is made.
+"""
 
 from __future__ import annotations
 
+from abc import ABCMeta
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -10,17 +16,62 @@ import numpy.typing as npt
 
 from gearmbs.dae.equations.bodies import RIGID, BodyKind
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.parts.attributes import OwnAttributes
 from gearmbs.mechanism.parts.quantities import (
+    Reader,
     Vector,
     cross,
     frame_along,
     inertia_matrix,
-    quantity,
+    mass_of,
+    reader,
     rotation_matrix,
     vector,
 )
 from gearmbs.units import shown
+from gearmbs.wording import did_you_mean
+
+
+class Made(ABCMeta):
+    """Metaclass that marks an object when its whole ``__init__`` has run, also that of a class derived by a user."""
+
+    def __call__(cls, *args: Any, **options: Any) -> Any:
+        made = super().__call__(*args, **options)
+        vars(made)["_made"] = True
+        return made
+
+
+class OwnAttributes(metaclass=Made):
+    """What a mechanism and its parts share: they take values of the attributes they have, and refuse others by name."""
+
+    reads: ClassVar[Mapping[str, Reader]] = {}
+    """How values are read that are assigned, by attribute."""
+    settled: ClassVar[tuple[str, ...]] = ()
+    """Attributes from which other parts have been made already: another value would leave those as they are."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute that there is; names with a leading underscore are a class's own affair.
+
+        Raises
+        ------
+        ModelError
+            For a name that is none, an attribute that is settled, and a value that cannot be one.
+        """
+        own, kind = vars(self), type(self)
+        if "_made" in own and name[0] != "_":
+            label = f"{kind.__name__} '{own.get('name', '')}'"
+            if name not in own and not hasattr(kind, name):
+                known = [key for key in own if key[0] != "_" and key not in kind.settled]
+                raise ModelError(
+                    f"{label}: it has no attribute '{name}', so that {name} = {value!r} would do nothing; "
+                    + did_you_mean(name, known, otherwise=f"it has {', '.join(known)}")
+                )
+            if name in kind.settled:
+                raise ModelError(
+                    f"{label}: {name} = {value!r} would not reach what was made from it; make another one with it"
+                )
+            if name in kind.reads:
+                value = kind.reads[name](value, f"{label}: {name}")
+        super().__setattr__(name, value)
 
 
 @dataclass(eq=False)
@@ -46,7 +97,7 @@ class Marker(OwnAttributes):
     number: int | None = None
 
     reads: ClassVar = {
-        "position": lambda value, field: vector(value, field, "length"),
+        "position": reader("length", vector),
         "orientation": rotation_matrix,
     }
     settled = ("name", "body")
@@ -66,14 +117,6 @@ class Marker(OwnAttributes):
 
     def __repr__(self) -> str:
         return f"Marker({self.name!r} on {self.body.name!r} at {np.array2string(self.position, precision=6)})"
-
-
-def mass_of(value: Any, field: str) -> float:
-    """Return a mass that is not negative, kg."""
-    mass = quantity(value, "mass", field)
-    if not np.isfinite(mass) or mass < 0.0:
-        raise ModelError(f"{field} = {mass} kg; it must be a positive number")
-    return mass
 
 
 @dataclass(eq=False)
@@ -110,11 +153,11 @@ class Body(OwnAttributes):
     reads: ClassVar = {
         "mass": mass_of,
         "inertia": inertia_matrix,
-        "com": lambda value, field: vector(value, field, "length"),
-        "position": lambda value, field: vector(value, field, "length"),
+        "com": reader("length", vector),
+        "position": reader("length", vector),
         "orientation": rotation_matrix,
-        "velocity": lambda value, field: vector(value, field, "speed"),
-        "angular_velocity": lambda value, field: vector(value, field, "angular speed"),
+        "velocity": reader("speed", vector),
+        "angular_velocity": reader("angular speed", vector),
     }
     settled = ("name", "is_ground", "markers")
 

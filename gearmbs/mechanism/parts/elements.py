@@ -11,8 +11,7 @@ import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, Diagnostic
 from gearmbs.kernels.jit import njit
-from gearmbs.mechanism.parts.attributes import OwnAttributes
-from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.bodies import Marker, OwnAttributes
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ import numpy as np
 
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.parts.attributes import OwnAttributes
-from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.bodies import Body, Marker, OwnAttributes
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
 

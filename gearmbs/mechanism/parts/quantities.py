@@ -23,6 +23,8 @@ from gearmbs.units import NUMBER, Given, to_si
 
 F = TypeVar("F", bound=Callable)
 Vector = npt.ArrayLike
+Reader = Callable[[Any, str], Any]
+"""From a value that is given, and the name of its field for messages, to the one that is kept, or a ModelError."""
 
 QUANTITY = re.compile(rf"\s*(?>{NUMBER.pattern})\s*[A-Za-zµμ°]")
 """Beginning of a number with a unit; an expression such as ``10*TIME`` has an operator there."""
@@ -192,6 +194,19 @@ def vector(value: Vector, field: str, unit: str = "dimensionless", factor: float
     if out.size != 3 or not np.all(np.isfinite(out)):
         raise ModelError(f"{field}: {value!r} is not three finite numbers")
     return out
+
+
+def reader(unit: str, kind: Callable[..., Any] = quantity) -> Reader:
+    """Return what reads a number, or with `vector` three, of one unit or dimension."""
+    return lambda value, field: kind(value, field=field, unit=unit)
+
+
+def mass_of(value: Any, field: str) -> float:
+    """Return a mass that is not negative, kg."""
+    mass = quantity(value, "mass", field)
+    if not np.isfinite(mass) or mass < 0.0:
+        raise ModelError(f"{field} = {mass} kg; it must be a positive number")
+    return mass
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

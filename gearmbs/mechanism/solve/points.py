@@ -15,8 +15,7 @@ from gearmbs.dae.analyses.statics import static_equilibrium as _static_equilibri
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.unknowns import FORMULATIONS
 from gearmbs.dae.model.model import Configuration, Model
-from gearmbs.dae.numbers import Number
-from gearmbs.dae.problem import ModelError
+from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State

@@ -20,8 +20,7 @@ from gearmbs.dae.model.brief import brief_changes
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.dae.results.stream import Stream
-from gearmbs.dae.results.watched import Watch
+from gearmbs.dae.results.watched import Stream, Watch
 from gearmbs.dae.state import State
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
@@ -197,7 +196,7 @@ def simulate(
     consumer : callable, optional
         With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
         and each valid during the call only, instead of keeping all steps in memory; see
-        `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
+        `gearmbs.dae.results.watched.Stream`. The solution returned then holds nothing but the last step.
     watch : sequence of (str, str)
         With a ``consumer``: methods of the solution, ``"reaction_force"``, ``"orientation"`` or ``"diagnostics"``, with
         the names they will be called with. The parts handed to it then return what the integrator has of them at its

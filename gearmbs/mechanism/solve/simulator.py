@@ -17,14 +17,13 @@ from gearmbs._lazy import uncollected
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
-from gearmbs.dae.numbers import INPUT, Number, cells_of
-from gearmbs.dae.problem import EPS, ModelError
+from gearmbs.dae.problem import EPS, INPUT, ModelError, Number, cells_of
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State, equations_of
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
-from gearmbs.mechanism.parts.attributes import OwnAttributes
+from gearmbs.mechanism.parts.bodies import OwnAttributes
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.simulate import ADVICE, checked, just_inside, prepared, start_time, with_brief_changes
