@@ -314,7 +314,8 @@ class SolverStats:
         Processor seconds of the thread by part: ``"steps"`` in compiled code, ``"pivots"`` chosen anew, ``"consumer"``
         of the steps that are handed over (empty when the integrator does not tell).
     t_steps, h_steps, orders : ndarray, shape (steps,)
-        End time, size and order of each accepted step (empty when the integrator does not tell).
+        End time, size and order of each accepted step (empty when the integrator does not tell, or a consumer has
+        taken the steps).
     """
 
     steps: int = 0

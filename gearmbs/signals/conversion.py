@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from gearmbs.signals.errors import SignalError
+from gearmbs.signals.filters import BLOCK
 from gearmbs.signals.signal.signal import DIMENSIONS, common_unit, like, rate_of, unit_dimension, units_of
 
 if TYPE_CHECKING:
@@ -202,7 +203,10 @@ def force_components(
         raise SignalError(
             f"channels: need the names of three Cartesian channels, {missing or channels} not among {names}"
         )
-    vector = force.values[:, [names.index(c) for c in channels]]
+    places = [names.index(c) for c in channels]
+    neighbours = places == list(range(places[0], places[0] + 3))
+    # neighbours are looked at where they are
+    vector = force.values[:, places[0] : places[0] + 3] if neighbours else force.values[:, places]
     result = component_values(vector, pressure_angle, centre_line, axis, sense)
     return like(force, result, channels=COMPONENTS, units=common_unit(force), pressure_angle=pressure_angle)
 
@@ -224,7 +228,12 @@ def component_values(
     e_c = _unit(along - e_z * (along @ e_z), "centre_line")
     e_t = np.cross(e_z, e_c)
     e_a = sense * math.cos(pressure_angle) * e_t + math.sin(pressure_angle) * e_c
-    return np.stack((vectors @ e_c, vectors @ e_t, vectors @ e_a, np.linalg.norm(vectors, axis=1)), axis=1)
+    # each component on end, as filters take it, and piece by piece in little memory
+    found = np.empty((4, len(vectors)))
+    for k in range(0, len(vectors), BLOCK):
+        piece = vectors[k : k + BLOCK]
+        found[:, k : k + BLOCK] = piece @ e_c, piece @ e_t, piece @ e_a, np.linalg.norm(piece, axis=1)
+    return found.T
 
 
 def force_to_acceleration(force: xr.DataArray, mass: float) -> xr.DataArray:

@@ -25,6 +25,9 @@ MARGIN = 64
 BLOCK = 4096
 """Samples that come out of the filter at a time, so that its input stays in the processor's cache."""
 
+KNOWN = 4
+"""Values at an end of those known so far that have no slope yet of the cubic through all, and one more."""
+
 GAIN_POINTS = 1 << 14
 """Points at which the gain of the filter is known, thirty and more to its transition."""
 
@@ -75,45 +78,142 @@ def even_signal(
     SignalError
         If the times do not increase or do not cover the span.
     """
-    # whoever analyses a file does not wait for a compiler
-
-    rate = check_rate(rate)
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if t.ndim != 1 or values.shape[:1] != t.shape:
         raise SignalError(f"t: has shape {t.shape}, values {values.shape}; give one row of values a time")
     if not np.all(np.diff(t) > 0.0):
         raise SignalError("t: the times do not increase; sort them and drop repeated ones")
-    factor = _fine_factor(rate, fine_rate)
-    first, last = int(np.ceil(start * rate - 1e-6)), int(np.floor(stop * rate + 1e-6))
-    low, high = first - MARGIN, last + MARGIN
-    low, high = max(low, int(np.ceil(t[0] * rate - 1e-6))), min(high, int(np.floor(t[-1] * rate + 1e-6)))
-    if first < low or last > high:
-        raise SignalError(f"start, stop: {start:g} to {stop:g} s is not within the times {t[0]:g} to {t[-1]:g} s")
-    columns = values.reshape(t.size, -1)
-    # the filter has a gain of one: what does not change, as forces along the shafts of spur wheels, comes out as it is
-    changes = [column[0] != column[-1] or np.ptp(column) != 0.0 for column in columns.T]
-    changing = np.flatnonzero(changes)
-    # each column on end, as the kernel takes it
-    even = np.empty((columns.shape[1], high - low + 1)).T
-    even[:] = columns[0]
-    if changing.size < columns.shape[1]:
-        columns = np.ascontiguousarray(columns[:, changing])
-    taps = decimation_taps(factor, factor * rate)
-    weights = np.ascontiguousarray(taps[::-1])
-    for k in range(0, len(even) if changing.size else 0, BLOCK):
-        rows = slice(k, min(k + BLOCK, len(even)))
-        fine = _fine(t, columns, rate, factor, (low, high), (low + rows.start, low + rows.stop - 1), taps.size // 2)
-        for channel, source in zip(changing, fine.T, strict=True):
-            products(np.ascontiguousarray(source), weights, factor, even.T[channel, rows])
-    return make_signal(
-        np.ascontiguousarray(even[first - low : last - low + 1]),
-        rate,
-        units=units,
-        channels=channels,
-        t0=first / rate,
-        speed=speed,
-        teeth=teeth,
-    )
+    samples = EvenSamples(rate, start, stop, fine_rate=fine_rate)
+    samples.take(t, values.reshape(t.size, -1))
+    even = np.ascontiguousarray(samples.finish())
+    t0 = float(samples.t[0])
+    return make_signal(even, rate, units=units, channels=channels, t0=t0, speed=speed, teeth=teeth)
+
+
+class EvenSamples:
+    """Samples of an evenly sampled signal, made while the values at uneven times come; see `even_signal`.
+
+    Of the values only those are kept of which samples are still to be made.
+
+    Parameters
+    ----------
+    rate, start, stop, fine_rate
+        As for `even_signal`.
+    smooth, linear, held : int
+        So many of the last columns go through no filter: they are samples of the monotone cubic, of straight lines, or
+        the last values before.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times of the samples, s.
+    """
+
+    def __init__(
+        self,
+        rate: float,
+        start: float,
+        stop: float,
+        *,
+        fine_rate: float = FINE_RATE,
+        smooth: int = 0,
+        linear: int = 0,
+        held: int = 0,
+    ) -> None:
+        self.rate = check_rate(rate)
+        self._span = start, stop
+        self._factor = _fine_factor(self.rate, fine_rate)
+        self._first, self._last = int(np.ceil(start * self.rate - 1e-6)), int(np.floor(stop * self.rate + 1e-6))
+        self.t = self._first / self.rate + np.arange(max(self._last - self._first + 1, 0)) / self.rate
+        taps = decimation_taps(self._factor, self._factor * self.rate)
+        self._weights = np.ascontiguousarray(taps[::-1])
+        self._sharp = np.cumsum([held, linear, smooth])[::-1]
+        self._low: int | None = None
+        self._next = 0
+        self._t, self._columns = np.empty(0), np.empty((0, 0))
+        self._even = np.empty((0, 0))
+
+    def take(self, t: np.ndarray, columns: np.ndarray) -> None:
+        """Take values, (m, columns), at increasing times behind those taken before; make what they decide."""
+        if self._low is None:
+            self._low = self._next = max(self._first - MARGIN, int(np.ceil(t[0] * self.rate - 1e-6)))
+            # each column on end, as the kernel takes it
+            self._even = np.empty((columns.shape[1], self.t.size)).T
+            self._t, self._columns = t, columns
+        else:
+            self._t, self._columns = np.concatenate([self._t, t]), np.concatenate([self._columns, columns])
+        self._go_on(self._last + MARGIN, is_last=False)
+
+    def finish(self) -> np.ndarray:
+        """Return all samples, shape (n, columns), each column on end in memory.
+
+        Raises
+        ------
+        SignalError
+            If the times do not cover the span.
+        """
+        t = self._t
+        if self._low is None or not t.size:
+            raise SignalError("t: there are no times; give those of the span and some beyond both ends")
+        high = min(self._last + MARGIN, int(np.floor(t[-1] * self.rate + 1e-6)))
+        if self._first < self._low or self._last > high:
+            start, stop = self._span
+            raise SignalError(
+                f"start, stop: {start:g} to {stop:g} s is not within the times {self._low / self.rate:g} to {t[-1]:g} s"
+            )
+        self._go_on(high, is_last=True)
+        return self._even
+
+    def known(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return times and columns of the samples made so far, and of the values behind them."""
+        made = min(max(self._next - self._first, 0), self.t.size)
+        behind = int(np.searchsorted(self._t, self.t[made - 1], side="right")) if made else 0
+        return [(self.t[:made], self._even[:made]), (self._t[behind:], self._columns[behind:])]
+
+    def _go_on(self, high: int, *, is_last: bool) -> None:
+        """Make samples in blocks up to number ``high``, or as far as the slopes of the cubic are known."""
+        assert self._low is not None
+        half = self._weights.size // 2
+        while self._next <= high:
+            last = min(self._next + BLOCK - 1, high)
+            reach = min(last + half / self._factor, high) / self.rate
+            if not is_last and (self._t.size < KNOWN or self._t[-KNOWN] < reach):
+                break
+            self._block(last, high, half)
+            self._next = last + 1
+        if not is_last:
+            spent = int(np.searchsorted(self._t, (self._next - half / self._factor - 1.0) / self.rate)) - KNOWN
+            if spent > 0:
+                self._t, self._columns = self._t[spent:].copy(), self._columns[spent:].copy()
+
+    def _block(self, last: int, high: int, half: int) -> None:
+        """Make the samples from the next one to number ``last``."""
+        assert self._low is not None
+        t, columns, even = self._t, self._columns, self._even
+        begin = max(self._first - self._next, 0)
+        rows = slice(self._next + begin - self._first, min(last, self._last) + 1 - self._first)
+        n = last - self._next + 1
+        smooth, linear, held = (columns.shape[1] - int(k) for k in self._sharp)
+        # the filter has a gain of one: what does not change, as forces along spur wheels' shafts, comes out as it is
+        changing = [c for c in range(smooth) if columns[0, c] != columns[-1, c] or np.ptp(columns[:, c]) != 0.0]
+        constant = [c for c in range(smooth) if c not in changing]
+        even[rows, constant] = columns[0, constant]
+        if changing:
+            values = columns if len(changing) == columns.shape[1] else np.ascontiguousarray(columns[:, changing])
+            fine = _fine(t, values, self.rate, self._factor, (self._low, high), (self._next, last), half)
+            room = np.empty(n)
+            for channel, source in zip(changing, fine.T, strict=True):
+                products(np.ascontiguousarray(source), self._weights, self._factor, room)
+                even[rows, channel] = room[begin : begin + rows.stop - rows.start]
+        if rows.stop <= rows.start:
+            return
+        at = self.t[rows]
+        if linear > smooth:
+            even[rows, smooth:linear] = monotone_cubic(t, columns[:, smooth:linear], np.clip(at, t[0], t[-1]))
+        for c in range(linear, held):
+            even[rows, c] = np.interp(at, t, columns[:, c])
+        if held < columns.shape[1]:
+            even[rows, held:] = columns[np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 1), held:]
 
 
 def _fine_factor(rate: float, fine_rate: float) -> int:

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from gearmbs.signals import SignalError, even_signal
-from gearmbs.signals.resampling import monotone_cubic
+from gearmbs.signals.resampling import EvenSamples, monotone_cubic
 from tests.says import says
 
 RATE = 51200.0
@@ -30,6 +30,28 @@ def test_slow_tones_keep_their_values():
     np.testing.assert_allclose(out.values[:, 0], np.sin(2000 * np.pi * grid), atol=3e-4)
     np.testing.assert_allclose(out.values[:, 1], np.cos(600 * np.pi * grid), atol=3e-5)
     assert out.attrs["teeth"] == (29, 29)
+
+
+def test_samples_of_values_that_come_in_pieces_are_those_of_all_at_once():
+    t = uneven_times(span=0.3)
+    tone = np.sin(2000 * np.pi * t)
+    values = np.stack([tone, np.full(t.size, 0.1), tone, tone, np.floor(3.0 * tone)], axis=1)
+    samples = EvenSamples(RATE, 0.01, 0.29, smooth=1, linear=1, held=1)
+    waiting = []
+    for k in range(0, t.size, 700):
+        samples.take(t[k : k + 700], values[k : k + 700])
+        waiting.append(samples.known()[1][0].size)
+    made = samples.known()[0][1].copy()
+    found = samples.finish()
+    whole = even_signal(t, values[:, :2], RATE, start=0.01, stop=0.29)
+    np.testing.assert_array_equal(samples.t, whole["time"].values)
+    np.testing.assert_array_equal(found[:, :2], whole.values)
+    np.testing.assert_array_equal(found[:, 2], monotone_cubic(t, tone, samples.t))
+    np.testing.assert_array_equal(found[:, 3], np.interp(samples.t, t, tone))
+    np.testing.assert_array_equal(found[:, 4], values[np.searchsorted(t, samples.t, side="right") - 1, 4])
+    # what is waited for does not grow with the record
+    assert max(waiting[len(waiting) // 2 :]) <= max(waiting[: len(waiting) // 2]) < t.size // 2
+    np.testing.assert_array_equal(made, found[: len(made)])
 
 
 @pytest.mark.parametrize("also", [[], [lambda t: np.sin(2000 * np.pi * t)]], ids=["all", "beside others"])

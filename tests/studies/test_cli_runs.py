@@ -67,7 +67,7 @@ def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypat
 def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch):
     path = tmp_path / "soft.toml"
     path.write_text(CASE)
-    monkeypatch.setattr("gearmbs.studies.run.simulation.slip", lambda *a: "the wheels slipped")
+    monkeypatch.setattr("gearmbs.studies.run.recorder.slip", lambda *a: "the wheels slipped")
     result = CliRunner().invoke(cli.app, ["run", str(path)])
     assert result.exit_code == 1
     assert "case 'soft': the wheels slipped\nWhat was computed until then is in" in result.output
@@ -79,7 +79,7 @@ def test_a_failed_run_keeps_what_was_computed(tmp_path, monkeypatch):
 def test_a_failed_case_of_the_study_is_kept(tmp_path, monkeypatch):
     """The case that failed and those finished before it are files, the study is not."""
     monkeypatch.setattr(
-        "gearmbs.studies.run.simulation.slip",
+        "gearmbs.studies.run.recorder.slip",
         lambda case, *a: "the wheels slipped" if case.name.startswith("mis") else None,
     )
     words = ["paper", "--out", str(tmp_path), "--duration", "80 ms", "--workers", "1"]

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from gearmbs import cli, files
 from gearmbs.files import KeptElsewhere, check_place
 from gearmbs.studies import Case, CaseError, SimulationFailed, case_mechanism, run_case, run_cases, simulate_case
-from gearmbs.studies.run import claims, engine, simulation
+from gearmbs.studies.run import claims, engine, recorder, simulation
 from gearmbs.studies.run.parallel import StorageWarning
 from gearmbs.studies.run.store import RecordFolder, keep_dataset, record_size, stored_record, write_dataset
 from tests.says import says
@@ -167,7 +167,7 @@ def test_two_calls_share_the_cases(tmp_path, monkeypatch):
 def test_errors_can_be_kept(tmp_path, monkeypatch):
     """The case whose record is too short, the one that fails, and the sound one, each in its place."""
     monkeypatch.setattr(
-        "gearmbs.studies.run.simulation.slip", lambda case, *a: "the wheels slipped" if case.name == "slips" else None
+        "gearmbs.studies.run.recorder.slip", lambda case, *a: "the wheels slipped" if case.name == "slips" else None
     )
     cases = [
         Case(name="short", operation={**SHORT, "duration": 0.005}),
@@ -201,7 +201,7 @@ def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     """Three cases are there from before; three are computed, and a full disk at the end costs nothing."""
     words = ["paper", "--out", str(tmp_path / "out"), "--duration", "80 ms", "--workers", "1"]
     with monkeypatch.context() as patch:
-        patch.setattr(simulation, "slip", lambda case, *a: "slipped" if case.operation.torque > 150.0 else None)
+        patch.setattr(recorder, "slip", lambda case, *a: "slipped" if case.operation.torque > 150.0 else None)
         result = CliRunner().invoke(cli.app, words)
     assert result.exit_code == 1
     assert len(list((tmp_path / "out" / "cases").glob("*load.nc"))) == 3

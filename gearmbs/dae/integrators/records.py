@@ -131,11 +131,12 @@ class Records:
         st = self.state
         m = st.n_records
         if m:
-            self.steps.append((st.record_t[:m].copy(), st.record_h[:m].copy(), st.record_order[:m].copy()))
             if self.options.consumer is not None:
                 self._hand_over(m)
-            elif st.keep_rows:
-                self.row_blocks.append(st.record_y[:m].copy())
+            else:
+                self.steps.append((st.record_t[:m].copy(), st.record_h[:m].copy(), st.record_order[:m].copy()))
+                if st.keep_rows:
+                    self.row_blocks.append(st.record_y[:m].copy())
             st.n_records = 0
         for e in range(st.n_crossings):
             self.crossings.append((float(st.crossing_t[e]), int(st.crossing_event[e]), st.crossing_y[e].copy()))
@@ -147,7 +148,7 @@ class Records:
         st = self.state
         is_step = st.record_order[:m] > 0
         # the start is an output, too
-        is_step[0] |= len(self.steps) == 1
+        is_step[0] |= not self.steps
         if not is_step.any():
             return
         whole = bool(is_step.all())
@@ -156,6 +157,8 @@ class Records:
         self.options.consumer(t, y, self.epochs[-1][1])
         self.processor_time += time.thread_time() - busy
         self.consumed_time += time.perf_counter() - begin
+        last = np.flatnonzero(is_step)[-1:]
+        self.steps = [(st.record_t[last], st.record_h[last], st.record_order[last])]
         self.row_blocks = [y[-1:].copy()]
 
     def change_table(self) -> None:
@@ -174,16 +177,17 @@ class Records:
         is_step = order > 0
         # the start comes first, and mostly nothing but steps after it
         taken = slice(1, None) if is_step[1:].all() and not is_step[0] else is_step
-        stats.t_steps, stats.h_steps, stats.orders = t[taken], h[taken], order[taken]
-        rows = np.concatenate(self.row_blocks) if self.row_blocks else None
         consumed = self.options.consumer is not None
+        if not consumed:
+            stats.t_steps, stats.h_steps, stats.orders = t[taken], h[taken], order[taken]
+        rows = np.concatenate(self.row_blocks) if self.row_blocks else None
         sol = None
         if rows is not None and not consumed:
             between = Between(self.algebraic, self.tables, st, self.options) if self.algebraic.is_needed else None
             sol = DenseOutput(t, rows, order, between)
         outputs: tuple[np.ndarray, np.ndarray, np.ndarray]
         if consumed and rows is not None:
-            outputs = t[np.append(0, np.flatnonzero(is_step))[-1:]], rows, np.empty((0, n))
+            outputs = t, rows, np.empty((0, n))
         elif self.every_step:
             assert rows is not None
             assert sol is not None

@@ -31,7 +31,7 @@ from gearmbs.signals.conversion import component_values
 from gearmbs.signals.resampling import MARGIN, even_signal_gain, monotone_cubic
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.case.limits import HARMONICS, band_taps, edge
-from gearmbs.studies.run.record import COUNTS, SMOOTH, Measured, Recorder, Span
+from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Recorder, Span
 
 SAMPLES = 1024
 """Samples of a mesh period, ten of a contact that lasts a hundredth of it; means over each lower the first harmonics by

@@ -1,4 +1,4 @@
-"""What the record of a case is made from, taken from the solution while it is being computed."""
+"""The record of a case from what was measured of its solution."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import platform
 from collections.abc import Collection
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,186 +17,16 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, gmf_rms, make_signal, trim
 from gearmbs.signals.analysis.bands import order_rms
 from gearmbs.signals.conversion import COMPONENTS
-from gearmbs.signals.resampling import MARGIN, monotone_cubic
+from gearmbs.signals.resampling import monotone_cubic
 from gearmbs.studies.case.case import Case, CaseError, units_of_fields
 from gearmbs.studies.case.drive import drive_angle
 from gearmbs.studies.case.limits import HARMONICS, edge, least_for_bands, remarks
-from gearmbs.studies.run import rig
+from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.mechanism import Mechanism
-
-SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
-COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
-"""Contact quantities of a record, with units; numbers of tooth pairs cannot be interpolated."""
-
-WATCHED = (
-    *(("reaction_force", seat) for seat in rig.SEATS),
-    *(("orientation", gear) for gear in rig.GEARS),
-    ("diagnostics", rig.MESH),
-)
-"""What a record takes from the integrator's own steps."""
-
-TURN_BEFORE = 0.02
-"""Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
-
-
-class Span(NamedTuple):
-    """Start and end of a record, s."""
-
-    start: float
-    stop: float
-
-
-class Measured(NamedTuple):
-    """What a record is made from, at the output times of a solution or some of them.
-
-    Attributes
-    ----------
-    t : ndarray, shape (m,)
-    forces : ndarray, shape (m, 6)
-        Force of shaft 1 on gear 1, then of shaft 2 on gear 2, N.
-    error : ndarray, shape (m,)
-        Lag of the driven wheel behind the driver at the driven base circle, m.
-    contact : dict of ndarray
-        The quantities of `SMOOTH` and `COUNTS`.
-    """
-
-    t: np.ndarray
-    forces: np.ndarray
-    error: np.ndarray
-    contact: dict[str, np.ndarray]
-
-
-class _Columns(NamedTuple):
-    """The quantities of `Measured` for some output times, the wheels' x axes, (m, 2, 3), in place of the error."""
-
-    t: np.ndarray
-    forces: np.ndarray
-    x_axes: np.ndarray
-    contact: np.ndarray
-
-
-def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> Measured:
-    """Return what a record is made from at the output times ``rows`` of a solution, default all."""
-    recorder = Recorder(case)
-    return recorder.joined([recorder.columns(part) for part in solution.parts(rows)])
-
-
-def rows_of_record(case: Case, t: np.ndarray, begin: float | None = None) -> np.ndarray:
-    """Return the numbers of the output times a record is made from.
-
-    Before ``begin``, by default of the span of its filters, only a few are needed, to follow the turning wheels.
-    """
-    first = int(np.searchsorted(t, span_begin(case) if begin is None else begin))
-    teeth = case.gears.teeth
-    turn = 2.0 * np.pi / (case.operation.top_speed * max(1.0, teeth[0] / teeth[1]))
-    interval = np.floor(t[: first + 1] / (TURN_BEFORE * turn))
-    return np.concatenate([np.flatnonzero(np.diff(interval) > 0.0), np.arange(first, t.size)])
-
-
-def span_of(case: Case) -> Span:
-    """Return when the record of a case begins and ends, if it does not depend on the motion."""
-    operation = case.operation
-    start = operation.run_up + operation.settling
-    return Span(start, start + operation.longest)
-
-
-def span_begin(case: Case) -> float:
-    """Return the time at which the span of a record's filters begins, s."""
-    return span_of(case).start - edge(case) - (MARGIN + 1) / case.output_rate
-
-
-class Recorder:
-    """Collects what the record of a case needs from the parts of a solution, as a consumer of `simulate`.
-
-    Of the steps before ``begin``, by default of the span of the record's filters, the unknowns are kept, and evaluated
-    only as far as needed.
-    """
-
-    def __init__(self, case: Case, begin: float | None = None) -> None:
-        self.case = case
-        pair = case.pair()
-        place = pair.placement(0.0)
-        self._axes = (place.axes_1, place.axes_2)
-        self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
-        self._lag = pair.rotation * pair.wheels[1].base_radius
-        self._begin = span_begin(case) if begin is None else begin
-        self._early: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        self._columns: list[_Columns] = []
-        self._model: Solution | None = None
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing has been taken yet."""
-        return self._model is None
-
-    def take(self, part: Solution) -> None:
-        """Take the next steps of a run."""
-        if self._columns:
-            self._columns.append(self.columns(part))
-            return
-        if self._model is None:
-            self._model = part.over(np.empty(0), part.result.y[:0], part.result.epochs)
-        self._early.append((part.t.copy(), part.result.y.copy(), part.result.epochs[0][1]))
-        if part.t[-1] < self._begin:
-            return
-        wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]), self._begin)
-        self._columns = [self.columns(piece) for piece in self._solution_over(wanted).parts()]
-
-    def measured(self) -> Measured:
-        """Return what the record is made from: all steps inside the span of its filters, some before."""
-        return self.joined(self._columns)
-
-    def tail(self, after: float) -> _Columns:
-        """Return what was taken after a time, and a little before."""
-        first = next((k for k, c in enumerate(self._columns) if c.t[-1] > after), 0)
-        return _Columns(*(np.concatenate(c) for c in zip(*self._columns[first:], strict=True)))
-
-    def everything(self) -> Measured:
-        """Return the same at all steps from the start on, for a run that failed."""
-        early = self._solution_over()
-        columns = [self.columns(part) for part in early.parts()]
-        return self.joined([*columns, *(c for c in self._columns if c.t[0] > early.t[-1])])
-
-    def _solution_over(self, wanted: np.ndarray | None = None) -> Solution:
-        """Return the solution over the steps whose unknowns were kept, or over some of them, by increasing numbers."""
-        assert self._model is not None
-        times, rows, tables = zip(*self._early, strict=True)
-        ends = np.cumsum([t.size for t in times])
-        wanted = np.arange(ends[-1]) if wanted is None else wanted
-        places = np.searchsorted(wanted, [0, *ends])
-        inside = [wanted[a:b] - end + t.size for a, b, end, t in zip(places, places[1:], ends, times)]
-        epochs = [(int(k), table) for k, table in zip(places, tables)]
-        return self._model.over(
-            np.concatenate([t[k] for t, k in zip(times, inside)]),
-            np.concatenate([y[k] for y, k in zip(rows, inside)]),
-            epochs,
-        )
-
-    def columns(self, part: Solution) -> _Columns:
-        """Return what is recorded of one part of a solution."""
-        forces = np.concatenate([*map(part.reaction_force, rig.SEATS)], axis=1)
-        x_axes = np.stack([*map(part.orientation, rig.GEARS)], axis=1)[..., 0]
-        diagnostics = part.contact(rig.MESH)
-        contact = np.stack([*map(diagnostics.__getitem__, (*SMOOTH, *COUNTS))], axis=1)
-        return _Columns(part.t.copy(), forces, x_axes, contact)
-
-    def joined(self, columns: list[_Columns]) -> Measured:
-        """Return the parts as one, with the transmission error from the wheels' angles."""
-        whole = _Columns(*(np.concatenate(c) for c in zip(*columns, strict=True)))
-        turned = [self._turned(whole.x_axes[:, wheel], axes) for wheel, axes in enumerate(self._axes)]
-        error = self._lag * (turned[0] * self._ratio + turned[1])
-        contact = {name: whole.contact[:, k] for k, name in enumerate((*SMOOTH, *COUNTS))}
-        return Measured(whole.t, whole.forces, error, contact)
-
-    @staticmethod
-    def _turned(x_axis: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        """Return the angle by which a wheel has turned, rad, from its x axis in the frame of its shaft."""
-        along, across = (x_axis @ axes[:, k] for k in range(2))
-        return np.unwrap(np.arctan2(across, along))
 
 
 # From what was measured of a solution to the variables of a record; only those that are asked for.
@@ -260,6 +90,10 @@ def evaluate(
     signal_stop = stop if signal_stop is None else signal_stop
     dataset = xr.Dataset()
     made = wanted - {"gmf_rms"} if levels is not None else wanted
+    if even:
+        first = int(np.searchsorted(known.t, start - edge(case) - 0.5 / case.output_rate))
+        contact = {name: values[first:] for name, values in known.contact.items()}
+        known = Measured(known.t[first:], known.forces[first:], known.error[first:], contact)
     forces = _even_forces(case, known, start, signal_stop if made & {"acceleration"} else stop, made, even=even)
     if wanted & set(SERIES):
         dataset = _series(case, known, forces, (start, stop), wanted, even=even)
@@ -299,11 +133,9 @@ def _even_forces(
     labels: dict[str, Any] = {"units": "N", "speed": case.operation.top_speed, "teeth": case.gears.teeth}
     names = [f"{wheel}{axis}" for wheel in wheels for axis in "xyz"]
     columns = [3 * (wheel - 1) + k for wheel in wheels for k in range(3)]
+    values = known.forces[:, columns[0] : columns[-1] + 1]
     if even:
-        keep = known.t >= start - ahead - 0.5 / rate
-        values = known.forces[keep][:, columns]
-        return make_signal(values, rate, channels=names, t0=float(known.t[keep][0]), **labels)
-    values = known.forces if len(columns) == 6 else known.forces[:, columns]
+        return make_signal(values, rate, channels=names, t0=float(known.t[0]), **labels)
     return even_signal(known.t, values, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels)
 
 
@@ -319,7 +151,11 @@ def _series(
     for name in FORCES:
         if name in wanted and forces is not None:
             first = list(forces["channel"].values).index(f"{name[-1]}x")
-            values[name] = forces.values[inside, first : first + 3].copy()
+            values[name] = forces.values[inside, first : first + 3]
+    if even:
+        told = {"transmission_error": known.error, **known.contact}
+        return time_series(t, values | {name: told[name][inside] for name in told if name in wanted})
+    values = {name: force.copy() for name, force in values.items()}
     if "transmission_error" in wanted:
         values["transmission_error"] = monotone_cubic(known.t, known.error, t)
     values |= {name: np.interp(t, known.t, known.contact[name]) for name in SMOOTH if name in wanted}
@@ -333,7 +169,7 @@ def _even_times(case: Case, known: Measured, start: float, stop: float, *, even:
     """Return the times at which forces would be, to the last digit."""
     rate, ahead = case.output_rate, edge(case)
     if even:
-        return known.t[known.t >= start - ahead - 0.5 / rate]
+        return known.t
     first, last = int(np.ceil((start - ahead) * rate - 1e-6)), int(np.floor((stop + ahead) * rate + 1e-6))
     return first / rate + np.arange(last - first + 1) / rate
 
@@ -367,10 +203,9 @@ def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -
     components = force_components(
         forces, pressure_angle=pair.working_pressure_angle, sense=pair.rotation, channels=("2x", "2y", "2z")
     )
-    acceleration = force_to_acceleration(components, pair.wheels[1].mass)
     if case.signal_rate < case.output_rate:
-        acceleration = decimate(acceleration, case.signal_rate)
-    return trim(acceleration, start, stop)
+        components = decimate(components, case.signal_rate)
+    return trim(force_to_acceleration(components, pair.wheels[1].mass), start, stop)
 
 
 WAYS = ("band", "orders")

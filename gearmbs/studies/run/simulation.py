@@ -21,17 +21,13 @@ from gearmbs.studies.run import rig
 from gearmbs.studies.run.periodic import PeriodicRecorder, reach, signal_stop
 from gearmbs.studies.run.record import (
     VARIABLES,
-    WATCHED,
-    Measured,
-    Recorder,
     attributes_of,
     bearing_attributes,
     check_variables,
     evaluate,
-    measure,
-    rows_of_record,
     time_series,
 )
+from gearmbs.studies.run.recorder import WATCHED, Measured, Recorder, measure, rows_of_record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -254,7 +250,8 @@ def run_case(
         raise kind(f"case '{case.name}': {solution.message}", solution, case, known)
     try:
         if periodic is None or periodic.found is None:
-            dataset = _evaluated(case, solution, recorder.measured(), even=False, variables=variables)
+            measured, even = recorder.measured(), recorder.is_even
+            dataset = _evaluated(case, solution, measured, recorder.slipped, even=even, variables=variables)
         else:
             dataset = _evaluated_period(case, solution, periodic, variables)
     except SimulationFailed as failure:
@@ -330,16 +327,23 @@ def record(case: Case, solution: Solution, mechanism: Mechanism | None = None) -
         If teeth slipped past each other.
     """
     known = measure(case, solution, rows_of_record(case, solution.t))
-    dataset = _evaluated(case, solution, known, even=_is_even(solution.t, case.output_rate))
+    slipped = slip(case, known.t, known.error)
+    dataset = _evaluated(case, solution, known, slipped, even=_is_even(solution.t, case.output_rate))
     dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
     return dataset
 
 
 def _evaluated(
-    case: Case, solution: Solution, known: Measured, *, even: bool, variables: Collection[str] | None = None
+    case: Case,
+    solution: Solution,
+    known: Measured,
+    slipped: str | None,
+    *,
+    even: bool,
+    variables: Collection[str] | None = None,
 ) -> xr.Dataset:
     """Return the record of what was measured, at even times or not; see `record`."""
-    _check_slip(case, solution, known)
+    _check_slip(case, solution, slipped)
     # the first one loads xarray and what xarray loads
     with uncollected():
         dataset = evaluate(case, known, even=even, variables=variables)
@@ -351,7 +355,7 @@ def _evaluated_period(
     case: Case, solution: Solution, periodic: PeriodicRecorder, variables: Collection[str] | None
 ) -> xr.Dataset:
     """Return the record of a motion that repeats itself; its acceleration lasts for some turns of the driver."""
-    _check_slip(case, solution, periodic.recorder.measured())
+    _check_slip(case, solution, periodic.recorder.slipped)
     span, wanted = periodic.span, VARIABLES if variables is None else variables
     levels = periodic.levels() if "gmf_rms" in wanted else None
     with uncollected():
@@ -368,8 +372,7 @@ def _evaluated_period(
     return dataset
 
 
-def _check_slip(case: Case, solution: Solution, known: Measured) -> None:
-    slipped = slip(case, known.t, known.error)
+def _check_slip(case: Case, solution: Solution, slipped: str | None) -> None:
     if slipped is not None:
         raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
 

@@ -1,0 +1,237 @@
+"""What the record of a case is made from, taken from the solution while it is being computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gearmbs.dae.results.solution import Solution
+from gearmbs.signals.resampling import MARGIN, EvenSamples
+from gearmbs.studies.case.case import Case
+from gearmbs.studies.case.limits import edge, slip
+from gearmbs.studies.run import rig
+
+SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
+COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
+"""Contact quantities of a record, with units; numbers of tooth pairs cannot be interpolated."""
+
+CONTACT = (*SMOOTH, *COUNTS)
+FORCES = 6
+"""Columns of the forces, which come first; the transmission error and `CONTACT` follow."""
+
+Taken = tuple[np.ndarray, np.ndarray]
+"""Times, and what is recorded at each, shape (m, 12)."""
+
+WATCHED = (
+    *(("reaction_force", seat) for seat in rig.SEATS),
+    *(("orientation", gear) for gear in rig.GEARS),
+    ("diagnostics", rig.MESH),
+)
+"""What a record takes from the integrator's own steps."""
+
+TURN_BEFORE = 0.02
+"""Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
+
+
+class Span(NamedTuple):
+    """Start and end of a record, s."""
+
+    start: float
+    stop: float
+
+
+class Measured(NamedTuple):
+    """What a record is made from, at the output times of a solution or some of them.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+    forces : ndarray, shape (m, 6)
+        Force of shaft 1 on gear 1, then of shaft 2 on gear 2, N.
+    error : ndarray, shape (m,)
+        Lag of the driven wheel behind the driver at the driven base circle, m.
+    contact : dict of ndarray
+        The quantities of `SMOOTH` and `COUNTS`.
+    """
+
+    t: np.ndarray
+    forces: np.ndarray
+    error: np.ndarray
+    contact: dict[str, np.ndarray]
+
+
+class _Turned:
+    """Follows the angles by which the wheels have turned, for the lag of the driven one."""
+
+    def __init__(self, case: Case) -> None:
+        pair = case.pair()
+        place = pair.placement(0.0)
+        self._axes = (place.axes_1, place.axes_2)
+        self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
+        self._lag = pair.rotation * pair.wheels[1].base_radius
+        self._last: list[np.ndarray] = [np.empty(0), np.empty(0)]
+
+    def error(self, part: Solution) -> np.ndarray:
+        """Return the transmission error of the next part of a solution, m."""
+        turned = []
+        for wheel, (gear, axes) in enumerate(zip(rig.GEARS, self._axes, strict=True)):
+            along, across = (part.orientation(gear)[..., 0] @ axes[:, k] for k in range(2))
+            before = self._last[wheel]
+            angles = np.unwrap(np.concatenate([before, np.arctan2(across, along)]))[before.size :]
+            self._last[wheel] = angles[-1:]
+            turned.append(angles)
+        return self._lag * (turned[0] * self._ratio + turned[1])
+
+
+def _taken(part: Solution, turned: _Turned) -> np.ndarray:
+    """Return what is recorded of a part of a solution, shape (m, 12): forces, transmission error, contact."""
+    forces = [*map(part.reaction_force, rig.SEATS)]
+    told = part.contact(rig.MESH)
+    return np.column_stack([*forces, turned.error(part), *(told[name] for name in CONTACT)])
+
+
+def _joined(parts: Sequence[Taken]) -> Taken:
+    """Return times and columns of some parts as one."""
+    t, columns = zip(*parts, strict=True)
+    return np.concatenate(t), np.concatenate(columns)
+
+
+def _named(t: np.ndarray, columns: np.ndarray) -> Measured:
+    """Return columns of `_taken` by their names."""
+    contact = {name: columns[:, FORCES + 1 + k] for k, name in enumerate(CONTACT)}
+    return Measured(t, columns[:, :FORCES], columns[:, FORCES], contact)
+
+
+def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> Measured:
+    """Return what a record is made from at the output times ``rows`` of a solution, default all."""
+    turned = _Turned(case)
+    return _named(*_joined([(part.t.copy(), _taken(part, turned)) for part in solution.parts(rows)]))
+
+
+def rows_of_record(case: Case, t: np.ndarray, begin: float | None = None) -> np.ndarray:
+    """Return the numbers of the output times a record is made from.
+
+    Before ``begin``, by default of the span of its filters, only a few are needed, to follow the turning wheels.
+    """
+    first = int(np.searchsorted(t, span_begin(case) if begin is None else begin))
+    teeth = case.gears.teeth
+    turn = 2.0 * np.pi / (case.operation.top_speed * max(1.0, teeth[0] / teeth[1]))
+    interval = np.floor(t[: first + 1] / (TURN_BEFORE * turn))
+    return np.concatenate([np.flatnonzero(np.diff(interval) > 0.0), np.arange(first, t.size)])
+
+
+def span_of(case: Case) -> Span:
+    """Return when the record of a case begins and ends, if it does not depend on the motion."""
+    operation = case.operation
+    start = operation.run_up + operation.settling
+    return Span(start, start + operation.longest)
+
+
+def span_begin(case: Case) -> float:
+    """Return the time at which the span of a record's filters begins, s."""
+    return span_of(case).start - edge(case) - (MARGIN + 1) / case.output_rate
+
+
+class Recorder:
+    """Collects what the record of a case needs from the parts of a solution, as a consumer of `simulate`.
+
+    Of the steps before ``begin`` the unknowns are kept, and evaluated only as far as needed.
+
+    Parameters
+    ----------
+    case : Case
+    begin : float, optional
+        Time from which all steps are kept, s. By default the record's span is known, and only its samples at the output
+        rate are.
+
+    Attributes
+    ----------
+    slipped : str or None
+        A sentence about the first time teeth passed each other.
+    """
+
+    def __init__(self, case: Case, begin: float | None = None) -> None:
+        self.case = case
+        self.slipped: str | None = None
+        self._begin = span_begin(case) if begin is None else begin
+        self._early: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._turned: _Turned | None = None
+        self._parts: list[Taken] = []
+        self._samples: EvenSamples | None = None
+        if begin is None:
+            (start, stop), ahead = span_of(case), edge(case)
+            self._samples = EvenSamples(
+                case.output_rate, start - ahead, stop + ahead, smooth=1, linear=len(SMOOTH), held=len(COUNTS)
+            )
+        self._model: Solution | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing has been taken yet."""
+        return self._model is None
+
+    @property
+    def is_even(self) -> bool:
+        """Whether samples at the output rate are kept instead of steps."""
+        return self._samples is not None
+
+    def take(self, part: Solution) -> None:
+        """Take the next steps of a run."""
+        if self._turned is not None:
+            self._add(part, self._turned)
+            return
+        if self._model is None:
+            self._model = part.over(np.empty(0), part.result.y[:0], part.result.epochs)
+        self._early.append((part.t.copy(), part.result.y.copy(), part.result.epochs[0][1]))
+        if part.t[-1] < self._begin:
+            return
+        self._turned = _Turned(self.case)
+        wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]), self._begin)
+        for piece in self._solution_over(wanted).parts():
+            self._add(piece, self._turned)
+
+    def _add(self, part: Solution, turned: _Turned) -> None:
+        """Keep what is recorded of a part of a solution."""
+        t, columns = part.t.copy(), _taken(part, turned)
+        self.slipped = self.slipped or slip(self.case, t, columns[:, FORCES])
+        if self._samples is None:
+            self._parts.append((t, columns))
+        else:
+            self._samples.take(t, columns)
+
+    def measured(self) -> Measured:
+        """Return what the record is made from: samples, or all steps inside the span of its filters and some before."""
+        if self._samples is not None:
+            return _named(self._samples.t, self._samples.finish())
+        return _named(*_joined(self._parts))
+
+    def tail(self, after: float) -> Measured:
+        """Return what was taken after a time, and a little before."""
+        first = next((k for k, (t, _) in enumerate(self._parts) if t[-1] > after), 0)
+        return _named(*_joined(self._parts[first:]))
+
+    def everything(self) -> Measured:
+        """Return what was taken from the start on, for a run that failed: samples where steps are not kept."""
+        early, turned = self._solution_over(), _Turned(self.case)
+        parts = [(part.t.copy(), _taken(part, turned)) for part in early.parts()]
+        for t, columns in self._parts if self._samples is None else self._samples.known():
+            first = int(np.searchsorted(t, early.t[-1], side="right"))
+            parts.append((t[first:], columns[first:]))
+        return _named(*_joined(parts))
+
+    def _solution_over(self, wanted: np.ndarray | None = None) -> Solution:
+        """Return the solution over the steps whose unknowns were kept, or over some of them, by increasing numbers."""
+        assert self._model is not None
+        times, rows, tables = zip(*self._early, strict=True)
+        ends = np.cumsum([t.size for t in times])
+        wanted = np.arange(ends[-1]) if wanted is None else wanted
+        places = np.searchsorted(wanted, [0, *ends])
+        inside = [wanted[a:b] - end + t.size for a, b, end, t in zip(places, places[1:], ends, times)]
+        epochs = [(int(k), table) for k, table in zip(places, tables)]
+        return self._model.over(
+            np.concatenate([t[k] for t, k in zip(times, inside)]),
+            np.concatenate([y[k] for y, k in zip(rows, inside)]),
+            epochs,
+        )
