@@ -1,4 +1,4 @@
-"""What one train says alone: the errors of its marks, and the torsional vibration of its shaft."""
+"""What one train says alone: the errors of its marks, whose they are, and the torsional vibration of its shaft."""
 
 from __future__ import annotations
 
@@ -13,6 +13,15 @@ import xarray as xr
 from gearmbs.signals.encoders.orders import Deviations, deviations, smooth_angle
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain, errors_of
 from gearmbs.signals.errors import SignalError
+
+ECCENTRIC = 2
+"""Orders of a disc that turn with its mounting, which need not be the same in two runs."""
+SIDEBANDS = 2
+"""Shaft orders beside a mesh order that are left out: modulation by the shaft is there."""
+FEWEST_ORDERS = 8
+"""Orders from which the scatter of a regression is known to a quarter of itself."""
+NEIGHBOURS = 33
+"""Orders whose median is the level that a line stands in: as many as `transmission.LEVEL_LINES` and its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +74,49 @@ def encoder_marks(trains: PulseTrain | Sequence[PulseTrain]) -> EncoderMarks:
     spread = float(np.sqrt(np.sum((off - errors[at]) ** 2) / max(off.size - np.count_nonzero(count), 1)))
     errors -= errors[count > 0].mean()
     return EncoderMarks(np.where(count > 0, errors, 0.0), spread / math.sqrt(off.size / np.count_nonzero(count)))
+
+
+def share_found(
+    known: EncoderMarks, trains: PulseTrain | Sequence[PulseTrain], mesh: float
+) -> tuple[float, float] | None:
+    """Share of known errors of marks that other trains show, and its standard error: one of the same disc, else zero.
+
+    The regression of the lines of the trains' marks upon the known ones, at the orders of the shaft that are no mesh
+    orders nor beside them, each weighted by the level around it: there transmission error and vibration are the least,
+    and count as noise.
+
+    Parameters
+    ----------
+    known : EncoderMarks
+    trains : PulseTrain or sequence of PulseTrain
+    mesh : float
+        Mesh order of the shaft.
+
+    Returns
+    -------
+    (float, float) or None
+        None where the known errors do not stand clear of their own noise, or of too few orders.
+    """
+    count = known.errors.size
+    orders = np.arange(ECCENTRIC + 1, (count + 1) // 2)
+    orders = orders[np.abs((orders + 0.5 * mesh) % mesh - 0.5 * mesh) > SIDEBANDS]
+    if orders.size < FEWEST_ORDERS:
+        return None
+    told, seen = (np.fft.rfft(errors)[orders] for errors in (known.errors, encoder_marks(trains).errors))
+    power = np.abs(seen) ** 2
+    reach = min(NEIGHBOURS, orders.size)
+    first = np.clip(np.arange(orders.size) - reach // 2, 0, orders.size - reach)
+    level = np.median(np.lib.stride_tricks.sliding_window_view(power, reach), axis=1)[first]
+    weight = 1.0 / np.maximum(level, np.finfo(float).tiny)
+    noise = count * known.uncertainty**2
+    clear = float(weight @ (np.abs(told) ** 2 - noise))
+    if clear < 3.0 * noise * math.sqrt(weight @ weight):
+        return None
+    product = weight * np.real(seen * told.conj())
+    share = float(product.sum()) / clear
+    # the noise of the known errors is part of the scatter, so that it is told from the terms themselves
+    scatter = product - share * weight * (np.abs(told) ** 2 - noise)
+    return share, math.sqrt(float(scatter @ scatter)) / clear
 
 
 def torsional_vibration(train: PulseTrain, marks: Any = None) -> xr.DataArray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from gearmbs.progress import waiting
 from gearmbs.signals.encoders.estimate import Found, Row, estimate
-from gearmbs.signals.encoders.marks import encoder_marks
+from gearmbs.signals.encoders.marks import encoder_marks, share_found
 from gearmbs.signals.encoders.orders import (
     FEWEST_TURNS,
     Course,
@@ -149,6 +149,7 @@ def transmission_error_from_pulses(
         raise SignalError(f"free: has {sorted(stray)}; the shafts are 'driver' and 'driven'")
     _check_trains(runs, freed, gearing)
     orders, refused, remarks = _orders(gearing, trains)
+    remarks += _check_free(runs, freed, gearing)
     # known marks are put right where the pulses are, as the wheels' lag moves them; what is left of them is an unknown
     errors = {name: encoder_marks(trains).errors if trains else None for name, trains in freed.items()}
     measured = [_lines_of(run, gearing, orders, errors) for run in runs]
@@ -229,6 +230,40 @@ def _check_trains(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrai
                 f"{float(gearing.ratio):.6g} times; check teeth, lines ({run.driver.lines}, {run.driven.lines}) and "
                 "which of the trains is the driver's"
             )
+
+
+def _check_free(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrain]], gearing: Gearing) -> list[str]:
+    """Refuse free runs of other discs than those of the runs, or the runs themselves; remark where nothing tells."""
+    remarks = []
+    for name, mesh in (("driver", gearing.mesh), ("driven", gearing.on_second(gearing.mesh))):
+        coupled = [getattr(run, name) for run in runs]
+        for free in freed[name]:
+            if any(np.isin(free.times, train.times).mean() > SAME_RECORD for train in coupled):
+                raise SignalError(
+                    f"free: {free.name!r} of the {name} is the run in mesh itself, and would take the transmission "
+                    f"error for marks; give a record of the {name} running free"
+                )
+            found = share_found(encoder_marks(free), coupled, float(mesh))
+            if found is None:
+                continue
+            share, error = found
+            words = f"{share:.2f} +- {error:.2f} of the errors of its marks is in the run in mesh"
+            if share + SURELY * error < SAME_DISC:
+                raise SignalError(
+                    f"free: {free.name!r} is not of the {name}'s disc: {words}, of one disc it is 1; give the free run "
+                    "of this disc, turning the same way and with the same mark 0, or leave free out"
+                )
+            if share - SURELY * error < SAME_DISC:
+                remarks.append(f"Free run of the {name}: {words}, which does not tell whether it is of the same disc.")
+    return remarks
+
+
+SAME_RECORD = 0.5
+"""Share of pulses at the same times from which two records are one: of two of 50 ns clocks one in thousands agrees."""
+SAME_DISC = 0.5
+"""Share of a free run's marks that must be found again: midway between those of one disc and of two."""
+SURELY = 3.0
+"""Standard errors by which a share must be below it: of a disc whose share is 1 fewer than 1 in 800 are."""
 
 
 def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order], list[str], list[str]]:

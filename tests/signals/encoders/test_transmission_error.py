@@ -5,9 +5,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import gearmbs as gm
 from gearmbs.signals import CoupledRun, SignalError, encoder, mark_errors, transmission_error_from_pulses
+from gearmbs.signals.encoders.estimate import amplitude_interval
 from gearmbs.view import measured_error_plot
 from tests.generators import seed
 from tests.says import says
@@ -83,6 +85,23 @@ def test_without_known_marks_the_interval_covers_the_truth(told, teeth):
         inside += (mesh["low"] <= exact) & (exact <= mesh["high"])
     # of 200 draws at 95 %, fewer than 180 are seen once in 500 times
     assert inside.min() >= 180, inside
+
+
+@pytest.mark.parametrize("freedom", [4.0, 12.0, math.inf])
+def test_intervals_of_amplitudes_cover_them(freedom):
+    """At nothing, at lines as large as noise, and at clear ones, where they are those of Student's t."""
+    rng = np.random.default_rng(seed(5))
+    draws = 60
+    for true in (0.0, 1.0, 4.0, 25.0):
+        seen = np.abs(true + rng.standard_normal(draws) + 1j * rng.standard_normal(draws))
+        variances = np.ones(draws) if math.isinf(freedom) else rng.chisquare(freedom, draws) / freedom
+        ends = [amplitude_interval(y, v, freedom, 0.9) for y, v in zip(seen, variances)]
+        # of 60 draws at 90 %, fewer than 46 are seen once in 1000 times
+        assert sum(low <= true <= high for low, high in ends) >= 46, true
+    low, high = amplitude_interval(29.0, 1.0, freedom, 0.95)
+    reach = stats.t.ppf(0.975, freedom)
+    assert abs(low - 29.0 + reach) < 0.1
+    assert abs(high - 29.0 - reach) < 0.1
 
 
 @pytest.mark.slow
@@ -182,6 +201,32 @@ def test_records_that_do_not_fit_are_refused():
     short = CoupledRun(encoder(angles[0][:9000], 200), encoder(angles[1][:9000], 200))
     with pytest.raises(SignalError, match=says("turns", "smooth")):
         transmission_error_from_pulses(short, TEETH, **known)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", range(3))
+@pytest.mark.parametrize("error", [0.01, 5e-5])
+def test_free_runs_of_other_discs_are_refused(case, error):
+    """Of another disc, of the other shaft's, turned round, or the run itself; of errors below the noise none is."""
+    angles = coupled(lambda turned: 4e-6 * np.cos(math.tau * 29 * turned), TEETH, 0.04, turns=8, rate=15e3)
+    discs, other, round_about = (Discs(400, error, seed=seed(11) + 3 * case + k) for k in range(3))
+    round_about.marks = [marks[::-1] for marks in discs.marks]
+    run, own = discs.run(angles), discs.free(seconds=0.5)
+    known = {"teeth": TEETH, "base_radius": 0.04}
+    sound = transmission_error_from_pulses(run, free=own, **known)
+    assert sound.harmonics()["calibrated"].all()
+    if error > 1e-3:
+        assert not any("does not tell" in note for note in sound.notes)
+    wrong = {"other": other.free(seconds=0.5)["driven"], "turned": round_about.free(seconds=0.5)["driven"]}
+    wrong["swapped"] = own["driver"]
+    for train in wrong.values():
+        if error > 1e-3:
+            with pytest.raises(SignalError, match=says("free", "driven", "same mark 0")):
+                transmission_error_from_pulses(run, free={"driven": train}, **known)
+        else:
+            assert len(transmission_error_from_pulses(run, free={"driven": train}, **known).harmonics()) == 6
+    with pytest.raises(SignalError, match=says("free", "driver", "itself")):
+        transmission_error_from_pulses(run, free={"driver": run.driver}, **known)
 
 
 @pytest.mark.slow
