@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import gearmbs as gm
-from gearmbs.signals import MissingMetadataError, SignalFileError, read_signal
+from gearmbs.signals import MissingMetadataError, SignalError, SignalFileError, read_signal
 from gearmbs.signals.signal.labels import measured, name_and_unit, rises_evenly, role_of
 from tests.says import says
 
@@ -310,6 +311,39 @@ def test_of_two_speeds_or_one_without_a_unit_is_asked_in_one_line():
     assert list(report.levels["channel"].values) == ["a"]
     assert any("--units 'Drehzahl=rpm'" in note for note in report.notes)
     assert gm.analyse(bare, units={"Drehzahl": "rpm"}).speed == pytest.approx(RPM * np.pi / 30, rel=1e-3)
+
+
+def test_the_sign_of_a_speed_is_told():
+    """Negative throughout: its amount. A few samples: rest. Many: the shaft turns back, and nothing is guessed."""
+    for wrong, words in ((-SPEED, "negative"), (np.where(np.arange(COUNT) < 5, -SPEED, SPEED), "5 samples")):
+        signal = gm.signals.make_signal(np.stack([A1, wrong], 1), RATE, channels=["a", "n"], units=["g", "rpm"])
+        report = gm.analyse(signal)
+        assert report.speed == pytest.approx(RPM * np.pi / 30, rel=2e-3)
+        assert any(words in note and "'n'" in note for note in report.notes)
+    turning = np.where(np.arange(COUNT) < COUNT // 4, -SPEED, SPEED)
+    signal = gm.signals.make_signal(np.stack([A1, turning], 1), RATE, channels=["a", "n"], units=["g", "rpm"])
+    with pytest.raises(SignalError, match=says("speed_channel", "'n'", "25 %", "cut the record")):
+        gm.analyse(signal)
+
+
+@pytest.mark.parametrize("gap", [1, 40])
+def test_a_speed_that_is_missing_in_rows_is_told_and_refused_where_it_is_long(gap, tmp_path):
+    path = tmp_path / "record.csv"
+
+    def written(there):
+        table = pd.DataFrame({"t [s]": TIME, "a [g]": A1, "n [rpm]": np.where(there, SPEED, np.nan)})
+        table.to_csv(path, index=False)
+        return path
+
+    rows = np.arange(COUNT)
+    for there in (rows % (gap + 1) == 0, (rows < 100) | (rows >= 100 + gap)):
+        report = gm.analyse(written(there))
+        assert report.speed == pytest.approx(RPM * np.pi / 30, rel=1e-3)
+        assert any(f"'n' is empty in {COUNT - int(there.sum())} of {COUNT} rows" in note for note in report.notes)
+    half = written((rows < COUNT // 4) | (rows >= COUNT // 4 * 3))
+    with pytest.raises(SignalFileError, match=says("record.csv", "'n'", "interpolate")):
+        gm.analyse(half)
+    assert gm.analyse(half, gaps="interpolate").speed == pytest.approx(RPM * np.pi / 30, rel=1e-3)
 
 
 def test_a_tacho_beside_a_speed_is_no_vibration_and_alone_is_named():

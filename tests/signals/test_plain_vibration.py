@@ -3,9 +3,11 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from gearmbs.signals import SignalError, VibrationReport, analyse, compare, make_signal
+from tests.generators import seed
 from tests.says import says
 
 RATE = 12800.0
@@ -87,6 +89,24 @@ def test_half_or_double_the_speed_is_remarked():
         said = checks(analyse(pair(), 32, rate=RATE, speed=wrong))
         assert any("CHECK THE SPEED" in note and "1500.0 rpm" in note for note in said), (wrong, said)
         assert said[0] in analyse(pair(), 32, rate=RATE, speed=wrong).to_markdown()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("off", "words"), [(2.0, "1500"), (0.5, "1500"), (0.95, "1500.0"), (1.01, "-0.99 %")])
+def test_a_speed_column_or_tacho_that_the_mesh_line_contradicts_is_remarked(off, words):
+    """Off by a factor or a few per cent; the true ones are taken without a remark."""
+    turn = np.arange(round(6 * RATE)) / RATE * SHAFT
+    column, pulses = np.full(turn.size, 60.0 * SHAFT), 1.0 * (turn % 1.0 < 0.1)
+    noise = 0.3 * np.random.default_rng(seed(2)).standard_normal(turn.size)
+    record = pd.DataFrame({"a [g]": pair(), "n [rpm]": column + noise, "tacho [V]": pulses})
+    assert checks(analyse(record, 32, rate=RATE)) == []
+    assert checks(analyse(record, 32, rate=RATE, tacho="tacho")) == []
+    wrong = record.assign(**{"n [rpm]": off * record["n [rpm]"]})
+    said = [analyse(wrong, 32, rate=RATE)]
+    if off in (0.5, 2.0):
+        said.append(analyse(record, 32, rate=RATE, tacho="tacho", pulses_per_rev=1.0 / off))
+    for report in said:
+        assert any("CHECK THE SPEED" in note and words in note for note in checks(report)), report.notes
 
 
 @pytest.mark.parametrize("sidebands", [0.0, 0.3])

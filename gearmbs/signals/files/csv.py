@@ -39,7 +39,7 @@ from gearmbs.signals.files.text_tables import (
     index_meaning,
     split_cells,
 )
-from gearmbs.signals.signal.labels import FEWEST_EVEN
+from gearmbs.signals.signal.labels import FEWEST_EVEN, role_of
 from gearmbs.signals.signal.record import (
     REMEDY,
     Progress,
@@ -73,6 +73,10 @@ FEWEST_FIXED = 20
 """Rows of the same number of digits that make a format: those without trailing zeros have fewer in one of ten."""
 MOST_ODD = 0.05
 """Part of the characters of a text that may be none of UTF-8 or of control, as umlauts of older code pages are."""
+LONGEST_EMPTY = 0.1
+"""Share of the rows in which a speed may be missing in a row: a drive may change its speed meanwhile."""
+LONGEST_STEP = 5.0
+"""Usual distances of the rows with a speed that are as long: loggers that write it now and then skip a few."""
 GAPS = [cell for cell in GAP_CELLS if cell not in ("inf", "-inf")]
 
 
@@ -120,8 +124,10 @@ def read_csv(
             raise SignalFileError(path, "holds no rows of numbers")
         known = [clock for clock in clocks if clock is not None]
         clock = np.concatenate(known) if known else None
-        found = _record(path, np.concatenate(blocks), clock, layout, rate)
-        said = _end_checked(path, packed, layout, len(found.values))
+        values = np.concatenate(blocks)
+        said = [] if pulses else _bridged(path, values, layout, gaps)
+        found = _record(path, values, clock, layout, rate)
+        said += _end_checked(path, packed, layout, len(found.values))
         return replace(found, notes=[*found.notes, *said]) if said else found
 
 
@@ -194,7 +200,9 @@ def csv_pieces(
         times, first, count = Times(layout, path), None, 0
         for values, stamped, fraction in _blocks(path, packed, layout, gaps):
             clock = times.seconds(values, stamped)
+            said = _bridged(path, values, layout, gaps)
             record = _record(path, values, clock, layout, rate if first is None else first.rate)
+            record.notes += said
             if first is None:
                 first = record
             elif clock is not None and first.rate is not None:
@@ -202,13 +210,42 @@ def csv_pieces(
                 # the mean rate of rounded times is as good as the given one, and drifts from it as much
                 if strayed > (MAX_JUMP if rate is None else max(MAX_JUMP, ROUNDED_TIMES * count)):
                     raise SignalFileError(path, f"its times jump by {strayed:.3g} samples after row {count}")
-                record = replace(first, values=record.values)
+                record = replace(first, values=record.values, notes=record.notes)
             count += len(values)
             if checked_gaps(gaps) == "interpolate":
                 record = replace(record, values=_filled(record.values))
             yield record, fraction
         for words in _end_checked(path, packed, layout, count):
             warnings.warn(words, UserWarning, stacklevel=2)
+
+
+def _bridged(path: Path, values: np.ndarray, layout: CsvLayout, gaps: str | None) -> list[str]:
+    """Fill columns that may be written in some rows only, in place; say of which, and how many rows.
+
+    Raises
+    ------
+    SignalFileError
+        If a speed is missing for long, beside rows in which it is there, and `gaps` does not say what to do.
+    """
+    said = []
+    for i in layout.slow:
+        there = np.flatnonzero(np.isfinite(values[:, i]))
+        lost = len(values) - there.size
+        if not lost or not there.size:
+            continue
+        steps = np.diff(there, prepend=-1, append=len(values))
+        longest, usual = int(steps.max()) - 1, float(np.median(steps))
+        name = layout.names[i]
+        missing = f"{name!r} is empty in {lost} of {len(values)} rows, in up to {longest} in a row"
+        odd = longest > max(LONGEST_EMPTY * len(values), LONGEST_STEP * usual)
+        if odd and role_of(name, layout.units[i]) == "speed" and checked_gaps(gaps) == "refuse":
+            raise SignalFileError(
+                path, f"{missing}, too many to tell the speed; pass gaps='interpolate' (--gaps interpolate) for "
+                "straight lines across them, or channels=[...] (--channel) without it"
+            )  # fmt: skip
+        values[:, [i]] = _filled(values[:, [i]])
+        said.append(f"{missing}, and interpolated.")
+    return said
 
 
 def _filled(values: np.ndarray) -> np.ndarray:
@@ -274,8 +311,6 @@ def _blocks(
                 values = np.full((len(block), width), np.nan)
                 values[:, numbers.columns] = numbers.to_numpy()
                 wanted = [i for i in range(width) if i not in {*layout.stamps, *layout.empty, *layout.slow}]
-                for i in layout.slow:
-                    values[:, [i]] = _filled(values[:, [i]])
                 if refuse and not np.isfinite(values[:, wanted]).all():
                     raise ValueError("missing values")
                 yield values, stamped, min(1.0, raw.tell() / size)

@@ -60,7 +60,7 @@ def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        rad, dimension (time,): the integral of the speed, over the samples that the curve covers.
+        rad, dimension (time,): the integral of the speed, over the samples that the curve covers, with its `notes`.
 
     Raises
     ------
@@ -78,7 +78,9 @@ def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
             f"speed: the curve spans {curve.times[0]:g} to {curve.times[-1]:g} s, "
             f"the record {times[0]:g} to {times[-1]:g} s"
         )
-    return _phase(times[inside], curve.angle(times[inside]), "speed curve")
+    result = _phase(times[inside], curve.angle(times[inside]), "speed curve")
+    notes = getattr(speed, "attrs", {}).get("notes")
+    return result.assign_attrs(notes=notes) if notes else result
 
 
 @takes_data()

@@ -100,10 +100,15 @@ def shaft_phase(
 def speed_of_channel(signal: xr.DataArray, channel: str) -> xr.DataArray:
     """The speed (rad/s) that a channel of the record holds, negative noise at rest cut off at zero.
 
+    Returns
+    -------
+    xarray.DataArray
+        Dimension (time,); attribute `notes`, where its sign was turned or values of the other sign were cut off.
+
     Raises
     ------
     SignalError
-        If there is no such channel, or its unit is not one of rotation.
+        If there is no such channel, its unit is not one of rotation, or the shaft turns back.
     """
     names = [str(c) for c in signal["channel"].values]
     if channel not in names:
@@ -120,10 +125,25 @@ def speed_of_channel(signal: xr.DataArray, channel: str) -> xr.DataArray:
             f"units={{{channel!r}: 'rpm'}} (on the command line: --units '{channel}=rpm')"
         ) from None
     values = factor * np.asarray(signal.values[:, at], dtype=float)
-    values = -values if values.mean() < 0.0 else values
+    notes = []
+    if values.mean() < 0.0:
+        values = -values
+        notes.append(f"The speed in {channel!r} is negative; its amount is taken, of a shaft that turns the other way.")
+    back = values < -AT_REST * float(values.max())
+    count = int(back.sum())
+    if count > MOST_BACK * values.size:
+        first = float(signal["time"].values[int(np.argmax(back))])
+        raise SignalError(
+            f"speed_channel: {channel!r} changes its sign, {100 * count / values.size:.3g} % of it have the other one, "
+            f"the first at {first:g} s; cut the record where the shaft turns back, or give the amounts if only signs "
+            "are wrong"
+        )
+    if count:
+        notes.append(f"The speed in {channel!r} has the other sign in {count} samples, which are taken as rest.")
     return xr.DataArray(
-        np.maximum(values, 0.0), dims=("time",), coords={"time": signal["time"].values}, attrs={"units": "rad/s"}
-    )
+        np.maximum(values, 0.0), dims=("time",), coords={"time": signal["time"].values},
+        attrs={"units": "rad/s", **({"notes": notes} if notes else {})},
+    )  # fmt: skip
 
 
 def _given_angle(phase: Any) -> xr.DataArray:
@@ -133,6 +153,12 @@ def _given_angle(phase: Any) -> xr.DataArray:
     if not np.isfinite(values).all():
         raise SignalError("phase: holds angles that are not finite; cut or fill them first")
     return phase.copy(data=-values) if values[-1] < values[0] else phase
+
+
+AT_REST = 0.02
+"""Part of the highest speed up to which one of the other sign is noise at rest: offsets of converters are within it."""
+MOST_BACK = 0.01
+"""Share of samples of the other sign that are glitches: of more the shaft turns back, or signs are wrong."""
 
 
 # The shaft of an analysis: its angle from tacho, known speed or mesh line, and remarks where a speed looks wrong.
@@ -145,6 +171,8 @@ VARYING = 0.02
 OTHER_COMB = 0.03
 """Relative difference of speeds up to which two combs mean one: a little more than `SPEED_TOLERANCE`, within which the
 given one is looked for."""
+LINES_OFF = 2.0
+"""Lines of the whole record's spectrum by which a mesh line may be off: there a Hann window leaves nothing of it."""
 STRONGER_DB = 3.0
 """By which another comb must be higher to count as stronger: scores of one record scatter by less."""
 SHARED_HARMONIC = 2
@@ -249,10 +277,13 @@ def mesh_shaft(
     teeth = tuple(counts)
     found, signal = known_shaft(signal, known)
     if isinstance(found, float):
+        notes += getattr(known.speed, "attrs", {}).get("notes", ())
         shaft = _near_speed(signal, teeth, found, notes)
     elif found is not None:
         shaft = found
         notes += shaft.phase.attrs.get("notes", ())
+        if shaft.range is None:
+            _compare(signal, teeth, shaft, notes)
     else:
         estimate = followed_comb(signal, teeth, known.speed_range)
         if estimate.doubt:
@@ -263,6 +294,24 @@ def mesh_shaft(
         shaft = Shaft(phase, estimate.speed, "estimated from the mesh line", estimate)
     remark_plausibility(signal, shaft.speed, found is None, notes)
     return shaft, signal
+
+
+def _compare(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, notes: list[str]) -> None:
+    """Say so where the mesh line contradicts a nearly steady speed from a channel, a tacho or an angle."""
+    found = _estimate(signal, counts, (shaft.speed * (1.0 - SPEED_TOLERANCE), shaft.speed * (1.0 + SPEED_TOLERANCE)))
+    if _remark_other(signal, counts, shaft.speed, found, notes):
+        return
+    gmf = shaft.speed * counts[0] / math.tau
+    if _turns(signal, shaft.speed) >= FOLLOWED_TURNS and line_near(signal, gmf, SPEED_TOLERANCE) is None:
+        notes.append(_nothing_near(counts[0], shaft.speed, False) + f" It is used as it is, {shaft.origin}.")
+    elif found is not None and found.phase is not None:
+        off = found.speed / shaft.speed - 1.0
+        if abs(off) * gmf > LINES_OFF * found.resolution:
+            notes.append(
+                f"CHECK THE SPEED: the mesh line is at {found.speed * 30 / math.pi:.2f} rpm, {100 * off:+.2f} % off "
+                f"the {shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}, by which orders and averages are taken. "
+                f"Calibrate it, or give speed='{found.speed * 30 / math.pi:.2f} rpm' alone."
+            )
 
 
 def remark_plausibility(signal: xr.DataArray, speed: float | None, estimated: bool, notes: list[str]) -> None:
@@ -290,7 +339,7 @@ def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, n
     gmf = nominal * counts[0] / math.tau
     line = gmf if sure else line_near(signal, gmf, SPEED_TOLERANCE)
     if line is None and _turns(signal, nominal) >= FOLLOWED_TURNS:
-        notes.append(_nothing_near(counts[0], nominal, doubted))
+        notes.append(_nothing_near(counts[0], nominal, doubted) + " It is taken as constant.")
         return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
     if found is not None and found.phase is not None:
         words = f"from the mesh line, {100 * (found.speed / nominal - 1):+.3f} % off the given speed"
@@ -313,7 +362,7 @@ def _nothing_near(count: int, nominal: float, doubted: bool) -> str:
         f"{'No' if doubted else 'CHECK THE SPEED: no'} mesh line was found within {100 * SPEED_TOLERANCE:g} % "
         f"of the given speed ({nominal * 30 / math.pi:.1f} rpm, {nominal * count / math.tau:.2f} Hz with {count} teeth)"
         ", none that stands out from the noise and other lines. Is it the speed of the wheel with these teeth, in its "
-        "right unit? It is taken as constant."
+        "right unit?"
     )
 
 
