@@ -28,9 +28,6 @@ BLOCK = 4096
 KNOWN = 4
 """Values at an end of those known so far that have no slope yet of the cubic through all, and one more."""
 
-GAIN_POINTS = 1 << 14
-"""Points at which the gain of the filter is known, thirty and more to its transition."""
-
 _VEC, _MAT = float64[::1], float64[:, ::1]
 
 
@@ -219,13 +216,6 @@ class EvenSamples:
 def _fine_factor(rate: float, fine_rate: float) -> int:
     """Return the least even multiple of a rate that is not below another one."""
     return max(2, 2 * int(np.ceil(0.5 * fine_rate / rate)))
-
-
-def even_signal_gain(rate: float, frequencies: np.ndarray) -> np.ndarray:
-    """Return by how much `even_signal` multiplies lines at some frequencies, Hz, of what it samples at ``rate``."""
-    factor = _fine_factor(rate, FINE_RATE)
-    gain = np.abs(np.fft.rfft(decimation_taps(factor, factor * rate), GAIN_POINTS))
-    return np.interp(frequencies, np.linspace(0.0, 0.5 * factor * rate, gain.size), gain)
 
 
 def _fine(

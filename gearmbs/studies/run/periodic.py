@@ -27,8 +27,8 @@ import numpy as np
 
 from gearmbs.dae.results.solution import Solution
 from gearmbs.signals.analysis.bands import HALF_WIDTH
-from gearmbs.signals.conversion import component_values
-from gearmbs.signals.resampling import MARGIN, even_signal_gain, monotone_cubic
+from gearmbs.signals.conversion import COMPONENTS, component_values
+from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.case.limits import HARMONICS, band_taps, edge
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Recorder, Span
@@ -113,7 +113,7 @@ class PeriodicRecorder:
         self.recorder = Recorder(case, self._begin - (MARGIN + 1) / case.output_rate)
         pair = case.pair()
         self._components = partial(component_values, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
-        self._amplitudes = np.empty((0, HARMONICS, 4), dtype=complex)
+        self._amplitudes = np.empty((0, HARMONICS, len(COMPONENTS)), dtype=complex)
         self.found: Found | None = None
         self.deviation = math.nan
 
@@ -143,21 +143,22 @@ class PeriodicRecorder:
                 # a little longer each time, and where a second return is seen
                 n += max(OVERLAP, n // 8)
 
-    def _forces(self, first: int, stop: int) -> np.ndarray:
-        """Return the force on the driven gear over mesh periods, means over each sample, (periods SAMPLES, 3), N.
+    def _values(self, first: int, stop: int) -> np.ndarray:
+        """Return the components of the force on the driven gear over mesh periods, (periods SAMPLES, 4), N.
 
-        Values at equal places of all mesh periods would put a jump, as of friction at the pitch point, at the same
-        wrong place in each.
+        They are means over each sample: values at equal places of all mesh periods would put a jump, as of friction at
+        the pitch point, at the same wrong place in each. Resultants are those of the steps: of means they would be too
+        small where forces vanish and come back.
         """
         columns = self.recorder.tail(self._begin + (first - 1.0) / self._gmf)
-        t, forces = columns.t, np.ascontiguousarray(columns.forces[:, 3:])
+        t, components = columns.t, self._components(columns.forces[:, 3:6])
         edges = self._begin + (first + np.arange((stop - first) * SAMPLES + 1) / SAMPLES) / self._gmf
         between = slice(*np.searchsorted(t, edges[[0, -1]]))
         places = np.searchsorted(edges, t[between])
         times = np.insert(edges, places, t[between])
-        values = np.insert(monotone_cubic(t, forces, edges), places, forces[between], axis=0)
+        values = np.insert(monotone_cubic(t, components, edges), places, components[between], axis=0)
         pieces = 0.5 * np.diff(times)[:, None] * (values[1:] + values[:-1])
-        integral = np.concatenate([np.zeros((1, 3)), np.cumsum(pieces, axis=0)])
+        integral = np.concatenate([np.zeros((1, len(COMPONENTS))), np.cumsum(pieces, axis=0)])
         at_edges = integral[np.arange(edges.size) + np.searchsorted(t[between], edges)]
         return np.diff(at_edges, axis=0) * (SAMPLES * self._gmf)
 
@@ -165,8 +166,8 @@ class PeriodicRecorder:
         """Take the amplitudes of mesh periods that are complete."""
         known = len(self._amplitudes)
         if whole > known:
-            values = self._components(self._forces(known, whole))
-            lines = np.fft.rfft(values.reshape(whole - known, SAMPLES, 4), axis=1)[:, 1 : HARMONICS + 1]
+            values = self._values(known, whole).reshape(whole - known, SAMPLES, len(COMPONENTS))
+            lines = np.fft.rfft(values, axis=1)[:, 1 : HARMONICS + 1]
             self._amplitudes = np.concatenate([self._amplitudes, lines * (2.0 / SAMPLES)])
 
     def _judged(self) -> Found | None:
@@ -233,11 +234,7 @@ class PeriodicRecorder:
         assert self.found is not None
         first, periods = self.found
         spacing, count = self._gmf / periods, periods * SAMPLES
-        # the components are those of forces at the output rate: a resultant is not that of forces with sharper edges
-        lines = np.fft.rfft(self._forces(first, first + periods), axis=0)
-        lines *= even_signal_gain(self.case.output_rate, spacing * np.arange(len(lines)))[:, None]
-        values = self._components(np.fft.irfft(lines, count, axis=0))
-        levels = np.abs(np.fft.rfft(values, axis=0)) * (math.sqrt(2.0) / count)
+        levels = np.abs(np.fft.rfft(self._values(first, first + periods), axis=0)) * (math.sqrt(2.0) / count)
         orders = levels[periods * np.arange(1, HARMONICS + 1)]
         bands = [self._band(levels, spacing, taps, k) for k, taps in enumerate(band_taps(self.case), 1)]
         return np.stack([np.stack(bands), orders]) / self.case.pair().wheels[1].mass

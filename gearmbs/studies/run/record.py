@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 
 FORCES = ("force_1", "force_2")
+RESULTANT = COMPONENTS[-1]
 LEVELS = ("gmf_rms", "order_rms")
 """RMS of the mesh harmonics: at constant speed, and of a run-up. A record has one of them."""
 
@@ -132,8 +133,11 @@ def _even_forces(
     rate, ahead = case.output_rate, edge(case)
     labels: dict[str, Any] = {"units": "N", "speed": case.operation.top_speed, "teeth": case.gears.teeth}
     names = [f"{wheel}{axis}" for wheel in wheels for axis in "xyz"]
-    columns = [3 * (wheel - 1) + k for wheel in wheels for k in range(3)]
-    values = known.forces[:, columns[0] : columns[-1] + 1]
+    first, last = 3 * (wheels[0] - 1), 3 * wheels[-1]
+    if wanted & {"acceleration", *LEVELS}:
+        names.append(RESULTANT)
+        last += 1
+    values = known.forces[:, first:last]
     if even:
         return make_signal(values, rate, channels=names, t0=float(known.t[0]), **labels)
     return even_signal(known.t, values, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels)
@@ -203,6 +207,7 @@ def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -
     components = force_components(
         forces, pressure_angle=pair.working_pressure_angle, sense=pair.rotation, channels=("2x", "2y", "2z")
     )
+    components.loc[:, RESULTANT] = forces.sel(channel=RESULTANT).values
     if case.signal_rate < case.output_rate:
         components = decimate(components, case.signal_rate)
     return trim(force_to_acceleration(components, pair.wheels[1].mass), start, stop)

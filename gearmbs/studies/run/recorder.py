@@ -18,11 +18,11 @@ COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
 """Contact quantities of a record, with units; numbers of tooth pairs cannot be interpolated."""
 
 CONTACT = (*SMOOTH, *COUNTS)
-FORCES = 6
-"""Columns of the forces, which come first; the transmission error and `CONTACT` follow."""
+FORCES = 7
+"""Columns of the forces and of the last one's size, which come first; the transmission error and `CONTACT` follow."""
 
 Taken = tuple[np.ndarray, np.ndarray]
-"""Times, and what is recorded at each, shape (m, 12)."""
+"""Times, and what is recorded at each, shape (m, 13)."""
 
 WATCHED = (
     *(("reaction_force", seat) for seat in rig.SEATS),
@@ -48,8 +48,9 @@ class Measured(NamedTuple):
     Attributes
     ----------
     t : ndarray, shape (m,)
-    forces : ndarray, shape (m, 6)
-        Force of shaft 1 on gear 1, then of shaft 2 on gear 2, N.
+    forces : ndarray, shape (m, 7)
+        Force of shaft 1 on gear 1, then of shaft 2 on gear 2, and the size of this one, N. The size is taken ahead of
+        the anti-alias filter: where forces vanish and come back that of a filtered one is not its size.
     error : ndarray, shape (m,)
         Lag of the driven wheel behind the driver at the driven base circle, m.
     contact : dict of ndarray
@@ -86,10 +87,11 @@ class _Turned:
 
 
 def _taken(part: Solution, turned: _Turned) -> np.ndarray:
-    """Return what is recorded of a part of a solution, shape (m, 12): forces, transmission error, contact."""
+    """Return what is recorded of a part of a solution, shape (m, 13): forces, transmission error, contact."""
     forces = [*map(part.reaction_force, rig.SEATS)]
     told = part.contact(rig.MESH)
-    return np.column_stack([*forces, turned.error(part), *(told[name] for name in CONTACT)])
+    size = np.linalg.norm(forces[1], axis=1)
+    return np.column_stack([*forces, size, turned.error(part), *(told[name] for name in CONTACT)])
 
 
 def _joined(parts: Sequence[Taken]) -> Taken:

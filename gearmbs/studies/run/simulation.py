@@ -302,7 +302,7 @@ def partial_record(case: Case, solution: Solution) -> xr.Dataset:
 
 
 def _partial_dataset(case: Case, solution: Solution, known: Measured) -> xr.Dataset:
-    forces = {"force_1": known.forces[:, :3], "force_2": known.forces[:, 3:]}
+    forces = {"force_1": known.forces[:, :3], "force_2": known.forces[:, 3:6]}
     dataset = time_series(known.t, {**forces, "transmission_error": known.error, **known.contact})
     attributes = attributes_of(case, solution)
     dataset.attrs = {**attributes, "status": solution.status.name, "message": solution.message}
