@@ -334,7 +334,7 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
 def _level_table(data: Any) -> str:
     """Return the levels of the mesh harmonics of a record as a table; of a run-up the highest, and where."""
     if "gmf_rms" in data:
-        from gearmbs.studies.run.record import told_levels
+        from gearmbs.studies.run.levels import told_levels
 
         levels = told_levels(data)
         lines = [f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2"]

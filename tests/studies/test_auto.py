@@ -8,9 +8,10 @@ import pytest
 from gearmbs.campaigns.subjects.pair import PairSubject
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import Case, CaseError, run_case, sweep
+from gearmbs.studies.case.limits import geometric_period, remarks
 from gearmbs.studies.run import periodic
-from gearmbs.studies.run.periodic import PeriodicRecorder, geometric_period
-from gearmbs.studies.run.record import told_levels
+from gearmbs.studies.run.levels import told_levels
+from gearmbs.studies.run.periodic import PeriodicRecorder
 from tests import generators
 from tests.says import says
 
@@ -86,6 +87,25 @@ def test_levels_where_flanks_hit_do_not_depend_on_the_output_rate(duration):
     coarse, fine = (run_case(case.changed(solver=one), variables=["gmf_rms"])["gmf_rms"] for one in rates)
     # the resultant of the filtered forces has 1.16 times the first level by orders
     assert coarse.sel(way="orders").values == pytest.approx(fine.sel(way="orders").values, rel=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wheel", EITHER)
+@pytest.mark.parametrize("turns", [1.01, 1.4, 2.3])
+def test_levels_of_a_given_record_of_a_turn_are_those_of_a_motion_that_repeats_itself(wheel, turns):
+    fault = {"teeth": {"kind": "eccentricity", "amount": "30 um", "wheel": wheel}}
+    case = Case(gears={"teeth": (20, 31)}, operation=AUTO, fault=fault, solver={"tolerance": 1e-8, "lump": True})
+    given = case.changed(operation={"duration": turns * geometric_period(case) / case.mesh_frequency})
+    found, wanted = (run_case(one, variables=["gmf_rms"])["gmf_rms"].values for one in (given, case))
+    assert found == pytest.approx(wanted, rel=5e-3)
+
+
+def test_a_given_record_shorter_than_a_turn_of_its_faulty_wheel_says_so():
+    operation, fault = {"duration": "50 ms"}, {"teeth": "eccentricity"}
+    assert "29 mesh periods" in (said := " ".join(remarks(Case(operation=operation, fault=fault))))
+    assert "give 0.06 s" in said
+    assert "'auto'" in said
+    assert "mesh periods after" not in " ".join(remarks(Case(operation={"duration": "60 ms"}, fault=fault)))
 
 
 def settled(case: Case, amplitudes: np.ndarray) -> tuple[int, int] | None:

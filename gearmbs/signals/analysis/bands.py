@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.filters import bandpass_taps, filtered_mean_square
+from gearmbs.signals.filters import bandpass_taps, filtered_mean_square, kaiser_order
 from gearmbs.signals.signal.signal import check_teeth, common_unit, mesh_frequency, rate_of, units_of
 
 if TYPE_CHECKING:
@@ -24,6 +24,9 @@ TRANSITION = 0.25
 ATTENUATION_DB = 100.0
 """Of what lies beyond: a line a hundred thousand times larger than the band's own counts as much."""
 MIN_PERIODS = 4
+RAMP = 4.0
+"""Samples beyond one period from which its ends are joined by ramps: they lower what folds to 1e-4, straight joints to
+1e-2 where lines reach 0.4 of the rate."""
 BLOCK = 1 << 16
 
 
@@ -79,8 +82,12 @@ def _band_levels(
     return np.array([math.sqrt(filtered_mean_square(column, taps, count)) for column in signal.values.T])
 
 
-def order_rms(signal: xr.DataArray, fundamental: float, orders: Sequence[float]) -> xr.DataArray:
+def order_rms(
+    signal: xr.DataArray, fundamental: float, orders: Sequence[float], *, least: int = MIN_PERIODS
+) -> xr.DataArray:
     """RMS of the lines at multiples of `fundamental` (Hz), by the transform over whole periods.
+
+    Records of fewer than ``least`` periods are refused.
 
     Returns
     -------
@@ -93,7 +100,7 @@ def order_rms(signal: xr.DataArray, fundamental: float, orders: Sequence[float])
     import xarray as xr
 
     orders = [float(k) for k in orders]
-    amplitudes = np.abs(harmonic_amplitudes(signal.values, rate_of(signal), fundamental, np.asarray(orders)))
+    amplitudes = np.abs(harmonic_amplitudes(signal.values, rate_of(signal), fundamental, np.asarray(orders), least))
     return xr.DataArray(
         amplitudes / math.sqrt(2.0),
         dims=("order", "channel"),
@@ -122,8 +129,10 @@ def gmf_rms(
     `band`: zero-phase FIR band-pass, flat over k GMF +- half_width GMF and 100 dB down from a further GMF / 4; RMS over
     whole mesh periods inside the filter's valid range. Sidebands inside the band count.
     `orders`: amplitude at exactly k GMF over whole mesh periods, divided by sqrt(2). Sidebands do not count.
-    For a signal periodic in the mesh the two agree to 1e-3. Where the tooth count is known and the record is long
-    enough, whole revolutions take the place of whole mesh periods, so that sidebands are kept apart exactly.
+    For a signal periodic in the mesh the two agree to 1e-3. Where the tooth count is known, whole revolutions of the
+    first wheel take the place of whole mesh periods, so that its sidebands count in full and are kept apart exactly;
+    for `band` one must fit into the filter's valid range, for `orders` into the record. The attributes `band_turns`
+    and `orders_turns` say how many did; at 0 the levels depend on where in a revolution the record begins.
 
     Parameters
     ----------
@@ -168,11 +177,17 @@ def gmf_rms(
     if not 0.0 < half_width < 1.0 - TRANSITION:
         raise SignalError(f"half_width: must lie between 0 and {1.0 - TRANSITION:g} of the GMF, got {half_width!r}")
     multiples = np.arange(1, harmonics + 1)
-    per_turn = _whole_turns(signal, gmf, teeth)
-    widths = half_width * gmf, TRANSITION * gmf
     rate = rate_of(signal)
-    by_band = np.stack([_band_levels(signal, rate, k * gmf, *widths, per_turn / gmf) for k in multiples])
-    by_orders = order_rms(signal, gmf / per_turn, list(multiples * per_turn)).values
+    known = teeth if teeth is not None else signal.attrs.get("teeth")
+    per_turn = 1 if known is None else check_teeth(known)[0]
+    turn, count = gmf / per_turn, signal.sizes["time"]
+    taps = kaiser_order(ATTENUATION_DB, TRANSITION * gmf / (0.5 * rate))[0] | 1
+    turns = max(0, math.floor((count - taps + 1) * turn / rate)), _whole_periods(count, turn / rate)
+    in_band, in_orders = (per_turn if whole else 1 for whole in turns)
+    widths = half_width * gmf, TRANSITION * gmf
+    by_band = np.stack([_band_levels(signal, rate, k * gmf, *widths, in_band / gmf) for k in multiples])
+    least = math.ceil(MIN_PERIODS / in_orders)
+    by_orders = order_rms(signal, gmf / in_orders, list(multiples * in_orders), least=least).values
     units = common_unit(signal)
     dims = ("harmonic", "channel")
     return xr.Dataset(
@@ -185,23 +200,20 @@ def gmf_rms(
             "frequency": ("harmonic", multiples * gmf, {"units": "Hz"}),
             **_channel_coords(signal),
         },
-        attrs={"gmf": gmf, "half_width": half_width, "transition": TRANSITION, "stop_band_db": ATTENUATION_DB},
+        attrs={
+            "gmf": gmf,
+            "half_width": half_width,
+            "transition": TRANSITION,
+            "stop_band_db": ATTENUATION_DB,
+            **({} if known is None else {"band_turns": turns[0], "orders_turns": turns[1]}),
+        },
     )
 
 
-def _whole_turns(signal: xr.DataArray, gmf: float, teeth: int | Sequence[int] | None) -> int:
-    """Mesh periods in the unit whose whole number is analysed: a revolution of the first wheel, or one mesh period."""
-    known = teeth if teeth is not None else signal.attrs.get("teeth")
-    if known is None:
-        return 1
-    count = check_teeth(known)[0]
-    shortest = signal.sizes["time"] / rate_of(signal) - _filter_seconds(gmf)
-    return count if shortest * gmf / count >= MIN_PERIODS else 1
-
-
-def _filter_seconds(gmf: float) -> float:
-    """Length of the band-pass in s (Kaiser's formula)."""
-    return (ATTENUATION_DB - 7.95) / (2.285 * 2.0 * math.pi * TRANSITION * gmf)
+def _whole_periods(count: int, per_sample: float) -> int:
+    """Number of periods in ``count`` samples; the end of the first may lie between the last sample and the next."""
+    held = count * per_sample + 1e-9
+    return math.floor(held) or math.floor(held + per_sample)
 
 
 def _channel_coords(signal: xr.DataArray) -> dict:
@@ -222,7 +234,9 @@ def _per_channel(signal: xr.DataArray, values: np.ndarray) -> xr.DataArray:
     )
 
 
-def harmonic_amplitudes(values: np.ndarray, rate: float, fundamental: float, multiples: np.ndarray) -> np.ndarray:
+def harmonic_amplitudes(
+    values: np.ndarray, rate: float, fundamental: float, multiples: np.ndarray, least: int = MIN_PERIODS
+) -> np.ndarray:
     """Complex amplitudes of `values` at given multiples of `fundamental`.
 
     The transform runs over the largest whole number P of fundamental periods, N = P rate / fundamental samples (not
@@ -231,7 +245,9 @@ def harmonic_amplitudes(values: np.ndarray, rate: float, fundamental: float, mul
         c_k = (2 / sum w) sum_n w_n (x_n - mean) exp(-2 pi i k n fundamental / rate)
 
     The weight vanishes with its slope at both ends, so the broken last sample costs only O(P^-3), and every other
-    multiple falls on a zero of its spectrum: a periodic signal gives its Fourier coefficients.
+    multiple falls on a zero of its spectrum: a periodic signal gives its Fourier coefficients. Of one period the
+    multiples beside would fall into its spectrum; its weight is even instead, and rises and falls over what the record
+    has beyond the period, so that both ends together count as one.
 
     Parameters
     ----------
@@ -242,6 +258,8 @@ def harmonic_amplitudes(values: np.ndarray, rate: float, fundamental: float, mul
         Frequency in Hz.
     multiples : ndarray of shape (m,)
         Multiples of the fundamental (orders); need not be whole. Those at fractions p/q are exact if P covers q.
+    least : int
+        Periods that the record must have.
 
     Returns
     -------
@@ -251,7 +269,7 @@ def harmonic_amplitudes(values: np.ndarray, rate: float, fundamental: float, mul
     Raises
     ------
     SignalError
-        If the record is shorter than four periods or a multiple lies at or above half the sampling rate.
+        If the record is shorter than that or a multiple lies at or above half the sampling rate.
     """
     multiples = np.atleast_1d(np.asarray(multiples, dtype=float))
     if not (math.isfinite(fundamental) and fundamental > 0.0):
@@ -264,21 +282,21 @@ def harmonic_amplitudes(values: np.ndarray, rate: float, fundamental: float, mul
             f"harmonics: {top:g} Hz is not below half the sampling rate ({rate / 2:g} Hz); "
             "ask for fewer or sample faster"
         )
-    periods = math.floor(values.shape[0] * fundamental / rate + 1e-9)
-    if periods < MIN_PERIODS:
+    periods = _whole_periods(values.shape[0], fundamental / rate)
+    if periods < least:
         raise SignalError(
             f"signal: holds {values.shape[0] * fundamental / rate:.2f} periods of {fundamental:g} Hz, "
-            f"at least {MIN_PERIODS} are needed; give a longer record"
+            f"at least {least} are needed; give a longer record"
         )
     span = periods * rate / fundamental
-    count = min(values.shape[0], math.ceil(span - 1e-9))
+    count = values.shape[0] if periods == 1 else min(values.shape[0], math.ceil(span - 1e-9))
     weight_sum = 0.0
     mean_sum = np.zeros(values.shape[1])
     raw = np.zeros((multiples.size, values.shape[1]), dtype=complex)
     leak = np.zeros(multiples.size, dtype=complex)
     for start in range(0, count, BLOCK):
         n = np.arange(start, min(start + BLOCK, count))
-        weight = 1.0 - np.cos((2.0 * np.pi / span) * n)
+        weight = _even_weight(n, span, count) if periods == 1 else 1.0 - np.cos((2.0 * np.pi / span) * n)
         block = values[n[0] : n[-1] + 1]
         weight_sum += weight.sum()
         mean_sum += weight @ block
@@ -287,3 +305,14 @@ def harmonic_amplitudes(values: np.ndarray, rate: float, fundamental: float, mul
             raw[i] += turn @ block
             leak[i] += turn.sum()
     return (2.0 / weight_sum) * (raw - np.outer(leak, mean_sum / weight_sum))
+
+
+def _even_weight(n: np.ndarray, span: float, count: int) -> np.ndarray:
+    """Weights of samples ``n`` of ``count`` that add to one with those a period of ``span`` samples later."""
+    ramp = min(count - 1.0 - span, span)
+    if ramp >= RAMP:
+        rise, fall = np.clip(n / ramp, 0.0, 1.0), np.clip((span + ramp - n) / ramp, 0.0, 1.0)
+        return 0.25 * (1.0 - np.cos(np.pi * rise)) * (1.0 - np.cos(np.pi * fall))
+    # the trapezoidal rule over the circle that the period is, whose last interval has a length of its own
+    last = min(count, math.floor(span) + 1) - 1
+    return np.where((n == 0) | (n == last), 0.5 * (1.0 + span - last), np.where(n < last, 1.0, 0.0))

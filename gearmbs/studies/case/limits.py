@@ -117,6 +117,26 @@ def least_for_bands(case: Case) -> float:
     return max((longest + 1) / rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / rate)
 
 
+def geometric_period(case: Case) -> int:
+    """Return after how many mesh periods the same flanks meet as the faults of teeth tell them apart."""
+    if not case.fault.teeth:
+        return 1
+    from gearmbs.gears.tables import tooth_deviations
+
+    periods = []
+    for wheel in tooth_deviations(case.pair()):
+        teeth = wheel.gear.teeth
+        parts = [np.moveaxis(part, 1, 0) for part in (wheel.offset, wheel.shape, wheel.tip, wheel.compliance)]
+        steps = (step for step in range(1, teeth + 1) if teeth % step == 0)
+        periods.append(next(s for s in steps if all(np.array_equal(part, np.roll(part, s, 0)) for part in parts)))
+    return math.lcm(*periods)
+
+
+def holds_period(case: Case) -> bool:
+    """Return whether a record is as long, to a sample, as faulty teeth take to meet again."""
+    return case.operation.longest + 1.0 / case.signal_rate >= geometric_period(case) / case.mesh_frequency
+
+
 def _check_curve(case: Case, source: str) -> None:
     """Refuse a run-up in which the driver turns less than the window that its orders are tracked with."""
     turned = case.angle_turned / math.tau
@@ -192,6 +212,13 @@ def remarks(case: Case) -> list[str]:
         found.append(
             f"operation.duration = {operation.longest:g} s is {periods:.3g} mesh periods: mesh harmonics are told by "
             f"orders alone, their bands need {least:.3g} s"
+        )
+    if operation.speed_curve is None and not case.is_auto and not holds_period(case):
+        period = geometric_period(case)
+        found.append(
+            f"operation.duration = {operation.longest:g} s is shorter than the {period} mesh periods after which "
+            "faulty teeth meet again: mesh harmonics depend on where the record begins; give "
+            f"{period / case.mesh_frequency:.3g} s or more, or 'auto'"
         )
     if solver.integrator == "IDA" and solver.used_tolerance > 2e-7:
         found.append(

@@ -26,11 +26,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearmbs.dae.results.solution import Solution
-from gearmbs.signals.analysis.bands import HALF_WIDTH
 from gearmbs.signals.conversion import COMPONENTS, component_values
 from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.case import Case
-from gearmbs.studies.case.limits import HARMONICS, band_taps, edge
+from gearmbs.studies.case.limits import HARMONICS, edge, geometric_period
+from gearmbs.studies.run.levels import bands_of_lines
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Recorder, Span
 
 SAMPLES = 1024
@@ -75,21 +75,6 @@ class Found(NamedTuple):
 
     start: int
     periods: int
-
-
-def geometric_period(case: Case) -> int:
-    """Return after how many mesh periods the same flanks meet as the faults of teeth tell them apart."""
-    if not case.fault.teeth:
-        return 1
-    from gearmbs.gears.tables import tooth_deviations
-
-    periods = []
-    for wheel in tooth_deviations(case.pair()):
-        teeth = wheel.gear.teeth
-        parts = [np.moveaxis(part, 1, 0) for part in (wheel.offset, wheel.shape, wheel.tip, wheel.compliance)]
-        steps = (step for step in range(1, teeth + 1) if teeth % step == 0)
-        periods.append(next(s for s in steps if all(np.array_equal(part, np.roll(part, s, 0)) for part in parts)))
-    return math.lcm(*periods)
 
 
 class PeriodicRecorder:
@@ -233,21 +218,11 @@ class PeriodicRecorder:
         """
         assert self.found is not None
         first, periods = self.found
-        spacing, count = self._gmf / periods, periods * SAMPLES
-        levels = np.abs(np.fft.rfft(self._values(first, first + periods), axis=0)) * (math.sqrt(2.0) / count)
+        lines = np.fft.rfft(self._values(first, first + periods), axis=0)
+        levels = np.abs(lines) * (math.sqrt(2.0) / (periods * SAMPLES))
         orders = levels[periods * np.arange(1, HARMONICS + 1)]
-        bands = [self._band(levels, spacing, taps, k) for k, taps in enumerate(band_taps(self.case), 1)]
-        return np.stack([np.stack(bands), orders]) / self.case.pair().wheels[1].mass
-
-    def _band(self, lines: np.ndarray, spacing: float, taps: np.ndarray, harmonic: int) -> np.ndarray:
-        """Return the RMS of what a band-pass lets through of lines at multiples of ``spacing``, Hz."""
-        # beyond twice the half width the pass is over, in the middle between two harmonics
-        low, high = ((harmonic + side * 2.0 * HALF_WIDTH) * self._gmf / spacing for side in (-1.0, 1.0))
-        numbers = np.arange(math.ceil(low), math.floor(high) + 1)
-        shift = np.arange(taps.size) - 0.5 * (taps.size - 1)
-        angles = (2.0 * np.pi * spacing / self.case.signal_rate) * np.outer(numbers, shift)
-        passed = np.cos(angles) @ taps
-        return np.sqrt(((passed[:, None] * lines[numbers]) ** 2).sum(axis=0))
+        bands = bands_of_lines(self.case, periods, levels.__getitem__)
+        return np.stack([bands, orders]) / self.case.pair().wheels[1].mass
 
     def _apart(self) -> float:
         """Return the part of the time behind the run-up in which no drive flanks touch."""

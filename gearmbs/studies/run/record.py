@@ -14,13 +14,13 @@ import numpy as np
 import gearmbs
 from gearmbs._lazy import spare_duck_arrays
 from gearmbs.dae.results.solution import Solution
-from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, gmf_rms, make_signal, trim
-from gearmbs.signals.analysis.bands import order_rms
+from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, make_signal, trim
 from gearmbs.signals.conversion import COMPONENTS
 from gearmbs.signals.resampling import monotone_cubic
 from gearmbs.studies.case.case import Case, CaseError, units_of_fields
 from gearmbs.studies.case.drive import drive_angle
-from gearmbs.studies.case.limits import HARMONICS, edge, least_for_bands, remarks
+from gearmbs.studies.case.limits import edge, remarks
+from gearmbs.studies.run.levels import LEVELS, as_levels, mesh_levels, tracked_levels
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of
 
 if TYPE_CHECKING:
@@ -34,9 +34,6 @@ if TYPE_CHECKING:
 
 FORCES = ("force_1", "force_2")
 RESULTANT = COMPONENTS[-1]
-LEVELS = ("gmf_rms", "order_rms")
-"""RMS of the mesh harmonics: at constant speed, and of a run-up. A record has one of them."""
-
 SERIES = (*FORCES, "transmission_error", *SMOOTH, *COUNTS)
 VARIABLES = (*SERIES, "acceleration", *LEVELS)
 """Variables of a record."""
@@ -99,7 +96,7 @@ def evaluate(
     if wanted & set(SERIES):
         dataset = _series(case, known, forces, (start, stop), wanted, even=even)
     if levels is not None and level in wanted:
-        dataset[level] = _levels(levels, np.array(COMPONENTS), case.mesh_frequency)
+        dataset[level] = as_levels(levels, np.array(COMPONENTS), case.mesh_frequency)
     if not made & {"acceleration", *LEVELS}:
         return dataset
     assert forces is not None
@@ -115,7 +112,7 @@ def evaluate(
         dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
     if level in made:
         dataset[level] = (
-            _mesh_levels(case, acceleration) if level == "gmf_rms" else _tracked_levels(case, acceleration, dataset)
+            mesh_levels(case, acceleration) if level == "gmf_rms" else tracked_levels(case, acceleration, dataset)
         )
     if "acceleration" not in wanted:
         dataset = dataset.drop_vars(["acceleration", "signal_time", "speed", "angle"], errors="ignore")
@@ -211,62 +208,6 @@ def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -
     if case.signal_rate < case.output_rate:
         components = decimate(components, case.signal_rate)
     return trim(force_to_acceleration(components, pair.wheels[1].mass), start, stop)
-
-
-WAYS = ("band", "orders")
-"""How the RMS of the mesh harmonics is found."""
-
-
-def told_levels(record: xr.Dataset) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics of a record by bands, or by orders if it is too short for them."""
-    levels = record["gmf_rms"]
-    by_band = levels.sel(way=WAYS[0])
-    return by_band if np.isfinite(by_band.values).all() else levels.sel(way=WAYS[1])
-
-
-def _mesh_levels(case: Case, acceleration: xr.DataArray) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics by both ways; NaN by bands of a record that is too short for them."""
-    if case.operation.longest >= least_for_bands(case):
-        found = gmf_rms(acceleration)
-        values = np.stack([found[way].values for way in WAYS])
-    else:
-        orders = order_rms(acceleration, case.mesh_frequency, list(range(1, HARMONICS + 1))).values
-        values = np.stack([np.full_like(orders, np.nan), orders])
-    return _levels(values, acceleration["channel"].values, case.mesh_frequency)
-
-
-def _levels(values: np.ndarray, components: np.ndarray, mesh_frequency: float) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics, shape (ways, harmonics, components), with their names."""
-    import xarray as xr
-
-    harmonics = np.arange(1, HARMONICS + 1)
-    found = xr.DataArray(
-        values,
-        dims=("way", "harmonic", "component"),
-        coords={
-            "harmonic": harmonics,
-            "frequency": ("harmonic", harmonics * mesh_frequency, {"units": "Hz"}),
-            "component": components,
-            "way": list(WAYS),
-        },
-    )
-    found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
-    return found
-
-
-def _tracked_levels(case: Case, acceleration: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
-    """Return the RMS of the mesh orders along a run-up, by order tracking over four revolutions at a time."""
-    # what only run-ups need takes longer to load than many a simulation
-    from gearmbs.signals import order_track
-
-    turning = {name: ("time", dataset[name].values, dataset[name].attrs) for name in ("speed", "angle")}
-    orders = [float(case.gears.teeth[0] * k) for k in range(1, HARMONICS + 1)]
-    tracks = order_track(acceleration.assign_coords(turning), orders=orders, scaling="rms")
-    found = tracks.rename(time="track_time", speed="track_speed", angle="track_angle", order="harmonic")
-    found = found.rename(channel="component").drop_vars(["units", "channel_units"], errors="ignore")
-    found = found.assign_coords(harmonic=np.arange(1, HARMONICS + 1))
-    found.attrs = {"units": "m/s^2", "long_name": "RMS of the mesh orders along the run-up"}
-    return found
 
 
 def teeth_in_mesh(case: Case, time: float) -> list[float]:

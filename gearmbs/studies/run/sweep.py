@@ -18,8 +18,8 @@ from gearmbs.signals.files.simulated import record_signal
 from gearmbs.studies.case.case import Case, CaseError, readable
 from gearmbs.studies.case.section import Section, measures_of
 from gearmbs.studies.presets.paper_cases import DEFAULT_COMPONENT
+from gearmbs.studies.run.levels import told_levels
 from gearmbs.studies.run.parallel import run_cases
-from gearmbs.studies.run.record import told_levels
 from gearmbs.studies.run.store import file_stem, save_study
 from gearmbs.wording import did_you_mean
 
