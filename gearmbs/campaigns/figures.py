@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.results import ABOUT, factor_names, result_names
+from gearmbs.campaigns.results import ABOUT, factor_names, numeric_results, result_names
 from gearmbs.campaigns.settings import CampaignError, satisfied, whole
 from gearmbs.schema.described import chosen
 
@@ -46,7 +46,7 @@ def varied_results(campaign: Campaign, most: int = 4) -> list[str]:
     correlation with one that varies more is above 0.95 are left out.
     """
     table = campaign.table
-    names = [name for name in result_names(campaign.folder, table) if table[name].dtype.kind in "biuf"]
+    names = numeric_results(campaign.folder, table)
     values = table[names].to_numpy(dtype=float)
     with np.errstate(all="ignore"):
         share = np.nanstd(values, axis=0) / np.sqrt(np.nanmean(values**2, axis=0))

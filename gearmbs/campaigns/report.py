@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.campaigns.figures import varied_results
-from gearmbs.campaigns.results import factor_names, result_names
+from gearmbs.campaigns.results import factor_names, numeric_results, result_names
 from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
@@ -67,7 +67,7 @@ def write_report(campaign: Campaign, path: str | Path, results: list[str] | None
 
 def _all_results(campaign: Campaign, table: pd.DataFrame, shown: list[str]) -> str:
     """Return the results that vary with their spread, the most varied first."""
-    names = [name for name in result_names(campaign.folder, table) if table[name].dtype.kind in "biuf"]
+    names = numeric_results(campaign.folder, table)
     values = table[names].astype(float)
     with np.errstate(all="ignore"):
         share = (values.std() / np.sqrt((values**2).mean())).fillna(0.0)

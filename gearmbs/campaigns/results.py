@@ -13,6 +13,7 @@ import numpy as np
 from gearmbs.campaigns.factors import Choice, Factor
 from gearmbs.campaigns.folder import REMEDY, Folder
 from gearmbs.campaigns.settings import CampaignError, local, names_in, satisfied, texts
+from gearmbs.campaigns.subjects.base import ABOUT_RECORD
 from gearmbs.files import whole_file, write_whole
 
 if TYPE_CHECKING:
@@ -103,6 +104,12 @@ def result_names(folder: Folder, table: pd.DataFrame) -> list[str]:
     """Return the names of the columns that simulations gave."""
     known = {*ABOUT, *factor_names(folder)}
     return [str(name) for name in table.columns if name not in known]
+
+
+def numeric_results(folder: Folder, table: pd.DataFrame) -> list[str]:
+    """Return the names of the results that are numbers and say something of what was simulated."""
+    names = [name for name in result_names(folder, table) if not name.startswith(ABOUT_RECORD)]
+    return [name for name in names if table[name].dtype.kind in "biuf"]
 
 
 def column_units(folder: Folder) -> dict[str, str]:

@@ -334,10 +334,12 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
 def _level_table(data: Any) -> str:
     """Return the levels of the mesh harmonics of a record as a table; of a run-up the highest, and where."""
     if "gmf_rms" in data:
-        from gearmbs.studies.run.levels import told_levels
+        from gearmbs.studies.run.levels import told_way
 
-        levels = told_levels(data)
-        lines = [f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2"]
+        way = told_way([data])
+        levels = data["gmf_rms"].sel(way=way)
+        heads = "".join(f"{h:>4} x GMF" for h in levels.harmonic.values)
+        lines = [f"{'component':<18}{heads}   RMS by {way}, m/s^2"]
         for component in levels.component.values:
             row = levels.sel(component=component).values
             lines.append(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))

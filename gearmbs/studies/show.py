@@ -120,7 +120,7 @@ def sweep_plot(sweep: Sweep, component: str | None = None, **options: Any) -> Fi
         for k, colour in zip((1, 2, 3), (BLUE, ORANGE, VERMILLION), strict=True):
             ax.plot(table.index.to_numpy(), table[f"{k} x GMF"].to_numpy(), "o-", color=colour, label=f"{k} × GMF")
         ax.set_xlabel(f"{sweep.field.rpartition('.')[2].replace('_', ' ')}, {sweep.unit}")
-        ax.set_ylabel("RMS, m/s²")
+        ax.set_ylabel(f"RMS by {table['way'].iloc[0]}, m/s²")
         ax.set_title(options.get("title") or f"{sweep.case.name}: mesh harmonics, {sweep.component(component)}")
         ax.legend()
     return figure

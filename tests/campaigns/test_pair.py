@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, load_plan, make_plan
+from gearmbs.campaigns.figures import varied_results
+from gearmbs.campaigns.subjects.pair import record_numbers
 from gearmbs.studies import Case, run_case
 from tests.says import says
 
@@ -46,6 +49,27 @@ def test_results_are_those_of_before(campaign):
     """An edit that moves them is one of the physics, and the numbers here are to be explained anew."""
     for name, value in STORED.items():
         assert campaign.table[name][1] == pytest.approx(value, rel=0.01)
+
+
+@pytest.mark.slow
+def test_rows_tell_whether_their_records_repeat_themselves(tmp_path):
+    plan = make_plan(factors=[Factor("operation.torque", 80.0, 120.0)], design="grid", unit=2)
+    campaign = Campaign(tmp_path / "c", plan)
+    campaign.run(workers=0)
+    table = campaign.read(where="record.at_limit < 1")
+    assert len(table) == 2
+    assert (table["record.deviation"] <= 1e-3).all()
+    assert (table["record.apart"] == 0.0).all()
+    # they are no results to look for effects in
+    assert not any(name.startswith("record.") for name in varied_results(campaign, 20))
+
+
+def test_records_that_do_not_repeat_themselves_are_told():
+    about = {"record_status": "at the limit", "record_apart": 0.25, "record_deviation": np.nan}
+    # where nothing could be watched there is no deviation, and no result that is no number
+    assert record_numbers(xr.Dataset(attrs=about)) == {"record.at_limit": 1.0, "record.apart": 0.25}
+    assert record_numbers(xr.Dataset(attrs=about | {"record_deviation": 0.5}))["record.deviation"] == 0.5
+    assert record_numbers(xr.Dataset()) == {}
 
 
 def test_rates_that_differ_are_named(tmp_path):

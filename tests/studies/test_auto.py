@@ -10,7 +10,7 @@ from gearmbs.mechanism import Mechanism
 from gearmbs.studies import Case, CaseError, run_case, sweep
 from gearmbs.studies.case.limits import geometric_period, remarks
 from gearmbs.studies.run import periodic
-from gearmbs.studies.run.levels import told_levels
+from gearmbs.studies.run.levels import told_way
 from gearmbs.studies.run.periodic import PeriodicRecorder
 from tests import generators
 from tests.says import says
@@ -192,7 +192,7 @@ def test_a_given_duration_is_kept_to_the_last_sample_however_short():
     levels = record["gmf_rms"]
     assert np.isnan(levels.sel(way="band")).all()
     assert np.isfinite(levels.sel(way="orders")).all()
-    assert told_levels(record).way == "orders"
+    assert told_way([record]) == "orders"
     assert "bands need" in record.attrs["remarks"]
     with pytest.raises(CaseError, match=says("operation.duration = 0.005 s", "5 mesh periods", "'auto'")):
         run_case(case.changed(operation={"duration": "5 ms"}))
@@ -228,7 +228,9 @@ def test_many_cases_take_auto_where_no_duration_is_given():
     assert PairSubject.from_settings(PairSubject(Case()).settings()).case == one
     study = sweep(Case(), "operation.torque", ["80 N m", "120 N m"])
     assert [r.attrs["record_status"] for r in study.records] == ["periodic", "periodic"]
-    assert (study.table()["1 x GMF"] > 1.0).all()
+    table = study.table()
+    assert (table["1 x GMF"] > 1.0).all()
+    assert list(table["record"]) == ["periodic", "periodic"]
 
 
 def test_a_run_may_be_ended_between_its_steps():

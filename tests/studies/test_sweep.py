@@ -1,5 +1,7 @@
 """One setting over many values: records that fit together, taken up again, with tables and figures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -42,6 +44,20 @@ def test_it_is_taken_up_where_it_stopped(speeds, monkeypatch):
     monkeypatch.setattr(simulation, "simulate_case", None)
     again = sweep(Case(name="pair", operation=SHORT), "operation.speed", SPEEDS, folder=folder)
     assert again.table().drop(columns="ms a mesh cycle").equals(study.table().drop(columns="ms a mesh cycle"))
+
+
+@pytest.mark.slow
+def test_levels_of_all_rows_are_found_by_one_way(speeds):
+    """A record that is too short for bands takes the others along, and the column says so."""
+    study = speeds[1]
+    assert list(study.table()["way"]) == ["band"] * 3
+    assert list(study.table()["record"]) == ["given"] * 3
+    first = study.records[0].copy(deep=True)
+    first.gmf_rms.loc[{"way": "band"}] = np.nan
+    mixed = replace(study, results=[first, *study.results[1:]])
+    assert list(mixed.table()["way"]) == ["orders"] * 3
+    levels = [float(r.gmf_rms.sel(component="line_of_action", way="orders", harmonic=1)) for r in study.records]
+    np.testing.assert_allclose(mixed.table()["1 x GMF"], levels)
 
 
 @pytest.mark.slow

@@ -30,6 +30,9 @@ KINDS = {
 }
 """Subjects that come with the package; a plan may also name one as ``"module:Class"``."""
 
+ABOUT_RECORD = "record."
+"""How names of numbers begin that say how far a record can be trusted, and nothing of what was simulated."""
+
 DONE, IMPOSSIBLE, FAILED, TIME, MEMORY, DIED = (
     "done",
     "impossible",

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.base import (
+    ABOUT_RECORD,
     FAILED,
     Kept,
     Outcome,
@@ -73,10 +74,11 @@ them."""
 class PairSubject(Subject):
     """Cases of the gear pair on two shafts.
 
-    Keeps ``harmonics`` (RMS of the mesh harmonics of every component, by band and by orders), ``indicators`` (condition
-    indicators of the synchronous averages), ``contact`` (force, penetration and transmission error), ``signal:NAME`` of
-    ``acceleration``, a component of it, ``transmission_error``, ``force_1`` or ``force_2``, and ``record``, the whole
-    record as NetCDF.
+    Keeps ``harmonics`` (RMS of the mesh harmonics of every component, by band and by orders; with ``record.at_limit``,
+    ``record.deviation`` and ``record.apart`` where records are as long as their motion takes), ``indicators``
+    (condition indicators of the synchronous averages), ``contact`` (force, penetration and transmission error),
+    ``signal:NAME`` of ``acceleration``, a component of it, ``transmission_error``, ``force_1`` or ``force_2``, and
+    ``record``, the whole record as NetCDF.
 
     Parameters
     ----------
@@ -154,6 +156,7 @@ class PairSubject(Subject):
             kept.numbers |= harmonics(record)
         if "contact" in keep:
             kept.numbers |= contact_numbers(thing, record)
+        kept.numbers |= record_numbers(record)
         if "indicators" in keep:
             kept.numbers |= indicators(record)
         for item in keep:
@@ -263,6 +266,22 @@ def harmonics(record: Any) -> dict[str, float]:
         for j, component in enumerate(levels.component.values)
         for k, harmonic in enumerate(levels.harmonic.values)
     }
+
+
+def record_numbers(record: Any) -> dict[str, float]:
+    """Return how a record that is as long as its motion takes came to its end; nothing for one of a given length.
+
+    ``record.at_limit``: 1 if the motion did not repeat itself up to the longest record, or could not be watched, else
+    0; ``record.deviation``: by what part of its mesh harmonics it repeats itself, where it was watched;
+    ``record.apart``: part of the time behind the run-up in which no drive flanks touch.
+    """
+    about = record.attrs
+    if "record_status" not in about:
+        return {}
+    found = {"at_limit": float(about["record_status"] != "periodic"), "apart": float(about["record_apart"])}
+    if math.isfinite(about["record_deviation"]):
+        found["deviation"] = float(about["record_deviation"])
+    return {f"{ABOUT_RECORD}{name}": value for name, value in found.items()}
 
 
 def contact_numbers(case: Case, record: Any) -> dict[str, float]:

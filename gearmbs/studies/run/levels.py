@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,11 +23,10 @@ WAYS = ("band", "orders")
 """How the RMS of the mesh harmonics is found."""
 
 
-def told_levels(record: xr.Dataset) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics of a record by bands, or by orders if it is too short for them."""
-    levels = record["gmf_rms"]
-    by_band = levels.sel(way=WAYS[0])
-    return by_band if np.isfinite(by_band.values).all() else levels.sel(way=WAYS[1])
+def told_way(records: Iterable[xr.Dataset]) -> str:
+    """Return the way by which levels of records are compared: bands, or orders if one is too short for them."""
+    levels = [record["gmf_rms"] for record in records if "gmf_rms" in record]
+    return WAYS[0] if all(np.isfinite(one.sel(way=WAYS[0]).values).all() for one in levels) else WAYS[1]
 
 
 def mesh_levels(case: Case, acceleration: xr.DataArray) -> xr.DataArray:

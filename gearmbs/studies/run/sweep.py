@@ -18,7 +18,7 @@ from gearmbs.signals.files.simulated import record_signal
 from gearmbs.studies.case.case import Case, CaseError, readable
 from gearmbs.studies.case.section import Section, measures_of
 from gearmbs.studies.presets.paper_cases import DEFAULT_COMPONENT
-from gearmbs.studies.run.levels import told_levels
+from gearmbs.studies.run.levels import told_way
 from gearmbs.studies.run.parallel import run_cases
 from gearmbs.studies.run.store import file_stem, save_study
 from gearmbs.wording import did_you_mean
@@ -85,14 +85,21 @@ class Sweep(Shown):
         return [record_signal(record, self.component(component)) for record in self.records]
 
     def table(self, component: str | None = None) -> pd.DataFrame:
-        """Return RMS of the mesh harmonics (m/s^2), the mesh frequency (Hz) and the solver's cost, a row a value."""
-        name = self.component(component)
+        """Return RMS of the mesh harmonics (m/s^2), the mesh frequency (Hz) and the solver's cost, a row a value.
+
+        All rows have their levels by ``way``: by bands, or by orders if one of the records is too short for bands.
+        ``record`` says whether a record has the length that was given, or one after which the motion repeats itself, or
+        the longest one.
+        """
+        name, way = self.component(component), told_way(self.records)
         rows = []
         for record in self.records:
             row = {"mesh frequency, Hz": record.attrs["mesh_frequency"]}
             if "gmf_rms" in record:
-                levels = told_levels(record).sel(component=name)
+                levels = record["gmf_rms"].sel(component=name, way=way)
                 row |= {f"{int(h)} x GMF": float(level) for h, level in zip(levels.harmonic, levels, strict=True)}
+                row["way"] = way
+            row["record"] = record.attrs.get("record_status", "given")
             row["ms a mesh cycle"] = 1e3 * record.attrs["solver_time_per_mesh_cycle"]
             rows.append(row)
         index = pd.Index(self.values, name=f"{self.field.rpartition('.')[2]}, {self.unit}")
