@@ -134,7 +134,8 @@ MORE = {
         "gearmbs.studies.run.store": ["write_dataset"],
     },
     "gearmbs.campaigns": {
-        "gearmbs.campaigns.factors": EVERYTHING,
+        "gearmbs.campaigns.plans.designs": EVERYTHING,
+        "gearmbs.campaigns.plans.factors": EVERYTHING,
         "gearmbs.campaigns.cluster": ["DaskRunner", "batch_cluster", "job_script"],
         "gearmbs.campaigns.results": ["export"],
         "gearmbs.campaigns.sobol_bounds": EVERYTHING,

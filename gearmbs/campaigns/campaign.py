@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.campaigns.folder import Folder, check_folder, extend_folder, litter, make_folder
-from gearmbs.campaigns.plan import Plan
+from gearmbs.campaigns.plans.plan import Plan
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, limit, whole
 from gearmbs.campaigns.status import CampaignStatus, read_status
 from gearmbs.progress import alone, bars, watched

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.results import ABOUT, factor_names, numeric_results, result_names
-from gearmbs.campaigns.settings import CampaignError, satisfied, whole
+from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.schema.described import chosen
 
 if TYPE_CHECKING:
@@ -320,7 +321,7 @@ def condition_map(
     table = campaign.table
     table = table[table["status"] == "done"]
     columns = {str(name): table[name].to_numpy() for name in table.columns}
-    held = satisfied(condition, columns)
+    held = satisfied(condition, columns, campaign.plan.unit_of)
     bins = whole(bins, "bins", 1)
     for name in (across, along):
         if name not in table.columns or table[name].dtype.kind not in "biuf":

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.plan import FORMAT, Plan
+from gearmbs.campaigns.plans.plan import FORMAT, Plan
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local, whole
 from gearmbs.campaigns.signals import Signals, check_store, shard, write_store
 from gearmbs.campaigns.subjects.base import SignalSpec
@@ -293,16 +293,18 @@ def _plan_tree(path: Path) -> dict[str, Any]:
     content, wrong = _look(place)
     if not wrong:
         return json.loads(content)
-    copy, _ = _look(path / "cases" / "plan.json")
-    if _ or not (isinstance(wrong, str) or _one_bit(content, copy)):
-        if isinstance(wrong, str):
-            raise CampaignError(f"{path}: {wrong}; make the plan again in another folder")
+    copy, unsound = _look(path / "cases" / "plan.json")
+    if unsound:
+        told = wrong if isinstance(wrong, str) else f"plan.json was edited or damaged ({', '.join(wrong)})"
+        raise CampaignError(f"{path}: {told}; make the plan again in another folder")
+    # what an editor leaves is neither of the same length nor the beginning of what it was
+    if isinstance(wrong, list) or (len(content) != len(copy) and not copy.startswith(content)):
+        told = wrong if isinstance(wrong, str) else ", ".join(wrong)
         raise CampaignError(
-            f"{place}: was edited ({', '.join(wrong)}), and what is done was done by the plan as it was made; remove "
-            "the file, which run then writes as it was, or plan another campaign in another folder"
+            f"{place}: was edited ({told}), and what is done was done by the plan as it was made; remove the file, "
+            "which run then writes as it was, or plan another campaign in another folder"
         )
-    reason = wrong if isinstance(wrong, str) else f"plan.json is damaged ({', '.join(wrong)})"
-    warnings.warn(f"{path}: {reason}; its copy cases/plan.json is taken, and {REMEDY}", CampaignWarning, stacklevel=4)
+    warnings.warn(f"{path}: {wrong}; its copy cases/plan.json is taken, and {REMEDY}", CampaignWarning, stacklevel=4)
     return json.loads(copy)
 
 
@@ -325,11 +327,6 @@ def _look(place: Path) -> tuple[bytes, str | list[str]]:
     if not wrong and tree["format"] != FORMAT:
         return content, f"format {tree['format']} is unknown; this version reads {FORMAT}"
     return content, wrong
-
-
-def _one_bit(a: bytes, b: bytes) -> bool:
-    """Return whether two files differ in one bit, as no edit does but one of a digit."""
-    return len(a) == len(b) and sum((x ^ y).bit_count() for x, y in zip(a, b)) == 1
 
 
 # Making, taking up, extending.
@@ -382,11 +379,18 @@ def _taken_up(path: Path, plan: Plan) -> Folder:
             f"{path}: holds another campaign, with other {' and '.join(other)}; choose another folder, or take up "
             "that one without a plan"
         )
-    drawn = folder.extents[-1].points
-    if plan.extends and plan.n > drawn:
+    drawn = [extent.points for extent in folder.extents]
+    if plan.has_n and plan.n not in drawn:
+        up = f"and extend it to {plan.n}" if plan.extends and plan.n > drawn[-1] else "as it is"
         raise CampaignError(
-            f"{path}: {drawn} points have been drawn, the plan has n = {plan.n}; take the campaign up without a plan "
-            f"and extend it to {plan.n}"
+            f"{path}: holds {drawn[-1]} points, the plan has n = {plan.n}; take the campaign up without a plan {up}, "
+            "or choose another folder"
+        )
+    if plan.has_n and plan.n != drawn[-1]:
+        warnings.warn(
+            f"{path}: was extended from the plan's n = {plan.n} to {drawn[-1]} points, all of which it has",
+            CampaignWarning,
+            stacklevel=4,
         )
     return folder
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.factors import Choice, Factor
 from gearmbs.campaigns.folder import REMEDY, Folder
-from gearmbs.campaigns.settings import CampaignError, local, names_in, satisfied, texts
+from gearmbs.campaigns.plans.conditions import names_in, satisfied
+from gearmbs.campaigns.settings import CampaignError, local, texts
 from gearmbs.campaigns.subjects.base import ABOUT_RECORD
 from gearmbs.files import whole_file, write_whole
 
@@ -52,14 +52,14 @@ def read_table(
         first = folder.unit_table(done[0])
         asked = names_in(where, first.column_names)
         # names that are none are told with all that there are
-        satisfied(where, {name: first[name].to_numpy() for name in first.column_names})
+        satisfied(where, {name: first[name].to_numpy() for name in first.column_names}, folder.plan.unit_of)
     # of what is not wanted nothing is read
     read = None if wanted is None else ["index", *wanted, *asked]
     tables = []
     for unit in done[:1] if units is not None and not units else done if units is None else units:
         table = folder.unit_table(unit, read)
         if where is not None:
-            held = satisfied(where, {name: table[name].to_numpy() for name in table.column_names})
+            held = satisfied(where, {name: table[name].to_numpy() for name in table.column_names}, folder.plan.unit_of)
             table = table.filter(pa.array(held))
         tables.append(table)
     table = pa.concat_tables(tables, promote_options="permissive")
@@ -114,16 +114,8 @@ def numeric_results(folder: Folder, table: pd.DataFrame) -> list[str]:
 
 def column_units(folder: Folder) -> dict[str, str]:
     """Return the units of the columns of factors and results that have one."""
-    subject, found = folder.plan.subject, {}
-    for factor in folder.plan.factors:
-        if isinstance(factor, Factor):
-            found[factor.name] = subject.unit_of(factor.path)
-        if isinstance(factor, Choice):
-            for option, keys in factor.ranges.items():
-                table = factor.options[option]
-                found |= {f"{factor.name}.{key}": subject.table_unit(factor.path, table, key) for key in keys}
-    if folder.done():
-        found |= {name: subject.unit_of_result(name) for name in result_names(folder, read_table(folder))}
+    names = read_table(folder).columns if folder.done() else folder.cases(0)[0]
+    found = {str(name): folder.plan.unit_of(str(name)) for name in names if name not in ABOUT}
     return {name: unit for name, unit in found.items() if unit not in ("", "1", "dimensionless")}
 
 

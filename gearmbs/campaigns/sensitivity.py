@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.factors import SEQUENCES, Choice
+from gearmbs.campaigns.plans.designs import SEQUENCES
+from gearmbs.campaigns.plans.factors import Choice
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.schema.described import chosen
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from gearmbs.campaigns.campaign import Campaign
-    from gearmbs.campaigns.plan import Plan
+    from gearmbs.campaigns.plans.plan import Plan
     from gearmbs.campaigns.surrogates import PolynomialChaos
 
 RESAMPLES = 200
@@ -99,7 +100,7 @@ def sobol_indices(
     Parameters
     ----------
     values : ndarray, shape (n (d + 2),)
-        In the order of `gearmbs.campaigns.factors.saltelli`; NaN where there is none.
+        In the order of `gearmbs.campaigns.plans.designs.saltelli`; NaN where there is none.
     names : list of str
         The d factors' coordinates.
     points : ndarray, shape (n (d + 2), d), optional
@@ -161,7 +162,7 @@ def morris_effects(values: np.ndarray, points: np.ndarray, names: list[str], *, 
     Parameters
     ----------
     values : ndarray, shape (n (d + 1),)
-        In the order of `gearmbs.campaigns.factors.morris`; trajectories with a NaN are left out.
+        In the order of `gearmbs.campaigns.plans.designs.morris`; trajectories with a NaN are left out.
     points : ndarray, shape (n (d + 1), d)
         The design.
 
@@ -266,7 +267,7 @@ def grid_indices(values: np.ndarray, counts: Sequence[int], names: list[str]) ->
     Parameters
     ----------
     values : ndarray, shape (product of counts,)
-        The last factor running fastest, as `gearmbs.campaigns.factors.grid` does.
+        The last factor running fastest, as `gearmbs.campaigns.plans.designs.grid` does.
     counts : sequence of int
         Values of each factor.
 
@@ -343,7 +344,7 @@ def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -
 
 def _levels(plan: Plan) -> list[int]:
     """Return the number of values of each coordinate that has but a few, 0 for a range."""
-    from gearmbs.campaigns.factors import Factor
+    from gearmbs.campaigns.plans.factors import Factor
 
     levels: list[int] = []
     for factor in plan.factors:

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 import hashlib
 import json
 import math
-import operator
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
-from keyword import iskeyword
+from collections.abc import Mapping
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gearmbs.schema.described import check_keys
 from gearmbs.schema.quantities import Measure
-from gearmbs.wording import did_you_mean
 
 # The error of campaigns.
 
@@ -120,122 +114,6 @@ def limit(value: Any, name: str, example: str) -> float:
         return float(Measure("byte" if name == "memory_limit" else "time", above=0).as_given(value))
     except ValueError:
         raise CampaignError(f"{name} = {value!r}; give a positive number or text such as {example!r}") from None
-
-
-# Constraints of a plan: comparisons of arithmetic expressions of its columns, as texts.
-#
-# ``"operation.torque * operation.speed <= 20e3"`` is in SI. Texts, since they are stored with the plan; they are
-# parsed, never executed.
-
-
-OPERATORS: dict[type, Callable[..., Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.USub: operator.neg,
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-    ast.Eq: operator.eq,
-    ast.NotEq: operator.ne,
-    ast.And: np.logical_and,
-    ast.Or: np.logical_or,
-    ast.Not: np.logical_not,
-}
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "abs", "minimum", "maximum")
-}
-
-
-def satisfied(text: str, given: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return which rows of a table satisfy a constraint.
-
-    Raises
-    ------
-    CampaignError
-        For a text that is no comparison of the columns.
-    """
-    written, columns = _as_names(text, given)
-    try:
-        tree = ast.parse(written, mode="eval").body
-    except SyntaxError as error:
-        raise CampaignError(
-            f"constraint {text!r}: {error.msg}; write for instance operation.torque <= 100, with columns as the table "
-            f"has them: {', '.join(map(str, given))}"
-        ) from None
-    result = np.asarray(_value(tree, columns, text))
-    if result.dtype != bool:
-        raise CampaignError(f"constraint {text!r}: is no comparison; write for instance operation.torque <= 100")
-    size = len(next(iter(columns.values())))
-    return np.broadcast_to(result, (size,))
-
-
-def names_in(text: str, columns: Iterable[str]) -> list[str]:
-    """Return those of some columns that a condition names."""
-    return [name for name in columns if re.search(_alone(name), text)]
-
-
-def _alone(name: str) -> str:
-    """Return the pattern of a name that is no part of a longer one."""
-    return rf"(?<![\w.]){re.escape(name)}(?![\w.])"
-
-
-STAND_IN = "_column_"
-"""What names in an expression begin with that stand for those that Python does not take."""
-
-
-def _as_names(text: str, columns: Mapping[str, np.ndarray]) -> tuple[str, dict[str, np.ndarray]]:
-    """Return a text with names that Python takes for those it does not, as orders.line_of_action.2, and the columns."""
-    found = dict(columns)
-    odd = [name for name in columns if not all(part.isidentifier() and not iskeyword(part) for part in name.split("."))]
-    for k, name in enumerate(sorted(odd, key=len, reverse=True)):
-        text, count = re.subn(_alone(name), f"{STAND_IN}{k}", text)
-        if count:
-            found[f"{STAND_IN}{k}"] = columns[name]
-    return text, found
-
-
-def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
-    def sub(part: ast.AST) -> Any:
-        return _value(part, columns, text)
-
-    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float, str)):
-        return node.value
-    if isinstance(node, (ast.Name, ast.Attribute)):
-        name = ast.unparse(node)
-        if name not in columns:
-            hint = did_you_mean(name, columns, before="; ")
-            known = ", ".join(column for column in columns if not column.startswith(STAND_IN))
-            raise CampaignError(f"constraint {text!r}: no column {name!r}; columns are {known}{hint}")
-        return columns[name]
-    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](sub(node.left), sub(node.right))
-    if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](sub(node.operand))
-    if isinstance(node, ast.BoolOp):
-        result = sub(node.values[0])
-        for part in node.values[1:]:
-            result = OPERATORS[type(node.op)](result, sub(part))
-        return result
-    if isinstance(node, ast.Compare):
-        left, result = sub(node.left), True
-        for op, part in zip(node.ops, node.comparators):
-            if type(op) not in OPERATORS:
-                break
-            right = sub(part)
-            result = np.logical_and(result, OPERATORS[type(op)](left, right))
-            left = right
-        else:
-            return result
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
-        return FUNCTIONS[node.func.id](*(sub(arg) for arg in node.args))
-    raise CampaignError(
-        f"constraint {text!r}: {ast.unparse(node)!r} is not understood; it takes columns, numbers, + - * / **, "
-        f"comparisons, and, or, not, and {', '.join(FUNCTIONS)}"
-    )
 
 
 # One content identity for everything that is simulated: equal physics, equal text, equal key.

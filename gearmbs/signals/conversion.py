@@ -15,6 +15,7 @@ import numpy as np
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import BLOCK
 from gearmbs.signals.signal.signal import DIMENSIONS, common_unit, like, rate_of, unit_dimension, units_of
+from gearmbs.units import to_si
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +37,7 @@ def convert(
     signal: xr.DataArray,
     to: Dimension,
     *,
-    band: tuple[float, float],
+    band: tuple[float | str, float | str],
     edges: Literal["trim", "keep"] = "trim",
 ) -> xr.DataArray:
     """Integrate or differentiate to displacement, velocity or acceleration, in SI units.
@@ -52,8 +53,8 @@ def convert(
         Dimensions (time, channel), each channel in a unit of displacement, velocity or acceleration ("g" is gravity).
     to : {"displacement", "velocity", "acceleration"}
         What to convert to: m, m/s or m/s^2.
-    band : (float, float)
-        Low and high end of the band in Hz, 0 < low < high; high is capped at half the sampling rate.
+    band : (float or str, float or str)
+        Low and high end of the band in Hz or with units, 0 < low < high; high is capped at half the sampling rate.
     edges : {"trim", "keep"}
         "trim" (default) fades the record in and out and drops 6 / low seconds at either end: what remains is right.
         "keep" keeps the length by reflecting the record at its ends; over those 6 / low seconds the result is
@@ -71,7 +72,10 @@ def convert(
         If the band or a unit does not fit, or nothing remains after trimming.
     """
     rate = rate_of(signal)
-    low, high = (float(f) for f in band)
+    try:
+        low, high = (to_si(f, "frequency", "band") for f in band)
+    except (TypeError, ValueError) as error:
+        raise SignalError(f"{error}; give its low and its high end, as ('10 Hz', '1 kHz')") from None
     if to not in DERIVATIVE:
         raise SignalError(f"to: must be one of {list(DERIVATIVE)}, got {to!r}")
     if not 0.0 < low < high or low >= rate / 2:

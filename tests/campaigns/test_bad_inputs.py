@@ -231,11 +231,23 @@ def test_an_edited_plan_is_told(tmp_path):
     small(tmp_path / "c", n=8)
     with pytest.raises(CampaignError, match=says("seed", "unit", "choose another folder")):
         small(tmp_path / "c", n=8, seed=4, unit=4)
-    with pytest.raises(CampaignError, match=says("8", "n = 16", "points")):
-        small(tmp_path / "c", n=16)
+    for n, remedy in ((16, "extend"), (4, "as it is")):
+        with pytest.raises(CampaignError, match=says("8 points", f"n = {n}", remedy, "another folder")):
+            small(tmp_path / "c", n=n)
+    assert small(tmp_path / "c", n=8).folder.case_count == 8
     # a script whose campaign was extended since is run again
     Campaign(tmp_path / "c").extend(12)
-    assert small(tmp_path / "c", n=8).folder.case_count == 12
+    with pytest.warns(CampaignWarning, match=says("extended", "n = 8", "12 points")):
+        assert small(tmp_path / "c", n=8).folder.case_count == 12
+    with pytest.raises(CampaignError, match=says("12 points", "n = 10", "as it")):
+        small(tmp_path / "c", n=10)
+
+
+def test_other_numbers_of_points_of_a_hypercube_are_told(tmp_path):
+    small(tmp_path / "c", design="latin hypercube", n=8)
+    assert small(tmp_path / "c", design="latin hypercube", n=8).folder.case_count == 8
+    with pytest.raises(CampaignError, match=says("8 points", "n = 12", "another folder")):
+        small(tmp_path / "c", design="latin hypercube", n=12)
 
 
 def test_damaged_files_are_named(tmp_path):
@@ -265,17 +277,19 @@ def test_damaged_files_are_named(tmp_path):
 
 
 def test_a_plan_is_what_it_was_made_as(tmp_path):
-    """What cannot be read is taken from its copy, an edit is refused by the name of the entry."""
+    """What is cut short or no text any more is taken from its copy, an edit is refused by the name of the entry."""
     campaign = small(tmp_path / "c", n=16)
     plan, cases = campaign.path / "plan.json", campaign.path / "cases" / "000-00000.parquet"
     made, drawn = plan.read_bytes(), cases.read_bytes()
-    for damage in (made[:40], made.replace(b'"seed": 3', b'"seed": 2')):  # one bit
+    for damage in (made[:40], made.replace(b'"seed": 3', b'"seed"\xba 3')):  # one bit
         plan.write_bytes(damage)
         with pytest.warns(CampaignWarning, match=says("plan.json", "cases/plan.json")):
             assert Campaign(campaign.path).plan.seed == 3
-    plan.write_bytes(made.replace(b'"seed": 3', b'"seed": 12'))
-    with pytest.raises(CampaignError, match=says("plan.json", "plan: seed", "remove the file")):
-        Campaign(campaign.path)
+    # of one digit, of two, and one that is no JSON any more
+    for edit, name in ((b'"seed": 2', "plan: seed"), (b'"seed": 12', "plan: seed"), (b'"seed": 3,', "plan.json is")):
+        plan.write_bytes(made.replace(b'"seed": 3', edit))
+        with pytest.raises(CampaignError, match=says("plan.json", name, "remove the file")):
+            Campaign(campaign.path)
     plan.unlink()
     with pytest.warns(CampaignWarning, match=says("plan.json", "its copy")):
         Campaign(campaign.path).run(workers=0)

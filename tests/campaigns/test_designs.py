@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearmbs.campaigns import CampaignError, Specimens, make_plan
-from gearmbs.campaigns import factors as designs
+from gearmbs.campaigns.plans import designs
 from tests.campaigns.support import function, ranges
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError, DrivetrainSubject, Factor, PairSubject, choose, make_plan
 from gearmbs.campaigns.figures import KINDS, varied_results
+from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.sensitivity import coordinates
-from gearmbs.campaigns.settings import satisfied
 from tests.campaigns.support import function, ranges
 from tests.says import says
 
@@ -41,6 +41,36 @@ COLUMNS = {
 )
 def test_conditions_take_the_names_of_the_table(text, held):
     assert satisfied(text, COLUMNS).tolist() == held
+
+
+@pytest.mark.parametrize(
+    ("text", "held"),
+    [
+        ("operation.torque > '12 N m'", [False, True, True]),
+        ("'12 N m' < operation.torque < '0.025 kN m' and status == 'done'", [False, True, False]),
+        ("orders.line_of_action.2 >= '200 cm/s^2'", [False, True, True]),
+    ],
+)
+def test_conditions_take_quantities_with_units(text, held):
+    units = {"operation.torque": "N m", "orders.line_of_action.2": "m/s^2"}
+    given = COLUMNS | {"status": np.array(["done"] * 3, dtype=object)}
+    assert satisfied(text, given, lambda name: units.get(name, "")).tolist() == held
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("operation.torque > '12 mm'", says("operation.torque", "12 mm", "N m")),
+        ("operation.torque > 'much'", says("operation.torque", "'much'", "N m")),
+        ("orders.line_of_action.2 > '1 m/s^2'", says("orders.line_of_action.2", "without", "write")),
+        ("2 * operation.torque > '12 N m'", says("operation.torque", "numbers in SI", "alone")),
+        ("status > 3", says("status", "texts", "numbers in SI")),
+    ],
+)
+def test_conditions_of_texts_and_numbers_are_refused(text, message):
+    given = COLUMNS | {"status": np.array(["done"] * 3, dtype=object)}
+    with pytest.raises(CampaignError, match=message):
+        satisfied(text, given, lambda name: "N m" if name == "operation.torque" else "")
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from gearmbs.campaigns import (
     sobol_indices,
     total_bounds,
 )
-from gearmbs.campaigns.factors import factorial, morris, saltelli, sequence
+from gearmbs.campaigns.plans.designs import factorial, morris, saltelli, sequence
 from gearmbs.cli import app
 from tests.campaigns.models import PI
 from tests.campaigns.support import function, ranges, small

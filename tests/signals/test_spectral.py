@@ -76,6 +76,8 @@ def test_units_convert_to_si_and_keep_edges():
     assert np.abs(result.values[:, 1]).max() == pytest.approx(1e-3 * 2 * np.pi * 500, rel=1e-3)
     kept = convert(signal, "acceleration", band=(50.0, 5000.0), edges="keep")
     assert kept.sizes == signal.sizes
+    same = convert(signal, "acceleration", band=("50 Hz", "5 kHz"), edges="keep")
+    np.testing.assert_array_equal(same.values, kept.values)
 
 
 @pytest.mark.parametrize(
@@ -106,6 +108,7 @@ def test_units_that_measure_no_vibration(unit):
         ({"to": "jerk", "band": (10.0, 100.0)}, "to: .*one of"),
         ({"to": "velocity", "band": (100.0, 10.0)}, says("band", "(100.0, 10.0)", "6400 Hz")),
         ({"to": "velocity", "band": (0.0, 10.0)}, says("band", "(0.0, 10.0)", "6400 Hz")),
+        ({"to": "velocity", "band": ("10 mm", "1 kHz")}, says("band", "10 mm", "Hz")),
         ({"to": "velocity", "band": (1.0, 10.0)}, says("1.5625 s", "6 s", "raise band[0]", "edges='keep'")),
     ],
 )

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from gearmbs.campaigns.datasets.layers import SensorLayers
-from gearmbs.campaigns.factors import AnyFactor, Choice, Factor, Specimens
-from gearmbs.campaigns.plan import Plan, make_plan
+from gearmbs.campaigns.plans.factors import AnyFactor, Choice, Factor, Specimens
+from gearmbs.campaigns.plans.plan import Plan, make_plan
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.tables import DrivetrainSubject
 from gearmbs.schema.described import chosen

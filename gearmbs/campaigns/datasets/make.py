@@ -16,7 +16,7 @@ from gearmbs.campaigns.campaign import Campaign
 from gearmbs.campaigns.datasets.card import write_card, write_croissant
 from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.datasets.splits import shared_groups, split_by_group, withhold
-from gearmbs.campaigns.factors import Choice
+from gearmbs.campaigns.plans.factors import Choice
 from gearmbs.campaigns.results import ROWS_A_FILE
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.files import whole_file

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.campaigns import factors as designs
-from gearmbs.campaigns.factors import (
+from gearmbs.campaigns.plans import designs
+from gearmbs.campaigns.plans.conditions import satisfied
+from gearmbs.campaigns.plans.factors import (
     AnyFactor,
     Choice,
     Columns,
@@ -23,7 +24,7 @@ from gearmbs.campaigns.factors import (
     number_in_si,
     set_path,
 )
-from gearmbs.campaigns.settings import CampaignError, check_settings, satisfied, texts, whole
+from gearmbs.campaigns.settings import CampaignError, check_settings, texts, whole
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
 from gearmbs.files import python_scalar
 from gearmbs.schema.described import chosen, read_toml
@@ -43,7 +44,7 @@ class Plan:
     factors : tuple
         Of `Factor`, `Choice` and `Specimens`, in SI.
     design : str
-        One of `gearmbs.campaigns.factors.DESIGNS`.
+        One of `gearmbs.campaigns.plans.designs.DESIGNS`.
     n : int
         Points of a sequence, base points of a Saltelli design, trajectories of a Morris design; of no meaning
         otherwise.
@@ -120,6 +121,11 @@ class Plan:
         return self.design in (*designs.SEQUENCES, *designs.ANALYSES)
 
     @property
+    def has_n(self) -> bool:
+        """Whether n is of meaning to the design."""
+        return self.extends or self.design == "latin hypercube"
+
+    @property
     def group(self) -> str | None:
         """Column of the physical individual, the group of every split; None without specimens."""
         return next((f.name for f in self.factors if isinstance(f, Specimens)), None)
@@ -139,8 +145,7 @@ class Plan:
     @property
     def size(self) -> int:
         """Number of cases, before constraints leave any out."""
-        counted = self.extends or self.design == "latin hypercube"
-        return self.variants * (self.n * self.points_a_base if counted else len(self.points()))
+        return self.variants * (self.n * self.points_a_base if self.has_n else len(self.points()))
 
     def blocks(self, n: int, first: int, size: int) -> Iterator[tuple[int, np.ndarray]]:
         """Yield the points from the first on, some at a time, each block with the number of its first point.
@@ -251,8 +256,22 @@ class Plan:
         """Return which rows satisfy all constraints."""
         good = np.ones(len(columns["point"]), dtype=bool)
         for text in self.constraints:
-            good &= satisfied(text, columns)
+            good &= satisfied(text, columns, self.unit_of)
         return good
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of a column, "1" or "" where it has none."""
+        if self.design == "list" and any(name in row for row in self.options["rows"]):
+            return self.subject.unit_of(name)
+        for factor in self.factors:
+            if isinstance(factor, Factor) and factor.name == name:
+                return self.subject.unit_of(factor.path)
+            if isinstance(factor, Choice):
+                for option, keys in factor.ranges.items():
+                    for key in keys:
+                        if name == f"{factor.name}.{key}":
+                            return self.subject.table_unit(factor.path, factor.options[option], key)
+        return self.subject.unit_of_result(name.removeprefix("result."))
 
     def data(self, row: dict[str, Any]) -> dict[str, Any]:
         """Return the nested data of a row of the table."""

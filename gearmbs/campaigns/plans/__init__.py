@@ -1,0 +1,1 @@
+"""What a plan says: what varies, by which design, which points are left out."""
