@@ -173,6 +173,28 @@ def test_the_period_is_that_of_flanks_that_differ(teeth, faults, period):
 
 
 @pytest.mark.slow
+def test_what_was_not_looked_at_is_not_said_to_differ(monkeypatch):
+    monkeypatch.setattr("gearmbs.studies.case.case.LONGEST", 0.02)
+    short = {"run_up": "10 ms", "settling": "10 ms", **AUTO}
+    case = Case(operation=short, solver={"integrator": "IDA", "tolerance": 1e-6})
+    record = run_case(case, variables=["transmission_error"])
+    assert record.attrs["record_status"] == "at the limit"
+    for told in ("not looked at", "IDA", "WSTIFF"):
+        assert told in record.attrs["record_length"]
+
+
+@pytest.mark.parametrize(
+    ("speed", "period", "need"), [("30 rpm", "turn of the driver", "2 s"), ("60 rpm", "turn of the driver", "1 s")]
+)
+def test_records_of_slow_wheels_name_the_duration_they_need(speed, period, need):
+    recorder = PeriodicRecorder(Case(operation={"speed": speed, **AUTO}, fault={"teeth": "broken tooth"}))
+    assert recorder.pause(0.0) == np.inf
+    told = recorder._why_longest(period, 1.0)
+    assert f"shorter than its period, {period}" in told
+    assert f"a duration of {need} or more" in told
+
+
+@pytest.mark.slow
 def test_a_period_longer_than_the_longest_record_is_told(monkeypatch):
     monkeypatch.setattr("gearmbs.studies.case.case.LONGEST", 0.06)
     faults = [{"kind": "chipped corner", "wheel": wheel} for wheel in EITHER]

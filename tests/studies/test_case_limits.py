@@ -212,3 +212,14 @@ def test_random_plausible_pairs_are_not_refused_for_their_rates():
     # wheels that cannot be, whatever their speed
     assert len(refused) <= 3
     assert all("rate" not in text for text in refused)
+
+
+@pytest.mark.parametrize("duration", ["auto", 1.0])
+def test_speeds_too_low_for_a_record_name_duration_and_speed(duration):
+    case = Case(operation={"speed": "1 rpm", "duration": duration})
+    with pytest.raises(CaseError, match=says("operation.duration", "8.276 s", "8.3 rpm or more")) as told:
+        check_record(case)
+    # the longest record at auto would be too short as well
+    assert "or 'auto'" not in str(told.value)
+    for twin in ({"speed": "8.3 rpm"}, {"duration": 8.276}):
+        check_record(case.changed(operation=twin))

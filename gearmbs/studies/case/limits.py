@@ -14,7 +14,7 @@ import numpy as np
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.signals.analysis.bands import ATTENUATION_DB, HALF_WIDTH, MIN_PERIODS, TRANSITION
 from gearmbs.signals.filters import bandpass_taps, decimation_taps
-from gearmbs.studies.case.case import Case, CaseError
+from gearmbs.studies.case.case import AUTO, LONGEST, Case, CaseError
 
 HARMONICS = 3
 EDGE = 0.01
@@ -93,14 +93,21 @@ def _check_length(case: Case, source: str, bands: bool) -> None:
     gmf = case.mesh_frequency
     need = least_for_bands(case) if bands else MIN_PERIODS / gmf + 1.0 / case.signal_rate
     if case.operation.longest < need:
-        least = math.ceil(1e4 * need) / 1e4
+        least, longest = math.ceil(1e4 * need) / 1e4, case.operation.longest
         what = "the band-pass about" if bands else "the transform at"
-        remedy = "" if bands else ", or 'auto'"
+        given = f"'{AUTO}', at most {longest:g} s" if case.is_auto else f"{longest:g} s"
+        enough = "" if bands or case.is_auto else _or_auto(need)
+        rpm = case.operation.top_speed * 30.0 / math.pi * need / longest
         raise CaseError(
-            f"{source}: operation.duration = {case.operation.longest:g} s: {what} the mesh frequency of "
-            f"{gmf:.6g} Hz needs a record of at least {least:g} s, that is {math.ceil(need * gmf)} mesh periods; give "
-            f"a longer duration{remedy}"
+            f"{source}: operation.duration = {given}: {what} the mesh frequency of {gmf:.6g} Hz needs a record of at "
+            f"least {least:g} s, that is {math.ceil(need * gmf)} mesh periods; give that duration{enough}, or a "
+            f"speed of {math.ceil(10.0 * rpm) / 10.0:g} rpm or more (a plain number is in rad/s; write '1000 rpm')"
         )
+
+
+def _or_auto(need: float) -> str:
+    """Return the second remedy of a record that needs so many seconds, where it is one."""
+    return f", or '{AUTO}'" if need <= LONGEST else ""
 
 
 def band_taps(case: Case) -> list[np.ndarray]:
@@ -215,10 +222,11 @@ def remarks(case: Case) -> list[str]:
         )
     if operation.speed_curve is None and not case.is_auto and not holds_period(case):
         period = geometric_period(case)
+        need = period / case.mesh_frequency
         found.append(
             f"operation.duration = {operation.longest:g} s is shorter than the {period} mesh periods after which "
             "faulty teeth meet again: mesh harmonics depend on where the record begins; give "
-            f"{period / case.mesh_frequency:.3g} s or more, or 'auto'"
+            f"{need:.3g} s or more{_or_auto(need)}"
         )
     if solver.integrator == "IDA" and solver.used_tolerance > 2e-7:
         found.append(

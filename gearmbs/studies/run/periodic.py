@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.results.solution import Solution
 from gearmbs.signals.conversion import COMPONENTS, component_values
 from gearmbs.signals.resampling import MARGIN, monotone_cubic
@@ -99,6 +100,7 @@ class PeriodicRecorder:
         pair = case.pair()
         self._components = partial(component_values, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
         self._amplitudes = np.empty((0, HARMONICS, len(COMPONENTS)), dtype=complex)
+        self._watched = False
         self.found: Found | None = None
         self.deviation = math.nan
 
@@ -108,6 +110,7 @@ class PeriodicRecorder:
 
     def pause(self, t: float) -> float | None:
         """Return when to look at the motion again, or None if it repeats itself; see `gearmbs.dae.Options`."""
+        self._watched = True
         whole = math.floor((t - self._begin) * self._gmf - 0.5 * BEYOND)
         if whole > 0:
             self._add(whole)
@@ -231,6 +234,28 @@ class PeriodicRecorder:
         later, loose = known.t[1:] > self._begin, known.contact["pairs_drive"][1:] == 0.0
         return float(steps[later & loose].sum() / steps[later].sum())
 
+    def _why_longest(self, period: str, length: float) -> str:
+        """Return what is said of a record that has its longest length, s."""
+        least = 3 * HALVES[0] if self.period == 1 else self.period + 2 * OVERLAP
+        if self.period == 0:
+            return f"the record has {length:g} s, the longest: its mechanism has periods besides the mesh's"
+        if not self._watched:
+            able = " or ".join(name for name, one in INTEGRATORS.items() if one.can("pause"))
+            return (
+                f"the record has {length:g} s, the longest: whether the motion repeats itself was not looked at, since "
+                f"{self.case.solver.integrator} cannot be stopped for it between its steps; take {able}"
+            )
+        if least > self._longest:
+            short = "is shorter than its period" if self.period > 1 else "is too short to tell its period"
+            need = (self.period if self.period > 1 else least) / self._gmf
+            return (
+                f"the record of {length:g} s, the longest, {short}, {period}; give a duration of {need:.3g} s or more"
+            )
+        return (
+            f"the motion does not repeat itself by {period} within {length:g} s, the longest record: its mesh "
+            "harmonics depend on its length"
+        )
+
     def attributes(self) -> dict[str, Any]:
         """Return what a record says of its length."""
         start, stop = self.span
@@ -238,14 +263,7 @@ class PeriodicRecorder:
         names = {0: "unknown", 1: "mesh", **turn}
         period = names.get(self.period, f"{self.period} mesh periods")
         if self.found is None:
-            said = (
-                f"the motion does not repeat itself by {period} within {stop - start:g} s, the longest record: its "
-                "mesh harmonics depend on its length"
-            )
-            if self.period + 2 * OVERLAP > self._longest:
-                said = f"the record of {stop - start:g} s, the longest, is shorter than its period, {period}"
-            if self.period == 0:
-                said = f"the record has {stop - start:g} s, the longest: its mechanism has periods besides the mesh's"
+            said = self._why_longest(period, stop - start)
         else:
             n, off = self.found.periods, self.deviation
             said = f"{n} mesh periods, after which the motion repeats itself to {off:.1e} of its mesh harmonics"
