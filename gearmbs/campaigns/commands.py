@@ -281,6 +281,9 @@ def dataset(
         list[Path] | None, typer.Option(help="Recording whose random part becomes the sensors' noise; repeat.")
     ] = None,
     rate: Annotated[str | None, typer.Option(help="Sampling rate of the recordings, where they do not say.")] = None,
+    bearing_defects: Annotated[
+        bool, typer.Option("--bearing-defects", help="Spalls of rolling bearings as sources beside the teeth.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="Of design, specimens and sensors.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores.")] = None,
     dask: Annotated[str | None, typer.Option(help='Address of a Dask scheduler, or "local".')] = None,
@@ -302,7 +305,13 @@ def dataset(
         campaigns = []
         for box in boxes:
             plan = data_set_plan(
-                -(-signals // len(boxes)), gearbox=box, specimens=specimens, duration=seconds, layers=layers, seed=seed
+                -(-signals // len(boxes)),
+                gearbox=box,
+                specimens=specimens,
+                duration=seconds,
+                layers=layers,
+                bearing_defects=bearing_defects,
+                seed=seed,
             )
             campaigns.append(Campaign(out.with_name(f"{out.name}-{box.replace(' ', '-')}.campaign"), plan))
         for campaign in campaigns:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import time
+from typing import ClassVar
 
 import numpy as np
+
+from gearmbs.campaigns import Kept, Subject
+from gearmbs.campaigns.subjects.base import SignalSpec
 
 PI = 3.141592653589793
 PLACES = {"x1": 0.0, "x2": 0.0, "x3": 0.0}
@@ -55,3 +59,40 @@ def several(x1: float, x2: float, x3: float) -> dict[str, float]:
     """Return a result, what tells the same, what tells something else, and what hardly varies."""
     y = x1 + 0.3 * x2 + 0.2 * x3
     return {"steady": 100.0 + x1 - 0.5 * x2 * x3, "y": y, "double": 2.0 * y + 1e-3, "square": x2 * x2}
+
+
+class Ringing(Subject):
+    """Something with teeth that rings for a tenth of a second, louder with a fault."""
+
+    kind: ClassVar[str] = "tests.campaigns.models:Ringing"
+    keeps: ClassVar[tuple[str, ...]] = ("numbers",)
+
+    def settings(self):
+        return {}
+
+    @classmethod
+    def from_settings(cls, settings):
+        return cls()
+
+    def base(self):
+        return {"gears": {"teeth": [20, 40]}, "operation": {"speed": 100.0, "torque": 10.0}, "size": 0.0}
+
+    def unit_of(self, path):
+        return "1"
+
+    def check(self, data, name):
+        return data
+
+    def canonical(self, thing):
+        return thing
+
+    def run(self, thing, progress, keep):
+        t = np.arange(4000) / 10000.0
+        size = thing["fault"]["teeth"][0]["size"] if thing["fault"]["teeth"] else 0.0
+        return (1.0 + size) * np.sin(900.0 * t * thing["operation"]["speed"] / 100.0)
+
+    def reduce(self, thing, record, keep):
+        return Kept({"size": float(np.std(record))}, {"housing": record[None, :]})
+
+    def signals(self, keep, things):
+        return [SignalSpec("housing", ("housing",), 4000, 10000.0, "m/s^2")]

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gearmbs.campaigns import Campaign, CampaignError
+from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, Specimens, make_plan
+from gearmbs.campaigns.codes import code_counts
 from gearmbs.campaigns.datasets import (
     GEARBOXES,
     Noise,
@@ -37,6 +38,7 @@ from gearmbs.campaigns.datasets import (
 from gearmbs.campaigns.datasets.baseline import NAMES
 from gearmbs.campaigns.datasets.layers import STOP
 from gearmbs.signals import make_signal
+from tests.campaigns.models import Ringing
 from tests.says import says
 
 RATE, DURATION = 12800.0, 0.25
@@ -319,10 +321,66 @@ def test_plans_of_all_gearboxes_have_margins_and_all_specimens():
         data_set_plan(48, gearbox=wrong, specimens=2)
 
 
+def ringing(path):
+    """Return a campaign of six specimens in two states that is done at once."""
+    factors = [
+        Factor("operation.speed", 90.0, 110.0),
+        Factor("operation.torque", 5.0, 20.0),
+        Choice("fault.teeth", {"healthy": [], "faulty": {"size": [0.1, 1.0]}}, crossed=True, name="state"),
+        Specimens(6),
+    ]
+    plan = make_plan(Ringing(), factors, n=6, keep=["numbers", "signal:housing"], unit=12)
+    campaign = Campaign(path, plan)
+    campaign.run(workers=0)
+    return campaign
+
+
+def test_gearboxes_of_a_data_set_share_no_noise_and_no_drift(tmp_path):
+    """Equal campaigns under one name, whose records of one number are of one state: noise they shared would tell."""
+    both = [ringing(tmp_path / name) for name in ("a", "b")]
+    paths = write_data_set(both, tmp_path / "data", test=0.5, validation=0.0)
+    rows = read_data_set(tmp_path / "data").sort_values(["point", "state"])
+    assert rows["specimen"].nunique() == 12
+    first, second = (rows[rows["specimen"] // 6 == k] for k in (0, 1))
+    assert list(first["id"]) == list(second["id"])
+    noise = [np.stack(part["signal.sensor_1"]) - np.stack(part["clean.sensor_1"]) for part in (first, second)]
+    for mine, other in zip(*noise, strict=True):
+        assert abs(np.corrcoef(mine, other)[0, 1]) < 0.1
+    for name in ("clean.sensor_1", "speed", "tacho"):
+        assert not any(np.array_equal(a, b) for a, b in zip(first[name], second[name], strict=True))
+    # the same campaign at the same place has the same
+    write_data_set(both, tmp_path / "again", test=0.5, validation=0.0)
+    assert read_data_set(tmp_path / "again").equals(read_data_set(tmp_path / "data"))
+    # what computed it is told, and both plans are there
+    names = {path.name for path in paths}
+    assert {"plan-pair.json", "plan-pair-2.json"} <= names
+    (digest,) = code_counts(both[0].folder)
+    assert f"code-{digest}.json" in names
+    card = (tmp_path / "data" / "README.md").read_text()
+    assert f"* pair: `{digest}`, 1 of 1 units (" in card
+    assert "no bearing fault" in card
+
+
+def test_bearings_with_defects_are_sources_in_all_states():
+    plan = data_set_plan(96, gearbox="one stage", specimens=4, duration=0.1, bearing_defects=True)
+    columns = plan.columns(plan.points())
+    found = columns["source.input a"].reshape(-1, 6)
+    assert (found == found[:, :1]).all()
+    assert set(found.ravel()) == {"sound", "outer spall", "inner spall", "element spall"}
+    row = next({k: v[i] for k, v in columns.items()} for i in range(24) if found.ravel()[i] == "inner spall")
+    train = plan.subject.check(plan.data(row), "case").train
+    (defect,) = train.part("input a").settings["defects"]
+    assert defect["part"] == "inner"
+    assert defect["width"] == row["source.input a.width"]
+    with pytest.raises(CampaignError, match=says("two stages", "bearing_defects", "one stage")):
+        data_set_plan(96, gearbox="two stages", specimens=4, bearing_defects=True)
+
+
 @pytest.mark.slow
 def test_from_plan_to_files(tmp_path):
     box = GEARBOXES["one stage"]
-    campaign = Campaign(tmp_path / "c", data_set_plan(48, gearbox=box, specimens=2, duration=0.1, unit=6))
+    plan = data_set_plan(48, gearbox=box, specimens=2, duration=0.1, bearing_defects=True, unit=6)
+    campaign = Campaign(tmp_path / "c", plan)
     campaign.run(workers=0)
     assert campaign.failed().empty, campaign.failed().message.tolist()
     paths = write_data_set(campaign, tmp_path / "data", test=0.5, validation=0.0)
@@ -340,6 +398,8 @@ def test_from_plan_to_files(tmp_path):
     card = (tmp_path / "data" / "README.md").read_text()
     assert card.startswith("---\nlicense: cc0-1.0")
     assert "specimens in two splits: 0" in card
+    assert "no bearing fault" not in card
+    assert rows["source.input a"].isin(["sound", "outer spall", "inner spall", "element spall"]).all()
     assert "* signals: 48" in card
     x, labels, owners, sizes = feature_table(rows, window=0.05)
     assert len(x) == len(labels) == len(owners) == len(sizes) == 12 * 4 * 2

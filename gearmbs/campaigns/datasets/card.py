@@ -44,6 +44,7 @@ BEGINNINGS = {
     "clean.": "the same of the simulation, band-limited, without noise and converter, m/s^2",
     "clipped.": "samples of the signal that the converter has clipped",
     "size.": "label: size of the fault, SI units, or its tooth; not a number where the state has none",
+    "source.": "of a bearing, alike in all states of a point: sound, or where its spall is; width, m, and angle, rad",
     "known.": "of the simulation, which no measurement knows: mesh with the fault, SI units",
 }
 
@@ -97,11 +98,17 @@ def _meaning(name: str) -> str:
 
 
 def write_card(
-    folder: Path, title: str, files: Sequence[Path], facts: Mapping[str, Any], layers: Mapping[str, Any]
+    folder: Path,
+    title: str,
+    files: Sequence[Path],
+    facts: Mapping[str, Any],
+    layers: Mapping[str, Any],
+    codes: Sequence[str],
 ) -> Path:
-    """Write README.md with the front matter that hubs read."""
+    """Write README.md with the front matter that hubs read; ``codes`` say what computed it."""
     from gearmbs.files import write_whole
 
+    bearings = "" if any(name.startswith("source.") for name in _columns(files)) else "no bearing fault, "
     lines = ["---", "license: cc0-1.0", "task_categories:", "- time-series-classification", "tags:", "- vibration"]
     lines += ["- gears", "- simulation", *front_matter(files, int(facts["signals"]))]
     lines += [
@@ -120,7 +127,7 @@ def write_card(
         "## How it was made",
         "",
         f"Gearboxes were simulated by gearmbs {gearmbs.__version__}, a multibody solver with contact of involute "
-        "flanks; `plan-*.json` hold the plans, from which the same command makes the same bits again. Clean signals "
+        "flanks; `plan-*.json` hold the plans, from which the same code makes the same bits again. Clean signals "
         "are accelerations of a housing that bends, with the modes of its specimen, at seats of bearings. "
         "Between them and the measured ones are layers of their own, drift of the speed, noise and converter, none of "
         "which knows the state; records are cut out of longer ones, so that filters leave no edges:",
@@ -128,6 +135,10 @@ def write_card(
         "```json",
         json.dumps(dict(layers), indent=1),
         "```",
+        "",
+        "What computed it, by fingerprints of sources, libraries and processor, which `code-*.json` hold in full:",
+        "",
+        *(f"* {code}" for code in codes),
         "",
         "## Splits",
         "",
@@ -139,7 +150,7 @@ def write_card(
         "",
         "## Limits",
         "",
-        "Shafts are rigid; there is no lubricant film, no bearing fault, no neighbouring machine. Faults are changes "
+        f"Shafts are rigid; there is no lubricant film, {bearings}no neighbouring machine. Faults are changes "
         "of flanks and of tooth stiffness. The mixture of classes is that of a design, not of the field. A model "
         "trained on it alone has to be tested on recordings before anything is concluded.",
         "",

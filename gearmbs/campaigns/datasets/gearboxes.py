@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from gearmbs.bearings.defects import PARTS
 from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.plans.factors import AnyFactor, Choice, Factor, Specimens
 from gearmbs.campaigns.plans.plan import Plan, make_plan
@@ -31,6 +32,13 @@ GRADE = 6
 
 RUN_OUT = (0.0, 2e-5)
 """Eccentricity of a wheel, m: run-out of grade 6 of wheels of this size is some 30 um."""
+
+
+SPALL = {"kind": "spall", "width": [3e-4, 2e-3], "angle": [0.0, 6.283]}
+"""A spall in a running surface of a bearing, anywhere: as wide as ten contacts are or as a quarter of a ball, m."""
+
+SOURCE = "source."
+"""How columns begin that say what sounds beside the faults of teeth, alike in all states of an operating point."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +92,28 @@ class Gearbox:
         if len(found) != 1:
             raise CampaignError(f"gearbox {self.name}: {len(found)} speed sensors; give the file one, for the tacho")
         return found[0]
+
+    @property
+    def rolling(self) -> list[str]:
+        """Names of the rolling bearings, which may have defects."""
+        return [name for name, table in self.tables.get("bearings", {}).items() if table.get("kind") == "rolling"]
+
+    def sources(self) -> list[Choice]:
+        """Return for each rolling bearing whether it is sound or where its spall is.
+
+        Raises
+        ------
+        CampaignError
+            If there is no rolling bearing.
+        """
+        if not self.rolling:
+            has = ", ".join(name for name, box in GEARBOXES.items() if box.rolling)
+            raise CampaignError(
+                f"gearbox {self.name}: bearing_defects = True, but none of its bearings is rolling; leave it out, or "
+                f"take {has} or a file with bearings of the kind 'rolling'"
+            )
+        where = {"sound": [], **{f"{part} spall": {**SPALL, "part": part} for part in PARTS}}
+        return [Choice(f"bearings.{name}.settings.defects", where, name=f"{SOURCE}{name}") for name in self.rolling]
 
     @property
     def driver(self) -> Mapping[str, Any]:
@@ -164,6 +194,7 @@ def data_set_plan(
     specimens: int = 200,
     duration: float = 0.25,
     layers: SensorLayers | None = None,
+    bearing_defects: bool = False,
     seed: int = 0,
     unit: int = 24,
 ) -> Plan:
@@ -181,11 +212,15 @@ def data_set_plan(
         Of a record, s. What the layers need before and after it is simulated in addition.
     layers : SensorLayers, optional
         What will be put on the clean signals.
+    bearing_defects : bool
+        Give rolling bearings a spall at three of four operating points, on outer ring, inner ring or an element: a
+        source of vibration beside the teeth, the same in all their states.
 
     Raises
     ------
     CampaignError
-        If there are fewer points, each of which is simulated in all states, than specimens.
+        If no bearing can have a defect, or there are fewer points, each of which is simulated in all states, than
+        specimens.
     """
     box = gearbox if isinstance(gearbox, Gearbox) else chosen(GEARBOXES, gearbox, "", CampaignError, "gearbox")
     layers = layers or SensorLayers()
@@ -201,11 +236,17 @@ def data_set_plan(
     rate = float(to_si(tables["run"].get("rate", 12800.0), "frequency"))
     before, after = layers.margins(duration, rate)
     tables["run"] |= {"rate": rate, "duration": duration + (before + after) / rate}
+    sources = box.sources() if bearing_defects else []
+    tables["bearings"] = {
+        name: {**table, "settings": dict(table.get("settings", {}))} if sources and name in box.rolling else table
+        for name, table in tables.get("bearings", {}).items()
+    }
     tables["meshes"] = {name: {**mesh, "slices": SLICES} for name, mesh in tables["meshes"].items()}
     factors: list[AnyFactor] = [
         Factor(f"drives.{box.drive}.speed", low=box.speed[0], high=box.speed[1], name="operation.speed"),
         Factor(f"loads.{box.load}.torque", low=box.torque[0], high=box.torque[1], name="operation.torque"),
         Choice(f"meshes.{box.mesh}.faults", states, crossed=True, name="state"),
+        *sources,
         box.specimens(specimens, seed),
     ]
     return make_plan(

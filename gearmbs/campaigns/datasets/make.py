@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.campaigns.campaign import Campaign
+from gearmbs.campaigns.codes import code_counts, known_code
 from gearmbs.campaigns.datasets.card import write_card, write_croissant
+from gearmbs.campaigns.datasets.gearboxes import SOURCE
 from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.datasets.splits import shared_groups, split_by_group, withhold
 from gearmbs.campaigns.plans.factors import Choice
@@ -52,12 +54,12 @@ class Measured:
     left_out: int
 
 
-def measured(campaign: Campaign, layers: SensorLayers) -> Measured:
+def measured(campaign: Campaign, layers: SensorLayers, number: int = 0) -> Measured:
     """Return the records of a campaign as sensors give them.
 
     Noise has the level of the operating point in all its states together, and the converter a range for the largest
     sample of all records, so that neither tells the state. Operating points are left out if one of their states failed:
-    what fails would tell.
+    what fails would tell. ``number`` tells the campaigns of a data set apart, which share neither noise nor housings.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def measured(campaign: Campaign, layers: SensorLayers) -> Measured:
     first = data[source.places[0][0]].isel(case=0).values[source.places[0][1]]
     duration = layers.longest(int(np.isfinite(first).sum()), source.rate)
     # records of equal number in several gearboxes have equal states, and must not have equal noise or drift
-    other = zlib.crc32(source.name.encode()) << 32
+    other = zlib.crc32(f"{source.name} {number}".encode()) << 32
     owners, records = ([other + int(number) for number in kept[name]] for name in (source.group, "index"))
     clean = np.empty((len(kept), len(source.places), round(duration * source.rate)), dtype=np.float32)
     speeds, pulses = [], []
@@ -186,7 +188,8 @@ def _labels(kept: pd.DataFrame, source: _Source) -> pd.DataFrame:
     known = {f"{source.mesh}.{name}": f"known.{name}" for name in MESH_NUMBERS}
     known = {name: new for name, new in known.items() if name in kept}
     names = ["id", source.group, "point", "state", "operation.speed", "operation.torque"]
-    rows = kept[[*names, *sizes, *known]].rename(columns={**sizes, **known, source.group: "specimen"})
+    sources = [name for name in kept.columns if name.startswith(SOURCE)]
+    rows = kept[[*names, *sizes, *sources, *known]].rename(columns={**sizes, **known, source.group: "specimen"})
     fixed = {"gearbox": source.name, "severity": kept["state.severity"], "sampling_rate": source.rate}
     rows = pd.concat([rows, pd.DataFrame(fixed, index=kept.index)], axis=1)
     return rows.assign(teeth=[list(source.teeth)] * len(rows))
@@ -232,8 +235,8 @@ def write_data_set(
     out, layers = Path(out), layers or SensorLayers(seed=seed)
     given = [campaigns] if isinstance(campaigns, Campaign) else list(campaigns)
     parts, individuals = [], 0
-    for campaign in given:
-        part = measured(campaign, layers)
+    for number, campaign in enumerate(given):
+        part = measured(campaign, layers, number)
         split = split_by_group(part.rows["specimen"].to_numpy(), test=test, validation=validation, seed=seed)
         part.rows["split"] = withhold(split, part.rows["severity"].to_numpy(), *withheld)
         part.rows["specimen"] += individuals
@@ -262,11 +265,29 @@ def write_data_set(
         "specimens in two splits": max(shared_groups(rows["split"].to_numpy(), rows["specimen"].to_numpy()).values()),
         "processor time of the simulations, core hours": f"{hours:.3g}",
     }
-    paths = [write_card(out, title, files, facts, layers.as_dict()), write_croissant(out, title, files, url, published)]
-    for campaign, part in zip(given, parts, strict=True):
-        paths.append(out / f"plan-{part.rows['gearbox'].iloc[0].replace(' ', '-')}.json")
+    boxes = [str(part.rows["gearbox"].iloc[0]) for part in parts]
+    codes = [f"{box}: {told}" for box, campaign in zip(boxes, given, strict=True) for told in _codes(campaign)]
+    card = write_card(out, title, files, facts, layers.as_dict(), codes)
+    paths = [card, write_croissant(out, title, files, url, published)]
+    for number, (box, campaign) in enumerate(zip(boxes, given, strict=True)):
+        again = f"-{number + 1}" if box in boxes[:number] else ""
+        paths.append(out / f"plan-{box.replace(' ', '-')}{again}.json")
         shutil.copy(campaign.path / "plan.json", paths[-1])
-    return [*files, *paths]
+        for digest in code_counts(campaign.folder):
+            if known_code(campaign.folder, digest) is not None:
+                paths.append(out / f"code-{digest}.json")
+                shutil.copy(campaign.path / "codes" / f"{digest}.json", paths[-1])
+    return [*files, *dict.fromkeys(paths)]
+
+
+def _codes(campaign: Campaign) -> list[str]:
+    """Return the codes that a campaign's results come from, each with its part of the units and its setting."""
+    found, counts = [], code_counts(campaign.folder)
+    for digest, units in counts.most_common():
+        code = known_code(campaign.folder, digest)
+        setting = "" if code is None else ", ".join(f"{name} {value}" for name, value in code.setting.items())
+        found.append(f"`{digest}`, {units} of {counts.total()} units ({setting or 'not noted'})")
+    return found
 
 
 def _parquet(rows: pd.DataFrame, out: Path) -> list[Path]:
