@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from gearmbs.studies import Case, CaseError, SimulationFailed, load_case, sweep
 from gearmbs.studies.case.case import case_toml
-from gearmbs.studies.run import simulation
+from gearmbs.studies.run import recorder, simulation
 from tests.says import says
 from tests.view.looking import assert_readable
 
@@ -76,7 +76,7 @@ def test_it_shows_and_saves_itself(speeds, tmp_path):
 
 def test_errors_are_kept_in_their_places(monkeypatch):
     monkeypatch.setattr(
-        simulation, "slip", lambda case, *a: "the wheels slipped" if case.operation.torque > 90.0 else None
+        recorder, "slip", lambda case, *a: "the wheels slipped" if case.operation.torque > 90.0 else None
     )
     study = sweep(Case(operation=SHORT), "operation.torque", [50.0, "100 N m"], errors="keep")
     assert list(study.failures) == ["case, torque 100 N m"]
