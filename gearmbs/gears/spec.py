@@ -152,6 +152,25 @@ class GearSpec(Shown, Written):
     rim_thickness: Quantity = None
 
     def __post_init__(self) -> None:
+        self._read()
+        self._check_sizes()
+        defaults = {
+            "addendum": (1.0 + self.profile_shift) * self.module,
+            "dedendum": (1.25 - self.profile_shift) * self.module,
+            "fillet_radius": (0.2 if self.internal else 0.38) * self.module,
+            "rim_thickness": 3.0 * self.module if self.internal else 0.0,
+        }
+        fit_root = self.fillet_radius is None
+        for name, value in defaults.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+        self._check_numbers()
+        if fit_root:
+            self._fit_root()
+        self._check()
+
+    def _read(self) -> None:
+        """Convert what was written to SI, and refuse what has another type."""
         lengths = ("module", "face_width", "addendum", "dedendum", "fillet_radius", "thinning", "tip_rounding")
         units = {name: "length" for name in (*lengths, "bore_radius", "rim_thickness")}
         convert_fields(self, units | {"pressure_angle": "angle", "helix_angle": "angle"}, self.name)
@@ -174,6 +193,9 @@ class GearSpec(Shown, Written):
         if isinstance(self.teeth, int) and self.teeth < 0:
             object.__setattr__(self, "teeth", -self.teeth)
             object.__setattr__(self, "internal", True)
+
+    def _check_sizes(self) -> None:
+        """Refuse, or warn of, sizes that are no number or look like one of another unit."""
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, float) and not math.isfinite(value):
@@ -195,22 +217,8 @@ class GearSpec(Shown, Written):
                 warnings.warn(
                     f"{self.name}.{name} is {shown(value, 'mm')}, {value / self.module:.4g} times the module of "
                     f"{shown(self.module, 'mm')}; is another unit meant?",
-                    stacklevel=3,
+                    stacklevel=4,
                 )
-        defaults = {
-            "addendum": (1.0 + self.profile_shift) * self.module,
-            "dedendum": (1.25 - self.profile_shift) * self.module,
-            "fillet_radius": (0.2 if self.internal else 0.38) * self.module,
-            "rim_thickness": 3.0 * self.module if self.internal else 0.0,
-        }
-        fit_root = self.fillet_radius is None
-        for name, value in defaults.items():
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, value)
-        self._check_numbers()
-        if fit_root:
-            self._fit_root()
-        self._check()
 
     def _fit_root(self) -> None:
         """Reduce the default root arcs where neighbours overlap or flanks lose what a rack leaves them."""

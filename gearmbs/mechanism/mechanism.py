@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Protocol, TypeVar
 
-import numpy as np
 import numpy.typing as npt
 
 from gearmbs._display import Shown
@@ -16,16 +15,17 @@ from gearmbs.mechanism.forces.friction import FrictionForce, add_friction, frict
 from gearmbs.mechanism.forces.functions import FunctionForce, function_force
 from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.language.user_functions import UserFunction
-from gearmbs.mechanism.load_methods import Expression, LoadMethods
+from gearmbs.mechanism.load_methods import LoadMethods
 from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Body, Marker, OwnAttributes, make_body
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
-from gearmbs.mechanism.parts.inputs import Input, Output, Parameter, make_input, make_output, make_parameter
+from gearmbs.mechanism.parts.inputs import Input, Output, Parameter
 from gearmbs.mechanism.parts.joints import JointMethods
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
-from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, reader, vector
+from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, reader, vector
+from gearmbs.mechanism.value_methods import ValueMethods
 from gearmbs.units import truth
 
 E = TypeVar("E", bound=ForceElement)
@@ -39,7 +39,7 @@ class ContactPair(Protocol):
         ...
 
 
-class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
+class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
     """A system of bodies, rigid or with modes of deformation, joints, motions and forces.
 
     Every part has a name. Joints take two bodies with a point and an axis in global components at the
@@ -406,133 +406,6 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
         self._check_name(name)
         self.constraints[name] = str(expression)
 
-    def input(self, name: str, unit: str, value: float = 0.0) -> Input:
-        """Add an input: a number with a name that is set from outside while a simulation goes on.
-
-        What is returned is a function of time for torques and motions; expressions use the name, in quotes if it holds
-        other characters than letters, digits, dot and underscore. `gearmbs.Simulator.set` gives it another value.
-
-        Parameters
-        ----------
-        name : str
-            In expressions capitals do not matter.
-        unit : str
-            Of SI, "N m", or a dimension, "torque".
-        value : float or str
-            Until it is set, SI or text with a unit.
-
-        Raises
-        ------
-        ModelError
-            For a name that is in use or a unit that is none of SI.
-
-        Examples
-        --------
-        >>> from gearmbs.mechanism import Mechanism
-        >>> m = Mechanism("disc")
-        >>> disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
-        >>> pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
-        >>> m.torque("drive", disc, m.input("load", "N m", 4.0))
-        Torque('drive', Input('load', 4 N m) N m on 'disc' about z of 'drive.J')
-        """
-        made = make_input(name, unit, value)
-        self._check_number(name, "input")
-        self.inputs[name] = made
-        return made
-
-    def parameter(self, name: str, unit: str, value: float) -> Parameter:
-        """Add a number with a name that expressions use and `gearmbs.Simulator.set` changes; as :meth:`input`."""
-        made = make_parameter(name, unit, value)
-        self._check_number(name, "parameter")
-        self.parameters[name] = made
-        return made
-
-    def output(self, name: str, what: str | Sequence[Any]) -> Output:
-        """Add an output: a name for something that solutions, `gearmbs.Simulator.get` and plants tell.
-
-        Parameters
-        ----------
-        name : str
-        what : str or sequence
-            An expression in the function language, accelerations included; or what is asked for, of what, and which
-            component: ``("reaction", "pin", "fz")``, ``("angular_velocity", "disc", "z")``, ``("joint_angle", "pin")``,
-            ``("transmission_error", "mesh")``. A component is "x", "y" or "z" of vectors, "fx" .. "tz" of
-            reactions and loads; without one all of them are told.
-
-        Raises
-        ------
-        ModelError
-            For a name that is in use, and an expression that cannot be read.
-
-        Examples
-        --------
-        >>> from gearmbs.mechanism import Mechanism
-        >>> m = Mechanism("disc")
-        >>> disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0), angular_velocity=(0, 0, 3.0))
-        >>> pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
-        >>> m.output("speed", ("angular_velocity", "disc", "z"))
-        Output('speed', ('angular_velocity', 'disc', 'z'))
-        >>> round(float(m.simulate(1.0).output("speed")[-1]), 6)
-        3.0
-        """
-        made = make_output(name, what)
-        self._check_number(name, "output")
-        self.outputs[name] = made
-        return made
-
-    def variable(self, name: str, expression: Expression) -> None:
-        """Name an expression; others use it as VARVAL(name)."""
-        self.variables[name] = str(expression)
-
-    def differential_state(self, name: str, expression: Expression, start: float = 0.0) -> State:
-        """Add a state with z' = expression; others use it as DIF(name)."""
-        value = quantity(start, "dimensionless", f"state '{name}': start")
-        self.states[name] = State(name, str(expression), value)
-        return self.states[name]
-
-    def function(
-        self, name: str, function: Callable, partials: Callable | None = None, count: int | None = None
-    ) -> UserFunction:
-        """Let expressions call a Python function of numbers by a name of its own, for instance ``SPRING(DX(a, b))``.
-
-        The function is called at every evaluation, some microseconds a time, and should be smooth; its derivatives are
-        made by differences unless ``partials`` returns them. In constraints it may have sixteen arguments.
-
-        Parameters
-        ----------
-        name : str
-            Letters, digits and underscores; not that of a function that expressions have.
-        function, partials, count
-            See `gearmbs.mechanism.language.user_functions.UserFunction`.
-
-        Raises
-        ------
-        ModelError
-            If the name is taken or none.
-        """
-        from gearmbs.mechanism.language.library import known_functions
-
-        key = name.upper()
-        if not name.isidentifier() or key in self.functions or key in known_functions():
-            taken = "taken" if name.isidentifier() else "no name of letters, digits and underscores"
-            raise ModelError(f"function '{name}': the name is {taken}; choose another")
-        self.functions[key] = UserFunction(name, function, partials, count)
-        return self.functions[key]
-
-    def algebraic_state(self, name: str, expression: Expression) -> State:
-        """Add a state z = expression, whose values are kept with the solution and at which a simulation may stop."""
-        self.states[name] = State(name, str(expression), algebraic=True)
-        return self.states[name]
-
-    def spline(self, name: str, x: npt.ArrayLike, y: npt.ArrayLike) -> None:
-        """Name a table of points for CUBSPL and AKISPL."""
-        points = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        self.splines[name] = SplineData(*points)  # type: ignore[arg-type]
-
-    def array(self, name: str, numbers: npt.ArrayLike) -> None:
-        """Name a list of numbers; expressions use them as ARYVAL(name, position), counted from 1."""
-        self.arrays[name] = tuple(float(v) for v in np.asarray(numbers, dtype=float).ravel())
-
     @property
     def every_state(self) -> list[State]:
         """All states in their order among the unknowns: those given by expressions, then those of force elements."""
@@ -591,12 +464,6 @@ class Mechanism(JointMethods, LoadMethods, Shown, OwnAttributes):
     def _check_body_name(self, name: str) -> None:
         if name in self.bodies or name == "ground":
             raise ModelError(f"body '{name}': the name is in use; choose another")
-
-    def _check_number(self, name: str, what: str) -> None:
-        tables: dict[str, Mapping[str, Any]] = {"input": self.inputs, "parameter": self.parameters}
-        for title, table in {**tables, "output": self.outputs}.items():
-            if name.upper() in map(str.upper, table):
-                raise ModelError(f"{what} {name!r}: one of its {title}s has the name; choose another")
 
     def _add_load(self, load: Load) -> Load:
         self._check_name(load.name)

@@ -18,14 +18,14 @@ is what is left, with U2 = T^T M T_u and so on: T', T_u' of axes that turn, see 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
 from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
 from gearmbs.dae.analyses.steady import Basis, GivenInputs, Linearised, turning_basis, weights
-from gearmbs.dae.analyses.turning import turning
+from gearmbs.dae.analyses.turning import Turning, turning
 from gearmbs.dae.problem import ModelError
 
 DEPENDENT = 1e-10
@@ -150,11 +150,11 @@ def reduce(instant: Instant, inputs: Inputs | None = None) -> Reduced:
     free, anchors = _free(instant, lin.constraint)
     found = turning_basis(instant, free, anchors, lin, linearised)
     basis, first, second = found.now, found.first, found.second
-    place, pushed, told = _driven(lin, found, anchors)
+    place, pushed, into_states = _driven(lin, found, anchors)
     absolute = np.abs(basis)
     forces = (lin.stiffness, lin.damping, lin.state_force, lin.mass, *pushed)
     projected = [basis.T @ force for force in forces]
-    rates = [lin.state_position, lin.state_velocity, lin.state_state, np.zeros_like(lin.state_position), *told]
+    rates = [lin.state_position, lin.state_velocity, lin.state_state, np.zeros_like(lin.state_position), *into_states]
     # what constraints exert themselves does no work along the basis; loads that follow the reactions do
     following = lin.force_reaction - lin.own_reaction
     felt = basis.T @ following
@@ -215,8 +215,8 @@ def _driven(
     ]
     value, rate = lin.inputs.state
     moved, sped = lin.state_position, lin.state_velocity
-    told = [value + moved @ now + sped @ first, rate + sped @ now, np.zeros_like(value)]
-    return (now, first, second), pushed, told
+    into_states = [value + moved @ now + sped @ first, rate + sped @ now, np.zeros_like(value)]
+    return (now, first, second), pushed, into_states
 
 
 def warn_of_varying(reduced: Reduced, stacklevel: int) -> None:
@@ -279,8 +279,8 @@ def linearised(instant: Instant, inputs: Inputs | None = None) -> Linearised:
             # further columns of the residual
             whole = np.hstack([full, inputs.value, inputs.rate])
             both = np.split(np.arange(full.shape[1], whole.shape[1]), 2)
-            pushed, told = ([eliminate(target, one, whole)[0] for one in both] for target in (force, z))
-            given = GivenInputs(pushed, [-one for one in told], inputs.value[rows])
+            pushed, into_states = ([eliminate(target, one, whole)[0] for one in both] for target in (force, z))
+            given = GivenInputs(pushed, [-one for one in into_states], inputs.value[rows])
     except np.linalg.LinAlgError as error:
         raise ModelError("the applied loads and variables depend on each other in a singular way") from error
     # delta p' = d/dt of -(dG_eps/d theta) delta theta - ...: its velocity part is a damping
@@ -290,36 +290,33 @@ def linearised(instant: Instant, inputs: Inputs | None = None) -> Linearised:
     if turn is None:
         damping[half:, half:] -= moved
         damping_terms[half:, half:] += np.abs(moved)
-    else:
-        # see `turning`: T delta phi for delta theta, and what the coefficients' own change adds
-        to, rate, mass = turn.transform, turn.transform_rate, turn.mass
-        stiffness_terms = stiffness_terms @ np.abs(to) + damping_terms @ turn.rate_terms
-        stiffness_terms = np.abs(to.T) @ stiffness_terms + turn.stiffness_terms
-        damping_terms = np.abs(to.T) @ damping_terms @ np.abs(to) + turn.damping_terms
-        stiffness = to.T @ (damping @ rate + stiffness @ to) + turn.stiffness
-        damping = to.T @ damping @ to + turn.damping
-        state_force = to.T @ state_force
-        state_q, state_v = state_q @ to + state_v @ rate, state_v @ to
-        constraint = constraint @ to
-        force_reaction, own_reaction = to.T @ force_reaction, to.T @ own_reaction
-        if given is not None:
-            given.force = [to.T @ one for one in given.force]
-    return Linearised(
-        mass,
-        damping,
-        stiffness,
-        damping_terms,
-        stiffness_terms,
-        constraint,
-        state_force,
-        state_q,
-        state_v,
-        state_z,
-        force_reaction,
-        own_reaction,
-        state_reaction,
-        None if turn is None else turn.transform,
-        given,
+    found = Linearised(
+        mass, damping, stiffness, damping_terms, stiffness_terms, constraint, state_force, state_q, state_v, state_z,
+        force_reaction, own_reaction, state_reaction, None, given,
+    )  # fmt: skip
+    return found if turn is None else _in_axes_at_rest(found, turn)
+
+
+def _in_axes_at_rest(one: Linearised, turn: Turning) -> Linearised:
+    """Return the equations with T delta phi for delta theta; see `turning`."""
+    to, rate = turn.transform, turn.transform_rate
+    stiffness_terms = one.stiffness_terms @ np.abs(to) + one.damping_terms @ turn.rate_terms
+    given = one.inputs
+    return replace(
+        one,
+        mass=turn.mass,
+        damping=to.T @ one.damping @ to + turn.damping,
+        stiffness=to.T @ (one.damping @ rate + one.stiffness @ to) + turn.stiffness,
+        damping_terms=np.abs(to.T) @ one.damping_terms @ np.abs(to) + turn.damping_terms,
+        stiffness_terms=np.abs(to.T) @ stiffness_terms + turn.stiffness_terms,
+        constraint=one.constraint @ to,
+        state_force=to.T @ one.state_force,
+        state_position=one.state_position @ to + one.state_velocity @ rate,
+        state_velocity=one.state_velocity @ to,
+        force_reaction=to.T @ one.force_reaction,
+        own_reaction=to.T @ one.own_reaction,
+        transform=to,
+        inputs=None if given is None else replace(given, force=[to.T @ each for each in given.force]),
     )
 
 

@@ -20,8 +20,9 @@ axes at rest stay there, and need neither W nor Z; changes of their stiffness, a
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import expm
@@ -225,18 +226,10 @@ def turning_basis(
         chain = _Chain(
             basis[np.ix_(rows, columns)], places, here.within(rows), parts, largest, weight[rows], owner[rows]
         )
-        least, kept = np.inf, None
-        for w in (np.zeros(3), *(w for w in own if np.linalg.norm(w) > SLOW * largest)):
-            whole, seen = _turned(instant, w, rows, owner, generators)
-            for z in chain.choices(whole):
-                change = chain.change(whole, seen, z, forces=bool(w.any()))
-                if change < least:
-                    least, kept = change, (w, whole, seen, z)
-                # the first that serves: which of several has less rounding would differ between machines
-                if least <= 1.0:
-                    break
-            if least <= 1.0:
-                break
+        speeds = (np.zeros(3), *(w for w in own if np.linalg.norm(w) > SLOW * largest))
+        least, kept = _best_axes(
+            chain, speeds, partial(_turned, instant, rows=rows, owner=owner, generators=generators)
+        )
         if least > 1.0:
             varying.append([instant.system.body_names[b] for b in np.flatnonzero(label == k)])
             changing |= label == k
@@ -255,6 +248,23 @@ def turning_basis(
         more = along.rates(basis)
         first, second = first + more[0], second + more[1]
     return Basis(basis, first, second, axes, varying, turn, along)
+
+
+def _best_axes(
+    chain: _Chain, speeds: Sequence[np.ndarray], turned: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+) -> tuple[float, tuple[np.ndarray, ...] | None]:
+    """Return by how much a chain's coefficients change in the axes that serve, of those at some speeds, and w, W, Z."""
+    least, kept = np.inf, None
+    for w in speeds:
+        whole, seen = turned(w)
+        for z in chain.choices(whole):
+            change = chain.change(whole, seen, z, forces=bool(w.any()))
+            if change < least:
+                least, kept = change, (w, whole, seen, z)
+            # the first that serves: which of several has less rounding would differ between machines
+            if least <= 1.0:
+                return least, kept
+    return least, kept
 
 
 STENCIL = np.array([[4 / 5, -1 / 5, 4 / 105, -1 / 280], [8 / 5, -1 / 5, 8 / 315, -1 / 560]])

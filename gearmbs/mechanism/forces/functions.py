@@ -473,22 +473,11 @@ def _compare(element, made: Compiled, names: list[str], frames, states, inputs, 
     except ArithmeticError:
         # the force is not defined here
         return
-    scaled = jac * units
     if not (np.isfinite(force).all() and np.isfinite(ahead).all() and np.isfinite(behind).all()):
         # nothing acts here that could be compared
         return
-    low, high = np.minimum(behind, ahead), np.maximum(behind, ahead)
-    size = np.maximum(np.maximum(np.abs(low), np.abs(high)), np.abs(scaled))
-    blocks = np.minimum(np.arange(columns) // 3, len(frames) * 4 + np.arange(columns))
-    block = np.array([size[:, blocks == b].max(axis=1) for b in blocks]).T
-    allowed = OFF * block + OF_ALL * size.max(axis=1, keepdims=True) + (ROUNDED / STEP) * np.abs(force)[:, None]
-    off = np.maximum(low - scaled, scaled - high)
-    off[np.isnan(off)] = np.inf
-    for k in range(element.wrenches):
-        # what is written for a part that is no unknown is ignored
-        off[6 * k : 6 * k + 3] *= element.has_force
-        off[6 * k + 3 : 6 * k + 6] *= element.has_torque
-    ratio = np.divide(off, allowed, out=np.where(off > 0.0, np.inf, 0.0), where=allowed > 0.0)
+    low, high, scaled = np.minimum(behind, ahead), np.maximum(behind, ahead), jac * units
+    ratio = _over_allowed(element, len(frames), force, low, high, scaled)
     row, column = np.unravel_index(int(np.argmax(np.nan_to_num(ratio, posinf=1e300))), ratio.shape)
     if not ratio[row, column] > 1.0:
         return
@@ -498,6 +487,24 @@ def _compare(element, made: Compiled, names: list[str], frames, states, inputs, 
         f"what the kernel gives make it {0.5 * (low + high)[row, column] / units[column]:.6g}. Correct it, or give the "
         "force to Mechanism.force without derivatives, which takes differences"
     )
+
+
+def _over_allowed(
+    element, frames: int, force: np.ndarray, low: np.ndarray, high: np.ndarray, scaled: np.ndarray
+) -> np.ndarray:
+    """Return how far each derivative is from between its differences, by what rounding and curvature allow."""
+    columns = scaled.shape[1]
+    size = np.maximum(np.maximum(np.abs(low), np.abs(high)), np.abs(scaled))
+    blocks = np.minimum(np.arange(columns) // 3, frames * 4 + np.arange(columns))
+    block = np.array([size[:, blocks == b].max(axis=1) for b in blocks]).T
+    allowed = OFF * block + OF_ALL * size.max(axis=1, keepdims=True) + (ROUNDED / STEP) * np.abs(force)[:, None]
+    off = np.maximum(low - scaled, scaled - high)
+    off[np.isnan(off)] = np.inf
+    for k in range(element.wrenches):
+        # what is written for a part that is no unknown is ignored
+        off[6 * k : 6 * k + 3] *= element.has_force
+        off[6 * k + 3 : 6 * k + 6] *= element.has_torque
+    return np.divide(off, allowed, out=np.where(off > 0.0, np.inf, 0.0), where=allowed > 0.0)
 
 
 def _row(element: ForceElement, row: int) -> str:

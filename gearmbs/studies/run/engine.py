@@ -124,20 +124,20 @@ def here(work: Work, jobs: Iterable[Any], workers: int = 1) -> Iterator[Message]
 
 def threads(work: Work, jobs: Iterable[Any], workers: int) -> Iterator[Message]:
     """Yield the messages of jobs in threads; a job that reports progress is stopped at its next report by the end."""
-    told: queue.SimpleQueue[Message] = queue.SimpleQueue()
+    sent: queue.SimpleQueue[Message] = queue.SimpleQueue()
     stop = threading.Event()
 
     def one(number: int, job: Any) -> None:
         def report(fraction: float) -> None:
             if stop.is_set():
                 raise Cancelled("the job was stopped")
-            told.put((number, job, PROGRESS, fraction))
+            sent.put((number, job, PROGRESS, fraction))
 
         found: tuple[str, Any] = (DEATH, None)
         try:
             found = outcome(work, job, report)
         finally:
-            told.put((number, job, *found))
+            sent.put((number, job, *found))
 
     source = enumerate(jobs)
     at_work = 0
@@ -151,7 +151,7 @@ def threads(work: Work, jobs: Iterable[Any], workers: int) -> Iterator[Message]:
                 return
             try:
                 # without an end it would be deaf to Ctrl-C on some systems
-                message = told.get(timeout=1.0)
+                message = sent.get(timeout=1.0)
             except queue.Empty:
                 continue
             at_work -= message[2] != PROGRESS
@@ -201,8 +201,8 @@ def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool =
             finished = set(wait(list(at_work), timeout=1.0))
             stuck = watch.stuck({c: started[c].pid for c in at_work}, finished)
             for connection in stuck:
-                told = f"worker process {started[connection].pid} stood still, it is ended and its job done by another"
-                warnings.warn(told, WorkerReplaced, stacklevel=2)
+                sent = f"worker process {started[connection].pid} stood still, it is ended and its job done by another"
+                warnings.warn(sent, WorkerReplaced, stacklevel=2)
                 started[connection].kill()
             for ready in [connection for connection in at_work if connection in {*finished, *stuck}]:
                 try:
@@ -391,6 +391,63 @@ class Results(list[Any]):
         self.left = list(left)
 
 
+class _Run:
+    """What has become of the jobs of one run: which wait, which others are at, and results by their numbers."""
+
+    def __init__(self, jobs: Sequence[Any], done: Callable[[Any, Any], None] | None, tries: int) -> None:
+        self.jobs, self.done, self.tries = jobs, done, tries
+        self.queue, self.elsewhere = deque(range(len(jobs))), deque[int]()
+        self.results: dict[int, Any] = {}
+        self.deaths: Counter[int] = Counter()
+        self.refusals: Counter[int] = Counter()
+
+    def ahead(self, taken: list[int], end: float) -> Iterator[Any]:
+        """Yield the jobs that wait, while there is time, and note their numbers in ``taken``."""
+        while self.queue and time.monotonic() < end:
+            taken.append(self.queue.popleft())
+            yield self.jobs[taken[-1]]
+
+    def finish(self, k: int, value: Any) -> None:
+        """Keep the result of a job."""
+        self.results[k] = value
+        if self.done is not None:
+            self.done(self.jobs[k], value)
+
+    def note(self, k: int, kind: str, value: Any) -> None:
+        """Take what a worker says of a job: its result, or why there is none; raise what ends the run."""
+        if kind == FAILURE:
+            raise value
+        if kind == CLAIMED:
+            self.elsewhere.append(k)
+        elif kind == REFUSED:
+            self.refusals[k] += 1
+            if self.refusals[k] == REFUSALS:
+                raise value
+            # what a file server has lost for a moment may be there again
+            time.sleep(0.1 * 4.0 ** (self.refusals[k] - 1))
+            self.queue.append(k)
+        elif kind == DEATH:
+            self.deaths[k] += 1
+            if self.deaths[k] == self.tries:
+                raise WorkerDied(
+                    "a worker process ended before its job was done. Is there enough memory? In a script of "
+                    "your own, is the call under if __name__ == '__main__'?",
+                    self.jobs[k],
+                )
+            self.queue.append(k)
+        else:
+            self.finish(k, value)
+
+    def look_up(self, ledger: Ledger) -> None:
+        """Take the results that others have entered; a job whose claim is void waits again."""
+        for _ in range(len(self.elsewhere)):
+            k = self.elsewhere.popleft()
+            if (known := ledger.result(self.jobs[k])) is not None:
+                self.finish(k, known)
+            else:
+                (self.queue if vacant(ledger.claim(self.jobs[k])) else self.elsewhere).append(k)
+
+
 def run_jobs(
     work: Work,
     jobs: Sequence[Any],
@@ -436,67 +493,27 @@ def run_jobs(
     Exception
         The first that a job raised; the other jobs are ended.
     """
-    results: dict[int, Any] = {}
-    deaths: Counter[int] = Counter()
-    refusals: Counter[int] = Counter()
+    run = _Run(jobs, done, tries)
     begun, patience = time.monotonic(), NOTICE
-    queue, elsewhere = deque(range(len(jobs))), deque[int]()
-    end = float("inf") if seconds is None else time.monotonic() + seconds
-
-    def finish(k: int, value: Any) -> None:
-        results[k] = value
-        if done is not None:
-            done(jobs[k], value)
-
-    while (queue or elsewhere) and time.monotonic() < end:
+    end = float("inf") if seconds is None else begun + seconds
+    while (run.queue or run.elsewhere) and time.monotonic() < end:
         taken: list[int] = []
-
-        def ahead(taken: list[int] = taken) -> Iterator[Any]:
-            while queue and time.monotonic() < end:
-                taken.append(queue.popleft())
-                yield jobs[taken[-1]]
-
         # it ends when there is nothing to take; what came back meanwhile is taken up by the next round
-        with closing(where(work, ahead(), workers)) as messages:
+        with closing(where(work, run.ahead(taken, end), workers)) as messages:
             for number, job, kind, value in messages:
-                k = taken[number]
                 if kind == PROGRESS:
                     if progress is not None:
                         progress(job, value)
-                elif kind == FAILURE:
-                    raise value
-                elif kind == CLAIMED:
-                    elsewhere.append(k)
-                elif kind == REFUSED:
-                    refusals[k] += 1
-                    if refusals[k] == REFUSALS:
-                        raise value
-                    # what a file server has lost for a moment may be there again
-                    time.sleep(0.1 * 4.0 ** (refusals[k] - 1))
-                    queue.append(k)
-                elif kind == DEATH:
-                    deaths[k] += 1
-                    if deaths[k] == tries:
-                        raise WorkerDied(
-                            "a worker process ended before its job was done. Is there enough memory? In a script of "
-                            "your own, is the call under if __name__ == '__main__'?",
-                            job,
-                        )
-                    queue.append(k)
                 else:
-                    finish(k, value)
-        if elsewhere and not queue:
+                    run.note(taken[number], kind, value)
+        if run.elsewhere and not run.queue:
             assert ledger is not None
             time.sleep(POLL)
-            for _ in range(len(elsewhere)):
-                k = elsewhere.popleft()
-                if (known := ledger.result(jobs[k])) is not None:
-                    finish(k, known)
-                else:
-                    (queue if vacant(ledger.claim(jobs[k])) else elsewhere).append(k)
-            if not elsewhere or queue:
+            run.look_up(ledger)
+            if not run.elsewhere or run.queue:
                 begun, patience = time.monotonic(), NOTICE
             elif waiting is not None and time.monotonic() - begun > patience:
                 patience *= 2.0
-                waiting([(jobs[k], who) for k in elsewhere if (who := owner(ledger.claim(jobs[k])))])
+                waiting([(jobs[k], who) for k in run.elsewhere if (who := owner(ledger.claim(jobs[k])))])
+    results = run.results
     return Results((results[k] for k in sorted(results)), [job for k, job in enumerate(jobs) if k not in results])
