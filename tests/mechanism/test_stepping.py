@@ -153,7 +153,7 @@ def test_a_state_brings_no_tolerance_and_no_order():
     loose, tight = (slider_crank().simulate(1.0, t_eval=[0.3, 1.0], tol=tol, initial=state) for tol in (1e-4, 1e-9))
     assert tight.stats.steps > 2 * loose.stats.steps
     assert error(tight) < 1e-2 * error(loose)
-    low, usual = (slider_crank().simulate(1.0, t_eval=[0.3, 1.0], tol=1e-7, initial=state, max_order=k) for k in (1, 6))
+    low, usual = (slider_crank().simulate(1.0, t_eval=[0.3, 1.0], tol=1e-5, initial=state, max_order=k) for k in (1, 6))
     assert low.stats.steps > 5 * usual.stats.steps
 
 

@@ -59,6 +59,7 @@ def test_step_is_a_closed_shell(name, tmp_path):
     check_shell(WHEELS[name], tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WHEELS)
 def test_step_volume_in_a_cad_kernel(name, tmp_path):
     # the area of an internal wheel is that of its outline's chords
