@@ -54,19 +54,19 @@ and equations share: the problem, results, errors, and the function that solves 
 
 EXCEPTIONS = {
     ("contact", "dae.equations"): "the signature that every force element's kernel has, and IMPACT",
-    ("gears", "dae.equations"): "the door for force elements: a pair hands its kernel to the mechanism",
+    ("gears", "dae.equations"): "the interface of force elements: a pair hands its kernel to the mechanism",
     (
         "flexible",
         "dae.equations",
-    ): "the door for force elements: beams of large motion hand their kernel to the mechanism",
+    ): "the interface of force elements: beams of large motion hand their kernel to the mechanism",
     ("flexible", "dae"): "the error of models, of which its own is one",
-    ("bearings", "dae.equations"): "the door for force elements: a bearing hands its kernel to the mechanism",
+    ("bearings", "dae.equations"): "the interface of force elements: a bearing hands its kernel to the mechanism",
     ("signals", "view"): "its commands draw figures and write files",
     ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
     ("signals", "drivetrain"): "its commands take bearings and shafts from the description of a drivetrain",
     ("bearings", "dae.results"): "lives of bearings follow from the loads of a run",
     ("drivetrain", "dae"): "the table of integrators: names that a description may give",
-    ("drivetrain", "dae.equations"): "the door for force elements: torques about an axis hand their kernels to it",
+    ("drivetrain", "dae.equations"): "the interface of force elements: torques about an axis hand their kernels to it",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
     ("adams", "flexible"): "FLEX_BODY is read from its modal neutral file",

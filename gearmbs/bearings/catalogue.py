@@ -123,16 +123,16 @@ def look_up(designation: str, changes: dict[str, Any], names: list[str]) -> dict
     """
     if not isinstance(designation, str) or not designation.strip():
         raise BearingError(f"designation is {designation!r}; give a text such as '6205'")
-    designation, given = _with_fields(designation, names)
-    changes = {**given, **changes}
+    designation, own_fields = _with_fields(designation, names)
+    changes = {**own_fields, **changes}
     if not designation:
         missing = {"elements", "element_diameter", "pitch_diameter"} - changes.keys()
         if missing:
             raise BearingError(f"a bearing without a designation needs {', '.join(f'{m}=' for m in sorted(missing))}")
         return changes
-    plain = re.sub(r"[^A-Z0-9]", "", designation.upper())
-    if plain in ALIASES:
-        return {**RECORDINGS[ALIASES[plain]], **changes}
+    bare = re.sub(r"[^A-Z0-9]", "", designation.upper())
+    if bare in ALIASES:
+        return {**RECORDINGS[ALIASES[bare]], **changes}
     bare = MAKERS.sub("", designation.upper().strip())
     group = dimension_series(bare)
     if group is not None:

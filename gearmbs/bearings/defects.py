@@ -401,12 +401,12 @@ def _distinct(make: Callable[[float], np.ndarray], heights: np.ndarray) -> tuple
 # Defects as they are given: objects, or tables of files with a kind and its fields.
 
 
-def as_defects(given: Any) -> tuple[Defect, ...]:
+def as_defects(value: Any) -> tuple[Defect, ...]:
     """Return defects given as one or several objects or tables.
 
     Parameters
     ----------
-    given : Defect, mapping, or sequence of them
+    value : Defect, mapping, or sequence of them
         A table has the ``kind`` of `gearmbs.bearings.DEFECTS` and the fields of its class.
 
     Raises
@@ -419,15 +419,15 @@ def as_defects(given: Any) -> tuple[Defect, ...]:
     >>> as_defects({"kind": "spall", "part": "inner", "width": "2 mm"})
     (Spall(part='inner', width='2 mm', edge=0.0001),)
     """
-    single = not isinstance(given, Sequence) or isinstance(given, str)
-    return tuple(_one(item) for item in ((given,) if single else given))
+    single = not isinstance(value, Sequence) or isinstance(value, str)
+    return tuple(_one(item) for item in ((value,) if single else value))
 
 
-def _one(given: Any) -> Defect:
-    if isinstance(given, Defect):
-        return given
-    if not isinstance(given, Mapping):
-        raise BearingError(f"defects holds {given!r}; give defects of gearmbs.bearings, or tables with their kind")
-    table = dict(given)
+def _one(value: Any) -> Defect:
+    if isinstance(value, Defect):
+        return value
+    if not isinstance(value, Mapping):
+        raise BearingError(f"defects holds {value!r}; give defects of gearmbs.bearings, or tables with their kind")
+    table = dict(value)
     kind = str(table.pop("kind", ""))
     return make(chosen(DEFECTS, kind, "defects: ", BearingError), table, f"defects: {kind}", BearingError)

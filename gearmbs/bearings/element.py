@@ -292,8 +292,8 @@ def described(mechanism: Mechanism) -> dict[str, dict[str, Any]]:
 
 
 def _settings(settings: BearingSettings) -> dict[str, Any]:
-    given = {item.name: (getattr(settings, item.name), item.default) for item in fields(settings)}
-    return {name: value for name, (value, default) in given.items()
+    settled = {item.name: (getattr(settings, item.name), item.default) for item in fields(settings)}
+    return {name: value for name, (value, default) in settled.items()
             if name not in ("bearing", "defects") and value != default}  # fmt: skip
 
 

@@ -62,9 +62,9 @@ class BearingSettings(Described):
             defect.check(self.bearing)
 
 
-def bearing_settings(bearing: Bearing, given: Mapping[str, Any], label: str) -> BearingSettings:
+def bearing_settings(bearing: Bearing, options: Mapping[str, Any], label: str) -> BearingSettings:
     """Return the settings of a bearing; ``label`` is what messages about their names begin with."""
-    return make(BearingSettings, given, label, BearingError, "{!r} is unknown", bearing=bearing)
+    return make(BearingSettings, options, label, BearingError, "{!r} is unknown", bearing=bearing)
 
 
 TYPICAL_LOAD = 0.025

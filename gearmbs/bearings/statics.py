@@ -516,10 +516,10 @@ class BearingStatics:
         return place
 
     def _five(self, values: npt.ArrayLike, field: str) -> np.ndarray:
-        given = np.asarray(values, dtype=float)
-        good = given.shape in ((3,), (5,)) and bool(np.all(np.isfinite(given)))
+        numbers = np.asarray(values, dtype=float)
+        good = numbers.shape in ((3,), (5,)) and bool(np.all(np.isfinite(numbers)))
         require(good, f"{field} is {values!r}; give 3 or 5 numbers")
-        return np.concatenate([given, np.zeros(5 - given.size)])
+        return np.concatenate([numbers, np.zeros(5 - numbers.size)])
 
     def _load(
         self, place: np.ndarray, cage_angle: float | None, tables: BearingTables | None = None

@@ -328,7 +328,7 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
         slopes_of_sums(motion, sums, (R1, v1, w1), (R2, v2, w2), wrench, jac)
 
 
-# Tooth contact behind the door for force elements, see `gearmbs.dae.equations.loads.forces`.
+# Tooth contact behind the interface of force elements, see `gearmbs.dae.equations.loads.forces`.
 
 
 contact_at = caller(GEAR_CONTACT_SIG)

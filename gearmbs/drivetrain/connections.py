@@ -32,9 +32,11 @@ def rolling_bearing(value: Any) -> Any:
     if isinstance(value, str):
         return bearings.Bearing.from_designation(value)
     if isinstance(value, Mapping):
-        given = dict(value)
-        designation = given.pop("designation", None)
-        return bearings.Bearing.from_designation(designation, **given) if designation else bearings.Bearing(**given)
+        settings = dict(value)
+        designation = settings.pop("designation", None)
+        return (
+            bearings.Bearing.from_designation(designation, **settings) if designation else bearings.Bearing(**settings)
+        )
     raise TypeError(f"rolling is {value!r}; give a designation such as '6205', a table, or a gearmbs.bearings.Bearing")
 
 
@@ -392,7 +394,7 @@ class ElasticClutch(Coupling):
         )  # fmt: skip
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
+                self.name, at.i, at.j, "clutch", parameters, counts_angle=True, own_diagnostics=(*ACCOUNTS, TWIST),
                 what="clutch",
             )
         )  # fmt: skip
@@ -459,7 +461,7 @@ class TorsionalShaft(Coupling):
         parameters = (0.0, self.tangent, 0.0, self.tangent_damping, 0.0, 1.0, 0.0, 0.0, 1.0)
         at.mechanism.add(
             ShaftTorque(
-                self.name, at.i, at.j, "clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
+                self.name, at.i, at.j, "clutch", parameters, counts_angle=True, own_diagnostics=(*ACCOUNTS, TWIST),
                 what="torsional shaft",
             )
         )  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import TOLD, ShaftTorque, on_curve, slopes
+from gearmbs.drivetrain.torque_element import OWN, ShaftTorque, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term
@@ -144,9 +144,9 @@ class TorqueDrive(Drive):
         return fixed_value(self.torque, "torque")
 
     def add(self, at: Attached) -> None:
-        given = over_time(self.torque, "torque", self.label, at)
+        torque = over_time(self.torque, "torque", self.label, at)
         parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0)
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(given,), what="torque"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(torque,), what="torque"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,7 +247,7 @@ class InductionMotor(Drive):
         at.mechanism.add(
             ShaftTorque(
                 self.name, at.i, at.j, law, (at.sense, self.synchronous, lag, *numbers), times=(on,),
-                own_states=states, told=SLIP, first_told=TOLD, what="motor",
+                own_states=states, own_diagnostics=SLIP, first_diagnostic=OWN, what="motor",
             )
         )  # fmt: skip
 
@@ -388,8 +388,8 @@ class ControlledDrive(Drive):
             ShaftTorque(
                 self.name, at.i, at.j, "controller",
                 (at.sense, self.proportional, self.integral, self.largest), times=(wanted,),
-                own_states=(State(f"{self.name}.integral"),), told=(Diagnostic("speed_error", "rad/s"),),
-                first_told=TOLD, what="motor",
+                own_states=(State(f"{self.name}.integral"),), own_diagnostics=(Diagnostic("speed_error", "rad/s"),),
+                first_diagnostic=OWN, what="motor",
             )
         )  # fmt: skip
 

@@ -513,62 +513,66 @@ def _measured(data: Mapping[str, Any], key: str, measure: Measure) -> Any:
 def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
     where = f"{group}.{name}"
     require(isinstance(table, Mapping), f"{where}: write a table, such as [{where}]")
-    given = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+    settings = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
     if group == "wheels":
-        return _wheel(where, name, given)
+        return _wheel(where, name, settings)
     if group == "meshes":
-        return _mesh(where, name, given, fault)
+        return _mesh(where, name, settings, fault)
     if group == "housings":
-        return _housing(where, name, given)
+        return _housing(where, name, settings)
     if group == "shafts":
-        return _of_kind(where, Shaft, name, given)
+        return _of_kind(where, Shaft, name, settings)
     kinds, usual = BY_KIND[group]
-    return _of_kind(where, chosen(kinds, str(given.pop("kind", usual)), f"{where}: ", DrivetrainError), name, given)
+    return _of_kind(
+        where, chosen(kinds, str(settings.pop("kind", usual)), f"{where}: ", DrivetrainError), name, settings
+    )
 
 
-def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
+def _of_kind(where: str, kind: type[Part], name: str, settings: Mapping[str, Any]) -> Any:
     with errors_named(where):
-        return make(kind, given, where, DrivetrainError, name=name)
+        return make(kind, settings, where, DrivetrainError, name=name)
 
 
-def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
-    own: dict[str, Any] = {key: given.pop(key) for key in ("shaft", "station", "angle") if key in given}
-    material = {key: given.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in given}
+def _wheel(where: str, name: str, settings: dict[str, Any]) -> Wheel:
+    own: dict[str, Any] = {key: settings.pop(key) for key in ("shaft", "station", "angle") if key in settings}
+    material = {key: settings.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in settings}
     known = ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"]
-    check_keys(given, known, where, DrivetrainError, shown=repr)
+    check_keys(settings, known, where, DrivetrainError, shown=repr)
     for key in ("teeth", "module"):
-        require(key in given, f"{where}: {key} is missing")
+        require(key in settings, f"{where}: {key} is missing")
     with errors_named(where):
         if material:
-            given["material"] = Material(**material)
-        radii = [key for key in ("tip_radius", "root_radius") if key in given]
+            settings["material"] = Material(**material)
+        radii = [key for key in ("tip_radius", "root_radius") if key in settings]
         if radii:
             require(len(radii) == 2, f"{where}: give tip_radius and root_radius, or addendum and dedendum")
-            gear = GearSpec.from_radii(name=name, **given)
+            gear = GearSpec.from_radii(name=name, **settings)
         else:
-            gear = GearSpec(name=name, **given)
+            gear = GearSpec(name=name, **settings)
     return _of_kind(where, Wheel, name, {**own, "gear": gear})
 
 
-def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | None) -> GearMesh:
-    own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
+def _mesh(where: str, name: str, settings: dict[str, Any], fault: FaultReader | None) -> GearMesh:
+    own: dict[str, Any] = {
+        key: settings.pop(key) for key in ("driver", "driven", "direction", "phase") if key in settings
+    }
     known = ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"]
-    check_keys(given, known, where, DrivetrainError, shown=repr)
-    if "faults" in given:
+    check_keys(settings, known, where, DrivetrainError, shown=repr)
+    if "faults" in settings:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None
         with errors_named(f"{where}.faults"):
-            given["faults"] = tuple(fault(table) for table in given["faults"])
-    return _of_kind(where, GearMesh, name, {**own, "settings": given})
+            settings["faults"] = tuple(fault(table) for table in settings["faults"])
+    return _of_kind(where, GearMesh, name, {**own, "settings": settings})
 
 
-def _housing(where: str, name: str, given: dict[str, Any]) -> Housing:
+def _housing(where: str, name: str, settings: dict[str, Any]) -> Housing:
     for key, kind in (("mounts", Mount), ("modes", HousingMode)):
-        tables = given.pop(key, {})
+        tables = settings.pop(key, {})
         require(isinstance(tables, Mapping), f"{where}.{key}: write a table for each, such as [{where}.{key}.a]")
         made = []
         for part, table in tables.items():
             fitted = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
             made.append(_of_kind(f"{where}.{key}.{part}", kind, f"{name} {part}", fitted))
-        given[key] = tuple(made)
-    return _of_kind(where, Housing, name, given)
+        settings[key] = tuple(made)
+    return _of_kind(where, Housing, name, settings)

@@ -13,7 +13,7 @@ import numpy as np
 from gearmbs.dae.equations.expressions.splines import SplineData, cubic_slopes
 from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
 from gearmbs.drivetrain.part import Attached, Part, errors_named, fixed_value, over_time, require, share_of
-from gearmbs.drivetrain.torque_element import LOST, TOLD, ShaftTorque, mean_of_curve, on_curve, slopes
+from gearmbs.drivetrain.torque_element import LOST, OWN, ShaftTorque, mean_of_curve, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.schema.quantities import Measure, OneOf, OverTime
@@ -70,9 +70,9 @@ class TorqueLoad(Load):
         return fixed_value(self.torque, "torque") or 0.0
 
     def add(self, at: Attached) -> None:
-        given = over_time(self.torque, "torque", self.label, at)
+        torque = over_time(self.torque, "torque", self.label, at)
         parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, -1.0, -1.0, 0.0, 0.0)
-        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(given,), what="load"))
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "table", parameters, times=(torque,), what="load"))
 
 
 def gear_pump_ripple(teeth: int, pressure_angle: Quantity = "20 deg", addendum: float = 1.0) -> tuple[float, float]:
@@ -181,7 +181,7 @@ class Pump(Load):
         at.mechanism.add(
             ShaftTorque(
                 self.name, at.i, at.j, "pump", parameters, times=(pressure,), counts_angle=bool(self.factors),
-                own_states=states, told=(Diagnostic("flow", "m^3/s"),), first_told=TOLD, what="pump",
+                own_states=states, own_diagnostics=(Diagnostic("flow", "m^3/s"),), first_diagnostic=OWN, what="pump",
             )
         )  # fmt: skip
 
@@ -265,12 +265,12 @@ class Drag(Load):
 def _resist(
     name: str, at: Attached, share: TimeFunction, dry: float, viscous: float, square: float, smoothing: float
 ) -> None:
-    told = (Diagnostic("damping_power", "W", DISSIPATED),)
+    own_diagnostics = (Diagnostic("damping_power", "W", DISSIPATED),)
     parameters = (dry, viscous, square, smoothing)
     at.mechanism.add(
         ShaftTorque(
-            name, at.i, at.j, "resistance", parameters, times=(share,), told=told, first_told=LOST,
-            what="load",
+            name, at.i, at.j, "resistance", parameters, times=(share,), own_diagnostics=own_diagnostics,
+            first_diagnostic=LOST, what="load",
         )
     )  # fmt: skip
 
@@ -353,9 +353,9 @@ class TableLoad(Load):
     def add(self, at: Attached) -> None:
         if self.over == "time":
             at.mechanism.spline(f"{self.name}.table", self.places, self.torques)
-            given = as_function(f"CUBSPL(TIME, 0, '{self.name}.table', 0)", "torque", self.label)
+            torque = as_function(f"CUBSPL(TIME, 0, '{self.name}.table', 0)", "torque", self.label)
             parameters: Any = (at.sense, 0.0, 2.0, 0.0, 1.0, -1.0, -1.0, 0.0, 0.0)
-            times = (given,)
+            times = (torque,)
         else:
             x, y, m = self._curve()
             parameters = np.concatenate([[at.sense, TURN if self.over == "angle" else 0.0, x.size], x, -y, -m])

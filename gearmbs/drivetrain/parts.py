@@ -98,9 +98,10 @@ class Shaft(Part):
     def _section(self, given: Any) -> tuple[float, float]:
         """Return length and radius of a section, m."""
         if hasattr(given, "outer"):
-            plain = given.outer == given.outer_end and given.inner == given.inner_end == 0.0
+            is_solid = given.outer == given.outer_end and given.inner == given.inner_end == 0.0
             require(
-                plain, f"{self.label}: sections has {given!r}; a rigid shaft has solid cylinders without bore or cone"
+                is_solid,
+                f"{self.label}: sections has {given!r}; a rigid shaft has solid cylinders without bore or cone",
             )
             given = {"length": given.length, "diameter": given.outer}
         if isinstance(given, Mapping):

@@ -92,9 +92,9 @@ def order(train: Drivetrain) -> Iterator[tuple[Tie, bool, bool]]:
     waiting = ties(train)
     placed: set[str] = set()
     drives = [drive.shaft for drive in train.drives]
-    given = [shaft.name for shaft in train.shafts if shaft.position is not None]
+    positioned = [shaft.name for shaft in train.shafts if shaft.position is not None]
     # a shaft with a place is a beginning, and where none has one that of the drive
-    for root in [*given[:1], *drives, *(shaft.name for shaft in train.shafts)]:
+    for root in [*positioned[:1], *drives, *(shaft.name for shaft in train.shafts)]:
         if root in placed:
             continue
         placed.add(root)

@@ -89,8 +89,8 @@ def linearize(
         at, t = "initial", after if t is None else t
     else:
         m = train.build()
-    given = [_input(train, m, item) for item in inputs]
-    return linear_plant(m, given, [_output(train, m, item) for item in outputs], at=at, t=t)
+    named = [_input(train, m, item) for item in inputs]
+    return linear_plant(m, named, [_output(train, m, item) for item in outputs], at=at, t=t)
 
 
 def _input(train: Drivetrain, m: Mechanism, item: Any) -> Any:

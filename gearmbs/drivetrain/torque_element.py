@@ -66,7 +66,7 @@ LAW_SIG = types.void(VEC, F8, F8, F8, VEC, VEC, VEC)
 
 TORQUE, BY_ANGLE, BY_SPEED, BY_STATE = 0, 1, 2, 3
 """Places in ``out``: the torque on I (N m) and its derivatives."""
-STORED_TORQUE, LOST, TOLD = 4, 5, 6
+STORED_TORQUE, LOST, OWN = 4, 5, 6
 """Energy stored (J), power dissipated (W), and one quantity of the law's own."""
 RATE, RATE_BY_ANGLE, RATE_BY_SPEED, RATE_BY_STATE = 7, 8, 9, 10
 """The state's rate and its derivatives."""
@@ -79,7 +79,7 @@ TIMES = 1
 """Place among the integers: how many functions of time are inputs."""
 COUNTS_ANGLE = 2
 """Whether the law looks at the angle."""
-FIRST_TOLD = 3
+FIRST_DIAGNOSTIC = 3
 """Place in ``out`` of the first diagnostic; the others follow."""
 WORK = OUT_SIZE + 9
 
@@ -113,7 +113,7 @@ def kloss(p, t, angle, speed, times, states, out):
     value = 2.0 * p[3] * p[4] * s / size
     slope = 2.0 * p[3] * p[4] * (p[4] * p[4] - s * s) / (size * size)
     _induction(p, value, slope, times[0], states, out)
-    out[TOLD] = s
+    out[OWN] = s
 
 
 @njit(LAW_SIG, cache=True, nogil=True, error_model="numpy")
@@ -125,7 +125,7 @@ def circuit(p, t, angle, speed, times, states, out):
     value = p[3] * p[5] * s / size
     slope = p[3] * p[5] * (p[5] * p[5] - (p[4] * p[4] + p[6] * p[6]) * s * s) / (size * size)
     _induction(p, value, slope, times[0], states, out)
-    out[TOLD] = s
+    out[OWN] = s
 
 
 @njit(LAW_SIG, cache=True, nogil=True, error_model="numpy")
@@ -147,7 +147,7 @@ def controller(p, t, angle, speed, times, states, out):
     out[RATE] = error + (torque - wanted) / p[1]
     out[RATE_BY_SPEED] = -p[0] * gain
     out[RATE_BY_STATE] = (gain - 1.0) * p[2] / p[1]
-    out[TOLD] = error
+    out[OWN] = error
 
 
 PUMP_SENSE, PER_PRESSURE, IDLE, VISCOUS, PUMP_SMOOTH, PUMP_TEETH, PUMP_START, PUMP_LAG, EFFICIENCY = range(9)
@@ -174,7 +174,7 @@ def pump(p, t, angle, speed, times, states, out):
         out[BY_STATE] = -sense * gain * ripple * STATE_UNIT
         out[RATE] = (times[0] / STATE_UNIT - states[0]) / p[PUMP_LAG]
         out[RATE_BY_STATE] = -1.0 / p[PUMP_LAG]
-    out[TOLD] = sense * speed * p[PER_PRESSURE] * ripple
+    out[OWN] = sense * speed * p[PER_PRESSURE] * ripple
 
 
 @njit(LAW_SIG, cache=True, nogil=True, error_model="numpy")
@@ -239,7 +239,7 @@ FREE, LINEAR, CUBIC, DAMPING, BAND, DEPTH, MORE, SECOND, WIDTH = range(9)
 def clutch(p, t, angle, speed, times, states, out):
     """Write an elastic clutch's torque."""
     twist = angle - p[FREE]
-    out[TOLD] = twist
+    out[OWN] = twist
     side = 1.0 if twist >= 0.0 else -1.0
     d = side * twist - p[BAND]
     if d <= 0.0 and p[BAND] > 0.0:
@@ -310,8 +310,8 @@ def shaft_torque(ints, reals, t, frames, states, inputs, want, work, wrench, rat
         wrench[0, 3 + q] = out[TORQUE] * z[q]
     if states.size:
         rates[0] = out[RATE]
-    for q in range(min(RATE - ints[FIRST_TOLD], diagnostics.size)):
-        diagnostics[q] = out[ints[FIRST_TOLD] + q]
+    for q in range(min(RATE - ints[FIRST_DIAGNOSTIC], diagnostics.size)):
+        diagnostics[q] = out[ints[FIRST_DIAGNOSTIC] + q]
     if not want & DERIVATIVES:
         return
     if ints[COUNTS_ANGLE]:
@@ -357,10 +357,10 @@ class ShaftTorque(ForceElement):
         Whether the law looks at the angle of I about J.
     own_states : tuple of State
         At most one.
-    told : tuple of Diagnostic
+    own_diagnostics : tuple of Diagnostic
         Some that follow one another of: energy stored, power dissipated, one quantity of the law's own.
-    first_told : int
-        Place of the first of them in what the law writes: STORED_TORQUE, LOST or TOLD.
+    first_diagnostic : int
+        Place of the first of them in what the law writes: STORED_TORQUE, LOST or OWN.
     what : str
         What messages call it.
     """
@@ -370,8 +370,8 @@ class ShaftTorque(ForceElement):
     times: tuple[TimeFunction, ...] = ()
     counts_angle: bool = False
     own_states: tuple[State, ...] = ()
-    told: tuple[Diagnostic, ...] = field(default=())
-    first_told: int = STORED_TORQUE
+    own_diagnostics: tuple[Diagnostic, ...] = field(default=())
+    first_diagnostic: int = STORED_TORQUE
     what: str = "shaft torque"
 
     has_force = False
@@ -389,12 +389,12 @@ class ShaftTorque(ForceElement):
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:  # type: ignore[override]
         """What it tells beside its torque."""
-        return self.told
+        return self.own_diagnostics
 
     def compiled(self) -> Compiled:
         return Compiled(
             shaft_torque,
-            (len(self.times), int(self.counts_angle), self.first_told),
+            (len(self.times), int(self.counts_angle), self.first_diagnostic),
             self.parameters,
             ((LAWS[self.law], LAW_SIG),),
             times=self.times,

@@ -152,13 +152,13 @@ class TorsionalModel:
             require(name in self.names, f"response: there is no shaft '{name}'; they are {', '.join(self.names)}")
         held = list(self.held)
         free = [i for i in range(len(self.names)) if i not in self.held]
-        given = np.array([complex(force.get(name, 0.0)) for name in self.names])
+        applied = np.array([complex(force.get(name, 0.0)) for name in self.names])
         out = np.zeros((np.size(frequency), len(self.names)), dtype=complex)
         for row, f in enumerate(np.atleast_1d(frequency)):
             w = 2.0 * np.pi * f
             dynamic = k + 1j * w * c - w * w * m
-            out[row, held] = given[held]
-            load = given[free] - dynamic[np.ix_(free, held)] @ given[held]
+            out[row, held] = applied[held]
+            load = applied[free] - dynamic[np.ix_(free, held)] @ applied[held]
             out[row, free] = np.linalg.solve(dynamic[np.ix_(free, free)], load)
         return out
 

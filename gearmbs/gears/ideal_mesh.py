@@ -197,11 +197,11 @@ class IdealMesh(Written):
         start = gear.base_half_angle + geometry.working_pressure_angle - (math.pi if geometry.sign < 0 else 0.0)
         phase = np.arange(n) / n - start * gear.teeth / (2 * math.pi)
 
-        def at(curve: Sequence[float] | None, plain: float) -> np.ndarray:
+        def at(curve: Sequence[float] | None, constant: float) -> np.ndarray:
             if curve is None:
-                return np.full(n, plain)
-            given = np.arange(len(curve)) / len(curve)
-            return np.interp(phase, given, np.asarray(curve), period=1.0)
+                return np.full(n, constant)
+            places = np.arange(len(curve)) / len(curve)
+            return np.interp(phase, places, np.asarray(curve), period=1.0)
 
         return at(self.stiffness_curve, 1.0), at(self.error, 0.0)
 

@@ -122,8 +122,8 @@ class GearPair(PairGeometry, Shown):
                     f"GearPair.torque is {self.torque!r}, on the driven wheel, and input_torque {input_torque!r}, on "
                     "the driver; give one of them"
                 )
-            given = to_si(input_torque, "torque", "GearPair.input_torque")
-            object.__setattr__(self, "torque", given * self.driven.teeth / self.driver.teeth)
+            torque = to_si(input_torque, "torque", "GearPair.input_torque")
+            object.__setattr__(self, "torque", torque * self.driven.teeth / self.driver.teeth)
             object.__setattr__(self, "_input_torque", input_torque)
         elif self.torque is None:
             object.__setattr__(self, "torque", OperatingPoint.torque)

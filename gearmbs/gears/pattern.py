@@ -306,15 +306,15 @@ def contact_history(
     diag = np.zeros((n, layout.DIAGNOSTICS))
     run: Any = _run
     run(gi, gr, *args, wrench, diag, np.zeros(size))
-    told = dict(zip(layout.TOTALS.names or (), diag.T))
+    diagnostics = dict(zip(layout.TOTALS.names or (), diag.T))
     return ContactHistory(
         wrench,
-        told["energy"],
-        told["damping_power"],
-        told["friction_power"],
-        told["depth_drive"],
-        told["depth_coast"],
-        told["pairs_drive"].astype(int),
-        told["pairs_coast"].astype(int),
-        told["normal_force"],
+        diagnostics["energy"],
+        diagnostics["damping_power"],
+        diagnostics["friction_power"],
+        diagnostics["depth_drive"],
+        diagnostics["depth_coast"],
+        diagnostics["pairs_drive"].astype(int),
+        diagnostics["pairs_coast"].astype(int),
+        diagnostics["normal_force"],
     )

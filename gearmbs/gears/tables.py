@@ -67,11 +67,11 @@ class _Latest:
     """The tables packed last: setting a simulation up asks for them several times, a series changes the load alone."""
 
     def __init__(self) -> None:
-        self._kept: deque[tuple[tuple, tuple[Fault, ...], tuple[np.ndarray, np.ndarray, int]]] = deque(maxlen=MESHES)
+        self._cache: deque[tuple[tuple, tuple[Fault, ...], tuple[np.ndarray, np.ndarray, int]]] = deque(maxlen=MESHES)
 
     def find(self, key: tuple, faults: tuple[Fault, ...]) -> tuple[np.ndarray, np.ndarray, int] | None:
         """Return copies of the tables of what the key holds and of these very faults, or None."""
-        for known, known_faults, (gi, gr, size) in self._kept:
+        for known, known_faults, (gi, gr, size) in self._cache:
             same_faults = len(faults) == len(known_faults) and all(map(operator.is_, faults, known_faults))
             if same_faults and known == key:
                 return gi.copy(), gr.copy(), size
@@ -80,7 +80,7 @@ class _Latest:
     def keep(self, key: tuple, faults: tuple[Fault, ...], tables: tuple[np.ndarray, np.ndarray, int]) -> None:
         """Keep copies of tables."""
         gi, gr, size = tables
-        self._kept.appendleft((key, faults, (gi.copy(), gr.copy(), size)))
+        self._cache.appendleft((key, faults, (gi.copy(), gr.copy(), size)))
 
 
 MESHES = 12
@@ -209,13 +209,13 @@ def tooth_deviations(pair: Mesh) -> tuple[ToothDeviations, ToothDeviations]:
     return both
 
 
-def _numbered(rows: np.ndarray, plain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _numbered(rows: np.ndarray, unmodified: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number of the distinct row for each row, -1 where it is the plain one, and the distinct rows."""
     # by their bytes: sorting whole rows takes longer than many a simulation's set-up
     known: dict[bytes, int] = {}
     number = np.array([known.setdefault(row.tobytes(), len(known)) for row in rows])
     distinct = rows[np.unique(number, return_index=True)[1]]
-    return np.where((rows == plain).all(axis=1), -1, number), distinct
+    return np.where((rows == unmodified).all(axis=1), -1, number), distinct
 
 
 def _pack_teeth(pair: Mesh, integers: np.void, reals: np.void) -> tuple[np.ndarray, np.ndarray]:
@@ -241,8 +241,8 @@ def _pack_teeth(pair: Mesh, integers: np.void, reals: np.void) -> tuple[np.ndarr
             ("tip", sign * deviations.tip.reshape(records[k], -1), sign * deviations.gear.tip_roll_length),
             ("compliance", deviations.compliance.reshape(records[k], -1) * base_curve, 0.0),
         )
-        for column, (name, data, plain) in enumerate(kinds):
-            number, distinct = _numbered(data, np.full(data.shape[1], plain))
+        for column, (name, data, unmodified) in enumerate(kinds):
+            number, distinct = _numbered(data, np.full(data.shape[1], unmodified))
             tooth[rows, column] = np.where(number < 0, -1, number + counts[name])
             counts[name] += len(distinct)
             parts[name].append(distinct.ravel())

@@ -30,8 +30,8 @@ def case_html(case: Case) -> str:
         for key in type(section).model_fields:
             if name == "fault" and key == "teeth":
                 continue
-            given = "" if key in section.model_fields_set else "default"
-            rows.append((name, key.replace("_", " "), readable(section, key), given))
+            origin = "" if key in section.model_fields_set else "default"
+            rows.append((name, key.replace("_", " "), readable(section, key), origin))
         if name == "fault":
             for fault in case.fault.teeth:
                 settings = ", ".join(f"{k} {v}" for k, v in fault.items() if k != "kind" and v is not None)

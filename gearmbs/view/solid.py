@@ -165,14 +165,14 @@ def _straight_teeth(gear: GearSpec, tolerance: float, deviations: Deviations | N
             top = tips[tooth, j]
             entire = gear.sign * (top - whole) >= 0
             here = half.radius if entire else gear.root_radius + rise * (top - gear.root_radius)
-            plain = half.half_angle if entire else np.interp(here, half.radius[order], half.half_angle[order])
+            angles_here = half.half_angle if entire else np.interp(here, half.radius[order], half.half_angle[order])
             roll_length = np.sqrt(np.maximum(here**2 - rb**2, 0.0))
             radius[j, tooth] = here
             for side in (0, 1):
                 shape = deviations.shape[side, tooth, j]
                 removed = np.interp(roll_length, deviations.roll_length[order], shape[order])
                 removed = exaggeration * (removed + deviations.offset[side, tooth])
-                angles[side][j, tooth] = plain - removed / rb
+                angles[side][j, tooth] = angles_here - removed / rb
     if ((angles[0] + angles[1]) <= 0.0).any():
         raise ValueError(f"exaggeration is {exaggeration}: a tooth's flanks cross; reduce it")
     return _Teeth(section, radius, angles)

@@ -287,11 +287,11 @@ def _solid(writer: Writer, gear: GearSpec, origin: np.ndarray, axes: np.ndarray)
     faces: list[int] = []
     loops: dict[float, list[int]] = {-half: [], half: []}
     toothed = (profile_edges(gear), gear.twist_tangent / gear.base_radius)
-    plain = (bore_edges(gear), 0.0)
-    chains = [toothed, plain]
+    bore = (bore_edges(gear), 0.0)
+    chains = [toothed, bore]
     if gear.internal:
         # material lies to the left of every chain, and the outer one comes first
-        chains = [(backwards(edges), lead) for edges, lead in (plain, toothed)]
+        chains = [(backwards(edges), lead) for edges, lead in (bore, toothed)]
     for edges, lead in chains:
         if edges:
             made, low, high = walls(frame, edges, Sweep(half, lead))

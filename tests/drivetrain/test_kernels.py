@@ -48,7 +48,7 @@ def test_derivatives_of_laws(law):
     name, parameters, times, angles, states = LAWS[law]
     element = ShaftTorque(
         "x", *markers(), name, parameters, times=(constant(1.0),) * times, counts_angle=bool(angles),
-        own_states=(State("x.z"),) * states, told=(*ACCOUNTS, Diagnostic("own", "1")),
+        own_states=(State("x.z"),) * states, own_diagnostics=(*ACCOUNTS, Diagnostic("own", "1")),
     )  # fmt: skip
     inputs = [*((30.0 if "pump" in law else 40.0 if "controller" in law else 0.7,) * times), *((0.3,) * angles)]
     z = (3e-5 if "pump" in law else 3.0,) * states

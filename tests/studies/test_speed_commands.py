@@ -10,7 +10,7 @@ import gearmbs as gm
 from gearmbs.cli import app
 from gearmbs.signals import analyse, write_signal
 from gearmbs.view import analysis_figures, changing_speed_figures
-from gearmbs.view.figures.changing_speed import strongest_orders
+from gearmbs.view.figures.variable_speed import strongest_orders
 from tests.drivetrain.test_description import TEXT
 from tests.says import says
 from tests.view.looking import assert_readable

@@ -273,8 +273,8 @@ class LinearPlant:
         kinds = (("states", self.states, self.state_units), ("inputs", self.inputs, self.input_units))
         lines = [repr(self)]
         for title, names, units in (*kinds, ("outputs", self.outputs, self.output_units)):
-            told = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)]
-            lines.append(f"  {title:<8} {', '.join(told) or 'none'}")
+            labels = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)]
+            lines.append(f"  {title:<8} {', '.join(labels) or 'none'}")
         for name, matrix in zip("ABCD", self, strict=True):
             rows = [" ".join(f"{v:13.6g}" for v in row) for row in matrix]
             lines += [f"  {name} ({matrix.shape[0]} by {matrix.shape[1]})", *(f"    {row}" for row in rows)]
@@ -326,7 +326,7 @@ class Realised:
     chains: list[list[int]]
 
 
-def realised(reduced: Reduced, own: np.ndarray, told: np.ndarray, given: np.ndarray) -> Realised:
+def realised(reduced: Reduced, own: np.ndarray, rates_of: np.ndarray, inputs_of: np.ndarray) -> Realised:
     """Return the plant of a linearisation.
 
     Parameters
@@ -335,9 +335,9 @@ def realised(reduced: Reduced, own: np.ndarray, told: np.ndarray, given: np.ndar
         With what its inputs do, if it has some.
     own : ndarray of int
         Differential states that are states of the plant.
-    told : ndarray of int
+    rates_of : ndarray of int
         Differential states whose rates are the outputs.
-    given : ndarray of int
+    inputs_of : ndarray of int
         Differential states of constant value that are inputs, before all others.
 
     Raises
@@ -347,7 +347,7 @@ def realised(reduced: Reduced, own: np.ndarray, told: np.ndarray, given: np.ndar
     """
     n, m = len(reduced.mass), own.size
     driven, between = reduced.driven, reduced.state_state
-    orders = [0] * given.size + ([] if driven is None else _orders(driven, own, told))
+    orders = [0] * inputs_of.size + ([] if driven is None else _orders(driven, own, rates_of))
     size = 2 * n + m
     chains: list[list[int]] = []
     for h in orders:
@@ -362,17 +362,17 @@ def realised(reduced: Reduced, own: np.ndarray, told: np.ndarray, given: np.ndar
         return out
 
     position, velocity, inner = (selected(range(*ends)) for ends in ((0, n), (n, 2 * n), (2 * n, 2 * n + m)))
-    of_given = selected(range(size, size + given.size))
-    count = len(orders) - given.size
+    of_given = selected(range(size, size + inputs_of.size))
+    count = len(orders) - inputs_of.size
     # u, u' and u'' of the other inputs
     levels = [np.zeros((count, width)) for _ in range(3)]
-    for k, (chain, h) in enumerate(zip(chains[given.size :], orders[given.size :], strict=True)):
-        for level, place in enumerate([*chain, size + given.size + k][: h + 1]):
+    for k, (chain, h) in enumerate(zip(chains[inputs_of.size :], orders[inputs_of.size :], strict=True)):
+        for level, place in enumerate([*chain, size + inputs_of.size + k][: h + 1]):
             levels[level][k, place] = 1.0
     force = reduced.stiffness @ position + reduced.damping @ velocity
-    force = force + reduced.state_force[:, own] @ inner + reduced.state_force[:, given] @ of_given
+    force = force + reduced.state_force[:, own] @ inner + reduced.state_force[:, inputs_of] @ of_given
     rates = reduced.state_position @ position + reduced.state_velocity @ velocity
-    rates = rates + between[:, own] @ inner + between[:, given] @ of_given
+    rates = rates + between[:, own] @ inner + between[:, inputs_of] @ of_given
     if driven is not None:
         for pushed, moved, rate in zip(driven.force, driven.state, levels, strict=True):
             force, rates = force + pushed @ rate, rates + moved @ rate
@@ -393,10 +393,10 @@ def realised(reduced: Reduced, own: np.ndarray, told: np.ndarray, given: np.ndar
         places[0] = places[0] + put @ levels[0]
         places[1] = places[1] + put @ levels[1] + put_first @ levels[0]
         places[2] = places[2] + put @ levels[2] + 2.0 * put_first @ levels[1] + put_second @ levels[0]
-    return Realised(rows, tuple(places), rates[told], chains)  # type: ignore[arg-type]
+    return Realised(rows, tuple(places), rates[rates_of], chains)  # type: ignore[arg-type]
 
 
-def _orders(driven: Driven, own: np.ndarray, told: np.ndarray) -> list[int]:
+def _orders(driven: Driven, own: np.ndarray, rates_of: np.ndarray) -> list[int]:
     """Return the highest rate with which each input acts."""
     count = driven.force[0].shape[1]
     orders = []

@@ -72,7 +72,7 @@ def equilibrium(relaxation: Relaxation, max_iterations: int) -> tuple[int, float
     SingularModelError, ModelError
         Of the relaxation, if there is no equilibrium by either way.
     """
-    before = _kept(relaxation.instant)
+    before = _saved(relaxation.instant)
     try:
         return relaxation.run(max_iterations)
     except SingularModelError:
@@ -97,7 +97,7 @@ def _release(relaxation: Relaxation, max_iterations: int) -> tuple[int, float] |
     max_iterations : int
         Of all parts together, for each of `FIRST_SHARES`.
     """
-    before, found = _kept(relaxation.instant), None
+    before, found = _saved(relaxation.instant), None
     for share in FIRST_SHARES:
         _put_back(relaxation.instant, before)
         found = _follow(relaxation, share, max_iterations)
@@ -112,7 +112,7 @@ def _follow(relaxation: Relaxation, share: float, max_iterations: int) -> tuple[
     """Release the forces in parts, ``share`` of them first."""
     instant, released, total = relaxation.instant, 0.0, 0
     while True:
-        before = _kept(instant)
+        before = _saved(instant)
         last = released + share >= 1.0
         # what is left of r0 is the present rest, whichever angles the bodies are described by now
         held = np.zeros(relaxation.rows.size)
@@ -170,7 +170,7 @@ def _stable(relaxation: Relaxation) -> bool:
     return free_motions(reduce(relaxation.instant))[0]
 
 
-def _kept(instant: Instant) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _saved(instant: Instant) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return instant.y.copy(), instant.idata.copy(), instant.rdata.copy()
 
 

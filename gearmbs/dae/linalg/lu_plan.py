@@ -26,11 +26,11 @@ from gearmbs.dae.linalg.entry_lists import (
     scaled_entries,
     taken_pattern,
 )
-from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, LINES_TYPE, THRESHOLDS, choose_pivots, new_lines
+from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, LINES_TYPE, THRESHOLDS, Lines, choose_pivots
 from gearmbs.dae.linalg.schedule import column_by_column, has_nodes, nodes, schedule
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import direct
-from gearmbs.kernels.structs import IndexVector, IntVector, Struct, Vector
+from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, IndexVector, IntVector, Struct, Vector
 
 KNOWN = 16
 """Choices of pivots whose plans are kept; those of the largest models take some megabytes each."""
@@ -339,6 +339,18 @@ def _choose(all_ptr, all_indices, vals, scale, drop, counted, negligible, column
     return (
         rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
     )  # fmt: skip
+
+
+@lru_cache(maxsize=KEPT_LAYOUTS)
+def _layout(n: int, size: int, with_values: bool) -> BlockLayout[Lines]:
+    whole = dict.fromkeys(("start", "length", "after", "before"), n)
+    counts = dict.fromkeys(("room", "head"), n + 1)
+    return BlockLayout(Lines, {**whole, **counts, "pool": size, "vals": size if with_values else 1})
+
+
+def new_lines(n: int, size: int) -> tuple[Lines, Lines]:
+    """Return ``n`` empty columns with values and ``n`` empty rows without, each with a pool of ``size`` places."""
+    return _layout(n, size, True).new(), _layout(n, size, False).new()
 
 
 def analyse(

@@ -14,13 +14,11 @@ References
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numba import float64, int64, types
 
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, IntVector, Struct, Vector
+from gearmbs.kernels.structs import IntVector, Struct, Vector
 
 THRESHOLDS = (0.01, 0.1, 0.5)
 """Fraction of its column's largest entry a pivot must reach; the next is taken where entries grow too much."""
@@ -108,18 +106,6 @@ class Lines(Struct):
     pool: IntVector
     vals: Vector
     full: bool
-
-
-@lru_cache(maxsize=KEPT_LAYOUTS)
-def _layout(n: int, size: int, with_values: bool) -> BlockLayout[Lines]:
-    whole = dict.fromkeys(("start", "length", "after", "before"), n)
-    counts = dict.fromkeys(("room", "head"), n + 1)
-    return BlockLayout(Lines, {**whole, **counts, "pool": size, "vals": size if with_values else 1})
-
-
-def new_lines(n: int, size: int) -> tuple[Lines, Lines]:
-    """Return ``n`` empty columns with values and ``n`` empty rows without, each with a pool of ``size`` places."""
-    return _layout(n, size, True).new(), _layout(n, size, False).new()
 
 
 LINES_TYPE = Lines.numba_type
@@ -478,7 +464,7 @@ def choose_pivots(indptr, indices, scaled, drop, threshold, columns, rows):
         Fraction of its largest value below which a column has cancelled and is left without a pivot; fraction of the
         largest entry left in its column that a pivot must reach.
     columns, rows : Lines
-        Scratch, of `new_lines`; ``columns`` with values.
+        Scratch, of `lu_plan.new_lines`; ``columns`` with values.
 
     Returns
     -------

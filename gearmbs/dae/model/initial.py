@@ -256,13 +256,13 @@ def assemble_position(
     report : InitialReport
     """
     weights = system.coordinate_weights()
-    given = _constrained(system, configuration, t)
-    if not np.all(np.isfinite(given.phi)):
-        raise _not_finite(system, given.phi, t)
-    drawn = prescribed_turns(system, *given)
-    kept = independent_rows(given.jacobian, weights, order=system.row_order)
+    start = _constrained(system, configuration, t)
+    if not np.all(np.isfinite(start.phi)):
+        raise _not_finite(system, start.phi, t)
+    drawn = prescribed_turns(system, *start)
+    kept = independent_rows(start.jacobian, weights, order=system.row_order)
     report = InitialReport(degrees_of_freedom=system.model.counts.coordinates - kept.size)
-    found, kept = _assembled(system, given, t, kept, weights, report)
+    found, kept = _assembled(system, start, t, kept, weights, report)
     off = {turn.row for turn in _half_turned(system, found, drawn)}
     if off:
         turned = _turned(system, configuration, t, kept, weights, [turn for turn in drawn if turn.row in off])

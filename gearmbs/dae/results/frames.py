@@ -209,8 +209,8 @@ def _counted(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray, row: i
     if not len(result.yp) and result.sol is not None:
         known = result.sol.derivative(result.t[:row])
     before = problem.t0
-    for (now, values, table), rate, given in zip(points, [*known, yp], held[: row + 1], strict=True):
-        rdata[cells] = given
+    for (now, values, table), rate, values_held in zip(points, [*known, yp], held[: row + 1], strict=True):
+        rdata[cells] = values_held
         kept = rdata.copy()
         # the hook may turn its point into other coordinates, which the state is not in
         problem.hook(now, values[None, :].copy(), 1, table.copy(), rdata, work)

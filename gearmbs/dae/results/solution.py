@@ -230,18 +230,18 @@ class Solution(Shown):
         if result.held is None and (result.counted is None or angles is None):
             evaluator.fill(self.t, result.y, result.epochs, records)
             return
-        given: list[tuple[np.ndarray, np.ndarray]] = []
+        tables: list[tuple[np.ndarray, np.ndarray]] = []
         anew = np.zeros(self.t.size, dtype=bool)
         if result.held is not None:
-            given.append(result.held)
+            tables.append(result.held)
             anew[1:] = (result.held[1][1:] != result.held[1][:-1]).any(axis=1)
         if result.counted is not None and angles is not None:
-            given.append((angles.places, result.counted))
+            tables.append((angles.places, result.counted))
             anew |= angles.jumps(self.t, result.counted)
         for first, last in pairwise([0, *(1 + np.flatnonzero(anew[1:])).tolist(), self.t.size]):
             if last == first:
                 continue
-            for cells, values in given:
+            for cells, values in tables:
                 evaluator.rdata[cells] = values[first]
             epochs = [(max(row - first, 0), table) for row, table in result.epochs if row < last]
             own = [k for k, (row, _) in enumerate(epochs) if row == 0]

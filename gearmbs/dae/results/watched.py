@@ -130,13 +130,13 @@ class Watch:
         if name not in model.names.forces:
             return None
         number = model.names.forces.index(name)
-        told, row = model.diagnostics[number], T.forces_in(self.idata)[number]
-        if not told or row[T.FORCE_KIND] != T.COMPILED:
+        diagnostics, row = model.diagnostics[number], T.forces_in(self.idata)[number]
+        if not diagnostics or row[T.FORCE_KIND] != T.COMPILED:
             return None
         row[T.FORCE_WANT] = DIAGNOSTICS
         first = self._work_of(row) + 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
-        columns = self._columns(range(first, first + len(told)))
-        return lambda steps: dict(zip((d.name for d in told), steps.left[:, columns].T, strict=True))
+        columns = self._columns(range(first, first + len(diagnostics)))
+        return lambda steps: dict(zip((d.name for d in diagnostics), steps.left[:, columns].T, strict=True))
 
     def _work_of(self, row: np.ndarray) -> int:
         """Return where in the work array an element's wrenches begin."""
@@ -366,11 +366,11 @@ class Stream:
         for k in range(0, t.size, size):
             rows = y[k : k + size]
             part = self.whole.over(t[k : k + size], rows[:, :n], [(0, idata)])
-            if self.watch is not None:
-                part.at_steps = self.watch.read(Steps(rows[:, :n], rows[:, n:], idata))
             if self.conflict is None and part.t[-1] >= self.next_look:
                 self.next_look = float(part.t[-1]) + self.interval
                 self.conflict = part.find_conflict(np.array([part.t.size - 1]))
+            if self.watch is not None:
+                part.at_steps = self.watch.read(Steps(rows[:, :n], rows[:, n:], idata))
             self.consumer(part)
 
     def close(self, solution: Solution) -> Solution:

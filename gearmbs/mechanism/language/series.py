@@ -100,14 +100,14 @@ def expression_values(
     """
     angles = np.zeros((2, t.size, max(1, tape.n_angles)))
     angles[0, :1, : tape.n_angles] = starts
-    told, out = np.array(known).reshape(len(known), t.size), np.zeros(t.size)
+    known_angles, out = np.array(known).reshape(len(known), t.size), np.zeros(t.size)
     evaluate_series(
-        tape.ints, tape.floats, t, kin, acc, marker_body, marker_frame, y, angles, told,
+        tape.ints, tape.floats, t, kin, acc, marker_body, marker_frame, y, angles, known_angles,
         np.zeros(max(1, tape.gradient_size)),
         np.zeros(tape.work_size), out,
     )  # fmt: skip
     for k, (function, i, j) in enumerate(tape.angles):
-        if not np.isnan(told[k]).any():
+        if not np.isnan(known_angles[k]).any():
             continue
         label = f"{function}({marker_named(i)}, {marker_named(j)})"
         warn_of_doubtful_turns(t, angles[0, :, k], angles[1, :, k], label)

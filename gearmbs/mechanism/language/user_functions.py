@@ -136,8 +136,8 @@ class UserFunction:
             if not isinstance(error, Exception):
                 raise error
             where = "; ".join(filter(None, [place_of(error), *getattr(error, "__notes__", ())]))
-            told = f"{type(error).__name__}: {error}" + (f" ({where})" if where else "")
-            raise ModelError(f"function '{self.name}': {told}") from error
+            reason = f"{type(error).__name__}: {error}" + (f" ({where})" if where else "")
+            raise ModelError(f"function '{self.name}': {reason}") from error
 
     def __getstate__(self) -> dict[str, Any]:
         # an address means nothing in another process

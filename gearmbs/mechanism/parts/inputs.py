@@ -98,12 +98,12 @@ class Output:
 
     @property
     def component(self) -> str | None:
-        """Component of it that is told, None for all."""
+        """Component of it that is asked for, None for all."""
         last = self.what[-1]
         return last if len(self.what) > 2 and not isinstance(self.what, str) and last in AXES + WRENCHES else None
 
-    def of(self, told: Any) -> Any:
-        """Return the component of what has been told, over time or at an instant.
+    def of(self, measured: Any) -> Any:
+        """Return the component of what was measured, over time or at an instant.
 
         Raises
         ------
@@ -112,13 +112,13 @@ class Output:
         """
         name = self.component
         if name is None:
-            return told
-        pair, single = isinstance(told, tuple), isinstance(told, np.ndarray) and told.shape[-1:] == (3,)
+            return measured
+        pair, single = isinstance(measured, tuple), isinstance(measured, np.ndarray) and measured.shape[-1:] == (3,)
         if pair and name in WRENCHES:
             place = WRENCHES.index(name)
-            return told[place // 3][..., place % 3]
+            return measured[place // 3][..., place % 3]
         if single and name in AXES:
-            return told[..., AXES.index(name)]
+            return measured[..., AXES.index(name)]
         known = ", ".join(WRENCHES if pair else AXES) if pair or single else "no components"
         raise ModelError(f"output {self.name!r}: {self.what[0]} has no component {name!r}; it has {known}")
 

@@ -164,12 +164,12 @@ def expression_text(value: Any, unit: str, field: str, factor: float = 1.0) -> s
         try:
             return repr(to_si(value, unit, field) / factor)
         except ValueError as other:
-            plain = _is_plain(value)
-            raise ModelError(str(other) if plain else f"{field}: {error}") from None
+            is_quantity = _looks_like_quantity(value)
+            raise ModelError(str(other) if is_quantity else f"{field}: {error}") from None
     return value
 
 
-def _is_plain(text: str) -> bool:
+def _looks_like_quantity(text: str) -> bool:
     """Whether a text that is no expression looks like a number with a unit."""
     head = text.strip().split(" ", 1)
     try:

@@ -237,10 +237,10 @@ class Operation(Section):
         curves = [changes[key] for key in ("speed", "torque") if key in changes]
         if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
             if self.duration != AUTO and "duration" in data and "duration" not in changes:
-                given = data.pop("duration")
+                asked = data.pop("duration")
                 warnings.warn(
-                    f"operation.duration = {given!r}, given before, goes: the record lasts as long as the new curve; "
-                    f"give 'duration': {given!r} beside the curve to keep it",
+                    f"operation.duration = {asked!r}, given before, goes: the record lasts as long as the new curve; "
+                    f"give 'duration': {asked!r} beside the curve to keep it",
                     CaseWarning,
                     stacklevel=3,
                 )
@@ -570,8 +570,8 @@ class Case(Section, Shown):
         rate = SIGNAL_RATE
         while KEPT_HARMONICS * self.mesh_frequency > rate / ANALYSER:
             rate *= 2.0
-        given = self.solver.output_rate
-        return rate if given is None else given / max(1, int(given // rate))
+        asked = self.solver.output_rate
+        return rate if asked is None else asked / max(1, int(asked // rate))
 
     @cached_property
     def output_rate(self) -> float:

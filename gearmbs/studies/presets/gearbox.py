@@ -154,8 +154,8 @@ def gearbox_choices(settings: GearboxSettings | None = None) -> list[BenchChoice
     teeth = ", ".join(f"{one.teeth}/{two.teeth}, m {1e3 * one.module:g} mm" for one, two in pairs)
     widths = " and ".join(f"{1e3 * one.face_width:g} mm" for one, _ in pairs)
     engine = "prescribed speed" if s.motor == "speed" else "induction motor, Kloss"
-    told = {"stages": teeth, "widths": widths, "damping": 100 * s.damping_ratio, "engine": engine}
-    return choices("gearbox", vars(s) | told)
+    known = {"stages": teeth, "widths": widths, "damping": 100 * s.damping_ratio, "engine": engine}
+    return choices("gearbox", vars(s) | known)
 
 
 # The industrial gearbox, studied: modes, Campbell diagram, steady state and run-up, bearing forces, housing.
@@ -204,10 +204,10 @@ class GearboxStudy:
         from gearmbs.signals.analysis.campbell import critical_speeds
 
         modes = self.modes.oscillating
-        told = zip(self.modes.frequencies[modes], self.modes.damping_ratios[modes], strict=True)
+        known = zip(self.modes.frequencies[modes], self.modes.damping_ratios[modes], strict=True)
         rows = [
             [k, f"{f:.5g}", f"{zeta:.3g}"]
-            for k, (f, zeta) in enumerate((pair for pair in told if 0.1 < pair[0] < HIGHEST), 1)
+            for k, (f, zeta) in enumerate((pair for pair in known if 0.1 < pair[0] < HIGHEST), 1)
         ]
         lines = ["# Industrial gearbox", "", "## Modes under load", ""]
         lines += [markdown_table(["mode", "Hz", "damping ratio"], rows), ""]

@@ -259,13 +259,13 @@ def _multibody(s: RattleSettings, cycles: int, settling: int) -> RattleResult:
     taken: list[tuple[np.ndarray, ...]] = []
 
     def take(part: Any) -> None:
-        told = part.contact("loose mesh")
+        diagnostics = part.contact("loose mesh")
         taken.append(
             (
                 part.t.copy(),
                 part.angular_velocity(LOOSE)[:, 2].copy(),
-                told["pairs_drive"].copy(),
-                told["pairs_back"].copy(),
+                diagnostics["pairs_drive"].copy(),
+                diagnostics["pairs_back"].copy(),
             )
         )
 

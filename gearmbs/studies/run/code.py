@@ -95,15 +95,15 @@ class Code:
         """Return in words in what another code differs from this one."""
         if other is None:
             return "nothing is known of it"
-        told = [
+        differing = [
             f"{name} {theirs or 'missing'} instead of {mine or 'missing'}"
             for name, mine, theirs in _unequal(self.setting, other.setting)
         ]
         modules = [name for name, _, _ in _unequal(self.sources, other.sources)]
         if modules:
             more = f" and {len(modules) - 3} more" if len(modules) > 3 else ""
-            told.append(f"another source of {', '.join(modules[:3])}{more}")
-        return "; ".join(told) or "nothing"
+            differing.append(f"another source of {', '.join(modules[:3])}{more}")
+        return "; ".join(differing) or "nothing"
 
 
 def _unequal(mine: Mapping[str, str], theirs: Mapping[str, str]) -> list[tuple[str, str, str]]:
@@ -365,7 +365,7 @@ def setting(packages: Iterable[str] = LIBRARIES) -> dict[str, str]:
     """Return the versions and options that numbers depend on."""
     found = {"python": platform.python_version(), "machine": platform.machine(), "processor": processor()}
     found |= {name: value for name in OPTIONS if (value := os.environ.get(name))}
-    return found | {name: told for name in packages if (told := _installed_as(name))}
+    return found | {name: differing for name in packages if (differing := _installed_as(name))}
 
 
 @functools.cache

@@ -122,8 +122,8 @@ def run_cases(
         for name in found:
             move(name, 1.0)
 
-        def finished(case: Case, told: tuple[Any, str]) -> None:
-            result, trouble = told
+        def finished(case: Case, ended: tuple[Any, str]) -> None:
+            result, trouble = ended
             found[case.name] = result
             move(case.name, 1.0)
             if trouble:

@@ -231,8 +231,8 @@ class PeriodicRecorder:
         """Return the part of the time behind the run-up in which no drive flanks touch."""
         known = self.recorder.measured()
         steps = np.diff(known.t)
-        later, loose = known.t[1:] > self._begin, known.contact["pairs_drive"][1:] == 0.0
-        return float(steps[later & loose].sum() / steps[later].sum())
+        later, separated = known.t[1:] > self._begin, known.contact["pairs_drive"][1:] == 0.0
+        return float(steps[later & separated].sum() / steps[later].sum())
 
     def _why_longest(self, period: str, length: float) -> str:
         """Return what is said of a record that has its longest length, s."""

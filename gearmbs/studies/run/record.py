@@ -101,8 +101,8 @@ def evaluate(
         return dataset
     assert forces is not None
     acceleration = _acceleration(case, forces, start, signal_stop)
-    plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
-    dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
+    without_units = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
+    dataset["acceleration"] = without_units.rename(time="signal_time", channel="component")
     dataset["acceleration"].attrs.update(
         units="m/s^2",
         long_name="force on the driven gear over its mass (Newton's second law)",
@@ -327,15 +327,15 @@ def bearing_attributes(mechanism: Mechanism | None, title: str = "") -> dict[str
         return {}
     from gearmbs.bearings.element import described
 
-    told = described(mechanism)
-    words = {name: [d["label"] for d in one["defects"]] for name, one in told.items()}
-    kinds = {one["bearing"]["designation"] or one["bearing"]["kind"] for one in told.values()}
+    mounted = described(mechanism)
+    words = {name: [d["label"] for d in one["defects"]] for name, one in mounted.items()}
+    kinds = {one["bearing"]["designation"] or one["bearing"]["kind"] for one in mounted.values()}
     return {
         "title": f"{title} on rolling bearings",
-        "bearings": f"{len(told)} rolling bearings {', '.join(sorted(kinds))}",
+        "bearings": f"{len(mounted)} rolling bearings {', '.join(sorted(kinds))}",
         "bearing_defects": "; ".join(f"{name}: {', '.join(labels)}" for name, labels in words.items() if labels)
         or "none",
-        "bearings_json": json.dumps(told),
+        "bearings_json": json.dumps(mounted),
     }
 
 

@@ -17,16 +17,6 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.flexible import Campbell, ModalModel, StressModes
 from gearmbs.signals import campbell
 from gearmbs.signals.signal.arguments import in_si
-from gearmbs.view.figures.changing_speed import (
-    RANGE_DB,
-    RPM,
-    by_speed,
-    draw_map,
-    mark_operating,
-    one_channel,
-    tag,
-    upto,
-)
 from gearmbs.view.figures.records import thinned
 from gearmbs.view.figures.style import (
     BLUE,
@@ -41,6 +31,16 @@ from gearmbs.view.figures.style import (
     new_figure,
     png_bytes,
     write_film,
+)
+from gearmbs.view.figures.variable_speed import (
+    RANGE_DB,
+    RPM,
+    by_speed,
+    draw_map,
+    mark_operating,
+    one_channel,
+    tag,
+    upto,
 )
 
 SHOWN = 0.1

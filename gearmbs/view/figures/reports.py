@@ -20,7 +20,6 @@ from gearmbs.signals import (
     shaft_phase,
     spectrum,
 )
-from gearmbs.view.figures.changing_speed import changing_speed_figures
 from gearmbs.view.figures.charts import comparison_bars
 from gearmbs.view.figures.records import average_plot, spectrum_plot
 from gearmbs.view.figures.style import (
@@ -34,6 +33,7 @@ from gearmbs.view.figures.style import (
     look,
     new_figure,
 )
+from gearmbs.view.figures.variable_speed import changing_speed_figures
 
 if TYPE_CHECKING:
     pass

@@ -6,8 +6,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.dae.linalg.lu_plan import SingularMatrixError, analyse
-from gearmbs.dae.linalg.pivoting import GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate, new_lines
+from gearmbs.dae.linalg.lu_plan import SingularMatrixError, analyse, new_lines
+from gearmbs.dae.linalg.pivoting import GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors, solve
 from tests.says import says
 

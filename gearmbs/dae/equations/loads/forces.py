@@ -17,7 +17,7 @@ from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, IVEC, MAT, VEC, caller
 from gearmbs.kernels.structs import matrix_at, vector_at
 
-# The door for compiled force elements: what the equations know of one, whatever it is.
+# The interface of compiled force elements: what the equations know of one, whatever it is.
 #
 # A force element is a kernel with the signature `FORCE_SIG` and a row of the tables. It looks at the frames of some
 # markers and acts on the bodies of one, two or more of them; the rows of eq. (9) for its F and N are F - F(q, q', t) =

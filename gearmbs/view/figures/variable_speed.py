@@ -178,8 +178,10 @@ def mark_top(panel: Axes, x: float, text: str) -> None:
 
 def mark_operating(panel: Axes, speeds: Any) -> None:
     """Mark operating speeds, rad/s or texts, by upright lines over a panel whose speeds are in rpm."""
-    given = [] if speeds is None else [speeds] if isinstance(speeds, str) or np.ndim(speeds) == 0 else list(speeds)
-    for k, speed in enumerate(given):
+    marked_speeds = (
+        [] if speeds is None else [speeds] if isinstance(speeds, str) or np.ndim(speeds) == 0 else list(speeds)
+    )
+    for k, speed in enumerate(marked_speeds):
         panel.axvline(
             abs(in_si(speed, "angular speed", "operating")) * RPM, color=BLACK, linewidth=1.1,
             linestyle=(0, (1, 1.5)), label=None if k else "operating speed",
