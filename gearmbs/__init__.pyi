@@ -41,6 +41,7 @@ from .gears import planetary_mechanism as planetary_mechanism
 from .mechanism import JointFriction as JointFriction
 from .mechanism import Mechanism as Mechanism
 from .mechanism import Simulator as Simulator
+from .mechanism import forward_sensitivities as forward_sensitivities
 from .mechanism import linear_modes as linear_modes
 from .mechanism import linearize as linearize
 from .mechanism import quasi_static as quasi_static

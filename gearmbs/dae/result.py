@@ -206,6 +206,14 @@ class DenseOutput:
         """Return y' at ``t``, shape (n,) or (m, n)."""
         return self.evaluate(t)[1]
 
+    def stored(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return times of the stored points, and orders of the steps that end there, 0 for history alone."""
+        return self._t, self._orders
+
+    def polynomials(self) -> DenseOutput:
+        """Return the polynomials alone, without what solves for algebraic unknowns between steps."""
+        return DenseOutput(self._t, self._y, self._orders)
+
     def _evaluate_on(self, ends: np.ndarray, times: np.ndarray, y: np.ndarray, yp: np.ndarray) -> None:
         """Write y and y' at times within the steps that end in the rows ``ends``."""
         if self._between is not None:

@@ -35,5 +35,7 @@ from .solve.analyses import linear_modes as linear_modes
 from .solve.analyses import quasi_static as quasi_static
 from .solve.analyses import static_equilibrium as static_equilibrium
 from .solve.plants import linearize as linearize
+from .solve.sensitivities import Sensitivities as Sensitivities
+from .solve.sensitivities import forward_sensitivities as forward_sensitivities
 from .solve.simulate import simulate as simulate
 from .solve.simulator import Simulator as Simulator

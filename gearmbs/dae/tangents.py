@@ -1,0 +1,537 @@
+"""Forward sensitivities: the variational equations along a run that is known.
+
+The solution of G(t, y, y', p) = 0 depends on a parameter p by s = dy/dp, with
+
+    dG/dy s + dG/dy' s' + dG/dp = 0,
+
+a linear DAE. It is solved behind the run, step by step along its own points ("staggered direct"), by the same
+variable-coefficient BDF and with the exact Jacobian of the problem,
+
+    (dG/dy + gamma dG/dy') s = -(dG/dy' s'_past + dG/dp),   s' = gamma s + s'_past,
+
+one factorisation a step for all parameters. On the right stands the rate at which the residual changes with the rates
+along s'_past, in which it is linear, and with the parameter: one difference in both. So no law needs a
+derivative by its parameters: it suffices that the problem can be made at p + d and at p - d.
+
+References
+----------
+.. [1] M. Caracotsios, W. E. Stewart, "Sensitivity analysis of initial value problems with mixed ODEs and algebraic
+       equations", Computers & Chemical Engineering 9 (1985) 359-365.
+.. [2] T. Maly, L. R. Petzold, "Numerical methods and software for sensitivity analysis of differential-algebraic
+       systems", Applied Numerical Mathematics 20 (1996) 57-79.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import float64, int64
+
+from gearmbs.dae.integrators.bdf import HISTORY, MAX_ORDER, error_constant
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, SingularMatrixError, analyse
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, factor, new_factors, solve
+from gearmbs.dae.problem import HISTORY_CHANGED, DAEProblem, ModelError
+from gearmbs.dae.result import DAEResult, DenseOutput, lagrange_weights
+from gearmbs.kernels.bound import unbound
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
+from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
+
+BY = 1e-8
+"""Part of a parameter's own scale, and of the rates along the past, by which the residual is moved: where it is not
+linear in both together this leaves 1e-8, and the rounding 1e-16/1e-8, of the terms."""
+MOST = 1e-4
+"""Part of a parameter's own scale by which models are made beside each other: central differences of their tables are
+off by 1e-8, and by the rounding of 1e-16/1e-4."""
+MOVED = 1e-6
+"""Largest part of their typical magnitude by which unknowns are moved along their sensitivities: from 1e-7 to 1e-5 the
+derivative of a mesh force is the same in four digits, below rounding shows."""
+GROWTH, GROWING_ORDER = 1.4, 3
+"""Ratio of a step to the one before it, and order, with which steps grow behind a restart: for ever at this ratio the
+formula of order three is stable up to 1.53, that of order four up to 1.28."""
+SHORTER = 0.25
+"""Ratio of a step of order one to the one before it from which a run has started afresh."""
+CHUNK = 2048
+"""Points at a time: their unknowns are laid out for the compiled loop."""
+NO_SOLUTION = (
+    "sensitivities at t = {:.6g} s: the linearised equations have no unique solution there, as at a singular position; "
+    "end the run before it"
+)
+END_OF_STEP, AFRESH = 1, 2
+"""Flags of a point: it ends a step of the run; no point before it but the last counts."""
+
+_VEC, _MAT, _IVEC = float64[::1], float64[:, ::1], int64[::1]
+
+
+class Track(Struct):
+    """Sensitivities along a run: their history, where parameters stand, and scratch.
+
+    Attributes
+    ----------
+    times : ndarray, shape (HISTORY,)
+        Of the points of the history, newest first.
+    y : ndarray, shape (HISTORY, n)
+        The run there, in the coordinates that are valid now.
+    s : ndarray, shape (HISTORY * p, n)
+        Sensitivities there, of all parameters point after point.
+    place, weight : ndarray
+        Places in the table of numbers that parameters change, and the change by one of the parameter.
+    first : ndarray of int64, shape (p + 1,)
+        Where the places of each parameter begin.
+    scale, differential : ndarray, shape (n,)
+        Typical magnitude of each unknown; 1 for those whose derivative appears.
+    vals : ndarray
+        CSC values of the matrix.
+    plus, minus, yp_moved, rate, found : ndarray, shape (n,)
+        Scratch.
+    value, slope, nodes : ndarray, shape (HISTORY + 1,)
+        Coefficients.
+    kept : ndarray
+        Table of numbers while a parameter is moved.
+    before : ndarray, shape (HISTORY, n)
+        History before a change of coordinates.
+    rows : ndarray, shape (HISTORY * (1 + 2 p), n)
+        Points of the history, each followed by those moved along its sensitivities.
+    old : ndarray of int64
+        The integer table before the last change.
+    table : ndarray of int64
+        Scratch of the same size.
+    error, largest : ndarray, shape (p, n)
+        Largest local error and largest value of each sensitivity.
+    """
+
+    parameters: int
+    n_past: int
+    seen: int  # outputs written
+    has_hook: bool
+    nonlinear_rates: bool
+    growth_limit: float
+    times: Vector
+    y: Matrix
+    s: Matrix
+    place: IntVector
+    weight: Vector
+    first: IntVector
+    scale: Vector
+    differential: Vector
+    vals: Vector
+    plus: Vector
+    minus: Vector
+    yp_moved: Vector
+    rate: Vector
+    found: Vector
+    value: Vector
+    slope: Vector
+    nodes: Vector
+    kept: Vector
+    before: Matrix
+    rows: Matrix
+    old: IntVector
+    table: IntVector
+    error: Matrix
+    largest: Matrix
+
+
+TRACK_TYPE = Track.numba_type
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _size_of_move(tr, s, row):
+    """Return by how much of a unit a parameter is moved whose sensitivities are a row of ``s``."""
+    largest = 0.0
+    for i in range(tr.scale.shape[0]):
+        largest = max(largest, abs(s[row, i]) / tr.scale[i])
+    return min(MOST, MOVED / largest) if largest > 0.0 else MOST
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
+    """Find the sensitivities at ``t`` by the order-k formula, into the row of ``s`` beyond the history.
+
+    The history has been moved back by one point: what is sought stands at 0.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors
+        As of `follow_run`.
+    t : float
+        Where the equations are looked at.
+    k : int
+    y, yp : ndarray, shape (n,)
+        The run there.
+    idata, rdata, work : ndarray
+        Tables and scratch of the problem.
+
+    Returns
+    -------
+    served : bool
+        Whether the pivots do.
+    """
+    n, count = tr.scale.shape[0], tr.parameters
+    times, s, nodes = tr.times, tr.s, tr.nodes
+    nodes[0] = t
+    for j in range(k):
+        nodes[j + 1] = times[j + 1]
+    # slopes of the polynomial through the new point and k past ones; the new point's own is gamma
+    lagrange_weights(t, nodes, k + 1, tr.value, tr.slope)
+    slope = tr.slope
+    gamma = slope[0]
+    functions.jacobian(t, y, yp, gamma, tr.vals, idata, rdata, work)
+    growth = factor(plan, factors, tr.vals)
+    if not growth <= tr.growth_limit:
+        return False
+    functions.residual(t, y, yp, tr.minus, idata, rdata, work)
+    past = min(k + 1, tr.n_past)
+    for j in range(past):
+        nodes[j] = times[j + 1]
+    foretold = tr.rate
+    for p in range(count):
+        for i in range(n):
+            v = 0.0
+            for j in range(1, k + 1):
+                v += slope[j] * s[j * count + p, i]
+            foretold[i] = v
+        # what the polynomial through the past says tells the error
+        for i in range(n):
+            s[p, i] = 0.0
+        for j in range(past):
+            w = 1.0
+            for m in range(past):
+                if m != j:
+                    w *= (t - nodes[m]) / (nodes[j] - nodes[m])
+            for i in range(n):
+                s[p, i] += w * s[(j + 1) * count + p, i]
+        by = BY
+        if tr.nonlinear_rates:
+            by = min(BY, _size_of_move(tr, s, p))
+        first, last = tr.first[p], tr.first[p + 1]
+        for q in range(first, last):
+            tr.kept[q] = rdata[tr.place[q]]
+            rdata[tr.place[q]] += by * tr.weight[q]
+        for i in range(n):
+            tr.yp_moved[i] = yp[i] + by * foretold[i]
+        functions.residual(t, y, tr.yp_moved, tr.plus, idata, rdata, work)
+        for q in range(first, last):
+            rdata[tr.place[q]] = tr.kept[q]
+        for i in range(n):
+            tr.plus[i] = (tr.minus[i] - tr.plus[i]) / by
+        solve(plan, factors, tr.plus, tr.found)
+        told = error_constant(t, nodes, k) if past > k else 0.5
+        for i in range(n):
+            tr.error[p, i] = max(tr.error[p, i], told * abs(tr.found[i] - s[p, i]))
+            s[p, i] = tr.found[i]
+            tr.largest[p, i] = max(tr.largest[p, i], abs(s[p, i]))
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _write_outputs(tr, k, outputs, s_out, sp_out):
+    """Write sensitivities and their rates at the outputs up to the newest point, on its polynomial."""
+    count, n = tr.parameters, tr.scale.shape[0]
+    while tr.seen < outputs.shape[0] and outputs[tr.seen] <= tr.times[0]:
+        m = tr.seen
+        lagrange_weights(outputs[m], tr.times, k + 1, tr.value, tr.slope)
+        for p in range(count):
+            for i in range(n):
+                v, d = 0.0, 0.0
+                for j in range(k + 1):
+                    v += tr.value[j] * tr.s[j * count + p, i]
+                    d += tr.slope[j] * tr.s[j * count + p, i]
+                s_out[m * count + p, i] = v
+                sp_out[m * count + p, i] = d
+        tr.seen = m + 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _change_coordinates(functions, tr, t, rdata, work):
+    """Rewrite sensitivities as the hook has rewritten the points that they belong to.
+
+    The hook decides by the first row: it is handed the old points, each with those moved along its sensitivities.
+    """
+    n, count, past = tr.scale.shape[0], tr.parameters, tr.n_past
+    width = 1 + 2 * count
+    for j in range(past):
+        for i in range(n):
+            tr.rows[j * width, i] = tr.before[j, i]
+        for p in range(count):
+            by = _size_of_move(tr, tr.s, j * count + p)
+            for i in range(n):
+                tr.rows[j * width + 1 + 2 * p, i] = tr.before[j, i] + by * tr.s[j * count + p, i]
+                tr.rows[j * width + 2 + 2 * p, i] = tr.before[j, i] - by * tr.s[j * count + p, i]
+    for i in range(tr.old.shape[0]):
+        tr.table[i] = tr.old[i]
+    # what it counts in the table of numbers is counted already
+    numbers = rdata.copy()
+    functions.hook(t, tr.rows, past * width, tr.table, numbers, work)
+    for j in range(past):
+        for p in range(count):
+            by = _size_of_move(tr, tr.s, j * count + p)
+            for i in range(n):
+                moved = tr.rows[j * width + 1 + 2 * p, i] - tr.rows[j * width + 2 + 2 * p, i]
+                tr.rows[j * width + 1 + 2 * p, i] = moved / (2.0 * by)
+    for j in range(past):
+        for p in range(count):
+            for i in range(n):
+                tr.s[j * count + p, i] = tr.rows[j * width + 1 + 2 * p, i]
+
+
+@njit(
+    int64(
+        FUNCTIONS_TYPE, TRACK_TYPE, PLAN_TYPE, FACTORS_TYPE, int64, _VEC, _VEC, _IVEC, _IVEC, _MAT, _MAT,
+        _VEC, _MAT, _MAT, _IVEC, _VEC, _VEC,
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)  # fmt: skip
+def follow_run(
+    bound, tr, plan, factors, start, times, looked, orders, flags, y, yp, outputs, s_out, sp_out, idata, rdata, work
+):
+    """Follow a run from point ``start`` on; return the number of points, or the first that needs new pivots.
+
+    Parameters
+    ----------
+    bound, tr, plan, factors
+        Functions of the problem, the `Track`, plan and numbers of the factorisation.
+    start : int
+    times, looked : ndarray, shape (m,)
+        Times of the points, and where the equations are looked at: before a jump.
+    orders, flags : ndarray of int64, shape (m,)
+        Orders of the formula at most; `END_OF_STEP` and `AFRESH`.
+    y, yp : ndarray, shape (m, n)
+        The run there.
+    outputs, s_out, sp_out : ndarray
+        Output times, and sensitivities and their rates there, all parameters of one output after another.
+    idata, rdata, work : ndarray
+        Tables of the problem as the run has left them at the point before, and scratch.
+    """
+    functions = unbound(bound)
+    n, count = tr.scale.shape[0], tr.parameters
+    for m in range(start, times.shape[0]):
+        afresh = flags[m] & AFRESH != 0
+        if afresh:
+            tr.n_past = 1
+        past = min(tr.n_past, HISTORY - 1)
+        for j in range(past, 0, -1):
+            tr.times[j] = tr.times[j - 1]
+            for i in range(n):
+                tr.y[j, i] = tr.y[j - 1, i]
+            for p in range(count):
+                for i in range(n):
+                    tr.s[j * count + p, i] = tr.s[(j - 1) * count + p, i]
+        k = min(orders[m], past)
+        if not _step(functions, tr, plan, factors, looked[m], k, y[m], yp[m], idata, rdata, work):
+            for j in range(past):
+                tr.times[j] = tr.times[j + 1]
+                for i in range(n):
+                    tr.y[j, i] = tr.y[j + 1, i]
+                for p in range(count):
+                    for i in range(n):
+                        tr.s[j * count + p, i] = tr.s[(j + 1) * count + p, i]
+            return m
+        tr.times[0] = times[m]
+        for i in range(n):
+            tr.y[0, i] = y[m, i]
+        if afresh:
+            # algebraic unknowns may jump where a run starts afresh
+            for p in range(count):
+                for i in range(n):
+                    if tr.differential[i] == 0.0:
+                        tr.s[count + p, i] = tr.s[p, i]
+        tr.n_past = min(past + 1, HISTORY)
+        _write_outputs(tr, k, outputs, s_out, sp_out)
+        if tr.has_hook and flags[m] & END_OF_STEP != 0:
+            for j in range(tr.n_past):
+                for i in range(n):
+                    tr.before[j, i] = tr.y[j, i]
+            if functions.hook(times[m], tr.y, tr.n_past, idata, rdata, work) == HISTORY_CHANGED:
+                _change_coordinates(functions, tr, times[m], rdata, work)
+                for i in range(idata.shape[0]):
+                    tr.old[i] = idata[i]
+    return times.shape[0]
+
+
+@dataclass
+class Direction:
+    """How a problem depends on a parameter: its start and its table of numbers, by one of the parameter.
+
+    Attributes
+    ----------
+    name : str
+    start : ndarray, shape (n,)
+        Sensitivities of the initial values.
+    places : ndarray of int64, shape (q,)
+        Places in ``rdata``.
+    weights : ndarray, shape (q,)
+    """
+
+    name: str
+    start: np.ndarray
+    places: np.ndarray
+    weights: np.ndarray
+
+
+@dataclass
+class Followed:
+    """Sensitivities of a run at its outputs.
+
+    Attributes
+    ----------
+    s, sp : ndarray, shape (p, m, n)
+        Of the unknowns and of their rates.
+    error : ndarray, shape (p,)
+        Largest local error of a step in any unknown under error control, as part of the largest value, both as parts of
+        the unknown's typical magnitude.
+    """
+
+    s: np.ndarray
+    sp: np.ndarray
+    error: np.ndarray
+
+
+def points_of(sol: DenseOutput) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times, orders and flags of the points at which a run is followed.
+
+    These are the ends of its steps. Where it starts afresh, long steps behind short ones are divided, so that the
+    order can grow from one as it does at the start of a run.
+    """
+    nodes, step_orders = sol.stored()
+    steps = np.flatnonzero(step_orders > 0)
+    times: list[float] = []
+    orders: list[int] = []
+    flags: list[int] = []
+    before, last, size, allowed, growing = 0, float(nodes[steps[0] - 1]), np.inf, 1, False
+    for step in steps:
+        end, order = float(nodes[step]), int(step_orders[step])
+        h = end - last
+        afresh = order == 1 and (before != 1 or h < SHORTER * size)
+        growing |= afresh
+        pieces = np.ones(1)
+        if not afresh and growing and h > GROWTH * size:
+            number = int(np.ceil(np.log1p((GROWTH - 1.0) * h / (GROWTH * size)) / np.log(GROWTH)))
+            pieces = GROWTH ** np.arange(number, dtype=float)
+        elif not afresh and allowed >= min(order, GROWING_ORDER):
+            growing = False
+        ends = last + h * np.cumsum(pieces) / pieces.sum()
+        ends[-1] = end
+        allowed = 0 if afresh else allowed
+        for q, t in enumerate(ends):
+            allowed = min(allowed + 1, GROWING_ORDER if growing else MAX_ORDER)
+            times.append(float(t))
+            orders.append(allowed if growing else min(allowed, order))
+            flags.append((AFRESH if afresh else 0) | (END_OF_STEP if q + 1 == len(ends) else 0))
+        size, before, last = h * float(pieces[-1] / pieces.sum()), order, end
+    return np.array(times), np.array(orders, dtype=np.int64), np.array(flags, dtype=np.int64)
+
+
+def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction]) -> Followed:
+    """Return the sensitivities of a run at its outputs.
+
+    Parameters
+    ----------
+    problem : DAEProblem
+        As it was integrated.
+    result : DAEResult
+        With ``sol``: the run has to be known between its outputs (``dense_output``).
+    directions : list of Direction
+        The parameters.
+
+    Raises
+    ------
+    ModelError
+        If the equations for the sensitivities have no unique solution.
+    """
+    n, count = problem.n, len(directions)
+    sol = result.sol
+    assert sol is not None
+    times, orders, flags = points_of(sol)
+    run = sol.polynomials()
+    # where the run starts afresh the equations may have jumped already
+    before_jump = np.append(flags[1:] & AFRESH != 0, False)
+    looked = np.where(before_jump, np.nextafter(times, -np.inf), times)
+    tr = _track(problem, directions)
+    tr.times[0] = sol.t_min
+    tr.y[0] = problem.y0
+    for p, direction in enumerate(directions):
+        tr.s[p] = direction.start
+    outputs = np.ascontiguousarray(result.t)
+    s_out, sp_out = np.zeros((outputs.size * count, n)), np.zeros((outputs.size * count, n))
+    hook = problem.hook if problem.hook is not None else no_hook
+    bound = bind(problem.residual, problem.jacobian, hook, no_events)
+    idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    plan: Any = None
+    factors: Any = None
+    for begin in range(0, times.size, CHUNK):
+        part = slice(begin, begin + CHUNK)
+        y, yp = run.evaluate(times[part])
+        args = [np.ascontiguousarray(a[part]) for a in (times, looked, orders, flags)]
+        at = 0
+        while at < y.shape[0]:
+            fresh = plan is None
+            if fresh:
+                plan, factors = _plan_at(problem, tr, args, at, y, yp, idata, rdata, work)
+            reached = direct(follow_run)(
+                bound, tr, plan, factors, at, *args, y, yp, outputs, s_out, sp_out, idata, rdata, work
+            )
+            if reached == at and fresh:
+                raise ModelError(NO_SOLUTION.format(args[0][at]))
+            if reached < y.shape[0]:
+                plan = None
+            at = reached
+    tested = np.asarray(problem.error_mask, dtype=float) / tr.scale
+    most = (tr.largest * tested).max(axis=1, initial=0.0)
+    error = (tr.error * tested).max(axis=1, initial=0.0) / np.where(most > 0.0, most, 1.0)
+    shape = (outputs.size, count, n)
+    return Followed(s_out.reshape(shape).swapaxes(0, 1), sp_out.reshape(shape).swapaxes(0, 1), error)
+
+
+def _plan_at(problem, tr, args, at, y, yp, idata, rdata, work):
+    """Return plan and factors with pivots chosen at a point."""
+    times, looked, orders = args[0], args[1], args[2]
+    past = 1 if args[3][at] & AFRESH else int(tr.n_past)
+    gamma = sum(1.0 / (times[at] - tr.times[j]) for j in range(min(int(orders[at]), past, HISTORY - 1)))
+    vals = np.zeros(len(problem.indices))
+    problem.jacobian(looked[at], y[at], yp[at], gamma, vals, idata, rdata, work)
+    indptr, indices = (np.asarray(a, dtype=np.int64) for a in (problem.indptr, problem.indices))
+    try:
+        plan = analyse(indptr, indices, vals, np.asarray(problem.scale, dtype=float))
+    except SingularMatrixError:
+        raise ModelError(NO_SOLUTION.format(times[at])) from None
+    factors = new_factors(plan)
+    growth = direct(factor)(plan, factors, vals)
+    tr.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
+    return plan, factors
+
+
+def _track(problem: DAEProblem, directions: list[Direction]) -> Track:
+    """Return the track of a run before its first point."""
+    n, count = problem.n, len(directions)
+    first = np.cumsum([0, *(d.places.size for d in directions)]).astype(np.int64)
+    numbers = int(first[-1])
+    return Track(
+        parameters=count,
+        n_past=1,
+        has_hook=problem.hook is not None,
+        nonlinear_rates=problem.nonlinear_rates,
+        growth_limit=GROWTH_LIMIT,
+        times=np.zeros(HISTORY),
+        y=np.zeros((HISTORY, n)),
+        s=np.zeros((HISTORY * count, n)),
+        place=np.concatenate([d.places for d in directions] or [np.zeros(0)]).astype(np.int64),
+        weight=np.concatenate([d.weights for d in directions] or [np.zeros(0)]).astype(float),
+        first=first,
+        scale=np.asarray(problem.scale, dtype=float).copy(),
+        differential=np.asarray(problem.differential, dtype=float),
+        vals=np.zeros(len(problem.indices)),
+        kept=np.zeros(max(1, numbers)),
+        before=np.zeros((HISTORY, n)),
+        rows=np.zeros((HISTORY * (1 + 2 * count), n)),
+        old=problem.idata.astype(np.int64),
+        table=np.zeros(len(problem.idata), dtype=np.int64),
+        error=np.zeros((count, n)),
+        largest=np.zeros((count, n)),
+        **{name: np.zeros(n) for name in ("plus", "minus", "yp_moved", "rate", "found")},
+        **{name: np.zeros(HISTORY + 1) for name in ("value", "slope", "nodes")},
+    )

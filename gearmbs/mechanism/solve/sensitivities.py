@@ -1,0 +1,228 @@
+"""Derivatives of everything a simulation gives by parameters of its model: forward sensitivities.
+
+The variational equations are followed along the run (`gearmbs.dae.tangents`). The parameters are arguments of whatever
+builds the mechanism; how tables and start depend on each is seen by building it at p + d and p - d. A result
+R(t, y, y', p) then has
+
+    dR/dp = (R(y + e s, y' + e s', p + e) - R(y - e s, y' - e s', p - e)) / 2 e,
+
+with the sensitivities s of the unknowns: solutions are made of both sides, and anything can be asked of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gearmbs.dae.methods import DEFAULT
+from gearmbs.dae.problem import DAEProblem, ModelError
+from gearmbs.dae.results.solution import Solution
+from gearmbs.dae.tangents import MOST, MOVED, Direction, Followed, follow
+from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.mechanism.solve.accuracy import chosen_accuracy
+from gearmbs.mechanism.solve.simulate import prepared, simulate
+from gearmbs.wording import did_you_mean
+
+TIGHTER = 0.1
+"""Part of the usual tolerance at which a run is differentiated where none is given. Derivatives bend where the rates of
+the run do, and are as accurate as the unknowns at ten times the tolerance (docs/theory/tangents.md)."""
+WITHOUT = ("every_step", "consumer", "watch", "stops", "initial", "inputs", "continued", "dense_output")
+"""Options of `simulate` that belong to runs of another kind."""
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """A run and its derivatives by parameters.
+
+    Attributes
+    ----------
+    solution : Solution
+    values : dict of float
+        The parameters, at which the run was made.
+    unknowns, rates : dict of ndarray, shape (m, n)
+        By parameter: dy/dp and dy'/dp at the outputs, in the order of the problem's unknowns.
+    local_error : dict of float
+        By parameter: the largest local error of a step of the variational equations, as part of the largest
+        value of the unknown; that of what is derived is larger by what steps add up to.
+    """
+
+    solution: Solution
+    values: dict[str, float]
+    unknowns: dict[str, np.ndarray]
+    rates: dict[str, np.ndarray]
+    local_error: dict[str, float]
+    _beside: Callable[[str, float], Solution]
+    _scales: dict[str, float]
+
+    def derivative(self, parameter: str, result: str | Callable[[Solution], Any]) -> np.ndarray:
+        """Return the derivative of a result by a parameter.
+
+        Parameters
+        ----------
+        parameter : str
+        result : str or callable
+            An expression in the function language of ADAMS, or what makes numbers of a solution, as
+            ``lambda s: s.diagnostics("mesh")["normal_force"]``; also those of a whole record, as its RMS.
+
+        Returns
+        -------
+        ndarray
+            Of the shape of the result.
+
+        Raises
+        ------
+        ModelError
+            For a parameter that was not asked for.
+        """
+        if parameter not in self.values:
+            there = list(self.values)
+            hint = did_you_mean(parameter, there, shown=repr, otherwise=f"there is {', '.join(there)}")
+            raise ModelError(f"derivative by {parameter!r}: it is no parameter of this run; {hint}")
+        problem = self.solution.problem
+        # positions and rates, of which forces are functions; reactions and accelerations are linear in what they follow
+        moved = np.abs(self.unknowns[parameter]) * problem.error_mask / problem.scale
+        most = float(moved.max(initial=0.0))
+        by = MOST * self._scales[parameter]
+        if most > 0.0:
+            by = min(by, MOVED / most)
+
+        def of(solution: Solution) -> np.ndarray:
+            found = solution.evaluate(result) if isinstance(result, str) else result(solution)
+            return np.asarray(found, dtype=float)
+
+        return (of(self._beside(parameter, by)) - of(self._beside(parameter, -by))) / (2.0 * by)
+
+    def __repr__(self) -> str:
+        by = ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
+        return f"Sensitivities({self.solution.t.size} outputs by {by})"
+
+
+def forward_sensitivities(
+    build: Callable[..., Mechanism],
+    parameters: Mapping[str, Any],
+    t_end: float,
+    *,
+    t_start: float = 0.0,
+    formulation: str = "SI2",
+    tol: float | None = None,
+    rate_scale: float | None = None,
+    lump: bool | None = None,
+    **options,
+) -> Sensitivities:
+    """Simulate a mechanism and differentiate the run by parameters of it.
+
+    Parameters
+    ----------
+    build : callable
+        ``build(**parameters)`` returns the mechanism; it has to have the same parts whatever the values.
+    parameters : mapping
+        Names and values, numbers in SI. A pair ``(value, scale)`` where the value is zero, or says nothing of its size.
+    t_end : float
+        End of the simulation, s.
+    t_start, formulation, rate_scale, lump, **options
+        As of `gearmbs.mechanism.simulate`, with WSTIFF or GSTIFF.
+    tol : float, optional
+        Of the run; default a tenth of that of `gearmbs.mechanism.simulate`: derivatives are less smooth than the run.
+
+    Returns
+    -------
+    Sensitivities
+
+    Raises
+    ------
+    ModelError
+        If the run fails; if a parameter changes what the model is made of; if an option is of another kind of run.
+
+    Notes
+    -----
+    Of S parameters the cost beside the run is that of a Jacobian and a factorisation, and of 2 S residuals and
+    S substitutions, for each step. Where forces jump with the state derivatives do too, which is not followed; contact
+    and friction here are continuous.
+    """
+    for option in WITHOUT:
+        if option in options:
+            raise ModelError(f"forward_sensitivities has no option {option!r}: it belongs to other runs; leave it out")
+    name = str(options.get("integrator", DEFAULT)).upper()
+    if name not in ("WSTIFF", "GSTIFF"):
+        raise ModelError(f"integrator: {name!r} does not keep its steps for sensitivities; choose WSTIFF or GSTIFF")
+    if not parameters:
+        raise ModelError("parameters: there is none; give names and values, as {'stiffness': 2e8}")
+    values, scales = {}, {}
+    for key, given in parameters.items():
+        values[key], scales[key] = _value_and_scale(key, given)
+    start, end = quantity(t_start, "time", "t_start"), quantity(t_end, "time", "t_end")
+    mechanism = _built(build, values)
+    usual, rate_scale = chosen_accuracy(mechanism, (start, end), tol, rate_scale)
+    tol = TIGHTER * usual if tol is None else usual
+    solution = simulate(
+        mechanism, end, t_start=start, formulation=formulation, tol=tol, rate_scale=rate_scale, lump=lump,
+        dense_output=True, **options,
+    )  # fmt: skip
+    if not solution.result.success:
+        raise ModelError(f"forward_sensitivities: the run itself fails: {solution.message}")
+    lumped = mechanism.lump if lump is None else lump
+
+    def made(key: str, value: float):
+        other = _built(build, values | {key: value})
+        return prepared(other, start, lumped, formulation, rate_scale, True)
+
+    directions = []
+    for key, value in values.items():
+        by = MOST * scales[key]
+        plus, minus = made(key, value + by)[1], made(key, value - by)[1]
+        directions.append(_direction(key, solution.problem, plus, minus, 2.0 * by / scales[key]))
+    followed: Followed = follow(solution.problem, solution.result, directions)
+    unknowns = {key: followed.s[p] / scales[key] for p, key in enumerate(values)}
+    rates = {key: followed.sp[p] / scales[key] for p, key in enumerate(values)}
+
+    def beside(key: str, by: float) -> Solution:
+        system, problem, members, _ = made(key, values[key] + by)
+        result = solution.result
+        moved = replace(
+            result, y=result.y + by * unknowns[key], yp=result.yp + by * rates[key] if result.yp.size else result.yp,
+            sol=None,
+        )  # fmt: skip
+        found = Solution(system, problem, moved, members)
+        found.inside = solution.inside
+        return found
+
+    errors = {key: float(followed.error[p]) for p, key in enumerate(values)}
+    return Sensitivities(solution, values, unknowns, rates, errors, beside, scales)
+
+
+def _value_and_scale(name: str, given: Any) -> tuple[float, float]:
+    """Return value and scale of a parameter."""
+    pair = given if isinstance(given, tuple) else (given, None)
+    try:
+        value = float(pair[0])
+        scale = abs(value) if pair[1] is None else float(pair[1])
+    except (TypeError, ValueError, IndexError):
+        raise ModelError(f"parameter {name!r}: {given!r} is no number in SI, or pair of value and scale") from None
+    if not (np.isfinite(value) and np.isfinite(scale) and scale > 0.0):
+        raise ModelError(f"parameter {name!r}: {given!r} says nothing of its size; give ({value:g}, scale), scale > 0")
+    return value, scale
+
+
+def _built(build: Callable[..., Mechanism], values: Mapping[str, float]) -> Mechanism:
+    made = build(**values)
+    if not isinstance(made, Mechanism):
+        raise ModelError(f"build: it returned {made!r}; it has to return the Mechanism of these parameters")
+    return made
+
+
+def _direction(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEProblem, width: float) -> Direction:
+    """Return how tables and start change by the scale of a parameter; refuse one that changes what there is."""
+    for side in (plus, minus):
+        same = side.n == problem.n and np.array_equal(side.idata, problem.idata)
+        if not same or side.rdata.shape != problem.rdata.shape:
+            raise ModelError(
+                f"parameter {name!r}: with another value the model has other parts or other tables, so that nothing "
+                "can be differentiated by it; take one that changes numbers only"
+            )
+    change = (plus.rdata - minus.rdata) / width
+    places = np.flatnonzero(change)
+    return Direction(name, (plus.y0 - minus.y0) / width, places, change[places])

@@ -1,0 +1,170 @@
+"""Forward sensitivities against closed forms, conserved quantities and differences of runs at tight tolerances."""
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.mechanism import ModelError, forward_sensitivities
+from gearmbs.studies import Case, case_mechanism
+from tests.says import says
+
+K, C, M_, F = 300.0, 1.5, 2.0, 40.0
+
+
+def oscillator(k=K, c=C, m=M_, force=F, start=0.0):
+    """m x'' + c x' + k x = force, from rest at ``start``."""
+    made = gm.Mechanism("oscillator", gravity=(0, 0, 0))
+    body = made.body("body", mass=m, inertia=(1, 1, 1), position=(start, 0, 0))
+    made.translational("slide", body, made.ground, at=(0, 0, 0), axis=(1, 0, 0))
+    place = body.marker(name="place")
+    made.load(
+        "spring", place, made.ground.marker(), rm=made.ground.marker(), fx=f"{force!r}-{k!r}*DX(place)-{c!r}*VX(place)"
+    )
+    return made
+
+
+def response(t, k=K, c=C, m=M_, force=F, start=0.0):
+    decay = c / (2 * m)
+    omega = np.sqrt(k / m - decay**2)
+    rest = force / k
+    return rest + (start - rest) * np.exp(-decay * t) * (np.cos(omega * t) + decay / omega * np.sin(omega * t))
+
+
+VALUES = {"k": K, "c": C, "m": M_, "force": F, "start": (0.0, 0.1)}
+
+
+@pytest.fixture(scope="module")
+def oscillating():
+    return forward_sensitivities(oscillator, VALUES, 2.0, rate=100, tol=1e-8)
+
+
+@pytest.mark.parametrize("parameter", VALUES)
+def test_derivatives_of_an_oscillator_are_those_of_its_closed_form(oscillating, parameter):
+    t = oscillating.solution.t
+    value = {"k": K, "c": C, "m": M_, "force": F, "start": 0.0}[parameter]
+    h = 1e-5 * (abs(value) or 1.0)
+    exact = (response(t, **{parameter: value + h}) - response(t, **{parameter: value - h})) / (2 * h)
+    found = oscillating.derivative(parameter, "DX(place)")
+    assert np.abs(found - exact).max() < 2e-5 * np.abs(exact).max()
+
+
+def test_a_number_of_the_whole_record_has_a_derivative(oscillating):
+    t, h = oscillating.solution.t, 1e-3
+    rms = [np.sqrt(np.mean(response(t, k=K + d) ** 2)) for d in (h, -h)]
+    found = oscillating.derivative("k", lambda s: np.sqrt(np.mean(s.evaluate("DX(place)") ** 2)))
+    assert found == pytest.approx((rms[0] - rms[1]) / (2 * h), rel=1e-4)
+
+
+def test_reactions_follow_what_moves():
+    """The pin of a turntable carries m r w^2: twice that over w by the speed, and 1/r of it by the radius."""
+
+    def table(radius, speed):
+        made = gm.Mechanism("table", gravity=(0, 0, 0))
+        body = made.body("body", mass=3.0, inertia=(1, 1, 1), position=(radius, 0, 0))
+        pin = made.revolute("pin", body, made.ground, at=(0, 0, 0), axis=(0, 0, 1))
+        made.rotation("turn", pin, speed, level="velocity")
+        return made
+
+    run = forward_sensitivities(table, {"radius": 0.4, "speed": 5.0}, 1.0, rate=50, tol=1e-8)
+    force = lambda s: np.linalg.norm(s.reaction("pin")[0], axis=1)  # noqa: E731
+    assert run.derivative("radius", force) == pytest.approx(3.0 * 5.0**2, rel=1e-5)
+    assert run.derivative("speed", force) == pytest.approx(2 * 3.0 * 0.4 * 5.0, rel=1e-5)
+
+
+def test_conserved_quantities_have_conserved_derivatives_through_changes_of_angles():
+    """A free body that flips over: energy and angular momentum by its first spin stay those of the start."""
+    moments = np.array([1.2, 2.0, 3.0])
+
+    def body(spin):
+        made = gm.Mechanism("free", gravity=(0, 0, 0))
+        made.body("body", mass=1.0, inertia=tuple(moments), angular_velocity=(0.05, spin, 0.02))
+        return made
+
+    run = forward_sensitivities(body, {"spin": 3.0}, 8.0, rate=50, tol=1e-9)
+    assert len(run.solution.result.epochs) > 1
+
+    def momentum(s):
+        turn, omega = s.orientation("body"), s.angular_velocity("body")
+        return np.einsum("tij,j,tkj,tk->ti", turn, moments, turn, omega)
+
+    def energy(s):
+        local = np.einsum("tji,tj->ti", s.orientation("body"), s.angular_velocity("body"))
+        return 0.5 * (moments * local**2).sum(axis=1)
+
+    assert run.derivative("spin", momentum) == pytest.approx(np.tile([0.0, 2.0, 0.0], (401, 1)), abs=2e-3)
+    assert run.derivative("spin", energy) == pytest.approx(6.0, rel=1e-4)
+
+
+def test_a_force_that_begins_at_a_breakpoint():
+    """From rest a force that begins at 0.5 s: by its size the motion is that of a unit force."""
+
+    def pushed(size):
+        made = gm.Mechanism("pushed", gravity=(0, 0, 0))
+        body = made.body("body", mass=2.0, inertia=(1, 1, 1))
+        made.translational("slide", body, made.ground, at=(0, 0, 0), axis=(1, 0, 0))
+        made.load(
+            "push", body.marker(name="place"), made.ground.marker(), rm=made.ground.marker(),
+            fx=f"IF(TIME-0.5: 0, 0, {size!r})-200*DX(place)",
+        )  # fmt: skip
+        return made
+
+    run = forward_sensitivities(pushed, {"size": 7.0}, 1.5, rate=100, tol=1e-8, breakpoints=[0.5])
+    t = run.solution.t
+    exact = np.where(t > 0.5, (1 - np.cos(10.0 * (t - 0.5))) / 200.0, 0.0)
+    assert np.abs(run.derivative("size", "DX(place)") - exact).max() < 2e-5 * exact.max()
+
+
+@pytest.mark.slow
+def test_mesh_force_of_a_gear_pair_against_differences_of_runs():
+    case = Case(operation={"speed": "1000 rpm", "torque": 100.0, "run_up": 0.004, "settling": 0.0, "duration": 0.01})
+
+    def pair(torque, damping, shift):
+        changed = case.changed(
+            operation={"torque": torque}, contact={"damping": damping}, fault={"centre_distance_error": shift}
+        )
+        return case_mechanism(changed)
+
+    values = {"torque": 100.0, "damping": 3e5, "shift": 1e-4}
+    settings = {"rate": 20_000, "rate_scale": 2000.0}
+    run = forward_sensitivities(pair, values, 0.012, tol=1e-8, **settings)
+
+    def force(s):
+        return s.diagnostics("mesh")["normal_force"][100:]
+
+    for name, value in values.items():
+        h = 1e-3 * value
+        sides = [force(pair(**values | {name: value + d}).simulate(0.012, tol=1e-10, **settings)) for d in (h, -h)]
+        exact = (sides[0] - sides[1]) / (2 * h)
+        off = np.abs(run.derivative(name, force) - exact) / np.abs(exact).max()
+        # at changes of teeth differences smear what jumps
+        assert np.median(off) < 1e-3
+        assert np.quantile(off, 0.9) < 2e-2
+
+
+def test_what_cannot_be_differentiated_is_named():
+    with pytest.raises(ModelError, match=says("'start'", "scale")):
+        forward_sensitivities(oscillator, {"start": 0.0}, 0.1)
+    with pytest.raises(ModelError, match=r"derivative by 'q'.*k"):
+        forward_sensitivities(oscillator, {"k": K}, 0.01).derivative("q", "DX(place)")
+    with pytest.raises(ModelError, match=says("forward_sensitivities", "'every_step'")):
+        forward_sensitivities(oscillator, {"k": K}, 0.1, every_step=True)
+    with pytest.raises(ModelError, match=r"IDA.*WSTIFF"):
+        forward_sensitivities(oscillator, {"k": K}, 0.1, integrator="IDA")
+    with pytest.raises(ModelError, match=r"k.*'stiff'"):
+        forward_sensitivities(oscillator, {"k": "stiff"}, 0.1)
+    with pytest.raises(ModelError, match=says("build", "Mechanism")):
+        forward_sensitivities(lambda k: k, {"k": K}, 0.1)
+    with pytest.raises(ModelError, match=says("parameters", "stiffness")):
+        forward_sensitivities(oscillator, {}, 0.1)
+
+
+def test_a_parameter_that_changes_what_there_is_is_refused():
+    def maybe(mass):
+        made = oscillator()
+        if mass > 1.0:
+            made.body("more", mass=mass, inertia=(1, 1, 1))
+        return made
+
+    with pytest.raises(ModelError, match=says("parameter", "'mass'")):
+        forward_sensitivities(maybe, {"mass": 1.0}, 0.1)
+    assert forward_sensitivities(maybe, {"mass": 2.0}, 0.01).unknowns["mass"].shape[0] > 1
