@@ -11,11 +11,12 @@ import numpy as np
 from numba import types
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.bodies.lane_lists import in_lanes, lanes_of, listed_sum, padded
 from gearmbs.dae.equations.constraints.terms import dot3
 from gearmbs.dae.equations.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_H, KIN_W
 from gearmbs.dae.equations.unknowns import put
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes
+from gearmbs.kernels.lanes import LANES, lanes_at, put_lanes
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
@@ -26,6 +27,8 @@ APART = 9
 """Behind J0 in the head of the table: 1 if M, K and D are diagonal."""
 LISTED = 10
 """How many lanes are listed."""
+GATHERED = 11
+"""1 if these lanes are of modes that have much in common instead of neighbours."""
 HEAD = 12
 """Numbers before the integrals."""
 
@@ -102,40 +105,18 @@ class ModalInertia:
         pairs = STIFF * (self.stiffness.astype(bool) | self.j2.any(axis=(2, 3)))
         pairs += TURNED * (self.damping.astype(bool) | self.c1.any(axis=2)) + SPUN * self.c1.any(axis=2).T
         pairs += HEAVY * self.mass.astype(bool)
-        lists = _in_lanes(np.concatenate([second, turned], axis=1))
+        order, lists = in_lanes(np.concatenate([second, turned], axis=1))
         head = np.zeros(HEAD)
         head[:APART] = np.ravel(inertia)
-        head[APART], head[LISTED] = apart, len(lists[1])
-        diagonals = [_padded(np.diag(part)) for part in parts]
-        pieces: tuple = (head, _padded(first), second, turned, *parts, pairs, *diagonals, *lists)
+        head[APART], head[LISTED], head[GATHERED] = apart, len(lists[1]), len(order) > 0
+        diagonals = [padded(np.diag(part)) for part in parts]
+        pieces: tuple = (head, padded(first), second, turned, *parts, pairs, *diagonals, *lists, order)
         return np.concatenate([np.ravel(piece) for piece in pieces])
 
 
-def lanes_of(modes: int) -> int:
-    """Return how many lanes the numbers of so many modes take."""
-    return -(-modes // LANES)
-
-
-def _padded(rows: np.ndarray) -> np.ndarray:
-    """Return numbers of all modes, the last axis, filled up to whole lanes."""
-    last = rows.shape[-1]
-    return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, LANES * lanes_of(last) - last)])
-
-
-def _in_lanes(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return for each lanes of the present state how many modes l add to them, these modes, and what they add.
-
-    ``rows`` has shape (n, PRESENT, n): l, number a mode, the other mode.
-    """
-    blocks = _padded(rows).reshape(rows.shape[0], -1, LANES)
-    taken = blocks.any(axis=2).T
-    place, mode = np.nonzero(taken)
-    return taken.sum(axis=1), mode, blocks[mode, place].ravel()
-
-
 def present_size(modes: int) -> int:
-    """Return how many numbers the present state of a body takes."""
-    return PRESENT * LANES * lanes_of(modes)
+    """Return how many numbers the present state of a body takes, with room for one of its rows."""
+    return (PRESENT + 1) * LANES * lanes_of(modes)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -187,6 +168,8 @@ def moving(modal, at, n):
         These modes, one after the other.
     blocks : ndarray
         What their coordinates, in the last quarter of the state their velocities, are multiplied by.
+    places : ndarray, shape (n,)
+        Where the modes stand in these lanes; see `GATHERED`.
     """
     wide = stride(n)
     head = vector_at(modal, at, HEAD)
@@ -199,6 +182,7 @@ def moving(modal, at, n):
         vector_at(modal, counts, PRESENT * (wide // LANES)),
         vector_at(modal, modes, listed),
         vector_at(modal, modes + listed, LANES * listed),
+        vector_at(modal, modes + (1 + LANES) * listed, n if head[GATHERED] > 0.0 else 0),
     )
 
 
@@ -259,27 +243,30 @@ def to_global(kin_row, v, i, out, k):
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
 
 
-@njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
+@njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy", fastmath={"contract"})
 def update_inertia(y, at, modal, partial, body_row):
     """Write J(q) to the body's row and dJ/dq, H and sum_l C1_kl v_l to its place in ``partial``."""
     n, place = at[T.AT_MODES], at[T.AT_PARTIAL]
     wide = stride(n)
-    head, first, counts, modes, blocks = moving(modal, at[T.AT_MODAL], n)
+    head, first, counts, modes, blocks, places = moving(modal, at[T.AT_MODAL], n)
     state = vector_at(partial, place, PRESENT * wide)
+    row = vector_at(partial, place + PRESENT * wide, wide)
     amounts, rates = vector_at(y, at[T.AT_QF], n), vector_at(y, at[T.AT_VF], n)
-    e = 0
-    for place in range(first.size // LANES):
-        total = lanes_at(first, place)
-        for _ in range(int(counts[place])):
-            total = total + lanes_at(blocks, e) * amounts[int(modes[e])]
-            e += 1
-        put_lanes(state, place, total)
-    for place in range(first.size // LANES, counts.size):
-        total = all_lanes(0.0)
-        for _ in range(int(counts[place])):
-            total = total + lanes_at(blocks, e) * rates[int(modes[e])]
-            e += 1
-        put_lanes(state, place, total)
+    lanes, e = wide // LANES, 0
+    for b in range(counts.size):
+        count, inner = int(counts[b]), b < 9 * lanes
+        total = listed_sum(modes, blocks, e, count, amounts if inner else rates)
+        e += count
+        if places.size == 0:
+            put_lanes(state, b, lanes_at(first, b) + total if inner else total)
+            continue
+        put_lanes(row, b % lanes, total)
+        if b % lanes == lanes - 1:
+            own = LANES * (b + 1) - wide
+            for k in range(n):
+                state[own + k] = row[int(places[k])]
+            for g in range(b + 1 - lanes, b + 1 if inner else 0):
+                put_lanes(state, g, lanes_at(first, g) + lanes_at(state, g))
     add_inertia_change(amounts, matrix_at(first, 0, 6, wide), matrix_at(state, 0, 6, wide), head, body_row)
 
 
