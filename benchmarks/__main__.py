@@ -1,4 +1,4 @@
-"""All benchmarks, or those named: ``python -m benchmarks [gear] [precision] [digits] [size] [contact] [step]``."""
+"""All benchmarks, or those named: ``python -m benchmarks [gear] [precision] [digits] [size] [contact] [step] ..``."""
 
 import os
 

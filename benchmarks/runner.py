@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-from benchmarks import contact, digits, gear_pair, plots, precision, size, step_parts
+from benchmarks import contact, digits, gear_pair, plots, precision, size, step_parts, whole_case
 from benchmarks.machine import describe
 from benchmarks.store import Store
 from gearmbs.files import write_whole
@@ -21,6 +21,7 @@ PARTS: dict[str, ModuleType] = {
     "size": size,
     "contact": contact,
     "step": step_parts,
+    "case": whole_case,
 }
 
 

@@ -21,6 +21,6 @@ def test_ratios_are_medians_of_pairs(monkeypatch):
         ("healthy", "after", True),
     ]
     assert [r["times_faster"] for r in rows] == [1.0, 2.0, 4.0] * 2
-    text = whole_case.render(rows)
+    text = whole_case.comparison(rows)
     assert "| healthy | after, lumped | 61 | 10 | 0.5 | 4 | 0 |" in text
     assert "| healthy | before | 1 | 1 | 1 | 1 | 1 | 1 | 1 | 7 |" in text
