@@ -9,9 +9,9 @@ import pytest
 
 from gearmbs.bearings import Bearing, Spall
 from gearmbs.signals import SignalError, bearing_lines, combine_bearings, diagnose_bearing, make_signal
-from gearmbs.signals.diagnosis.bearing_judgement import Evidence, Judged
+from gearmbs.signals.diagnosis.bearing_judgement import Evidence, Judged, chances_at, find_lines
 from gearmbs.signals.diagnosis.bearing_margins import agreed, answers_at, verdicts_of
-from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, find_shaft
+from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, far_shaft, find_shaft
 from gearmbs.signals.diagnosis.bearings import channel_spectrum
 from tests.says import says
 from tests.signals.test_bearing_diagnosis import LINES, RATE, SHAFT, TIME, pulses, record
@@ -53,6 +53,78 @@ def test_no_shaft_is_found_where_none_or_two_are(parts):
     found = find_shaft(spectrum_of(*parts), SHAFT * 1.002)
     assert not found.found
     assert found.turns == found.told
+
+
+def turning(turns, orders=12, amplitude=0.05):
+    return sum(amplitude * np.cos(2 * np.pi * k * turns * TIME + k) for k in range(1, orders + 1))
+
+
+@pytest.mark.parametrize("amplitude", [0.05, 1.0, 100.0])
+@pytest.mark.parametrize("orders", [3, 5, 12])
+def test_the_shafts_line_is_found_weak_or_strong(orders, amplitude):
+    found = find_shaft(spectrum_of(turning(SHAFT, orders, amplitude)), SHAFT * 1.003)
+    assert found.found
+    assert found.turns == pytest.approx(SHAFT, abs=found.doubt)
+
+
+@pytest.mark.parametrize(("turns", "others", "is_found"), [
+    (49.5, (), True), (50.0, (), False), (49.5, (49.5 / 48.5,), False), (46.0, (), True),
+])  # fmt: skip
+def test_far_from_the_told_speed_neither_the_mains_nor_a_known_shaft_count(turns, others, is_found):
+    found = far_shaft(spectrum_of(turning(turns)), 48.5, 0.005, others)
+    assert found.found is is_found
+    assert found.turns == pytest.approx(turns if is_found else 48.5, rel=2e-4)
+
+
+@pytest.mark.parametrize("share", [-0.05, -0.03, 0.02, 0.05])
+@pytest.mark.parametrize("part", ["outer race", "inner race"])
+def test_where_the_shaft_turns_faster_or_slower_than_told_it_is_judged_there(part, share):
+    order = LINES.orders[part]
+    report = diagnose_bearing(record(pulses(order * SHAFT, 0.002), RUNNING), "6205", rpm(share), shafts=())
+    assert report.fault == part
+    assert report.shaft == pytest.approx(SHAFT, rel=2e-4)
+    assert "CHECK THE SPEED" in report.verdict
+    assert f"{60 * SHAFT * (1 + share):.1f} rpm" in report.verdict
+
+
+@pytest.mark.parametrize("share", [-0.05, -0.03, 0.03, 0.05])
+def test_without_the_shafts_line_a_wrong_speed_acquits_nobody(share):
+    report = diagnose_bearing(record(pulses(LINES.bpfo * SHAFT)), "6205", rpm(share), shafts=())
+    assert report.fault is None
+    (doubted,) = [finding for finding in report.findings if finding.grade == "shifted"]
+    assert doubted.part == "outer race"
+    assert doubted.slip == pytest.approx(1.0 / (1.0 + share) - 1.0, abs=1e-3)
+    for words in ("CHECK THE SPEED", "Not certain", "slower" if share > 0.0 else "faster", "+-0.5 % of the told one"):
+        assert words in report.verdict
+    assert combine_bearings([report]).fault is None
+
+
+def test_a_sound_record_is_acquitted_within_the_tolerance_unless_its_speed_is_found():
+    sound = diagnose_bearing(record(), "6205", rpm(0.0), shafts=())
+    assert "this holds for speeds of 1731.3 to 1748.7 rpm" in sound.verdict
+    assert "CHECK" not in sound.verdict
+    turning_too = diagnose_bearing(record(RUNNING), "6205", rpm(0.0), shafts=())
+    exact = diagnose_bearing(record(), "6205", rpm(0.0), shafts=(), tolerance=0.0)
+    assert not any("this holds for" in report.verdict for report in (turning_too, exact))
+
+
+def test_a_clear_part_stays_named_beside_another_machines_shaft():
+    other = turning(1.03 * SHAFT)
+    report = diagnose_bearing(record(pulses(LINES.bpfo * SHAFT), other), "6205", rpm(0.0), shafts=())
+    assert report.fault == "outer race"
+    assert "CHECK THE SPEED" in report.verdict
+    apart = diagnose_bearing(record(pulses(LINES.bpfo * SHAFT), other), "6205", rpm(0.0), shafts=(1.03,))
+    assert apart.fault == "outer race"
+    assert "CHECK THE SPEED" not in apart.verdict
+
+
+def test_many_families_at_once_have_the_chances_of_each():
+    (spectrum,) = spectrum_of(pulses(LINES.bpfo * SHAFT))
+    places = 10.0 * np.exp(0.05 * np.arange(140))
+    one_by_one = [find_lines(spectrum, float(f), slip=0.015, harmonics=4).log_chance for f in places]
+    np.testing.assert_allclose(chances_at(spectrum, places, slip=0.015, harmonics=4), one_by_one, rtol=1e-12)
+    assert min(one_by_one) < -15.0
+    assert places[-1] > spectrum.top
 
 
 @pytest.mark.parametrize("share", [-0.005, -0.002, 0.0, 0.002, 0.005])

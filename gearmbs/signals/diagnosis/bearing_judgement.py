@@ -170,6 +170,38 @@ def find_lines(
     return Evidence(line, float(candidates[best]), found, min(chance / math.log(10.0), 0.0), spectrum.where)
 
 
+def chances_at(spectrum: EnvelopeSpectrum, lines: np.ndarray, *, slip: float, harmonics: int) -> np.ndarray:
+    """Return the decimal logarithm of the chance of each of many families at once, as `find_lines` does of one."""
+    step = spectrum.step
+    fits = np.zeros(lines.size, dtype=int)
+    for k in range(1, harmonics + 1):
+        fits += np.rint(k * lines * (1 + slip) / step) < spectrum.ratio.size
+    known = fits > 0
+    out = np.zeros(lines.size)
+    if not known.any():
+        return out
+    lines, fits = lines[known], fits[known]
+    spacing = step / (2.0 * fits)
+    half = np.maximum(slip * lines, spacing)
+    counts = 2 * (half / spacing).astype(int) + 1
+    starts = np.cumsum(counts) - counts
+    place = np.arange(counts.sum()) - np.repeat(starts, counts)
+    candidates = np.repeat(lines - half, counts) + place * np.repeat(2.0 * half / (counts - 1), counts)
+    highest = np.repeat(fits, counts)
+    total = np.zeros(candidates.size)
+    for k in range(1, harmonics + 1):
+        total += np.where(k <= highest, ratio_at(spectrum, k * candidates), 0.0)
+    best = np.maximum.reduceat(total, starts)
+    terms = np.ones(best.size)
+    tail = terms.copy()
+    for j in range(1, harmonics):
+        terms = terms * best / j
+        tail += np.where(j < fits, terms, 0.0)
+    trials = np.maximum(1.0, half / step * (fits + 1))
+    out[known] = np.minimum((np.log(tail) - best + np.log(trials)) / math.log(10.0), 0.0)
+    return out
+
+
 def ratio_at(spectrum: EnvelopeSpectrum, frequency: np.ndarray) -> np.ndarray:
     """Return the ratio at frequencies; 1 outside the spectrum."""
     place = np.rint(frequency / spectrum.step).astype(int)
@@ -200,7 +232,7 @@ def power_of(envelope: np.ndarray) -> np.ndarray:
 
 
 CLEAR, SIGNS, OPEN, FAINT, MULTIPLES, NONE = "clear", "signs", "open", "faint", "multiples", "none"
-UNCERTAIN, QUIET = "uncertain", "quiet"
+UNCERTAIN, SHIFTED, QUIET = "uncertain", "shifted", "quiet"
 CLEAR_CHANCE, SIGNS_CHANCE, FAINT_CHANCE = -12.0, -6.0, -2.0
 """Decimal logarithm of the chance from which lines are no noise; from the last on they are told but accuse nothing."""
 LEAST_RATIO = 10.0
@@ -392,8 +424,8 @@ class _Look:
             lowest = LOWEST_ORDER * shaft
             count = int(math.log(max(ABOVE * self.highest / lowest, 2.0)) / (2.0 * self.slip))
             places = lowest * np.exp(2.0 * self.slip * np.arange(count))
-            found = [find_lines(spectrum, float(f), slip=self.slip, harmonics=self.harmonics) for f in places]
-            self._places[own.where, shaft] = places, np.array([evidence.log_chance for evidence in found])
+            found = chances_at(spectrum, places, slip=self.slip, harmonics=self.harmonics)
+            self._places[own.where, shaft] = places, found
         places, chances = self._places[own.where, shaft]
         # windows that hold the part's own lines, or families of their multiples, are no other places
         times = places / own.found

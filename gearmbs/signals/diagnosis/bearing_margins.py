@@ -3,6 +3,8 @@
 **Speed.** Where the shaft's own line is not found, a record is judged at speeds all over the tolerance of the told one,
 and else at those that the width of its lines leaves. A part is named if no other leads at any of them, and if it is at
 half of them at least; otherwise it is uncertain, and so is a part that would be named beside the middle speed only.
+A told speed may also be wrong. So the shaft's line is looked for within 6 %, too, and the record is judged where it
+stands. Without one, a part whose lines are clear at a speed beyond the tolerance is told, but not accused.
 
 **Level.** The stiffness of a sound bearing changes as elements pass through the load (varying compliance), and waves of
 its rings do the same. Where nothing hides them, as in a calculation or on a quiet rig, the lines of that motion are as
@@ -22,9 +24,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.fft
 
-from gearmbs.signals.diagnosis.bearing_judgement import CLEAR, SIGNS, UNCERTAIN, Judged
+from gearmbs.signals.diagnosis.bearing_judgement import (
+    CLEAR,
+    SHIFTED,
+    SIGNS,
+    SPEED_SHARE,
+    UNCERTAIN,
+    EnvelopeSpectrum,
+    Judged,
+)
 from gearmbs.signals.diagnosis.bearing_report import CAGE
-from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed
+from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, far_shaft, tried_speeds
 
 CARRIERS = 20.0
 """Carriers above so many times a line show blows; below, smooth motions have lines, too."""
@@ -32,6 +42,9 @@ LEAST_LEVEL = 0.03
 """m/s^2 RMS of the part of the carriers that a line modulates, from which it accuses."""
 LEAST_AGREEMENT = 0.5
 """Share of the speeds at which a part must be named."""
+SHIFTS = (-0.03, 0.03, -0.05, 0.05)
+"""Shares by which a told speed is tried to be wrong: with the windows of slip about them they reach to 6.5 % without a
+gap, as far as a shaft's own line is looked for."""
 
 
 Verdicts = tuple[tuple[Judged, ...], ...]
@@ -56,6 +69,105 @@ def leading(judged: Verdicts) -> Judged | None:
     named = [one for channel in judged for one in channel if one.grade in (CLEAR, SIGNS)]
     order = sorted(named, key=lambda j: (j.grade != CLEAR, j.part == CAGE, j.evidence.log_chance))
     return order[0] if order else None
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What a record says of a told speed and of those beside it.
+
+    Attributes
+    ----------
+    answers : list of Answer
+        To speeds told within the tolerance, rising.
+    verdicts : tuple of tuple of Judged
+    remark : str or None
+        What is wrong with the told speed.
+    """
+
+    answers: list[Answer]
+    verdicts: Verdicts
+    remark: str | None = None
+
+    @property
+    def speed(self) -> ShaftSpeed:
+        """The told speed and the one that is used."""
+        return self.answers[len(self.answers) // 2].speed
+
+
+def weigh(
+    spectra: Sequence[EnvelopeSpectrum],
+    told: float,
+    tolerance: float,
+    others: Sequence[float],
+    judge_at: Callable[[float], Iterator[Sequence[Judged]]],
+) -> Weighed:
+    """Judge a record at the told speed, at those within its tolerance, and where its shaft's own line stands.
+
+    Parameters
+    ----------
+    spectra : sequence of EnvelopeSpectrum
+        Of the record and of its envelope, in which the shaft's own line is looked for.
+    told, tolerance
+        Hz, and the share by which it may be off; 0 if it is exact.
+    others : sequence of float
+        Ratios of the machine's other shafts.
+    judge_at : callable
+        Returns what is judged at a speed in Hz, by channel.
+    """
+    answers = answers_at(tried_speeds(spectra, told, tolerance), judge_at, SPEED_SHARE)
+    near = Weighed(answers, verdicts_of(answers))
+    if near.speed.found or tolerance <= 0.0:
+        return near
+    far = far_shaft(spectra, told, tolerance, others)
+    if not far.found:
+        return replace(near, verdicts=_shifted(near, told, tolerance, judge_at))
+    (there,) = answers_at([far], judge_at, SPEED_SHARE)
+    own, other = leading(near.verdicts), leading(there.judged)
+    lines = f"CHECK THE SPEED: lines such as a shaft's own stand at {60 * far.turns:.1f} rpm"
+    if own is None:
+        beside = f"{100 * -far.deviation:+.1f} % beside these, and all is judged there"
+        return Weighed(
+            [replace(there, speed=replace(far, told=answer.speed.told)) for answer in answers],
+            there.judged,
+            f"{lines}; the told {60 * told:.1f} rpm are {beside}.",
+        )
+    same = other is None or (own.lines, own.part) == (other.lines, other.part)
+    verdicts = near.verdicts if same else tuple(tuple(map(_doubted, channel)) for channel in near.verdicts)
+    return Weighed(answers, verdicts, f"{lines}, and none at the told {60 * told:.1f} rpm, at which all is judged.")
+
+
+def _doubted(judged: Judged) -> Judged:
+    """Return a part as uncertain if it is named."""
+    return replace(judged, grade=UNCERTAIN, beside=False) if judged.grade in (CLEAR, SIGNS) else judged
+
+
+def _shifted(
+    near: Weighed, told: float, tolerance: float, judge_at: Callable[[float], Iterator[Sequence[Judged]]]
+) -> Verdicts:
+    """Return the verdicts, with the part whose lines are clear at a speed beyond the tolerance if none is named."""
+    if any(one.grade in (CLEAR, SIGNS, UNCERTAIN) for channel in near.verdicts for one in channel):
+        return near.verdicts
+    found = [
+        (one, c, p)
+        for shift in SHIFTS
+        for c, channel in enumerate(judge_at(told * (1.0 + shift)))
+        for p, one in enumerate(channel)
+        if one.grade == CLEAR and one.part != CAGE and not _whole_turns(one, told, tolerance)
+    ]
+    if not found:
+        return near.verdicts
+    one, c, p = min(found, key=lambda each: each[0].evidence.log_chance)
+    kinematic = one.lines.orders[one.part] * one.lines.ratio * told
+    shown = replace(one, grade=SHIFTED, evidence=replace(one.evidence, kinematic=kinematic))
+    channels = [list(channel) for channel in near.verdicts]
+    channels[c][p] = shown
+    return tuple(map(tuple, channels))
+
+
+def _whole_turns(judged: Judged, told: float, tolerance: float) -> bool:
+    """Return whether lines are at whole multiples of a shaft's told turns, as those of blades are."""
+    turns = judged.evidence.found / (told * judged.lines.ratio)
+    return abs(turns - round(turns)) <= tolerance * turns
 
 
 def answers_at(

@@ -21,6 +21,7 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     FAINT_CHANCE,
     NONE,
     QUIET,
+    SHIFTED,
     SIGNS,
     SIGNS_CHANCE,
     log_tail,
@@ -146,7 +147,7 @@ def _clearest(report: BearingReport, k: int) -> tuple[PartFinding, int]:
 
 def _counts(finding: PartFinding) -> bool:
     """Return whether no cause but the bearing's part is known for its lines."""
-    return not finding.beside and finding.grade != QUIET and finding.multiple is None
+    return not finding.beside and finding.grade not in (SHIFTED, QUIET) and finding.multiple is None
 
 
 def _together(found: Sequence[tuple[PartFinding, int]]) -> tuple[int, int, int, float, float, float, float, str]:

@@ -134,11 +134,12 @@ class PartFinding:
         Power of the first sidebands by that of the line; NaN for parts that have none.
     where : str
         Band in which they are clearest.
-    grade : {"clear", "signs", "open", "faint", "multiples", "uncertain", "quiet", "none"}
+    grade : {"clear", "signs", "open", "faint", "multiples", "uncertain", "shifted", "quiet", "none"}
         "open": lines that may also be another shaft's; "faint": hardly above noise, but as strong at no other place of
         the record; "multiples": no noise, and as strong at no other place, but without the fundamental; "uncertain":
-        named at some of the speeds that the record leaves open, while at others another part is or none; "quiet": as
-        sound bearings make them, too. None of these accuses.
+        named at some of the speeds that the record leaves open, while at others another part is or none; "shifted":
+        where they would be if the told speed were wrong; "quiet": as sound bearings make them, too. None of these
+        accuses.
     beside : bool
         Whether there are lines, but another part, or another cause, explains more of them.
     stronger, places : int
@@ -231,6 +232,13 @@ class PartFinding:
                 "or none's. Give a tacho, a measured speed (speed=, --speed; tolerance=0, --speed-tolerance 0 if it is "
                 "exact) or a longer record."
             )
+        if self.grade == "shifted":
+            return (
+                f"CHECK THE SPEED: clear lines at {self.found:.2f} Hz {place} are those of {WORDS[self.part]} of "
+                f"bearing {self.bearing} ({self.kinematic:.2f} Hz) if the shaft turns {100 * abs(self.slip):.1f} % "
+                f"{'faster' if self.slip > 0.0 else 'slower'} than told, and its own line is not found. Not certain: "
+                "give a tacho or a measured speed (speed=, --speed)."
+            )
         if self.grade == "quiet":
             kind = "the stiffness that varies as elements pass through the load" if self.part == OUTER else "waves"
             return (
@@ -283,6 +291,8 @@ class BearingReport(Shown):
     stability : DataFrame
         What would be named of speeds told within the tolerance: told and used turns (Hz), whether these were found in
         the record, bearing, part and grade.
+    speed_remark : str, optional
+        What is wrong with the told speed.
     """
 
     source: str
@@ -297,6 +307,7 @@ class BearingReport(Shown):
     shafts: tuple[float, ...] | None = None
     notes: list[str] = field(default_factory=list)
     stability: pd.DataFrame = field(default_factory=pd.DataFrame)
+    speed_remark: str | None = None
 
     @property
     def accused(self) -> list[PartFinding]:
@@ -322,6 +333,7 @@ class BearingReport(Shown):
             return (
                 f"No lines of a defect of bearing {names} stand out. A defect of a rolling element often shows none, "
                 "and an old, spread one may have lost its lines: this acquits the races of a fresh local defect only."
+                + self._limits()
                 + "".join(f" {remark}" for remark in self.remarks)
             )
         parts = [finding.sentence() for finding in self.accused]
@@ -334,7 +346,18 @@ class BearingReport(Shown):
     @property
     def remarks(self) -> list[str]:
         """What stands in the record but accuses nothing, in words."""
-        return [remark for finding in self.findings if (remark := finding.remark()) is not None]
+        found = [remark for finding in self.findings if (remark := finding.remark()) is not None]
+        return found if self.speed_remark is None else [self.speed_remark, *found]
+
+    def _limits(self) -> str:
+        """Return at which speeds nothing stands out, if the shaft's own line does not tell the speed."""
+        if len(self.stability) < 2 or self.stability["found"].iloc[len(self.stability) // 2]:
+            return ""
+        low, told, high = (self.stability["told"].iloc[k] for k in (0, len(self.stability) // 2, -1))
+        return (
+            f" The shaft's own line was not found: this holds for speeds of {60 * low:.1f} to {60 * high:.1f} rpm, "
+            f"+-{100 * (high / told - 1.0):.2g} % of the told one."
+        )
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The numbers as tables: bearing_evidence, bearing_lines, bearing_levels, bearing_stability."""

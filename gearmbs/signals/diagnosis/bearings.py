@@ -17,6 +17,7 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     HARMONICS,
     NONE,
     QUIET,
+    SHIFTED,
     SIGNS,
     SIGNS_CHANCE,
     SLIP,
@@ -29,9 +30,9 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     power_of,
     squared_envelope,
 )
-from gearmbs.signals.diagnosis.bearing_margins import LEAST_LEVEL, Answer, answers_at, modulated_level, verdicts_of
+from gearmbs.signals.diagnosis.bearing_margins import LEAST_LEVEL, Answer, modulated_level, weigh
 from gearmbs.signals.diagnosis.bearing_report import CAGE, BearingLines, BearingReport, PartFinding, bearing_lines
-from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE, tried_speeds
+from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
@@ -256,12 +257,13 @@ def diagnose_bearing(
             yield judge(spectra, known, turns, others, slip=slip, harmonics=harmonics, looks=len(names))
 
     own = [] if phase is not None else [channel_spectrum(values, rate, told) for values in signal.values.T]
-    speeds = tried_speeds([*own, *(s[-1] for s in found)], told, 0.0 if phase is not None else tolerance)
-    answers = answers_at(speeds, judge_at, SPEED_SHARE)
-    shaft = answers[len(answers) // 2].speed.turns
+    weighed = weigh(
+        [*own, *(s[-1] for s in found)], told, 0.0 if phase is not None else tolerance, others or (), judge_at
+    )
+    shaft = weighed.speed.turns
     turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
     findings, tables = [], {}
-    for c, judged in enumerate(verdicts_of(answers)):
+    for c, judged in enumerate(weighed.verdicts):
         one = signal.isel(channel=[c])
         findings += [_finding(one, each, found[c], shaft, turning, slip, level, highest) for each in judged]
         tables[names[c]] = _table(_clearest_spectrum(found[c], judged), highest * (harmonics + 1))
@@ -277,7 +279,8 @@ def diagnose_bearing(
         levels=_levels(signal),
         shafts=others,
         notes=notes,
-        stability=_stability(answers),
+        stability=_stability(weighed.answers),
+        speed_remark=weighed.remark,
     )
 
 
@@ -394,7 +397,8 @@ def _finding(
     lines, part, evidence, grade = judged.lines, judged.part, judged.evidence, judged.grade
     spectrum = next(s for s in spectra if s.where == evidence.where)
     sides = _sidebands(spectrum, evidence.found, lines.sidebands[part] * shaft * lines.ratio)
-    modulated = _modulated(signal, evidence.found, highest) if grade in (CLEAR, SIGNS) else math.nan
+    loud = grade in (CLEAR, SIGNS, SHIFTED)
+    modulated = _modulated(signal, evidence.found, highest) if loud else math.nan
     if modulated < level:
         grade = QUIET
     step = None if grade != NONE else _multiple_of_turns(judged, spectra, shaft, slip)
