@@ -49,7 +49,8 @@ def test_another_reason_fails_the_run():
 def bounds():
     """Return the bounds of pyproject.toml by package, as texts."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    listed = [*project["project"]["dependencies"], *project["build-system"]["requires"]]
+    extras = [text for extra in project["project"]["optional-dependencies"].values() for text in extra]
+    listed = [*extras, *project["project"]["dependencies"], *project["build-system"]["requires"]]
     return {re.match(r"[\w-]+", text)[0]: re.sub(r"^[\w-]+(\[.*\])?", "", text) for text in listed}
 
 

@@ -17,6 +17,7 @@ import xarray as xr
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
+from gearmbs.signals.signal.labels import is_clock
 from gearmbs.signals.signal.record import (
     Record,
     assemble,
@@ -31,6 +32,8 @@ OWN = "gearmbs_signal"
 LAYOUT = "gearmbs signal"
 BLOCK = 1 << 17
 MAGIC = b"\x89HDF\r\n\x1a\n"
+NAMELESS = frozenset(("data", "value", "values", "samples", "signal", "y"))
+"""Datasets of one channel that are named by their groups."""
 USER_BLOCK = 512
 """Bytes that MATLAB 7.3 puts before the HDF5 data."""
 
@@ -136,8 +139,13 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
                     for attr, value in item.attrs.items():
                         scalars[f"{name.replace('/', '.')}.{attr}"] = _value(value)
                     return
-                short = name.rsplit("/", 1)[-1]
+                *above, short = name.rsplit("/", 2)[-2:]
+                if above and short.lower() in NAMELESS:
+                    short = above[0]
                 key = short if short not in arrays else name.replace("/", ".")
+                if item.dtype.names:
+                    arrays.update(_fields(item[...]))
+                    return
                 for attr, value in item.attrs.items():
                     if rate_candidates({attr: _value(value)}):
                         scalars[f"{key}.{attr}"] = _value(value)
@@ -147,9 +155,10 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
                     scalars.setdefault(key, item[()].item() if item.shape == () else item[...].ravel()[0].item())
                     return
                 arrays[key] = item[...]
-                for attr in ("units", "unit"):
-                    if attr in item.attrs:
-                        units[key] = str(_value(item.attrs[attr]))
+                for owner in (item.parent, item):
+                    for attr, value in owner.attrs.items():
+                        if attr.lower() in ("units", "unit"):
+                            units[key] = str(_value(value))
                 labels[key] = str(_value(item.attrs.get("channel", key)))
                 order[key] = int(_value(item.attrs.get("channel_index", len(order))))
 
@@ -160,6 +169,24 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
         arrays = {key: arrays[key] for key in sorted(arrays, key=lambda key: order[key])}
         return _own(path, arrays, units, labels, scalars)
     return assemble(path, arrays, scalars, units, channels, rate)
+
+
+def _fields(table: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of a table with named fields; where one numbers the channel of each row, those of each."""
+    columns = {name: table[name] for name in table.dtype.names or () if table.dtype[name].kind in "fiu"}
+    place = next((name for name in columns if name.lower() == "channel"), None)
+    if place is None:
+        return columns
+    numbers = columns.pop(place)
+    rows = {number: numbers == number for number in np.unique(numbers)}
+    first = next(iter(rows.values()))
+    clocks = {name: column[first] for name, column in columns.items() if is_clock(name)}
+    return clocks | {
+        f"{name}_{number}": column[mask]
+        for name, column in columns.items()
+        if name not in clocks
+        for number, mask in rows.items()
+    }
 
 
 def hdf_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:

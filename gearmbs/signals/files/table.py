@@ -51,6 +51,7 @@ TABLE: dict[str, Row] = {
     "netcdf": Row("NetCDF", "arrays", ".nc .nc4 .cdf"),
     "hdf5": Row("HDF5", "arrays", ".h5 .hdf5 .hdf"),
     "tdms": Row("TDMS", "labview", ".tdms"),
+    "mdf": Row("MDF", "mdf", ".mf4 .mdf"),
     "npy": Row("numpy", "arrays", ".npy .npz"),
     "parquet": Row("Parquet", "frames", ".parquet .pq"),
     "feather": Row("Feather", "frames", ".feather"),

@@ -1,0 +1,100 @@
+"""Files of loggers in the MDF format of ASAM (.mf4, .mdf) through asammdf, which is imported when one is read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.table import Content, Format, begins_with
+from gearmbs.signals.signal.labels import SLOW_ROLES, role_of
+from gearmbs.signals.signal.record import Record, rate_from_times
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS
+
+
+class _Channel(NamedTuple):
+    name: str
+    group: int
+    unit: str
+    times: np.ndarray
+    values: np.ndarray
+
+
+def read_mdf(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
+    """Read the channels of an MDF file that share a time base; slower speeds and temperatures are interpolated to it.
+
+    Parameters
+    ----------
+    path : Path
+    channels : sequence of str, optional
+        Only these; channels of equal names in several groups are called name/group.
+    rate : float, optional
+        Hz; stands in for times that a logger did not take evenly.
+
+    Raises
+    ------
+    SignalFileError
+        If asammdf is not installed, no channel holds numbers over time, or those that do have several rates.
+    """
+    found = _numeric(path)
+    kept = [c for c in found if channels is None or c.name in channels]
+    if not kept:
+        raise SignalFileError(
+            path, f"holds no samples over time; it holds {', '.join(c.name for c in found) or 'none'}"
+        )
+    fast = [c for c in kept if role_of(c.name, c.unit) not in SLOW_ROLES] or kept
+    base = max(fast, key=lambda c: c.times.size).times
+    others = [c for c in fast if not np.array_equal(c.times, base)]
+    if others:
+        listed = ", ".join(f"{c.name} ({c.times.size} samples)" for c in fast)
+        raise SignalFileError(
+            path, f"holds records at different times: {listed}; choose with channels=[...] (--channel)"
+        )
+    slow = [c.name for c in kept if not np.array_equal(c.times, base)]
+    return Record(
+        np.stack([np.interp(base, c.times, c.values) if c.name in slow else c.values for c in kept], axis=1),
+        [c.name for c in kept],
+        [c.unit for c in kept],
+        rate if rate is not None else rate_from_times(base, path),
+        float(base[0]),
+        notes=[f"{name} has times of its own; between them it is interpolated." for name in slow],
+    )
+
+
+def _numeric(path: Path) -> list[_Channel]:
+    """Return all channels with numbers over time; what a logger marked as invalid is NaN."""
+    found = []
+    with _library(path).MDF(path) as file:
+        for group, entry in enumerate(file.groups):
+            for index in range(len(entry.channels)):
+                if index == file.masters_db.get(group):
+                    continue
+                got = file.get(group=group, index=index)
+                if got.samples.ndim != 1 or got.samples.dtype.kind not in "fiub" or got.samples.size < 2:
+                    continue
+                values = got.samples.astype(float)
+                if got.invalidation_bits is not None:
+                    values[np.asarray(got.invalidation_bits, dtype=bool)] = np.nan
+                found.append(_Channel(got.name, group, str(got.unit or UNKNOWN_UNITS), got.timestamps, values))
+    names = [c.name for c in found]
+    return [c if names.count(c.name) == 1 else c._replace(name=f"{c.name}/{c.group}") for c in found]
+
+
+def _library(path: Path) -> Any:
+    try:
+        import asammdf
+    except ImportError as exc:
+        raise SignalFileError(path, "MDF files need asammdf; install it with: pip install 'gearmbs[mdf]'") from exc
+    return asammdf
+
+
+FORMATS = {
+    "mdf": Format(
+        read=lambda path, asked: read_mdf(path, asked.channels, asked.rate),
+        contents={"mdf": Content("an MDF file", begins_with(b"MDF     ", b"UnFinMF "))},
+        through="asammdf (extra `mdf`)",
+    )
+}
