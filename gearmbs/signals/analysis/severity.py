@@ -1,12 +1,13 @@
 """Zones of vibration severity of industrial machines by ISO 20816-3, from the record of a bearing housing.
 
-The limits are those of its tables for measurements on parts that do not rotate, which have been the same since ISO
-10816-3: RMS values over 10 to 1000 Hz, or from 2 Hz on below 600 rpm.
+The limits of the velocity, RMS over 10 to 1000 Hz, or from 2 Hz on below 600 rpm, are those of ISO 10816-3:2009, which
+ISO 20816-3:2022 replaces; public manuals of instruments and of controllers print them (docs/howto/bearings.md). For the
+displacement none was found that does.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -25,20 +26,18 @@ MEANING = {
 }
 
 
-class Limits(NamedTuple):
-    """Upper ends of zones A, B and C: velocity in m/s and displacement in m, RMS."""
-
-    velocity: tuple[float, float, float]
-    displacement: tuple[float, float, float]
-
-
-LIMITS: dict[tuple[int, str], Limits] = {
-    (1, "rigid"): Limits((2.3e-3, 4.5e-3, 7.1e-3), (29e-6, 57e-6, 90e-6)),
-    (1, "flexible"): Limits((3.5e-3, 7.1e-3, 11.0e-3), (45e-6, 90e-6, 140e-6)),
-    (2, "rigid"): Limits((1.4e-3, 2.8e-3, 4.5e-3), (22e-6, 45e-6, 71e-6)),
-    (2, "flexible"): Limits((2.3e-3, 4.5e-3, 7.1e-3), (37e-6, 71e-6, 113e-6)),
+LIMITS: dict[tuple[int, str], tuple[float, float, float]] = {
+    (1, "rigid"): (2.3e-3, 4.5e-3, 7.1e-3),
+    (1, "flexible"): (3.5e-3, 7.1e-3, 11.0e-3),
+    (2, "rigid"): (1.4e-3, 2.8e-3, 4.5e-3),
+    (2, "flexible"): (2.3e-3, 4.5e-3, 7.1e-3),
 }
-"""By group (1: above 300 kW, or shafts 315 mm high and more; 2: 15 to 300 kW, or 160 to 315 mm) and support."""
+"""Upper ends of zones A, B and C, m/s RMS, by group (1: above 300 kW, or shafts 315 mm high and more; 2: 15 to 300 kW,
+or 160 to 315 mm) and support."""
+CORNER = {1: 12.5, 2: 10.0}
+"""Hz, by group: the limits of the displacement are those of the velocity at this frequency, to which those of the
+standard are round numbers."""
+QUANTITIES: tuple[Literal["velocity", "displacement"], ...] = ("velocity", "displacement")
 TOP = 1000.0
 """Hz."""
 SLOW, SLOWEST = 600.0, 120.0
@@ -91,12 +90,14 @@ def vibration_zones(
     rpm = float(turning) * 30.0 / np.pi
     if rpm < SLOWEST:
         raise SignalError(f"speed: {rpm:g} rpm is below {SLOWEST:g} rpm, from which ISO 20816-3 applies")
-    limits, band = LIMITS[group, support], (10.0 if rpm >= SLOW else 2.0, TOP)
+    velocities = np.array(LIMITS[group, support])
+    limits = dict(zip(QUANTITIES, (velocities, velocities / (2.0 * np.pi * CORNER[group])), strict=True))
+    band = (10.0 if rpm >= SLOW else 2.0, TOP)
     rows = []
     for c, name in enumerate(signal["channel"].values):
         one = signal.isel(channel=[c])
-        levels = {to: float(convert(one, to, band=band, edges="keep").std()) for to in ("velocity", "displacement")}
-        zones = [ZONES[int(np.searchsorted(getattr(limits, to), level))] for to, level in levels.items()]
+        levels = {to: float(convert(one, to, band=band, edges="keep").std()) for to in QUANTITIES}
+        zones = [ZONES[int(np.searchsorted(limits[to], level))] for to, level in levels.items()]
         rows.append((str(name), *levels.values(), *zones, max(zones), MEANING[max(zones)]))
     columns = ["channel", "velocity", "displacement", "velocity_zone", "displacement_zone", "zone", "meaning"]
     return pd.DataFrame(rows, columns=columns)
