@@ -206,7 +206,7 @@ def ratio_at(spectrum: EnvelopeSpectrum, frequency: np.ndarray) -> np.ndarray:
     """Return the ratio at frequencies; 1 outside the spectrum."""
     place = np.rint(frequency / spectrum.step).astype(int)
     inside = (place >= LOWEST) & (place < spectrum.ratio.size)
-    return np.where(inside, spectrum.ratio[np.clip(place, 0, spectrum.ratio.size - 1)], 1.0)
+    return np.where(inside, spectrum.ratio.take(place, mode="clip"), 1.0)
 
 
 def log_tail(total: float, count: int) -> float:
@@ -405,15 +405,18 @@ class _Look:
     ) -> None:  # fmt: skip
         self.spectra, self.turns, self.slip, self.harmonics = spectra, turns, slip, harmonics
         self.highest = max(lines.orders[part] * lines.ratio for lines, part in parts) * turns
+        self._lines = {(lines, part): lines.orders[part] * lines.ratio * turns for lines, part in parts}
+        places = np.array(list(self._lines.values()))
+        chances = [chances_at(spectrum, places, slip=slip, harmonics=harmonics) for spectrum in spectra]
+        self._clearest = dict(zip(self._lines, np.argmin(chances, axis=0), strict=True))
         self._parts: dict[tuple[BearingLines, str], Evidence] = {}
         self._places: dict[tuple[str, float], tuple[np.ndarray, np.ndarray]] = {}
 
     def of(self, key: tuple[BearingLines, str]) -> Evidence:
         """Return the evidence for a part, of the spectrum in which it is clearest."""
         if key not in self._parts:
-            line = key[0].orders[key[1]] * key[0].ratio * self.turns
-            found = [find_lines(s, line, slip=self.slip, harmonics=self.harmonics) for s in self.spectra]
-            self._parts[key] = min(found, key=lambda e: e.log_chance)
+            spectrum = self.spectra[self._clearest[key]]
+            self._parts[key] = find_lines(spectrum, self._lines[key], slip=self.slip, harmonics=self.harmonics)
         return self._parts[key]
 
     def rivals(self, key: tuple[BearingLines, str]) -> tuple[int, int]:

@@ -30,7 +30,7 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     power_of,
     squared_envelope,
 )
-from gearmbs.signals.diagnosis.bearing_margins import LEAST_LEVEL, Answer, modulated_level, weigh
+from gearmbs.signals.diagnosis.bearing_margins import LEAST_LEVEL, Answer, Weighed, modulated_level, weigh
 from gearmbs.signals.diagnosis.bearing_report import CAGE, BearingLines, BearingReport, PartFinding, bearing_lines
 from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE
 from gearmbs.signals.errors import MissingMetadataError, SignalError
@@ -244,44 +244,70 @@ def diagnose_bearing(
     highest = max(order for lines in known for order in lines.orders.values()) * told
     _check_record(signal.sizes["time"], rate, told, None if phase is not None else highest)
     others = _other_shafts(signal, known, shafts)
-    names = [str(name) for name in signal["channel"].values]
-    bands, found = {}, []
-    for c, name in enumerate(names):
-        if progress is not None:
-            progress((c + 0.5) / len(names), name)
-        bands[name], spectra = envelope_spectra(signal.isel(channel=[c]), told, highest, band=band, phase=phase)
-        found.append(spectra)
+    bands, heard = _heard(signal, told, highest, band, phase, progress)
 
     def judge_at(turns: float) -> Iterator[list[Judged]]:
-        for spectra in found:
-            yield judge(spectra, known, turns, others, slip=slip, harmonics=harmonics, looks=len(names))
+        for spectra in heard.values():
+            yield judge(spectra, known, turns, others, slip=slip, harmonics=harmonics, looks=len(heard))
 
     own = [] if phase is not None else [channel_spectrum(values, rate, told) for values in signal.values.T]
-    weighed = weigh(
-        [*own, *(s[-1] for s in found)], told, 0.0 if phase is not None else tolerance, others or (), judge_at
-    )
-    shaft = weighed.speed.turns
-    turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
-    findings, tables = [], {}
-    for c, judged in enumerate(weighed.verdicts):
-        one = signal.isel(channel=[c])
-        findings += [_finding(one, each, found[c], shaft, turning, slip, level, highest) for each in judged]
-        tables[names[c]] = _table(_clearest_spectrum(found[c], judged), highest * (harmonics + 1))
+    spectra = [*own, *(each[-1] for each in heard.values())]
+    weighed = weigh(spectra, told, 0.0 if phase is not None else tolerance, others or (), judge_at)
+    findings, clearest = _found(signal, weighed, heard, known, others, slip, level, highest)
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
         rate=rate,
         duration=signal.sizes["time"] / rate,
-        shaft=shaft,
+        shaft=weighed.speed.turns,
         bearings=known,
         findings=findings,
         bands=bands,
-        spectra=tables,
+        spectra={name: _table(each, highest * (harmonics + 1)) for name, each in clearest.items()},
         levels=_levels(signal),
         shafts=others,
         notes=notes,
         stability=_stability(weighed.answers),
         speed_remark=weighed.remark,
     )
+
+
+def _heard(
+    signal: xr.DataArray,
+    told: float,
+    highest: float,
+    band: tuple[float, float] | None,
+    phase: xr.DataArray | None,
+    progress: Callable[[float, str], None] | None,
+) -> tuple[dict[str, tuple[float, float]], dict[str, list[EnvelopeSpectrum]]]:
+    """Return the band of each channel, and the spectra of its envelope."""
+    bands, heard = {}, {}
+    names = [str(name) for name in signal["channel"].values]
+    for c, name in enumerate(names):
+        if progress is not None:
+            progress((c + 0.5) / len(names), name)
+        bands[name], heard[name] = envelope_spectra(signal.isel(channel=[c]), told, highest, band=band, phase=phase)
+    return bands, heard
+
+
+def _found(
+    signal: xr.DataArray,
+    weighed: Weighed,
+    heard: Mapping[str, Sequence[EnvelopeSpectrum]],
+    known: Sequence[BearingLines],
+    others: Sequence[float] | None,
+    slip: float,
+    level: float,
+    highest: float,
+) -> tuple[list[PartFinding], dict[str, EnvelopeSpectrum]]:
+    """Return what is to be told of each part in each channel, and the channels' clearest spectra."""
+    shaft = weighed.speed.turns
+    turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
+    findings, clearest = [], {}
+    for c, ((name, spectra), judged) in enumerate(zip(heard.items(), weighed.verdicts, strict=True)):
+        one = signal.isel(channel=[c])
+        findings += [_finding(one, each, spectra, shaft, turning, slip, level, highest) for each in judged]
+        clearest[name] = _clearest_spectrum(spectra, judged)
+    return findings, clearest
 
 
 def channel_spectrum(values: np.ndarray, rate: float, turns: float) -> EnvelopeSpectrum:
