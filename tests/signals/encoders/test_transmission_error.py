@@ -152,9 +152,11 @@ def test_orders_of_both_shafts_come_back_from_any_pair(case):
     """Lines at chance orders of both shafts and the mesh, perfect discs: each to a part in a thousand."""
     rng = np.random.default_rng(seed(3) + case)
     teeth = tuple(int(z) for z in rng.integers(12, 40, 2))
-    turns = (
-        2 * teeth[1] // math.gcd(*teeth) if teeth[1] // math.gcd(*teeth) < 25 else 12 * max(1.0, teeth[1] / teeth[0])
-    )
+    whole = teeth[1] // math.gcd(*teeth)
+    # a record of few turns has to be whole periods of the pair, and six turns of the slower shaft at least
+    turns = 12 * max(1.0, teeth[1] / teeth[0])
+    if whole < 25:
+        turns = whole * math.ceil(max(2, 6 * max(1.0, teeth[1] / teeth[0]) / whole))
     orders = {Fraction(1): 3e-6, Fraction(teeth[0], teeth[1]) * 2: 2e-6, Fraction(teeth[0]): 4e-6}
     phases = dict(zip(orders, rng.uniform(0, math.tau, len(orders))))
 
