@@ -12,7 +12,7 @@ from gearmbs.bearings.bearing import Bearing, equivalent_load, mean_load, rating
 from gearmbs.bearings.clearance import ClearanceForce
 from gearmbs.bearings.defects import INNER, OUTER, Defect, LooseFit, as_defects
 from gearmbs.bearings.kinds import BearingError, require
-from gearmbs.bearings.settings import BearingSettings, bearing_settings, pack
+from gearmbs.bearings.settings import BearingSettings, bearing_settings, pack, reals_by
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.mechanism.parts.bodies import Body
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
@@ -160,6 +160,54 @@ class RollingBearing(ForceElement):
 
         tables = self.tables
         return Compiled(bearing_force, tables.integers, tables.reals, scratch=scratch(len(tables.spinning)))
+
+    def by_parameter(self, name: str, frames: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Return the exact derivatives of wrench and rates by a number of the settings or of the bearing.
+
+        Parameters
+        ----------
+        name : str
+            A setting such as ``"stiffness"`` (by default that of Hertz), ``"damping"`` or ``"preload"``, or a field of
+            the bearing such as ``"clearance"`` or ``"pitch_diameter"``.
+        frames : ndarray, shape (2, 18)
+            Of markers I and J as kernels see them: origin, orientation by rows, velocity, angular velocity.
+        states : ndarray
+            Of the element, see `states`.
+
+        Returns
+        -------
+        ndarray, shape (6 + states,)
+            Of force and torque on the inner ring, global components, and of the rates, by the parameter in SI.
+
+        Raises
+        ------
+        BearingError
+            For a name that is no number of either or with which the tables change their shape; with centrifugal load.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from gearmbs.mechanism import Mechanism
+        >>> ground = Mechanism("held").ground
+        >>> bearing = Bearing.from_designation("6205")
+        >>> element = RollingBearing("A", ground.marker(), ground.marker(), bearing=bearing)
+        >>> frames = np.zeros((2, 18))
+        >>> frames[:, 3:12] = np.eye(3).ravel()
+        >>> frames[0, 0] = 2e-5
+        >>> bool(element.by_parameter("clearance", frames, np.zeros(1))[0] > 0.0)
+        True
+        """
+        from gearmbs.bearings.layout import scratch
+        from gearmbs.bearings.parameters_kernel import bearing_force_changed
+
+        require(
+            not self.settings.centrifugal,
+            f"bearing '{self.name}': centrifugal is True; derivatives by parameters are known without that load",
+        )
+        tables, out = self.tables, np.zeros(6 + len(self.states))
+        changed, work = reals_by(self.settings, name), np.zeros(scratch(len(tables.spinning)))
+        bearing_force_changed(tables.integers, tables.reals, changed, frames, states, work, out)
+        return out
 
     def __repr__(self) -> str:
         name = self.bearing.designation or self.bearing.kind

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearmbs.bearings import derived as D
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.elements_kernel import element_sums
 from gearmbs.bearings.layout import place_of, profile_slope, profile_value
@@ -44,15 +45,15 @@ def measure(ints, reals, frames, work):
     az = frames[0, FRAME_A + 6] * n0 + frames[0, FRAME_A + 7] * n1 + frames[0, FRAME_A + 8] * n2
     for k in range(3):
         e0, e1, e2 = frames[1, FRAME_A + k], frames[1, FRAME_A + 3 + k], frames[1, FRAME_A + 6 + k]
-        work[B.S_Q + k] = e0 * dx + e1 * dy + e2 * dz
+        work[B.S_MOTION + k] = e0 * dx + e1 * dy + e2 * dz
         work[B.S_A + k] = e0 * ax + e1 * ay + e2 * az
-        work[B.S_V + k] = e0 * vx + e1 * vy + e2 * vz
+        work[B.S_RATES + k] = e0 * vx + e1 * vy + e2 * vz
         work[B.S_W + k] = e0 * ux + e1 * uy + e2 * uz
     work[B.S_SPIN] = wx * frames[1, FRAME_A + 2] + wy * frames[1, FRAME_A + 5] + wz * frames[1, FRAME_A + 8]
     work[B.S_TILT] = work[B.S_A] - reals[B.OUTER_TILT]
     work[B.S_TILT + 1] = work[B.S_A + 1] - reals[B.OUTER_TILT + 1]
-    work[B.S_TILT + 2] = work[B.S_W + 1] * work[B.S_A + 2] - work[B.S_W + 2] * work[B.S_A + 1]
-    work[B.S_TILT + 3] = work[B.S_W + 2] * work[B.S_A] - work[B.S_W] * work[B.S_A + 2]
+    work[B.S_RATES + 3] = work[B.S_W + 1] * work[B.S_A + 2] - work[B.S_W + 2] * work[B.S_A + 1]
+    work[B.S_RATES + 4] = work[B.S_W + 2] * work[B.S_A] - work[B.S_W] * work[B.S_A + 2]
     work[B.S_THETA] = work[B.S_THETA_RATE] = 0.0
     for k in range(3):
         work[B.S_TURN + k] = 0.0
@@ -120,18 +121,11 @@ def cage_rate(ints, reals, psi, work):
 
 
 @njit(cache=True, error_model="numpy")
-def friction_torque(reals, total, speed):
+def friction_of(reals, total, speed):
     """Return the friction torque about z at a sum of normal forces and a speed, its slope by either."""
     if reals[B.ROLLING] == 0.0 and reals[B.VISCOUS] == 0.0:
         return 0.0, 0.0, 0.0
-    square = speed * speed + reals[B.SLOW] ** 2
-    root = np.sqrt(square)
-    even = reals[B.ROLLING] * speed / root
-    cube = square ** (-1.0 / 6.0)
-    torque = -even * total - reals[B.VISCOUS] * speed * cube
-    by_speed = -reals[B.ROLLING] * total * reals[B.SLOW] ** 2 / (square * root)
-    by_speed -= reals[B.VISCOUS] * cube * (1.0 - speed * speed / (3.0 * square))
-    return torque, -even, by_speed
+    return D.friction_torque(reals[B.ROLLING], reals[B.VISCOUS], reals[B.SLOW], total, speed)
 
 
 @njit(cache=True, error_model="numpy")
@@ -153,7 +147,7 @@ def bearing_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
     cage_rate(ints, reals, states[0], work)
     element_sums(ints, reals, states, want, work)
     speed = work[B.S_W + 2]
-    friction, by_total, by_speed = friction_torque(reals, work[B.S_SUMS], speed)
+    friction, by_total, by_speed = friction_of(reals, work[B.S_SUMS], speed)
     g, a = B.S_LOCAL, B.S_A
     nx, ny = -work[a + 2] * work[g + 4], work[a + 2] * work[g + 3]
     nz = work[a] * work[g + 4] - work[a + 1] * work[g + 3] + drive_of(ints, reals, work) + friction
@@ -190,7 +184,7 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
     spins = ints[B.SPINS]
     n, m, states = B.BETA + spins, B.VARIATIONS, 1 + spins
     base = B.S_LOCAL
-    columns, first = m + states, base + n * (12 + 2 * n) + 8
+    columns, first = m + states, B.variations(n)
     force, out = matrix_at(work, first, n + 1, columns), matrix_at(work, first + (n + 1) * columns, 6, columns)
     bend = vector_at(work, first + (n + 7) * columns, 9)
     for k in range(9):
@@ -200,16 +194,11 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
     cage = 0.0
     if ints[B.CENTRIFUGAL]:
         cage = 2.0 * reals[B.MASS_RADIUS] * (work[B.S_SPIN] + work[B.S_CAGE] * work[B.S_W + 2])
-    stiff, damp = base + n, base + n + n * n
-    by_load = damp + n * n
+    stiff, damp, by_load = base + n + 1, base + (n + 1) * (n + 1), base + (n + 1) * (2 * n + 1)
     for r in range(n + 1):
-        by_q, by_rate, effect = stiff + n * r, damp + n * r, work[by_load + r]
-        if r == n:
-            # the sum of the normal forces
-            by_q, by_rate, effect = by_load + n, by_load + 2 * n, work[first - 2]
         by_variations(
-            ints, reals, work, vector_at(work, by_q, n), vector_at(work, by_rate, n), effect * cage, bend,
-            vector_at(work, first + columns * r, columns),
+            ints, reals, work, vector_at(work, stiff + n * r, n), vector_at(work, damp + n * r, n),
+            work[by_load + r] * cage, bend, vector_at(work, first + columns * r, columns),
         )  # fmt: skip
     ax, ay, az = work[B.S_A], work[B.S_A + 1], work[B.S_A + 2]
     for c in range(columns):
@@ -282,7 +271,7 @@ def spread(ints, reals, frames, work, wrench, jac):
     """Turn the local derivatives into those by the variations of both frames, in global components."""
     spins = ints[B.SPINS]
     n, m, states = B.BETA + spins, B.VARIATIONS, 1 + spins
-    at = B.S_LOCAL + n * (12 + 2 * n) + 8 + (n + 1) * (m + states)
+    at = B.variations(n) + (n + 1) * (m + states)
     local = matrix_at(work, at, 6, m + states)
     at += 6 * (m + states) + 9
     turned = vector_at(work, at, m)
@@ -291,7 +280,7 @@ def spread(ints, reals, frames, work, wrench, jac):
         d[c] = frames[0, FRAME_P + c] - frames[1, FRAME_P + c]
         v[c] = w[c] = 0.0
         for k in range(3):
-            v[c] += frames[1, FRAME_A + 3 * c + k] * work[B.S_V + k]
+            v[c] += frames[1, FRAME_A + 3 * c + k] * work[B.S_RATES + k]
             w[c] += frames[1, FRAME_A + 3 * c + k] * work[B.S_W + k]
     for b in range(0, 6, 3):
         for row in range(3):

@@ -1,12 +1,8 @@
-"""The force of one contact path and its derivatives: balls without and with centrifugal load, rollers.
+"""Constants of Hertz's contacts, and the contact of a path of balls and rollers with centrifugal load.
 
-A path sees the vector (X, Y) from the groove centre of the outer to that of the inner ring in the plane of the element,
-radial and axial, and the material h that is missing. Balls without inertia lie on the line of the centres,
-
-    delta = L - A_0 - h,    L = |(X, Y)|,    n = (X, Y)/L,    Q = K s(delta)^n,
-
-rollers have a fixed normal: delta = n . (X, Y) - gap - h. What is told of the contact, at ``S_LAW`` of the scratch: Q,
-n, dQ by X, Y, h and the centrifugal load F, and d(alpha) by the same, the turn of n in its plane.
+The law of a contact without it, and all that follows from a law, is in `gearmbs.bearings.definitions`. With it the
+place of an element is the solution of an iteration. What is told of the contact, at ``S_LAW`` of the scratch: Q, n, dQ
+by X, Y, h and the centrifugal load F, and d(alpha) by the same, the turn of n in its plane; then both by the tilt phi.
 """
 
 from __future__ import annotations
@@ -17,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearmbs.bearings import layout as B
+from gearmbs.bearings.derived import smooth_part
 from gearmbs.kernels.jit import njit
 
 # Hertz constants of balls on grooves and of rollers on rings.
@@ -156,9 +153,7 @@ def positive_part(delta, width):
         return delta, 1.0
     if delta <= -width:
         return 0.0, 0.0
-    up = delta + width
-    scale = 1.0 / (16.0 * width * width * width)
-    return up * up * up * (3.0 * width - delta) * scale, 4.0 * up * up * (2.0 * width - delta) * scale
+    return smooth_part(delta, width)
 
 
 @njit(cache=True, error_model="numpy")
@@ -210,64 +205,6 @@ def hertz_energy_within(stiffness, exponent, delta, width):
                 total += w * positive_part(middle + 0.5 * panel * sign * x, width)[0] ** exponent
         total += 0.5688888888888889 * positive_part(middle, width)[0] ** exponent
     return 0.5 * panel * stiffness * total
-
-
-@njit(cache=True, error_model="numpy")
-def ball_law(stiffness, exponent, distance, width, x, y, h, law):
-    """Write the contact of a ball without inertia; return its deflection.
-
-    Parameters
-    ----------
-    stiffness, exponent : float
-        K and n.
-    distance : float
-        A_0, m.
-    width : float
-        Half width of the smooth transition, m.
-    x, y : float
-        From the groove centre of the outer to that of the inner ring, m.
-    h : float
-        Missing material, m.
-    law : ndarray, shape (13,)
-        Out: Q, n (2), dQ by x, y, h, F, d(alpha) by x, y, h, F, then zeros, see `layout.LAW`. Only Q where there is no
-        contact.
-    """
-    law[0] = 0.0
-    reach = distance + h - width
-    square = x * x + y * y
-    if square <= reach * reach and reach > 0.0:
-        return np.sqrt(square) - distance - h
-    length = np.sqrt(square)
-    part, part_slope = positive_part(length - distance - h, width)
-    force, slope = hertz_force(stiffness, exponent, part)
-    if force <= 0.0:
-        return length - distance - h
-    write_ball_law(force, slope * part_slope, x / length, y / length, length, law)
-    return length - distance - h
-
-
-@njit(cache=True, error_model="numpy")
-def write_ball_law(force, slope, nx, ny, length, law):
-    """Write the contact of a ball without inertia, of a force, its slope, a normal and a distance of the centres."""
-    law[0], law[1], law[2] = force, nx, ny
-    law[3], law[4], law[5], law[6] = slope * nx, slope * ny, -slope, 0.0
-    law[7], law[8], law[9], law[10] = -ny / length, nx / length, 0.0, 0.0
-    law[11] = law[12] = 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def roller_law(stiffness, exponent, width, nx, ny, delta, law):
-    """Write the contact of a slice of a roller with normal n at a deflection; see `ball_law`."""
-    law[0] = 0.0
-    part, part_slope = positive_part(delta, width)
-    force, slope = hertz_force(stiffness, exponent, part)
-    if force <= 0.0:
-        return
-    slope *= part_slope
-    law[0], law[1], law[2] = force, nx, ny
-    law[3], law[4], law[5] = slope * nx, slope * ny, -slope
-    for k in range(6, B.LAW):
-        law[k] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -382,7 +319,7 @@ def ball_law_at_speed(reals, x, y, other_x, other_y, apart, twist, h, vr, vz, la
     """Write the contact of a ball in equilibrium with its centrifugal load; return its deflection.
 
     The centre v balances all contacts and the load, with one path Q_o v/|v| = Q_i (A - v)/|A - v| + F e_r; what is
-    written is this path's contact with the inner ring, see `ball_law`.
+    written is this path's contact with the inner ring, see `layout.S_LAW`.
 
     Parameters
     ----------
@@ -442,8 +379,8 @@ def roller_law_at_speed(reals, share, nx, ny, delta, load, law):
     """Write the contact of a slice of a roller pressed outward; return its deflection and energy.
 
     With delta_i + delta_o = delta and F the centrifugal load along the normal, K_o delta_o^n = K_i delta_i^n + F; of a
-    tapered roller the flange takes what is left. What is written is the contact with the inner ring, see `ball_law`;
-    the energy is that of both contacts less F delta_o.
+    tapered roller the flange takes what is left. What is written is the contact with the inner ring, see
+    `layout.S_LAW`; the energy is that of both contacts less F delta_o.
 
     Parameters
     ----------

@@ -95,33 +95,44 @@ PSI, THETA, BETA = 5, 6, 7
 """Local coordinates q: displacement (0 to 2), tilt of the axis (3, 4), cage angle, angle of the inner ring, spins."""
 
 # scratch
-S_Q = 0
-"""d, a, v, w of I seen from J in its axes, three each."""
-S_A = 3
-S_V = 6
-S_W = 9
-S_TURN = 12
+S_MOTION = 0
+"""Displacement d of I seen from J in its axes, and q_3, q_4; then the rates of all q, one for all spins."""
+S_TILT = 3
+S_RATES = 5
+MOTION = 13
+S_A = 13
+"""Axis of the inner ring and w of I seen from J, in its axes."""
+S_W = 16
+S_TURN = 19
 """Gradient of the angle of the inner ring by a rotation of I, and the angle, the rate."""
-S_THETA = 15
-S_THETA_RATE = 16
-S_SPIN = 17
+S_THETA = 22
+S_THETA_RATE = 23
+S_SPIN = 24
 """w_J . z_J"""
-S_TILT = 18
-"""q_3, q_4 and their rates."""
-S_SUMS = 22
+S_CAGE = 25
+"""d psi' / d Omega at the cage's angle, and its slope by it."""
+S_CAGE_SLOPE = 26
+S_CENTRE = 27
+"""Centre of a four-point bearing's ball, whose two paths share it, radially and along the axis."""
+S_SUMS = 29
 """Sums over the elements: normal forces, energy, damping power, largest force, number loaded, largest deflection."""
 SUMS = 6
-S_LAW = 28
+S_LAW = 35
 """Of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load, then of both by the
 tilt phi, as far as it moves the other path of the element against this one."""
 LAW = 13
-S_CENTRE = 41
-"""Centre of a four-point bearing's ball, whose two paths share it, radially and along the axis."""
-S_CAGE = 43
-"""d psi' / d Omega at the cage's angle, and its slope by it."""
-S_CAGE_SLOPE = 44
-S_LOCAL = 45
-"""From here: generalised forces, then what the derivatives need; see `scratch`."""
+S_PROFILE = 48
+"""Of one contact: slopes of the outer ring's, the inner ring's and the element's profile, then their curvatures."""
+S_PLANE = 54
+"""Of one element, in its plane: u, w, phi, the rates of these and of the angles psi, theta, beta."""
+PLANE = 9
+S_PLANE_SUMS = 63
+"""Sums over the paths of one element: six forces in its plane and f, their derivatives by the six coordinates, by the
+rates, and by the centrifugal load; of plain elements three forces, f, and their derivatives by three and three."""
+PLANE_FORCES, PLANE_SUMS, PLAIN_SUMS = 7, 98, 28
+S_LOCAL = 161
+"""From here, with n local coordinates: n generalised forces and the sum of normal forces, their derivatives by q, by
+q' and by the centrifugal load, n + 1 rows each; then what the variations need, see `variations`."""
 
 VARIATIONS = 13
 """Local variations: d, rotation, v, w of I seen from J, and w_J . z_J."""
@@ -130,9 +141,15 @@ VARIATIONS = 13
 def scratch(spins: int) -> int:
     """Return the length of the scratch of a bearing with so many spins."""
     n = BETA + spins
-    # generalised forces, their derivatives, vectors of one contact, its profiles; then the variations of the forces,
-    # of F and N locally and turned, and the angle's derivatives
-    return S_LOCAL + n * (12 + 2 * n) + 8 + (n + 7) * (VARIATIONS + 1 + spins) + 32
+    # behind the generalised forces: the variations of the forces, of F and N locally and turned, and the angle's
+    # derivatives
+    return variations(n) + (n + 7) * (VARIATIONS + 1 + spins) + 32
+
+
+@njit(cache=True, error_model="numpy")
+def variations(n):
+    """Return where the variations begin in the scratch of a bearing with n local coordinates."""
+    return S_LOCAL + 2 * (n + 1) * (n + 1)
 
 
 # Periodic profiles by cubic B-splines: value, slope and curvature.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -128,6 +129,51 @@ def pack(settings: BearingSettings) -> BearingTables:
         parts.append(_random_slip(settings))
         integers[B.SLIP_NODES] = parts[-1].size - MARGIN
     return BearingTables(integers, np.concatenate(parts), spinning)
+
+
+STEP = 1e-3
+"""Step of differences of tables by the parameter's size: what is left off and rounding are 1e-13 of what is found."""
+LEAST_STEP = 1e-6
+"""The step where a parameter is zero, SI."""
+
+
+def reals_by(settings: BearingSettings, name: str) -> np.ndarray:
+    """Return the derivatives of the kernel's reals by a number of the settings or of the bearing, by its name.
+
+    The tables are smooth functions of it, of which differences of sixth order are taken, to one side of a zero.
+
+    Raises
+    ------
+    BearingError
+        For a name that is no number of either, and for one with which the tables change their shape.
+    """
+    own, ring = (
+        {item.name: getattr(owner, item.name) for item in fields(owner)} for owner in (settings, settings.bearing)
+    )
+    numbers = {key: value for key, value in (ring | own).items() if isinstance(value, float)}
+    numbers["stiffness"] = series_stiffness(settings)
+    require(name in numbers, f"RollingBearing: {name!r} is no number of it; give one of {', '.join(sorted(numbers))}")
+    value = numbers[name]
+
+    def table(there: float) -> np.ndarray:
+        change: dict[str, Any] = {name: there}
+        if name in own:
+            return pack(replace(settings, **change)).reals
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return pack(replace(settings, bearing=settings.bearing.changed(**change))).reals
+
+    step = STEP * abs(value) or LEAST_STEP
+    places = np.arange(-3, 4) if value else np.arange(7)
+    # of the polynomial through all of them, the slope at the middle or at zero
+    weights = np.linalg.solve(np.vander(places, increasing=True).T, np.eye(7)[1])
+    tables = [table(value + step * k) for k in places]
+    require(
+        len({one.size for one in tables}) == 1,
+        f"RollingBearing.{name} is {value:g}; the tables near it differ in their number of nodes: it has no derivative",
+    )
+    # what does not change has no rounding either
+    return np.tensordot(weights / step, np.array(tables) - pack(settings).reals, 1)
 
 
 def _spin_profiles(settings: BearingSettings, surfaces: list, spinning: tuple[int, ...]) -> list[np.ndarray]:

@@ -1,0 +1,389 @@
+"""Values, derivatives and products of them from one definition of a law, written as kernels.
+
+A law is a plain Python function of numbers. Called with `Value` objects it is traced: each operation becomes a node of
+a graph in which no node is there twice, so that whatever intermediate results derivatives have in common is computed
+once. `derivative` adds nodes, `given` adds a number that somebody else computes together with its derivatives (a table,
+the solution of an iteration), and `Function.text` writes nodes as a kernel.
+
+A module ``definitions.py`` has a function ``functions()`` that returns `Function` objects; ``derived.py`` beside it is
+what they become:
+
+    python -m gearmbs.kernels.derive
+
+writes all such files anew. Branches are not traced: whether bodies touch is asked by whoever calls the kernel.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+WIDTH = 110
+"""Characters of an expression beyond which a part of it gets a line of its own."""
+_nodes: dict[tuple, Value] = {}
+_slopes: dict[tuple[Value, Value], Value] = {}
+
+
+class Value:
+    """A number that is being written down: an operation on other numbers.
+
+    ``numpy.sqrt(value)`` and other functions of numpy call the method of that name.
+    """
+
+    __slots__ = ("_partials", "name", "operands", "operation", "place")
+
+    def __init__(self, operation: str, operands: tuple, name: str = "") -> None:
+        self.operation, self.operands, self.name = operation, operands, name
+        self.place = len(_nodes)
+        self._partials: Mapping[Value, Value] = {}
+
+    def __add__(self, other: Any) -> Value:
+        other = _value(other)
+        if other.operation == "-x":
+            return self - other.operands[0]
+        if self.operation == "-x":
+            return other - self.operands[0]
+        if ZERO in (self, other):
+            return other if self is ZERO else self
+        if self is other:
+            return 2.0 * self
+        return _commuting("+", self, other, lambda a, b: a + b)
+
+    def __sub__(self, other: Any) -> Value:
+        other = _value(other)
+        if self is other:
+            return ZERO
+        if self is ZERO or other is ZERO:
+            return -other if self is ZERO else self
+        if other.operation == "-x":
+            return self + other.operands[0]
+        if self.operation == "-x":
+            return -(self.operands[0] + other)
+        if self.operation == other.operation == "number":
+            return _number(self.operands[0] - other.operands[0])
+        return _node("-", self, other)
+
+    def __mul__(self, other: Any) -> Value:
+        other = _value(other)
+        if ZERO in (self, other):
+            return ZERO
+        if ONE in (self, other):
+            return other if self is ONE else self
+        for a, b in ((self, other), (other, self)):
+            if a.operation == "-x":
+                return -(a.operands[0] * b)
+            if a.operation == "number" and a.operands[0] < 0.0:
+                return -(-a * b)
+            if a.operation == "number" and b.operation == "*" and b.operands[0].operation == "number":
+                return (a * b.operands[0]) * b.operands[1]
+            if a.operation != "number" and b.operation == "*" and b.operands[0].operation == "number":
+                return b.operands[0] * (a * b.operands[1])
+        return _commuting("*", self, other, lambda a, b: a * b)
+
+    def __truediv__(self, other: Any) -> Value:
+        other = _value(other)
+        if other.operation == "number":
+            return self * (1.0 / other.operands[0])
+        if self.operation == "-x":
+            return -(self.operands[0] / other)
+        return self * _node("1/x", other)
+
+    def __neg__(self) -> Value:
+        if self.operation == "number":
+            return _number(-self.operands[0])
+        return self.operands[0] if self.operation == "-x" else _node("-x", self)
+
+    def __pow__(self, exponent: Any) -> Value:
+        exponent = _value(exponent)
+        if exponent.operation != "number":
+            # written as a product, whose second factor its slope has, too
+            return _node("power", self, _node("**", self, exponent - 1.0), exponent)
+        n = exponent.operands[0]
+        if n in (0.5, 1.0):
+            return self.sqrt() if n == 0.5 else self
+        if n == 2.0:
+            return self * self
+        if n > 1.0:
+            return _node("power", self, self ** (n - 1.0), exponent)
+        return _node("**", self, exponent)
+
+    def __radd__(self, other: Any) -> Value:
+        return self + other
+
+    def __rsub__(self, other: Any) -> Value:
+        return _value(other) - self
+
+    def __rmul__(self, other: Any) -> Value:
+        return self * other
+
+    def __rtruediv__(self, other: Any) -> Value:
+        return _value(other) / self
+
+    def sqrt(self) -> Value:
+        squares = _squares(self)
+        return _node("norm", *squares) if squares else _node("sqrt", self)
+
+    def sin(self) -> Value:
+        return _node("sin", self)
+
+    def cos(self) -> Value:
+        return _node("cos", self)
+
+    def arctan2(self, other: Any) -> Value:
+        return _node("arctan2", self, _value(other))
+
+    def partials(self) -> Iterable[tuple[Value, Value]]:
+        """Yield the operands and the derivatives by them."""
+        kind, (a, b) = self.operation, (*self.operands, None, None)[:2]
+        if kind == "given":
+            yield from self._partials.items()
+        elif kind in "+-":
+            yield from ((a, ONE), (b, ONE if kind == "+" else -ONE))
+        elif kind == "*":
+            yield from ((a, b), (b, a))
+        elif kind == "-x":
+            yield a, -ONE
+        elif kind == "1/x":
+            yield a, -(self * self)
+        elif kind == "sqrt":
+            yield a, 0.5 / self
+        elif kind == "sin":
+            yield a, a.cos()
+        elif kind == "cos":
+            yield a, -a.sin()
+        elif kind == "norm":
+            yield from ((operand, operand / self) for operand in self.operands)
+        elif kind == "arctan2":
+            length = (a * a + b * b).sqrt()
+            yield from ((a, b / length / length), (b, -(a / length / length)))
+        elif kind == "power":
+            yield a, self.operands[2] * b
+        elif kind == "**":
+            # by the base alone: exponents are constants of a law
+            yield a, b * (self / a)
+
+
+def _node(operation: str, *operands: Any, name: str = "") -> Value:
+    key = (operation, *operands)
+    if key not in _nodes:
+        _nodes[key] = Value(operation, operands, name)
+    return _nodes[key]
+
+
+def _number(number: float) -> Value:
+    return _node("number", float(number))
+
+
+def _value(number: Any) -> Value:
+    return number if isinstance(number, Value) else _number(number)
+
+
+def _squares(value: Value) -> list[Value]:
+    """Return the numbers whose squares a value is the sum of, if it is."""
+    if value.operation == "+":
+        first, second = map(_squares, value.operands)
+        return first + second if first and second else []
+    return [value.operands[0]] if value.operation == "*" and len({*value.operands}) == 1 else []
+
+
+def _commuting(operation: str, a: Value, b: Value, fold: Any) -> Value:
+    if a.operation == b.operation == "number":
+        return _number(fold(a.operands[0], b.operands[0]))
+    # numbers first, then as they came to be
+    order = sorted((a, b), key=lambda x: (x.operation != "number", x.place))
+    return _node(operation, *order)
+
+
+ZERO, ONE = _number(0.0), _number(1.0)
+
+
+def start() -> None:
+    """Forget all nodes, so that what is written does not hang on what was traced before."""
+    _nodes.clear()
+    _slopes.clear()
+    for number in (ZERO, ONE):
+        _nodes["number", number.operands[0]] = number
+
+
+def inputs(names: str, array: str = "", first: int = 0) -> list[Value]:
+    """Return arguments of a kernel: each for itself, or as the numbers of an array from one on."""
+    places = [f"{array}[{first + k}]" if array else name for k, name in enumerate(names.split())]
+    # of one name there may be several, one for each law
+    return [_node("given", place, len(_nodes), name=name) for place, name in zip(places, names.split())]
+
+
+def given(value: Value, partials: Mapping[Value, Any]) -> Value:
+    """Say what derivatives an argument has, by other values; all else is taken for constant. Return it."""
+    value._partials = {by: _value(slope) for by, slope in partials.items()}
+    return value
+
+
+def derivative(value: Value, by: Value) -> Value:
+    """Return the derivative of a value by another one that it was made of."""
+    if value is by:
+        return ONE
+    if (value, by) not in _slopes:
+        _slopes[value, by] = ZERO
+        total = ZERO
+        for operand, slope in value.partials():
+            total = total + slope * derivative(operand, by)
+        _slopes[value, by] = total
+    return _slopes[value, by]
+
+
+def slopes(value: Value, by: Iterable[Value]) -> list[Value]:
+    """Return the derivatives of a value by several others."""
+    return [derivative(value, one) for one in by]
+
+
+def tangent(value: Value, rates: Mapping[Value, Any]) -> Value:
+    """Return the derivative of a value along rates of what it is made of: by time, or by a parameter."""
+    return product((derivative(value, by) for by in rates), map(_value, rates.values()))
+
+
+def product(first: Iterable[Value], second: Iterable[Value]) -> Value:
+    """Return the sum of the products of two rows of numbers."""
+    return sum((a * b for a, b in zip(first, second, strict=True)), ZERO)
+
+
+@dataclass
+class Function:
+    """A kernel to be written.
+
+    Attributes
+    ----------
+    name : str
+    arguments : str
+        Their names, with commas: arrays or numbers.
+    text : str
+        Docstring.
+    returns : sequence of Value
+        What it returns, as a tuple.
+    sets, adds : mapping of str to Value
+        What it writes, and adds, to places of arrays, such as ``"sums[3]"``.
+    """
+
+    name: str
+    arguments: str
+    text: str
+    returns: Sequence[Any] = ()
+    sets: Mapping[str, Any] = field(default_factory=dict)
+    adds: Mapping[str, Any] = field(default_factory=dict)
+
+    def source(self) -> str:
+        """Return the kernel as text."""
+        lines = _Lines([_value(value) for value in (*self.returns, *self.sets.values(), *self.adds.values())])
+        body = [f'    """{self.text}"""', *lines.inputs()]
+        returned = [lines.told(_value(value)) for value in self.returns]
+        written = [f"{place} = {lines.told(_value(value))}" for place, value in self.sets.items()]
+        for place, value in self.adds.items():
+            if value.operation == "-x":
+                written.append(f"{place} -= {lines.told(value.operands[0])}")
+            elif value is not ZERO:
+                written.append(f"{place} += {lines.told(value)}")
+        body += lines.written + ["    " + line for line in written]
+        if returned:
+            body.append(f"    return {', '.join(returned)}")
+        head = '@njit(cache=True, error_model="numpy", forceinline=True)'
+        return "\n".join([head, f"def {self.name}({self.arguments}):", *body]) + "\n"
+
+
+class _Lines:
+    """Lines of a kernel: a name for each value that is used more than once, in the order in which they are needed."""
+
+    def __init__(self, ends: Iterable[Value]) -> None:
+        self.uses: dict[Value, int] = {}
+        self.names: dict[Value, str] = {}
+        self.written: list[str] = []
+        for value in ends:
+            self._count(value)
+
+    def _count(self, value: Value) -> None:
+        self.uses[value] = self.uses.get(value, 0) + 1
+        if self.uses[value] == 1 and value.operation not in ("given", "number"):
+            for operand in value.operands * (2 if value.operation == "norm" else 1):
+                self._count(operand)
+
+    def inputs(self) -> list[str]:
+        """Return the lines that take numbers out of arrays, eight in one."""
+        taken = [value for value in self.uses if value.operation == "given" and value.operands[0] != value.name]
+        taken.sort(key=lambda value: value.place)
+        rows = [taken[k : k + 8] for k in range(0, len(taken), 8)]
+        return [
+            f"    {', '.join(value.name for value in row)} = {', '.join(value.operands[0] for value in row)}"
+            for row in rows
+        ]
+
+    def told(self, value: Value) -> str:
+        """Return the text of a value, after the lines that it needs."""
+        kind = value.operation
+        if value in self.names or kind in ("given", "number"):
+            return self.names.get(value) or value.name or repr(value.operands[0])
+        parts = [self.told(operand) for operand in value.operands]
+        closed = [f"({p})" if re.search(r" [-+*/] |^-", p) and not _whole(p) else p for p in parts]
+        if kind in "+-":
+            text = f"{parts[0]} {kind} {parts[1] if kind == '+' and parts[1][0] != '-' else closed[1]}"
+        elif kind in ("*", "**", "power"):
+            sign = "**" if kind == "**" else "*"
+            text = f"{_factor(parts[0], closed[0]) if sign == '*' else closed[0]} {sign} {closed[1]}"
+        elif kind == "-x":
+            text = f"-{closed[0]}"
+        elif kind == "1/x":
+            text = f"1.0 / {closed[0]}"
+        elif kind == "norm":
+            text = f"np.sqrt({' + '.join(f'{p} * {p}' for p in closed)})"
+        else:
+            text = f"np.{kind}({', '.join(parts)})"
+        if (self.uses[value] > 1 and kind != "-x") or len(text) > WIDTH:
+            name = f"_{len(self.names)}"
+            self.written.append(f"    {name} = {text}")
+            self.names[value] = name
+            return name
+        return text
+
+
+def _whole(text: str) -> bool:
+    """Whether a text is one call."""
+    return text.startswith("np.") and text.endswith(")") and text.count("(") == 1
+
+
+def _factor(text: str, closed: str) -> str:
+    """Return the first factor of a product: without brackets if it is a product of products itself."""
+    return text if not re.search(r" [-+/] |^-", text) else closed
+
+
+def derived(module: str) -> str:
+    """Return the text of the kernels that follow from a module of definitions."""
+    start()
+    made = importlib.import_module(module).functions()
+    return "\n\n".join([
+        f'"""Generated by ``python -m gearmbs.kernels.derive`` from `{module}`: change that, and make it again."""\n\n'
+        "# ruff: noqa\n# fmt: off\n\nimport numpy as np\n\nfrom gearmbs.kernels.jit import njit\n",
+        *(function.source() for function in made),
+    ])  # fmt: skip
+
+
+def definitions() -> list[tuple[str, Path]]:
+    """Return the names of all modules of definitions of the package, and the files of what follows from them."""
+    package = Path(__file__).parent.parent
+    found = sorted(package.rglob("definitions.py"))
+    return [
+        (".".join(path.relative_to(package.parent).with_suffix("").parts), path.with_name("derived.py"))
+        for path in found
+    ]
+
+
+def main() -> None:
+    """Write the kernels of all definitions."""
+    for module, path in definitions():
+        path.write_text(derived(module), encoding="utf-8")
+        print(path)
+
+
+if __name__ == "__main__":
+    # definitions know this module by its name
+    importlib.import_module("gearmbs.kernels.derive").main()
