@@ -76,9 +76,9 @@ class _Turned:
 
     def error(self, part: Solution) -> np.ndarray:
         """Return the transmission error of the next part of a solution, m."""
-        turned = []
-        for wheel, (gear, axes) in enumerate(zip(rig.GEARS, self._axes, strict=True)):
-            along, across = (part.orientation(gear)[..., 0] @ axes[:, k] for k in range(2))
+        turned, wheels = [], [*map(part.orientation, rig.GEARS)]
+        for wheel, (matrices, axes) in enumerate(zip(wheels, self._axes, strict=True)):
+            along, across = (matrices[..., 0] @ axes[:, k] for k in range(2))
             before = self._last[wheel]
             angles = np.unwrap(np.concatenate([before, np.arctan2(across, along)]))[before.size :]
             self._last[wheel] = angles[-1:]
