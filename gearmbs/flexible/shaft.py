@@ -329,7 +329,9 @@ class Shaft(Written):
     def spin_stiffness(self, about: str | Quantity) -> np.ndarray:
         """Return the geometric stiffness by a spin of 1 rad/s across the shaft, about an axis through a place of it.
 
-        What is farther out pulls with its centrifugal force, which stiffens the shaft against bending.
+        What is farther out pulls with its centrifugal force, which stiffens the shaft against bending: at a place p
+        beyond the axis at c the tension is the integral of the mass over (z - c) from p to the end, with all discs
+        there. At the axis it jumps, so that an element around it is integrated in two parts.
 
         Parameters
         ----------
@@ -337,16 +339,27 @@ class Shaft(Written):
             Seat, or position along the shaft, m, that the spin's axis goes through.
         """
         centre = self.seats[about] if about in self.seats else quantity(about, "length", f"shaft '{self.name}': spin")
-        slices, z = self.model().slices, self.stations()
-        assert slices is not None
-        place, pull = slices.position[:, 2], slices.mass * (slices.position[:, 2] - centre)
+        z = self.stations()
+        sections = [self.element_section(a, b) for a, b in pairwise(z)]
+        masses = np.array([section.mass for section in sections])
+        pulls = np.diff((z - centre) ** 2) / 2 * masses
+        places_of_discs = np.array([z[np.argmin(np.abs(z - disc.at))] for disc in self.discs])
+        pulls_of_discs = np.array([d.properties(self.material)[0] for d in self.discs]) * (places_of_discs - centre)
         out = np.zeros((DOFS * z.size,) * 2)
-        for k, (a, b) in enumerate(pairwise(z)):
-            at = a + GAUSS_X * (b - a)
-            tension = np.array([abs(np.sum(pull[(place > p) if p > centre else (place < p)])) for p in at])
+        for k, ((a, b), section) in enumerate(zip(pairwise(z), sections)):
+            parts = [(a, centre), (centre, b)] if a < centre < b else [(a, b)]
+            at = np.concatenate([p + GAUSS_X * (q - p) for p, q in parts])
+            weights = np.concatenate([GAUSS_W * (q - p) / (b - a) for p, q in parts])
+            beyond = at > centre
+            ends = np.where(beyond, (b - centre) ** 2, -((a - centre) ** 2))
+            within = masses[k] / 2 * (ends - np.where(beyond, 1.0, -1.0) * (at - centre) ** 2)
+            outside = np.where(beyond, pulls[k + 1 :].sum(), pulls[:k].sum())
+            discs = np.where(
+                beyond, pulls_of_discs[places_of_discs >= b].sum(), pulls_of_discs[places_of_discs <= a].sum()
+            )
+            tension = np.abs(within + outside + discs)
             places = slice(DOFS * k, DOFS * (k + 2))
-            section = self.element_section(a, b)
-            out[places, places] += geometric_stiffness(b - a, section, GAUSS_X, GAUSS_W * tension)
+            out[places, places] += geometric_stiffness(b - a, section, (at - a) / (b - a), weights * tension)
         return out
 
     def modal_model(

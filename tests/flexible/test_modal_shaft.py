@@ -234,3 +234,58 @@ def test_an_unknown_level_of_coupling_is_refused_with_all_that_there_are():
     model = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}).modal_model().slowest(4)
     with pytest.raises(FlexibleError, match=says("coupling = 'half'", "choose")):
         model.add_to(Mechanism("m"), coupling="half")
+
+
+@pytest.mark.parametrize("case", range(12))
+def test_stiffening_by_spin_holds_against_a_rigid_turn_what_the_mass_weighs(case):
+    """w = z - c has the slope 1, so that what G holds against it is the integral of the tension, that of m (z - c)^2.
+
+    Between the shaft's ends, beyond them (a hub), and at a seat; with steps, bores and discs.
+    """
+    rng = np.random.default_rng(100 + case)
+    sections = [
+        ShaftSection(float(length), float(outer), inner=float(bore))
+        for length, outer, bore in zip(rng.uniform(0.05, 0.4, 3), rng.uniform(0.03, 0.06, 3), rng.uniform(0.0, 0.02, 3))
+    ]
+    total = sum(section.length for section in sections)
+    discs = [Disc(float(at), outer=0.2, width=0.02, inner=0.05) for at in rng.uniform(0.0, total, 2)]
+    shaft = Shaft(sections, discs, {"a": 0.0, "b": total})
+    centre = float(rng.uniform(-0.3, 1.2) * total)
+    z = shaft.stations()
+    q = np.zeros(6 * z.size)
+    q[0::6], q[4::6] = z - centre, 1.0
+    held = q @ shaft.spin_stiffness(centre) @ q
+    weighed, start, pull = 0.0, 0.0, 0.0
+    for section in sections:
+        area = np.pi / 4 * (section.outer**2 - section.inner**2)
+        ends = np.array([start, start + section.length]) - centre
+        weighed += shaft.material.density * area * np.diff(ends**3)[0] / 3
+        pull += shaft.material.density * area * np.diff(ends**2)[0] / 2
+        start += section.length
+    for disc in shaft.discs:
+        mass = disc.properties(shaft.material)[0]
+        weighed += mass * (disc.at - centre) ** 2
+        pull += mass * (disc.at - centre)
+    # a hub between axis and shaft holds its part
+    weighed -= pull * (min(max(centre, 0.0), total) - centre)
+    assert held == pytest.approx(weighed, rel=1e-6)
+
+
+BLADE = [(3, 4.7973, 23.3203), (6, 7.3604, 26.8091), (12, 13.1702, 37.6031)]
+
+
+@pytest.mark.parametrize(("spin", "first", "second"), BLADE)
+def test_a_turning_blade_has_the_published_frequencies(spin, first, second):
+    """Wright, Smith, Thresher and Wang (1982): flapwise frequencies of a uniform blade clamped at the axis, in units
+    of sqrt(EI/m)/L^2, as the speed is. The tension is exact for any number of elements."""
+    slender = ElasticMaterial(youngs_modulus=210e9, shear_modulus=80e9, density=7800)
+    length, width = 1.0, 0.005
+    shaft = Shaft([ShaftSection(length, width)], [], {"root": 0.0, "tip": length}, slender)
+    model = shaft.model()
+    unit = np.sqrt(7800 * np.pi / 4 * width**2 / (210e9 * np.pi / 64 * width**4)) * length**2
+    matrix = model.stiffness + (spin / unit) ** 2 * shaft.spin_stiffness("root")
+    mass = model.mass.toarray()
+    flap = np.array([k for k in range(6, matrix.shape[0]) if k % 6 in (0, 4)])
+    both = np.ix_(flap, flap)
+    found = np.sqrt(scipy.linalg.eigh(matrix[both], mass[both], eigvals_only=True)[:2])
+    assert found * unit == pytest.approx([first, second], rel=2e-4)
