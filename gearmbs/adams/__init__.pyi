@@ -8,6 +8,7 @@ from .parse.commands import Script as Script
 from .parse.commands import parse_script as parse_script
 from .parse.commands import read_script as read_script
 from .parse.deck import Deck as Deck
+from .parse.files import reading_from as reading_from
 from .parse.reader import parse_deck as parse_deck
 from .results.res import ResultSet as ResultSet
 from .results.res import ResultsFile as ResultsFile

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,6 +36,10 @@ def adams(
     variable: Annotated[
         list[str] | None, typer.Option(help="NAME=VALUE of a design variable of a .cmd; may be given again.")
     ] = None,
+    read_from: Annotated[
+        list[Path] | None,
+        typer.Option(help="Folder whose files the model may read, too; may be given again."),
+    ] = None,
     to_deck: Annotated[
         Path | None, typer.Option(help="Write the deck of a .cmd here, and its simulations beside; run nothing.")
     ] = None,
@@ -44,9 +49,10 @@ def adams(
     ] = None,
 ) -> None:
     """Run an ADAMS deck, or a command file of View; write .req, .res, .msg and NetCDF."""
-    with guarded():
-        from gearmbs.adams import DeckError, load_routines, read_script, run_deck
+    with guarded(), ExitStack() as stack:
+        from gearmbs.adams import DeckError, load_routines, read_script, reading_from, run_deck
 
+        stack.enter_context(reading_from(*(read_from or [])))
         if not model.is_file():
             fail(f"there is no file '{model}'")
         viewed = _viewed(model, variable or [], to_deck is not None or simulation is not None)

@@ -30,6 +30,10 @@ MOST = 10_000
 """Passages in one analysis after which a sensor is taken to chatter."""
 AT_ONCE = 100
 """Passages at one time, besides one of each sensor, after which they are taken to go on there for ever."""
+CROWD = 200
+"""Passages between two outputs after which a sensor is taken to chatter, if they make up little of the analysis."""
+LITTLE = 0.1
+"""Of what was left of the analysis when they began: vibrations of a long analysis with few outputs go on beyond it."""
 SAME = 1e-9
 """Of the span of an analysis: output times nearer to a passage are that time."""
 
@@ -47,6 +51,10 @@ class Watch:
         Carried out so far.
     at_once : int
         Parts in which time has not gone on, since the last in which it has.
+    crowded : int
+        Parts that have ended before their first output, since the last that has reached it.
+    crowded_from : float
+        When the first of these began, in the deck's unit.
     first_step : float or None
         That a STEPSIZE asks for, in the deck's unit.
     """
@@ -55,6 +63,8 @@ class Watch:
     waits: dict[int, int] = field(default_factory=dict)
     parts: int = 0
     at_once: int = 0
+    crowded: int = 0
+    crowded_from: float = 0.0
     first_step: float | None = None
 
     def stops(self) -> list[StopAt]:
@@ -116,12 +126,22 @@ class Watch:
         """Count a part that was to go through ``times`` and has ended at ``now``; say why there are too many, if so."""
         self.parts += 1
         self.at_once = self.at_once + 1 if now - times[0] <= SAME * (times[-1] - times[0]) else 0
+        if now >= times[1] or self.crowded == 0:
+            self.crowded, self.crowded_from = 0, float(times[0])
+        self.crowded += now < times[1]
         if self.at_once > AT_ONCE + len(self.sensors):
             return (
                 f"it fires again and again at TIME = {now:.9g}; what it evaluates there, or a jump of its function, "
                 "puts the function back behind its VALUE"
             )
-        return f"it fired {MOST} times in one analysis; its function chatters" if self.parts > MOST else ""
+        if self.parts > MOST:
+            return f"it fired {MOST} times in one analysis; its function chatters"
+        if self.crowded > CROWD and now - self.crowded_from < LITTLE * (times[-1] - self.crowded_from):
+            return (
+                f"sensors fired {CROWD} times from TIME = {self.crowded_from:.9g} to {now:.9g} without an output; "
+                "if no function chatters, as an angle does where it is not defined, ask for more STEPS"
+            )
+        return ""
 
     def note_passage(self, sensor: st.Sensor, evaluator: RequestEvaluator) -> None:
         """Expect a sensor's function back from where it went."""

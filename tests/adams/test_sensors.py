@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
+from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck, sensors
 from gearmbs.adams.results.result import message_text
 from gearmbs.adams.sensors import in_unit
 from gearmbs.mechanism import Mechanism, ModelError
@@ -232,6 +232,15 @@ def test_a_sequence_of_equilibria_returns_and_halts():
 def test_a_sensor_that_is_met_at_the_first_equilibrium_fires_there():
     result = pulled("SENSOR/1, LE, VALUE=0.5, FUNCTION=DZ(20), RETURN")
     assert list(result.t) == [0.0]
+
+
+@pytest.mark.slow
+def test_a_sensor_that_chatters_between_outputs_ends_the_run(monkeypatch):
+    monkeypatch.setattr(sensors, "CROWD", 20)
+    text = "SENSOR/1, LE, VALUE=0.5, FUNCTION=MOD(1E4*TIME,1)+0*DZ(20)"
+    with pytest.raises(DeckError, match=says("SENSOR/1", "chatters", "STEPS")):
+        run(text, "SIMULATE/DYNAMICS, END=1, STEPS=2\n")
+    assert run(text, "SIMULATE/DYNAMICS, END=0.001, STEPS=2\n").success
 
 
 def test_a_routine_evaluates_what_a_sensor_senses():

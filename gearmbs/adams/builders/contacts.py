@@ -12,6 +12,7 @@ from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import curve_points
+from gearmbs.adams.parse.files import named_file
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
 from gearmbs.mechanism.contacts.meshes import READERS, SUFFIXES, body_of, read_mesh, shape_of
@@ -163,13 +164,15 @@ def _point(b: Builder, g: st.Graphics) -> Shape:
 
 
 def _file(b: Builder, g: st.Graphics) -> Path:
-    name = Path((g.data_file or "").replace("\\", "/"))
-    return name if name.is_absolute() else Path(b.deck.file).parent / name
+    return named_file("FILE", g.data_file or "", b.deck.file)
 
 
 def _unread(b: Builder, g: st.Graphics) -> str:
     """Return why the solid of a file cannot be read at all; empty if it can."""
-    path = _file(b, g)
+    try:
+        path = _file(b, g)
+    except ValueError as error:
+        return f"{error}; a CONTACT without it"
     if path.suffix.lower() not in (*READERS, *SUFFIXES):
         return f"save the solid as {', '.join((*SUFFIXES, *READERS))}; other files"
     if path.suffix.lower() in SUFFIXES and not path.is_file():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,7 @@ from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import matrix_values
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.files import named_file
 from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.syntax import Call, Scope, parse, walk
@@ -477,11 +477,9 @@ def _neutral_file(deck: Deck, s: st.FlexBody) -> ModalNeutralFile:
             "files are not read. Write MNF_FILE = the body's modal neutral file; of matrices with a table of nodes one "
             "is made by gearmbs.flexible: write_mnf(path, mnf_of(reduce_model(from_matrices(k, m, positions), faces)))"
         )
-    path = Path(s.mnf_file.replace("\\", "/"))
     if "://" in s.mnf_file:
         raise ValueError(f"MNF_FILE = {s.mnf_file}: no database of ADAMS/Car is looked up; give the path of the file")
-    if not path.is_absolute():
-        path = Path(deck.file).parent / path
+    path = named_file("MNF_FILE", s.mnf_file, deck.file)
     key = str(path)
     if key not in deck.modal_files:
         if not path.exists():

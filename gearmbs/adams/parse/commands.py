@@ -9,6 +9,7 @@ from pathlib import Path, PureWindowsPath
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.files import named_file
 from gearmbs.adams.parse.grammar import (
     CHOICE,
     CONTINUED,
@@ -242,8 +243,9 @@ def parse_script(text: str, file: str = "<script>", depth: int = 0) -> Script:
 def _include(script: Script, command: FileCommand, errors: list[Diagnostic], depth: int) -> None:
     """Append the commands of another file."""
     name = command.command or ""
-    path = Path(script.file).parent / (name if Path(name).suffix else f"{name}.acf")
+    path = Path(script.file)
     try:
+        path = named_file("COMMAND", name if Path(name).suffix else f"{name}.acf", path)
         if depth >= DEEPEST:
             raise DeckError([Diagnostic(ERROR, f"files call each other more than {DEEPEST} deep", script.file, 0)])
         if not path.is_file():

@@ -12,6 +12,7 @@ import numpy as np
 
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.files import named_file
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.mechanism.parts.curves import Curve
 
@@ -106,8 +107,8 @@ def matrix_values(matrix: st.Matrix) -> np.ndarray:
 
 def _from_file(matrix: st.Matrix) -> np.ndarray:
     """Return a MATRIX of a file beside the deck: by its name there, or the only one."""
-    path = Path((matrix.data_file or "").replace("\\", "/"))
-    found = read_matrices(path if path.is_absolute() else Path(matrix.file).parent / path)
+    path = named_file("FILE", matrix.data_file or "", matrix.file)
+    found = read_matrices(path)
     wanted = (matrix.matrix_name or "").upper()
     if wanted in found or (not wanted and len(found) == 1):
         return found[wanted] if wanted else next(iter(found.values()))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -461,36 +462,31 @@ for _k, _name in enumerate(("DX", "DY", "DZ")):
     FUNCTIONS[_name] = Function(1, 3, _component(_k), placing=True)
 
 
-def _angle_about(k: int) -> Run:
+def _angle_about(k: int, c: np.ndarray) -> float:
     """Angle of a frame about axis k of another: of its next axis but one, as the solver's AX, AY and AZ."""
+    i, j = (k + 1) % 3, (k + 2) % 3
+    # AX, AY: of the z axis and the x axis; AZ: of the x axis
+    return math.atan2(-c[i, j], c[j, j]) if k < 2 else math.atan2(c[1, 0], c[0, 0])
+
+
+def _turn(angle: Callable[[np.ndarray], float]) -> Run:
+    """One angle of a frame to another, or to the global one."""
 
     def run(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> float:
         a = _pose(values, ev, args[0])[0]
         b = _pose(values, ev, args[1])[0] if len(args) > 1 else frames.IDENTITY
-        c = b.T @ a
-        i, j = (k + 1) % 3, (k + 2) % 3
-        # AX, AY: of the z axis and the x axis; AZ: of the x axis
-        angle = math.atan2(-c[i, j], c[j, j]) if k < 2 else math.atan2(c[1, 0], c[0, 0])
-        return angle / values.db.units.radian
+        return angle(b.T @ a) / values.db.units.radian
 
     return run
 
 
-for _k, _name in enumerate(("AX", "AY", "AZ")):
-    FUNCTIONS[_name] = Function(1, 2, _angle_about(_k), placing=True)
+def _euler(k: int, c: np.ndarray) -> float:
+    return frames.angles_313(c)[k]
 
 
-def _euler(k: int) -> Run:
-    def run(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> float:
-        a = _pose(values, ev, args[0])[0]
-        b = _pose(values, ev, args[1])[0] if len(args) > 1 else frames.IDENTITY
-        return frames.angles_313(b.T @ a)[k] / values.db.units.radian
-
-    return run
-
-
-for _k, _name in enumerate(("PSI", "THETA", "PHI")):
-    FUNCTIONS[_name] = Function(1, 2, _euler(_k), placing=True)
+for _names, _angle in (("AX AY AZ", _angle_about), ("PSI THETA PHI", _euler)):
+    for _k, _name in enumerate(_names.split()):
+        FUNCTIONS[_name] = Function(1, 2, _turn(partial(_angle, _k)), placing=True)
 
 
 FUNCTIONS |= {

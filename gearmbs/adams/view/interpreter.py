@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gearmbs.adams.parse.files import named_file
 from gearmbs.adams.parse.reader import read_text
 from gearmbs.adams.view.edits import Editor
 from gearmbs.adams.view.expressions import text_of
@@ -303,12 +304,8 @@ class Interpreter(Editor):
         """
         if self.folder is None:
             raise ViewError(f"{name[:80]}: a text without a folder reads no files", line)
-        root = self.folder.resolve()
-        path = (root / name.replace("\\", "/")).resolve()
-        if root not in path.parents:
-            raise ViewError(f"{name[:80]} is outside the folder of this file; copy it there", line)
         try:
-            return read_text(path.read_bytes())
+            return read_text(named_file("file_name", name, self.folder / "this file").read_bytes())
         except (OSError, ValueError) as error:
             raise ViewError(f"{name[:80]} cannot be read: {error}", line) from error
 

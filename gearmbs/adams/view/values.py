@@ -25,6 +25,9 @@ _SPECIAL = {"none": "", "true": 1, "false": 0, "pi": math.pi}
 Pose = tuple[np.ndarray, np.ndarray]
 """Rotation and position of a frame in the global one."""
 GLOBAL: Pose = (frames.IDENTITY, frames.ORIGIN)
+AT_ONCE = 20
+"""Arguments that are evaluated within each other: what stands behind these is evaluated first, so that rows of any
+length are no deep recursion."""
 ORIENTATIONS = ("orientation", "along_axis_orientation", "in_plane_orientation")
 
 
@@ -62,15 +65,23 @@ def fixed(*values: Any, line: int = 0) -> Stored:
     return Stored(tuple(("value", one) for one in values), line)
 
 
+class _DeepError(Exception):
+    """An argument is to be evaluated before what asks for it."""
+
+    def __init__(self, *wanted: Any) -> None:
+        self.wanted: tuple[Item, str, Item | None] = wanted
+
+
 class Values:
     """Reads arguments of objects in a database."""
 
     def __init__(self, database: Database) -> None:
         self.db = database
         self.busy: set[tuple[int, str]] = set()
+        self._deep: dict[tuple[int, str, int], list[Any]] = {}
         self.loops: dict[str, Item] = {}
         self._poses: dict[int, Pose] = {}
-        self._version = -1
+        self._version = self._deep_version = -1
         self.constant = 0
 
     # From what was written to what is stored.
@@ -190,15 +201,38 @@ class Values:
         ViewError
             If it depends on itself, or cannot be evaluated.
         """
+        if self.busy:
+            return self._evaluated(item, key, frame)
+        if self._deep_version != self.db.version or self.loops:
+            self._deep, self._deep_version = {}, self.db.version
+        waiting = [(item, key, frame)]
+        while True:
+            try:
+                found = self._evaluated(*waiting[-1])
+            except _DeepError as deep:
+                if any(all(a is b for a, b in zip(deep.wanted, one)) for one in waiting):
+                    raise ViewError(f"{key} of {item.path} depends on itself", item.fields[key].line) from None
+                waiting.append(deep.wanted)
+            except RecursionError:
+                message = f"{key} of {item.path}: its expressions are nested too deeply; give parts of them names"
+                raise ViewError(message, item.fields[key].line) from None
+            else:
+                last, name, home = waiting.pop()
+                if not waiting:
+                    return found
+                self._deep[id(last), name, id(home)] = found
+
+    def _evaluated(self, item: Item, key: str, frame: Item | None) -> list[Any]:
         stored: Stored = item.fields[key]
         item.used.add(key)
         mark = (id(item), key)
         if mark in self.busy:
             raise ViewError(f"{key} of {item.path} depends on itself", stored.line)
-        if len(self.busy) > 150:
-            raise ViewError(
-                f"{key} of {item.path}: expressions depend on each other through more than 150 objects", stored.line
-            )
+        known = self._deep.get((id(item), key, id(frame)))
+        if known is not None:
+            return known
+        if len(self.busy) >= AT_ONCE:
+            raise _DeepError(item, key, frame)
         self.busy.add(mark)
         try:
             found: list[Any] = []

@@ -21,9 +21,11 @@ from gearmbs.mechanism.language.syntax import (
     Power,
     Ref,
     Scope,
+    Steps,
     innermost_first,
     parse,
     shown,
+    unrolled,
 )
 from gearmbs.wording import did_you_mean
 
@@ -50,10 +52,22 @@ UNSUPPORTED = frozenset(
     "UVX UVY UVZ DXYZ VXYZ WXYZ FXYZ TXYZ TRANS ARYSUM RANDOM".split()
 )
 """Functions of ADAMS that exist but are not evaluated here."""
+DEEPEST = 500
+"""Expressions that name each other in a row: each of them is written with all behind it, so that time goes with the
+square of their number, and these take some ten seconds."""
+LONGEST_RING = 10
+"""Expressions that name each other, of which a message names all."""
 
 
 Function = tuple[Callable[["Lowering", Call], int], int, int]
 """A function of the language: what writes its call to the tape, least and most number of arguments."""
+
+
+class _NamesError(Exception):
+    """A call names another element's expression, which is to be written first."""
+
+    def __init__(self, key: tuple[str, Ref], text: str) -> None:
+        self.key, self.text = key, text
 
 
 class Lowering:
@@ -85,14 +99,30 @@ class Lowering:
     # syntax tree -> registers
 
     def whole(self, root: Node) -> int:
-        """Return the register of a whole tree: its functions and operations from the innermost out, in a loop."""
+        """Return the register of a whole tree, and before it of the expressions that it names, in a loop."""
+        return unrolled(self._steps(root))
+
+    def _steps(self, root: Node) -> Steps[int]:
+        """Write a tree's functions and operations, from the innermost out."""
         outer, self._made = self._made, {}
         for part in innermost_first(root):
-            if not isinstance(part, (Number, Name)):
-                self._made[id(part)] = self._written(part)
+            while not isinstance(part, (Number, Name)) and id(part) not in self._made:
+                try:
+                    self._made[id(part)] = self._written(part)
+                except _NamesError as names:
+                    yield self._in_place(names.key, names.text)
         register = self.node(root)
         self._made = outer
         return register
+
+    def _in_place(self, key: tuple[str, Ref], text: str) -> Steps[int]:
+        """Write another element's expression."""
+        self._open.append(key)
+        outer, self.text = self.text, text
+        self._inlined[key] = yield self._steps(parse(text))
+        self.text = outer
+        self._open.pop()
+        return self._inlined[key]
 
     def node(self, node: Node) -> int:
         """Return the register of a node, the parts of which have theirs."""
@@ -230,16 +260,13 @@ class Lowering:
         if key in self._inlined:
             return self._inlined[key]
         if key in self._open:
-            ring = " -> ".join(f"{k.upper()}/{r}" for k, r in [*self._open[self._open.index(key) :], key])
-            self.fail(f"{ring} depends on itself", at)
-        if len(self._open) > 50:
-            self.fail(f"{kind.upper()} expressions refer to each other more than 50 deep", at)
-        self._open.append(key)
-        outer, self.text = self.text, text
-        self._inlined[key] = self.whole(parse(text))
-        self.text = outer
-        self._open.pop()
-        return self._inlined[key]
+            ring = [f"{k.upper()}/{r}" for k, r in [*self._open[self._open.index(key) :], key]]
+            if len(ring) > LONGEST_RING:
+                ring[LONGEST_RING // 2 : -LONGEST_RING // 2] = ["..."]
+            self.fail(f"{' -> '.join(ring)} depends on itself", at)
+        if len(self._open) >= DEEPEST:
+            self.fail(f"{kind.upper()} expressions refer to each other more than {DEEPEST} deep; join some of them", at)
+        raise _NamesError(key, text)
 
     # forces of elements
 

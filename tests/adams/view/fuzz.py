@@ -66,7 +66,7 @@ def corpus() -> list[str]:
 
 def mutated(text: str, rng: random.Random) -> str:
     """Change lines, words and characters of a file."""
-    for _ in range(rng.choice((1, 1, 1, 2, 3, 6))):
+    for _ in range(rng.choice((1, 1, 1, 1, 2, 6))):
         lines = text.split("\n")
         k, j = rng.randrange(len(lines)), rng.randrange(len(lines))
         # numbers half of the time, so that many files can still be built

@@ -171,3 +171,17 @@ def test_circles_are_ended_by_what_was_there_before():
     run.run("marker modify marker_name = .m.P.E location = (LOC_RELATIVE_TO({0, 0, 0}, .m.P.D)) relative_to = .m.P\n")
     assert not run.errors
     assert np.all(np.isfinite(run.values.location(run.database.find(".m.P.D"))))
+
+
+def test_variables_in_a_row_are_no_deep_recursion():
+    row = "".join(f"variable create variable_name = .m.r{k} real_value = (.m.r{k - 1} + 1)\n" for k in range(1, 500))
+    model = f"{MODEL}variable create variable_name = .m.r0 real_value = (.m.list[1])\n{row}"
+    run = Interpreter()
+    run.run(model)
+    assert not run.errors
+    assert evaluated(run.values, ".m.r499") == 500
+    run.run("variable modify variable_name = .m.list real_value = 7, 8\n")
+    assert evaluated(run.values, ".m.r499") == 506
+    run.run("variable modify variable_name = .m.r0 real_value = (.m.r499)\n")
+    with pytest.raises(ViewError, match=says("real_value", "depends on itself")):
+        evaluated(run.values, ".m.r499")

@@ -179,6 +179,15 @@ def test_variables_are_written_in_place_and_cycles_named():
         compile_expression("VARVAL(3)", Scope(**scope))
 
 
+def test_variables_in_a_row_are_no_deep_recursion():
+    row = {1: "TIME", **{k: f"VARVAL({k - 1}) + 1" for k in range(2, 400)}}
+    assert at("VARVAL(399)", 1.5, variables=row) == pytest.approx(1.5 + 398)
+    with pytest.raises(ExpressionError, match=says("VARIABLE", "500 deep", "join")):
+        at("VARVAL(700)", 1.5, variables={1: "TIME", **{k: f"VARVAL({k - 1}) + 1" for k in range(2, 701)}})
+    with pytest.raises(ExpressionError, match=r"VARIABLE/1 -> .* -> \.\.\. -> .* -> VARIABLE/1 depends on itself"):
+        at("VARVAL(1)", 0.0, variables={1: "VARVAL(399)", **{k: f"VARVAL({k - 1})" for k in range(2, 400)}})
+
+
 def test_arrays_and_plants():
     scope = {"arrays": {3: (5.0, 6.0)}, "variables": {1: "TIME"}, "plants": {("pinput", 2): (1,)}}
     assert at("ARYVAL(3,2)", 0.0, **scope) == 6.0
