@@ -12,7 +12,8 @@ import numpy as np
 
 from gearmbs.dae.problem import ModelError
 from gearmbs.solids.faces import Crossed, cut
-from gearmbs.solids.surfaces import Chain, Curve, Surface, Turned, chain, curve_of, surface_of
+from gearmbs.solids.procedural import surface_of
+from gearmbs.solids.surfaces import Chain, Curve, Surface, Turned, chain, curve_of
 from gearmbs.solids.transmit import Node, Nodes, read_transmit
 
 SOLID = 1
@@ -82,8 +83,18 @@ class Body:
         """Return the surface of a node."""
         known = self._surfaces.get(number)
         if known is None:
-            known = self._surfaces[number] = surface_of(self.nodes, number)
+            if number in self._wanted:
+                raise ModelError(f"its surface {number} is made of itself")
+            self._wanted.add(number)
+            try:
+                known = self._surfaces[number] = surface_of(self.nodes, number, self.surface)
+            finally:
+                self._wanted.discard(number)
         return known
+
+    @cached_property
+    def _wanted(self) -> set[int]:
+        return set()
 
     @cached_property
     def _surfaces(self) -> dict[int, Surface]:

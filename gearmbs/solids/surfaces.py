@@ -220,8 +220,11 @@ def _intersection(nodes: Nodes, node: Node, surface: Callable[[int], Any]) -> Ch
         return rough
     out = fine.copy()
     for _ in range(20):
+        before = out
         for s in both:
             out = s.points(s.project(out))
+        if np.abs(out - before).max() < 1e-12:
+            break
     # where it does not come back, as at places where the surfaces touch, the chord stays
     far = np.linalg.norm(out - fine, axis=1)
     bad = ~(far < 0.3 * np.repeat(np.r_[chords, chords[-1:]], FINER)[: len(fine)])
@@ -453,98 +456,6 @@ class BSplineSurface(Searched):
     def points(self, uv: np.ndarray) -> np.ndarray:
         values = self._spline(self._inside(uv))
         return values[:, :-1] / values[:, -1:] if self._rational else values
-
-
-class Swept(Searched):
-    """C(u) + v D."""
-
-    kind = "SWEPT_SURF"
-
-    def __init__(self, section: Curve, direction: np.ndarray, sense: float) -> None:
-        self.section, self.direction, self.sense = section, direction, sense
-        low, high, period = _range(section)
-        self.low, self.high = np.array([low, -1.0]), np.array([high, 1.0])
-        self.periods = (period, None)
-
-    def points(self, uv: np.ndarray) -> np.ndarray:
-        return self.section.points(uv[:, 0]) + np.outer(uv[:, 1], self.direction)
-
-    def project(self, x: np.ndarray) -> np.ndarray:
-        along = (x - self.section.points(np.array([self.low[0]]))) @ self.direction
-        room = np.ptp(along) + 1e-3
-        self.low[1], self.high[1], self._grid = along.min() - room, along.max() + room, None
-        return super().project(x)
-
-
-class Spun(Searched):
-    """C(u) turned about an axis by v."""
-
-    kind = "SPUN_SURF"
-
-    def __init__(self, profile: Curve, node: Node) -> None:
-        self.profile, self.base, self.axis = profile, np.array(node.base), np.array(node.axis)
-        self.sense = -1.0 if node.sense == "-" else 1.0
-        low, high, period = _range(profile)
-        self.low, self.high = np.array([low, 0.0]), np.array([high, ROUND])
-        self.periods = (period, ROUND)
-
-    def points(self, uv: np.ndarray) -> np.ndarray:
-        c = self.profile.points(uv[:, 0]) - self.base
-        z = np.outer(c @ self.axis, self.axis)
-        arm, cos, sin = c - z, np.cos(uv[:, 1:]), np.sin(uv[:, 1:])
-        return self.base + z + arm * cos + np.cross(self.axis, arm) * sin
-
-
-class Offset(Searched):
-    """Another surface, moved along its normal."""
-
-    kind = "OFFSET_SURF"
-
-    def __init__(self, base: Surface, distance: float) -> None:
-        self.base, self.distance, self.sense = base, distance, base.sense
-        self.periods, self.poles = base.periods, base.poles
-        if isinstance(base, Searched):
-            self.low, self.high = base.low, base.high
-
-    def points(self, uv: np.ndarray) -> np.ndarray:
-        normals = np.array([self.base.normal(p, np.ones(2)) for p in uv])
-        normals *= self.base.sense / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
-        return self.base.points(uv) + self.base.sense * self.distance * normals
-
-    def project(self, x: np.ndarray) -> np.ndarray:
-        # along the normal, the nearest point of both is the same
-        return self.base.project(x)
-
-
-def _range(curve: Curve) -> tuple[float, float, float | None]:
-    if curve.period is not None and not np.isfinite(curve.low):
-        return 0.0, curve.period, curve.period
-    if not np.isfinite(curve.low):
-        return -10.0, 10.0, None
-    return curve.low, curve.high, curve.period
-
-
-def surface_of(nodes: Nodes, number: int) -> Surface:
-    """Return the surface of a node.
-
-    Raises
-    ------
-    ModelError
-        If it is of a kind that is not read.
-    """
-    node = nodes[number]
-    if node.kind in ("PLANE", "CYLINDER", "CONE", "SPHERE", "TORUS"):
-        return Turned(node)
-    if node.kind == "B_SURFACE":
-        return BSplineSurface(nodes, node)
-    if node.kind == "SWEPT_SURF":
-        section = curve_of(nodes, node.section, lambda n: surface_of(nodes, n))
-        return Swept(section, np.array(node.sweep), -1.0 if node.sense == "-" else 1.0)
-    if node.kind == "SPUN_SURF":
-        return Spun(curve_of(nodes, node.profile, lambda n: surface_of(nodes, n)), node)
-    if node.kind == "OFFSET_SURF":
-        return Offset(surface_of(nodes, node.surface), node.offset)
-    raise ModelError(f"its faces have surfaces of the kind {node.kind}, which are not read; save the solid as .stl")
 
 
 # Parameters of a surface as a plane: unrolled, or of a sphere stereographic.

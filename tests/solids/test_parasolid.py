@@ -8,8 +8,20 @@ from gearmbs.mechanism.contacts import Box, Cylinder, Frustum, Mesh, Sphere, Tor
 from gearmbs.mechanism.contacts.shapes import volume
 from gearmbs.solids import read_bodies
 from gearmbs.solids.bodies import faceted, primitive
+from gearmbs.solids.procedural import Blend, Bound
 from tests.says import says
-from tests.solids.transmit_files import Solid, block, circle, cylinder, drilled, line, plane, transmit, turned
+from tests.solids.transmit_files import (
+    Solid,
+    block,
+    circle,
+    cylinder,
+    drilled,
+    line,
+    plane,
+    rounded_cylinder,
+    transmit,
+    turned,
+)
 
 Z, X = (0, 0, 1), (1, 0, 0)
 
@@ -124,6 +136,21 @@ def test_a_cylinder_s_side_may_be_given_otherwise(tmp_path, kind):
         side = spline_cylinder(0.4, 2.0), "+"
     vertices, triangles = facets_of(tmp_path, turned(0.4, 0.4, 2.0, side), 1e-4)
     assert volume(vertices, triangles) == pytest.approx(np.pi * 0.16 * 2.0, rel=1e-3)
+
+
+def test_an_edge_that_a_ball_has_rounded(tmp_path):
+    """Of it a quarter of a torus is left; where the ball touches it ends."""
+    vertices, triangles = facets_of(tmp_path, rounded_cylinder(0.4, 2.0, 0.1), 1e-4)
+    layer = 0.3**2 * 0.1 + 0.3 * np.pi * 0.1**2 / 2.0 + 2.0 * 0.1**3 / 3.0
+    assert volume(vertices, triangles) == pytest.approx(np.pi * (0.16 * 1.9 + layer), rel=1e-3)
+    high = vertices[vertices[:, 2] > 1.9]
+    assert np.hypot(np.hypot(high[:, 0], high[:, 1]) - 0.3, high[:, 2] - 1.9) == pytest.approx(0.1, abs=1e-12)
+
+    body = read_bodies(written(tmp_path, rounded_cylinder(0.4, 2.0, 0.1)))[0]
+    blend = next(face.surface for face in body.faces if isinstance(face.surface, Blend))
+    for near, touched in (((0.5, 0.0, 1.95), (0.4, 0.0, 1.9)), ((0.0, 0.35, 2.1), (0.0, 0.3, 2.0))):
+        edge = Bound(blend)
+        assert edge.points(edge.project(np.array([near])))[0] == pytest.approx(touched, abs=1e-9)
 
 
 def spline_cylinder(radius, length):

@@ -40,10 +40,12 @@ class Writer:
 
     def geometry(self, kind, fields):
         """Add a curve or surface; fields that are pairs (kind, fields) become nodes of their own."""
-        fields = {
-            k: self.geometry(*v) if isinstance(v, tuple) and isinstance(v[0], str) else v for k, v in fields.items()
-        }
-        return self.new(kind, **fields)
+        return self.new(kind, **{key: self._made(value) for key, value in fields.items()})
+
+    def _made(self, value):
+        if isinstance(value, list):
+            return [self._made(one) for one in value]
+        return self.geometry(*value) if isinstance(value, tuple) and isinstance(value[0], str) else value
 
     def text(self):
         words, seen = [], set()
@@ -203,6 +205,18 @@ def turned(bottom, top, length, side=None, **more):
         (plane((0, 0, length), z, x), "+", [[(1, True)]]),
         (*(side or cylinder(bottom)), [[(0, True)], [(1, False)]]),
     ]
+    return solid
+
+
+def rounded_cylinder(radius, length, ball):
+    """Return a cylinder about z from 0 whose upper edge a ball has rounded."""
+    x, z, level = (1, 0, 0), (0, 0, 1), length - ball
+    solid = turned(radius, radius, level)
+    solid.edges.append((circle((0, 0, length), z, x, radius - ball), None, None))
+    top, side = plane((0, 0, length), z, x), cylinder(radius)[0]
+    spine = circle((0, 0, level), z, x, radius - ball)
+    blend = {"blend_type": "R", "surface": [top, side], "spine": spine, "range": [-ball, -ball], "thumb_weight": [1, 1]}
+    solid.faces[1:2] = [(top, "+", [[(2, True)]]), (("BLENDED_EDGE", blend), "+", [[(1, True)], [(2, False)]])]
     return solid
 
 

@@ -395,4 +395,10 @@ def _valued(maker: Deckmaker, item: Item, line: int) -> str:
         return str(maker.id(value))
     if not isinstance(value, (int, float)):
         raise ViewError(f"in the expression: the variable {item.path} is no number", line)
+    if maker.radian != 1.0 and maker.values.word(item, "units") == "angle":
+        raise ViewError(
+            f"in the expression: {item.path} is an angle, {number(value)} in the model's unit, where functions of the "
+            f"solver are in radians; give it units = no_units and write DTOR*{item.name}",
+            line,
+        )
     return f"({number(value)})"

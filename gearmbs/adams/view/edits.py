@@ -294,6 +294,7 @@ class Editor:
             for key in VALUES:
                 item.fields.pop(key, None)
             item.fields.update(held)
+        item.fields |= {"units": given["units"]} if "units" in given else {}
         db.version += 1
 
     def _member(self, item: Item, index: Stored, held: tuple[str, Stored], line: int) -> None:

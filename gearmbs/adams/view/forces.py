@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 from gearmbs.adams.view.deckmaker import JOINTS, Deckmaker
 from gearmbs.adams.view.lexer import ViewError
+from gearmbs.adams.view.masses import bodies_of
 from gearmbs.adams.view.model import PARTS, Item
-from gearmbs.adams.view.solids import bodies_of, extrusion_outline, link_outline, plate_outline
+from gearmbs.adams.view.solids import extrusion_outline, link_outline, plate_outline
 from gearmbs.adams.view.statements import refuse
 from gearmbs.adams.view.values import fixed
 from gearmbs.adams.write.text import listed, number
@@ -191,6 +192,8 @@ def _size(m: Deckmaker, shape: Item, *pairs: tuple[str, str]) -> list[str]:
 def _solid(m: Deckmaker, shape: Item) -> list[str | None]:
     """Return the arguments of the GRAPHICS of a solid that touches others."""
     kind = shape.kind
+    if kind != "csg" and any(one.active for one in shape.children.values()):
+        raise ViewError(f"{shape.path} has features, which cannot touch here; leave them out, or give a mesh in a file")
     marker = m.ref(shape, "center_marker", "CM", ("marker",))
     if kind == "block":
         size = m.values.numbers(shape, "diag_corner_coords", 3) or [0.0] * 3

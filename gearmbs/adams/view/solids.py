@@ -1,4 +1,4 @@
-"""Mass, centre and inertia of a part from its geometry and density, where the file gives no mass.
+"""Moments of the solids of View.
 
 Every solid is the sum of integrals of 1, r and r r^T over it, which add up and move with frames; that of a part is
 the sum over its solids, whatever they share, as in View.
@@ -16,16 +16,7 @@ from gearmbs.adams.view import frames
 from gearmbs.adams.view.deckmaker import Deckmaker
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
-from gearmbs.adams.write.text import listed, number
-from gearmbs.dae.problem import ModelError
-from gearmbs.solids.bodies import PART_NUMBER, Body, faceted, read_bodies
 
-STANDARD = {
-    "steel": 7801.0, "stainless": 7750.0, "aluminum": 2740.0, "brass": 8545.0, "cast_iron": 7080.0, "copper": 8906.0,
-    "glass": 2595.0, "lead": 11370.0, "magnesium": 1795.0, "nickel": 7750.0, "titanium": 4850.0, "tungsten": 19222.0,
-    "wood": 438.0,
-}  # fmt: skip
-"""Densities in kg/m^3 of the materials that View's models begin with (table of standard materials of its manual)."""
 FLAT = frozenset("circle arc polyline plane graphic".split())
 """Geometry without volume."""
 
@@ -53,7 +44,7 @@ class Moments:
         return Moments(self.volume + other.volume, self.first + other.first, self.second + other.second)
 
 
-def _prism(area: float, sx: float, sy: float, sxx: float, syy: float, sxy: float, low: float, high: float) -> Moments:
+def prism(area: float, sx: float, sy: float, sxx: float, syy: float, sxy: float, low: float, high: float) -> Moments:
     """Return the moments of a plane figure, by its own integrals, between two heights."""
     z1, z2, z3 = high - low, (high**2 - low**2) / 2.0, (high**3 - low**3) / 3.0
     if z1 < 0.0:
@@ -177,7 +168,14 @@ def revolution(points: np.ndarray, angle: float) -> Moments:
 Shape = Callable[["Deckmaker", Item], tuple[Item, Moments]]
 
 
-def _need(m: Deckmaker, item: Item, key: str) -> float:
+def need(m: Deckmaker, item: Item, key: str) -> float:
+    """Return an argument as a number.
+
+    Raises
+    ------
+    ViewError
+        If it is not given.
+    """
     value = m.values.number(item, key)
     if value is None:
         raise ViewError(f"{item.path} has no {key}", item.line)
@@ -196,17 +194,23 @@ def _angle(m: Deckmaker, item: Item) -> float:
     return 2.0 * math.pi if given is None else given * m.radian
 
 
-def _block(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+def block_corner(m: Deckmaker, item: Item) -> tuple[Item, list[float]]:
+    """Return the corner marker of a block and its sizes."""
     size = m.values.numbers(item, "diag_corner_coords", 3)
     if size is None:
         raise ViewError(f"{item.path} has no diag_corner_coords", item.line)
-    return _marker(m, item, "corner_marker"), box(*size)
+    return _marker(m, item, "corner_marker"), size
+
+
+def _block(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
+    marker, size = block_corner(m, item)
+    return marker, box(*size)
 
 
 def _radius(m: Deckmaker, item: Item) -> float:
     other = m.values.ref(item, "ref_radius_by_marker", ("marker",))
     if other is None:
-        return _need(m, item, "radius")
+        return need(m, item, "radius")
     a, r = m.values.pose(_marker(m, item, "center_marker"))
     seen = a.T @ (m.values.point(other) - r)
     return math.hypot(seen[0], seen[1])
@@ -227,29 +231,29 @@ def _sides(m: Deckmaker, item: Item) -> int:
 
 def _cylinder(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
     r = _radius(m, item)
-    length = _need(m, item, "length")
+    length = need(m, item, "length")
     return _marker(m, item, "center_marker"), frustum(length, r, r, _angle(m, item), _sides(m, item))
 
 
 def _frustum(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
-    bottom, top = _need(m, item, "bottom_radius"), _need(m, item, "top_radius")
-    length = _need(m, item, "length")
+    bottom, top = need(m, item, "bottom_radius"), need(m, item, "top_radius")
+    length = need(m, item, "length")
     return _marker(m, item, "center_marker"), frustum(length, bottom, top, _angle(m, item), _sides(m, item))
 
 
 def _ellipsoid(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
     # the scales are whole axes
-    axes = (_need(m, item, f"{c}_scale_factor") / 2.0 for c in "xyz")
+    axes = (need(m, item, f"{c}_scale_factor") / 2.0 for c in "xyz")
     return _marker(m, item, "center_marker"), ellipsoid(*axes)
 
 
 def _sphere(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
-    r = _need(m, item, "radius")
+    r = need(m, item, "radius")
     return _marker(m, item, "center_marker"), ellipsoid(r, r, r)
 
 
 def _torus(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
-    radii = _need(m, item, "major_radius"), _need(m, item, "minor_radius")
+    radii = need(m, item, "major_radius"), need(m, item, "minor_radius")
     return _marker(m, item, "center_marker"), torus(*radii, _angle(m, item))
 
 
@@ -260,10 +264,10 @@ Outline = tuple[Item, np.ndarray, float, float]
 def _spine(m: Deckmaker, item: Item) -> tuple[Outline, float]:
     """Return the middle line of a link, and how far it is widened."""
     i, j = _marker(m, item, "i_marker"), _marker(m, item, "j_marker")
-    width, depth = _need(m, item, "width"), _need(m, item, "depth")
+    width, depth = need(m, item, "width"), need(m, item, "depth")
     a, r = m.values.pose(i)
     across = a.T @ (m.values.point(j) - r)
-    if math.hypot(across[0], across[1]) < frames.SMALL or abs(across[2]) > 1e-6 * float(np.linalg.norm(across)):
+    if math.hypot(across[0], across[1]) < frames.SMALL or abs(across[2]) > 1e-6 * math.hypot(*across):
         raise ViewError(f"{item.path}: a link whose markers are not in one plane of the first", item.line)
     return (i, np.array([[0.0, 0.0], across[:2]]), -depth / 2.0, depth / 2.0), width / 2.0
 
@@ -277,7 +281,7 @@ def _corners(m: Deckmaker, item: Item) -> tuple[Outline, float]:
     corners = np.array([a.T @ (m.values.point(one) - r) for one in markers])
     if np.abs(corners[:, 2]).max() > 1e-6 * np.abs(corners).max():
         raise ViewError(f"{item.path}: its corners are not in the plane of the first marker", item.line)
-    width = _need(m, item, "width")
+    width = need(m, item, "width")
     return (markers[0], corners[:, :2], -width / 2.0, width / 2.0), m.values.number(item, "radius", 0.0) or 0.0
 
 
@@ -325,7 +329,7 @@ def _widened(points: np.ndarray, radius: float) -> np.ndarray:
 
 def rounded(points: np.ndarray, radius: float, low: float, high: float) -> Moments:
     """Return the moments of a plate: a polygon widened by a radius, with arcs at corners and fillets at inner ones."""
-    total = _prism(*polygon(points), low, high)
+    total = prism(*polygon(points), low, high)
     if radius == 0.0:
         return total
 
@@ -334,22 +338,22 @@ def rounded(points: np.ndarray, radius: float, low: float, high: float) -> Momen
         a[:2, 0], a[:2, 1] = start, (-start[1], start[0])
         area, sx, sy, sxx, syy, sxy = sector(angle)
         r = radius
-        solid = _prism(area * r**2, sx * r**3, sy * r**3, sxx * r**4, syy * r**4, sxy * r**4, low, high)
+        solid = prism(area * r**2, sx * r**3, sy * r**3, sxx * r**4, syy * r**4, sxy * r**4, low, high)
         return solid.moved(a, np.array([*centre, 0.0])).times(sign)
 
     for p, edge, w, x, turn in _turns(_leftwards(points)):
         n, o = np.array([w[1], -w[0]]), np.array([x[1], -x[0]])
         strip = np.array([p, p + radius * o, p + edge + radius * o, p + edge])
-        total += _prism(*polygon(strip), low, high)
+        total += prism(*polygon(strip), low, high)
         if turn >= 0.0:
             total += cap(turn, n, p, 1.0)
             continue
         # two strips have a kite in common; the fillet fills the kite beyond it but for a sector
         out = radius * (n + o) / (1.0 + math.cos(turn))
-        total += _prism(*polygon(np.array([p, p + radius * n, p + out, p + radius * o])), low, high).times(-1.0)
+        total += prism(*polygon(np.array([p, p + radius * n, p + out, p + radius * o])), low, high).times(-1.0)
         centre = p + 2.0 * out
         beyond = np.array([p + out, centre - radius * n, centre, centre - radius * o])
-        total += _prism(*polygon(beyond), low, high) + cap(-turn, -o, centre, -1.0)
+        total += prism(*polygon(beyond), low, high) + cap(-turn, -o, centre, -1.0)
     return total
 
 
@@ -360,6 +364,12 @@ def sector(angle: float) -> tuple[float, float, float, float, float, float]:
         s, c = 0.0, 1.0
     half, squares = angle / 2.0, s * c / 2.0
     return half, s / 3.0, (1.0 - c) / 3.0, (half + squares) / 4.0, (half - squares) / 4.0, s * s / 8.0
+
+
+def block_outline(m: Deckmaker, item: Item) -> Outline:
+    """Return the outline of a block, whose sizes may be negative."""
+    marker, (x, y, z) = block_corner(m, item)
+    return marker, np.array([[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]]), min(z, 0.0), max(z, 0.0)
 
 
 def link_outline(m: Deckmaker, item: Item) -> Outline:
@@ -409,7 +419,7 @@ def _drawn_out(outline: Callable[[Deckmaker, Item], Outline]) -> Shape:
 
     def shape(m: Deckmaker, item: Item) -> tuple[Item, Moments]:
         marker, points, low, high = outline(m, item)
-        return marker, _prism(*polygon(points), low, high)
+        return marker, prism(*polygon(points), low, high)
 
     return shape
 
@@ -425,33 +435,7 @@ SHAPES: dict[str, Shape] = {
     "extrusion": _drawn_out(extrusion_outline), "revolution": _revolution,
 }  # fmt: skip
 """Shapes whose moments are known exactly."""
-UNKNOWN = frozenset("csg solid feature".split())
-"""Solids whose moments are not computed."""
 REMEDY = "give the part mass, center_of_mass_marker, ixx, iyy and izz"
-
-
-def density_of(m: Deckmaker, item: Item) -> float:
-    """Return the density of a part: its own, or that of its material.
-
-    Raises
-    ------
-    ViewError
-    """
-    density = m.values.number(item, "density")
-    if density is not None:
-        return density
-    if "material_type" in item.fields:
-        name = str(m.values.text(item, "material_type"))
-        found = m.db.find(name, ("material",))
-        if found is not None:
-            return _need(m, found, "density")
-        standard = STANDARD.get(name.rsplit(".", 1)[-1].lower())
-        if standard is None:
-            raise ViewError(f"{item.path}: there is no material {name[:60]}", item.line)
-    else:
-        standard = STANDARD["steel"]
-    units = m.db.units
-    return standard * units.si("length") ** 3 / units.si("mass")
 
 
 def polyhedron(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
@@ -463,107 +447,3 @@ def polyhedron(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     for corner in (a, b, c):
         second += np.einsum("i,ij,ik->jk", volume, corner, corner)
     return Moments(float(volume.sum()), (volume[:, None] * whole).sum(axis=0) / 4.0, second / 20.0)
-
-
-def _facets(m: Deckmaker, body: Body) -> Moments:
-    """Return the moments of a body of a Parasolid file in the model's units, extrapolated from two tolerances.
-
-    The difference of a surface from its chords goes with the square of their length, that is with the tolerance.
-    """
-    scale = 1.0 / m.db.units.si("length")
-    extent = faceted(body)[0]
-    tolerance = 1e-3 * float(np.linalg.norm(np.ptp(extent, axis=0)))
-    coarse, fine = (polyhedron(scale * v, t) for v, t in (faceted(body, tolerance * f) for f in (0.5, 0.25)))
-    return Moments(
-        2.0 * fine.volume - coarse.volume, 2.0 * fine.first - coarse.first, 2.0 * fine.second - coarse.second
-    )
-
-
-def bodies_of(m: Deckmaker, item: Item) -> list[Body]:
-    """Return the bodies that a part has in the model's Parasolid files.
-
-    Raises
-    ------
-    ViewError
-        If a file is missing or cannot be read: nobody knows then whether the part has one.
-    """
-    found = []
-    for name, line in m.parasolids:
-        path = m.beside(name)
-        if path is None:
-            raise ViewError(
-                f"{name[:80]} is not beside the command file, and may hold the geometry of {item.path}", line
-            )
-        if path not in m.bodies:
-            try:
-                m.bodies[path] = read_bodies(path)
-            except ModelError as error:
-                raise ViewError(f"{name[:80]}: {error}", line) from error
-        found += [body for body in m.bodies[path] if body.attributes.get(PART_NUMBER) == m.ids[id(item)]]
-    return found
-
-
-def moments_of(m: Deckmaker, item: Item, marker: Item | None) -> Moments | None:
-    """Return the moments of all solids of a part in its frame, None if it has none.
-
-    Raises
-    ------
-    ViewError
-        If those of one are not known.
-    """
-    total = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
-    a, r = m.values.pose(item)
-    shells = False
-    for one in item.children.values():
-        if not one.active:
-            continue
-        if one.kind in UNKNOWN:
-            raise ViewError(f"{one.path} is a {one.kind}, whose mass is not computed; {REMEDY}", item.line)
-        shells |= one.kind == "shell"
-        if one.kind in SHAPES:
-            at, solid = SHAPES[one.kind](m, one)
-            b, s = m.values.pose(at)
-            total += solid.moved(a.T @ b, a.T @ (s - r))
-    try:
-        for body in bodies_of(m, item):
-            total += _facets(m, body)
-    except ModelError as error:
-        raise ViewError(f"{error}; {REMEDY}", item.line) from error
-    if shells and not _agrees(m, total, marker):
-        # View counts surfaces in some parts and not in others; the centre that it wrote tells which
-        raise ViewError(f"{item.path} has a shell, whose mass is not computed; {REMEDY}", item.line)
-    return total if total.volume > 0.0 else None
-
-
-def _agrees(m: Deckmaker, found: Moments, marker: Item | None) -> bool:
-    """Return whether a centre of mass that the file gives is that of the moments."""
-    if marker is None or not found.volume > 0.0:
-        return False
-    centre = found.first / found.volume
-    spread = found.second / found.volume - np.outer(centre, centre)
-    given = m.values.location(marker)
-    return float(np.abs(given - centre).max()) < 1e-6 * math.sqrt(float(np.trace(spread)))
-
-
-def mass_of_geometry(m: Deckmaker, item: Item, marker: Item | None) -> list[str | None]:
-    """Return mass, centre and inertia of a part as arguments, from its solids; none of a part without any."""
-    found = moments_of(m, item, marker)
-    if found is None:
-        return [] if marker is None else [f"CM = {m.id(marker)}"]
-    mass = density_of(m, item) * found.volume
-    centre = found.first / found.volume
-    spread = found.second / found.volume - np.outer(centre, centre)
-    inertia = mass * (np.trace(spread) * np.eye(3) - spread)
-    if marker is None:
-        a, r = m.values.pose(item)
-        at, axes = m.new_marker(item, item, a, a @ centre + r), frames.IDENTITY
-    else:
-        at, axes = m.id(marker), m.values.orientation(marker)
-        m.centres[id(marker)] = centre
-    turned = axes.T @ inertia @ axes
-    values = [turned[0, 0], turned[1, 1], turned[2, 2], -turned[0, 1], -turned[0, 2], -turned[1, 2]]
-    # products that are rounding alone are none
-    values = [0.0 if abs(x) < 1e-13 * max(values[:3]) else float(x) for x in values]
-    if item.kind == "point_mass":
-        return [f"MASS = {number(mass)}", f"CM = {at}"]
-    return [f"MASS = {number(mass)}", f"CM = {at}", f"IP = {listed(values if any(values[3:]) else values[:3])}"]

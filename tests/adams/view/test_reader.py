@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,6 +13,12 @@ from gearmbs.adams.parse import statements as st
 
 from ...says import says
 from .files import CHAIN, PENDULUM, WHOLE
+
+TORQUE = (
+    "force create direct single_component_force single_component_force_name = .swing.DRIVE  &\n"
+    "   type_of_freedom = rotational  &\n"
+    '   i_marker_name = .swing.ROD.TOP j_marker_name = .swing.ground.PIVOT action_only = off function = "{}"\n'
+)
 
 
 def by_name(view, kind, name):
@@ -172,6 +180,19 @@ def test_words_may_be_shortened():
         "constraint create joint revolute", "cons cre joi rev"
     )
     assert parse_view(short).deck.of(st.Marker).keys() == parse_view(PENDULUM).deck.of(st.Marker).keys()
+
+
+@pytest.mark.parametrize(
+    ("units", "refused"), [("angle", True), ('"angle"', True), ("no_units", False), ("length", False)]
+)
+def test_angles_of_view_in_functions_of_the_solver_are_refused(units, refused):
+    turned = f"variable create variable_name = .swing.TURN units = {units} real_value = 30\n"
+    found = parse_view(PENDULUM + turned + TORQUE.format("DTOR * .swing.TURN")).deck
+    messages = [d.message for d in found.unsupported]
+    assert bool(messages) == refused
+    assert not refused or re.search(says(".swing.TURN", "30", "no_units", "DTOR"), messages[0])
+    place = "marker create marker_name = .swing.ROD.M location = 0, 0, 0 orientation = (.swing.TURN), 0, 0\n"
+    assert not parse_view(PENDULUM + turned + place).deck.unsupported
 
 
 def test_macros_are_carried_out():

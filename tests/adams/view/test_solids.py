@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from gearmbs.adams import parse_view
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.view import solids
+from tests.says import says
 
 CELLS = 120
 """Along each side of a box of points: sums over them are within 1 % of integrals over smooth bodies."""
@@ -145,6 +148,73 @@ def test_a_cm_marker_goes_to_the_centre():
     deck = parse_view(PART + marker + MASSES % ("density = 1", "")).deck
     assert np.allclose(deck.of(st.Marker)[deck.of(st.Part)[2].cm].qp, (2.0, 0.5, 0.5))
     assert np.allclose(deck.of(st.Part)[2].ip, np.array([5.0, 2.0, 5.0]) / 6.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "volume", "centre"),
+    [
+        ("difference", 2.0 - 0.75, (2.0 * 2.0 - 0.75 * 2.25) / 1.25),
+        ("intersection", 0.75, 2.25),
+        ("union", 2.0 + 1.5 - 0.75, (2.0 * 2.0 + 1.5 * 3.0 - 0.75 * 2.25) / 2.75),
+    ],
+)
+def test_blocks_put_together(kind, volume, centre):
+    """A block from x = 1 to 3 of section 1, and one from 1.5 to 4.5 (of half the width, a quarter turned) within it."""
+    csg = (
+        "marker create marker_name = .m.P.B location = 1.5, 1, 0.5 orientation = 0, 90, 0\n"
+        "geometry create shape block block_name = .m.P.IN corner_marker = .m.P.B diag_corner_coords = 3, 0.5, 1\n"
+        f"geometry create shape csg csg_name = .m.P.C base_object = .m.P.BOX object = .m.P.IN type = {kind}"
+    )
+    deck = parse_view(PART + MASSES % ("density = 1", csg)).deck
+    part = deck.of(st.Part)[2]
+    assert part.mass == pytest.approx(volume)
+    assert deck.of(st.Marker)[part.cm].qp[0] == pytest.approx(centre)
+
+
+BLEND = (
+    "geometry create feature blend blend_name = .m.P.BOX.BLEND_1 radius1 = {0} radius2 = {0} chamfer = {1}  &\n"
+    "   reference_marker = .m.P.A locations = {2}"
+)
+
+
+@pytest.mark.parametrize(
+    ("radius", "chamfer", "area", "reach"),
+    [
+        (0.5, "yes", 0.5**2 / 2.0, 0.5 / 3.0),
+        (0.5, "no", 0.5**2 * (1.0 - np.pi / 4.0), 0.5 * (1.0 / 2.0 - (np.pi / 4.0 - 1.0 / 3.0)) / (1.0 - np.pi / 4.0)),
+    ],
+)
+def test_an_edge_of_a_block_is_taken_off(radius, chamfer, area, reach):
+    """Of a block of 2 by 1 by 1 from x = 1, the edge at its far side, along y."""
+    blend = BLEND.format(radius, chamfer, "2, 0.5, 1")
+    deck = parse_view(PART + MASSES % ("density = 1", blend)).deck
+    part = deck.of(st.Part)[2]
+    assert part.mass == pytest.approx(2.0 - area)
+    left = np.array(deck.of(st.Marker)[part.cm].qp) * part.mass
+    assert left == pytest.approx(np.array([2.0, 0.5, 0.5]) * 2.0 - area * np.array([3.0 - reach, 0.5, 1.0 - reach]))
+
+
+def test_a_ball_larger_than_a_side_touches_its_far_end():
+    """A ball of 1.25 on a side of 1: what it leaves is the segment between both."""
+    deck = parse_view(PART + MASSES % ("density = 1", BLEND.format(1.25, "no", "2, 0.5, 1"))).deck
+    width = np.sqrt(1.25**2 - 0.25**2)
+    under = 0.5 * (width * 0.25 + 1.25**2 * np.arcsin(width / 1.25))
+    assert deck.of(st.Part)[2].mass == pytest.approx(2.0 - (1.25 * width - under))
+
+
+@pytest.mark.parametrize(
+    "blend",
+    [
+        BLEND.format(0.5, "no", "2, 0.5, 1, 2, 1, 0.5"),
+        BLEND.format(0.7, "no", "2, 0.5, 1, 2, 0.5, 0"),
+        BLEND.format(1.5, "yes", "2, 0.5, 1"),
+        "geometry create feature hole hole_name = .m.P.BOX.H radius = 0.1 reference_marker = .m.P.A",
+    ],
+    ids=["edges that meet", "arcs that meet", "a large chamfer", "a hole"],
+)
+def test_other_features_are_refused(blend):
+    refused = parse_view(PART + MASSES % ("density = 1", blend)).deck
+    assert re.search(says(".m.P.BOX", "features", "center_of_mass_marker"), refused.unsupported[0].message)
 
 
 def test_what_has_no_formula_is_refused_and_with_a_mass_runs():
