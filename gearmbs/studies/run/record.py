@@ -14,8 +14,9 @@ import numpy as np
 import gearmbs
 from gearmbs._lazy import spare_duck_arrays
 from gearmbs.dae.results.solution import Solution
-from gearmbs.signals import decimate, even_signal, force_components, force_to_acceleration, make_signal, trim
-from gearmbs.signals.conversion import COMPONENTS
+from gearmbs.signals import even_signal, make_signal
+from gearmbs.signals.conversion import COMPONENTS, component_values
+from gearmbs.signals.filters import apply_zero_phase, decimation_taps
 from gearmbs.signals.resampling import monotone_cubic
 from gearmbs.studies.case.case import Case, CaseError, units_of_fields
 from gearmbs.studies.case.drive import drive_angle
@@ -200,14 +201,25 @@ def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
 
 def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -> xr.DataArray:
     """Return the components of the force on the driven gear over its mass, at the signal rate."""
-    pair = case.pair()
-    components = force_components(
-        forces, pressure_angle=pair.working_pressure_angle, sense=pair.rotation, channels=("2x", "2y", "2z")
+    pair, rate = case.pair(), case.signal_rate
+    angle, mass = pair.working_pressure_angle, pair.wheels[1].mass
+    values, t = component_values(forces.values[:, -4:-1], angle, sense=pair.rotation), forces["time"].values
+    values[:, -1] = forces.values[:, -1]
+    if rate < case.output_rate:
+        ratio = round(case.output_rate / rate)
+        values, first = apply_zero_phase(values, decimation_taps(ratio, case.output_rate), "trim", step=ratio)
+        t = t[first] + np.arange(len(values)) / rate
+    first, last = np.searchsorted(t, [at - 0.5 / rate for at in (start, stop)])
+    return make_signal(
+        values[first:last] / mass,
+        rate,
+        units="m/s^2",
+        channels=COMPONENTS,
+        t0=float(t[first]),
+        speed=case.operation.top_speed,
+        teeth=case.gears.teeth,
+        attrs={"pressure_angle": angle, "mass": mass},
     )
-    components.loc[:, RESULTANT] = forces.sel(channel=RESULTANT).values
-    if case.signal_rate < case.output_rate:
-        components = decimate(components, case.signal_rate)
-    return trim(force_to_acceleration(components, pair.wheels[1].mass), start, stop)
 
 
 def teeth_in_mesh(case: Case, time: float) -> list[float]:
