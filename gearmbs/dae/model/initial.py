@@ -45,6 +45,8 @@ VISIBLE = 1e-3
 VISIBLE_TURN = np.radians(0.1)
 DENSE_ROWS = 400
 """Rows up to which redundancy is looked for by a dense factorisation."""
+DENSE_SYSTEM = 250
+"""Rows and coordinates up to which a dense elimination takes less time than to put a sparse matrix together."""
 SURE = 1e-12
 """Squared distance of a row from the others, all of length 1, above which it is independent beyond rounding."""
 DOUBTFUL = (1e-6, 1e-3)
@@ -124,19 +126,26 @@ def independent_rows(
     row of length 1 from those before below which it counts as redundant; ``order`` names all rows in another order of
     preference.
     """
-    if order is not None:
-        preferred = scipy.sparse.csc_array(scipy.sparse.csr_array(jacobian)[order])
-        return np.sort(order[independent_rows(preferred, weights, least)])
     m = jacobian.shape[0]
+    order = np.arange(m) if order is None else order
     if m == 0:
         return np.zeros(0, dtype=np.int64)
-    scaled = scipy.sparse.csc_array(jacobian @ scipy.sparse.diags_array(1.0 / np.sqrt(weights)))
-    norms = np.sqrt(np.asarray((scaled.multiply(scaled)).sum(axis=1)).ravel())
-    norms[norms == 0.0] = 1.0
-    scaled = scipy.sparse.csc_array(scipy.sparse.diags_array(1.0 / norms) @ scaled)
     if m > DENSE_ROWS:
-        return _sparse_rows(scaled, least)
-    dense = scaled.toarray()
+        scaled = scipy.sparse.csr_array(jacobian @ scipy.sparse.diags_array(1.0 / np.sqrt(weights)))[order]
+        norms = np.sqrt(np.asarray((scaled.multiply(scaled)).sum(axis=1)).ravel())
+        norms[norms == 0.0] = 1.0
+        kept = _sparse_rows(scipy.sparse.csc_array(scipy.sparse.diags_array(1.0 / norms) @ scaled), least)
+    else:
+        dense = jacobian.toarray()[order] / np.sqrt(weights)
+        norms = np.linalg.norm(dense, axis=1, keepdims=True)
+        norms[norms == 0.0] = 1.0
+        kept = _dense_rows(dense / norms, least)
+    return np.sort(order[kept])
+
+
+def _dense_rows(dense: np.ndarray, least: float) -> np.ndarray:
+    """Independent rows of a matrix whose rows have length 1, earlier ones preferred."""
+    m = len(dense)
     r_diagonal = np.abs(np.diag(scipy.linalg.qr(dense.T, mode="r", pivoting=True)[0]))
     rank = int(np.sum(r_diagonal > RANK_TOLERANCE * max(1.0, r_diagonal[0])))
     if rank == m and least <= LEAST:
@@ -214,14 +223,17 @@ def _greedy_rows(dense: np.ndarray, rank: int, least: float = LEAST) -> np.ndarr
 
 def least_correction(jacobian: scipy.sparse.csc_array, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
     """Solve min |x|_W subject to jacobian x = -violation."""
-    n = jacobian.shape[1]
-    kkt = scipy.sparse.csc_array(
-        scipy.sparse.block_array([[scipy.sparse.diags_array(weights), jacobian.T], [jacobian, None]])
-    )
+    m, n = jacobian.shape
     rhs = np.concatenate([np.zeros(n), -violation])
     try:
-        return scipy.sparse.linalg.splu(kkt).solve(rhs)[:n]
-    except RuntimeError as error:
+        if m + n <= DENSE_SYSTEM:
+            full, dense = np.zeros((n + m, n + m)), jacobian.toarray()
+            full[np.arange(n), np.arange(n)] = weights
+            full[n:, :n], full[:n, n:] = dense, dense.T
+            return np.linalg.solve(full, rhs)[:n]
+        kkt = scipy.sparse.block_array([[scipy.sparse.diags_array(weights), jacobian.T], [jacobian, None]])
+        return scipy.sparse.linalg.splu(scipy.sparse.csc_array(kkt)).solve(rhs)[:n]
+    except (RuntimeError, np.linalg.LinAlgError) as error:
         raise AssemblyError(
             "the constraints became dependent while the mechanism was being assembled: "
             "it is near a position where it locks; move the bodies closer to a position that satisfies the joints"
@@ -426,6 +438,12 @@ class Turn:
         return abs(self.angle) > 0.5 * np.pi
 
 
+def _entries(matrix: scipy.sparse.csc_array, row: int, columns: np.ndarray) -> np.ndarray:
+    """Return the entries of a row in some columns; scipy's own way takes a hundred times as long."""
+    ends = zip(matrix.indptr[columns], matrix.indptr[columns + 1], strict=True)
+    return np.array([matrix.data[a:b][matrix.indices[a:b] == row].sum() for a, b in ends])
+
+
 def prescribed_turns(
     system: BaseSystem, configuration: Configuration, jacobian: scipy.sparse.csc_array, phi: np.ndarray
 ) -> list[Turn]:
@@ -443,7 +461,7 @@ def prescribed_turns(
         # one of the bodies moves: its rotation about the axis changes the sine by the cosine
         body, sense = (body_i, 1.0) if body_i > 0 else (body_j, -1.0)
         columns = POSE_PLACES * (body - 1) + 3 + np.arange(3)
-        cosine = sense * float(jacobian[[row]][:, columns].toarray()[0] @ j[:, 2])
+        cosine = sense * float(_entries(jacobian, row, columns) @ j[:, 2])
         angle = float(np.arctan2(i[:, 0] @ j[:, 1], i[:, 0] @ j[:, 0]))
         found.append(Turn(row, angle, float(np.arctan2(-phi[row], cosine))))
     return found
