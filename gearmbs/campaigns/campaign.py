@@ -7,7 +7,7 @@ import random
 import time
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -83,6 +83,7 @@ class Campaign:
         progress: bool | Callable[[CampaignStatus], None] | None = None,
         minutes: float | None = None,
         other_code: str = "refuse",
+        page: bool | str | Path = False,
     ) -> CampaignStatus:
         """Work on what is not done yet, until all is; what is damaged is done again.
 
@@ -99,6 +100,9 @@ class Campaign:
         other_code : {"refuse", "mix", "again"}
             What becomes of it if results so far come from other code, versions or another kind of processor: refuse to
             work, go on all the same, or do those units again.
+        page : bool or path-like
+            Write every five seconds how it stands to this file of HTML, which a browser shows and refreshes: counts,
+            pace, remaining time, failures by cause, who is at work. True: ``page.html`` in the folder.
 
         Raises
         ------
@@ -122,7 +126,7 @@ class Campaign:
         else:
             # workers need modules only, which they import by name
             where = here if workers == 0 else partial(processes, own_main=False)
-        return self._drive(where, workers or available_cores(), None, progress, minutes, other_code)
+        return self._drive(where, workers or available_cores(), None, progress, minutes, other_code, page)
 
     def work(
         self, part: int, parts: int, *, minutes: float | None = None, other_code: str = "refuse"
@@ -146,8 +150,16 @@ class Campaign:
         return self._drive(here, 1, mine, False, minutes, other_code)
 
     def _drive(
-        self, where: Any, workers: int, mine: Iterable[int] | None, progress: Any, minutes: Any, other_code: str
+        self,
+        where: Any,
+        workers: int,
+        mine: Iterable[int] | None,
+        progress: Any,
+        minutes: Any,
+        other_code: str,
+        page: bool | str | Path = False,
     ) -> CampaignStatus:
+        from gearmbs.campaigns.page import LivePage
         from gearmbs.campaigns.work import work_unit
         from gearmbs.studies.run.engine import Refused, WorkerDied, run_jobs
 
@@ -158,8 +170,11 @@ class Campaign:
         units = [unit for unit in (range(self.folder.unit_count) if mine is None else mine) if unit not in done]
         # drivers side by side begin at different ends, so that they rarely want the same unit
         offset = random.Random(os.getpid()).randrange(len(units)) if _driven(self.folder, units) else 0
+        live = (
+            LivePage(lambda: self.folder, self.path / "page.html" if page is True else page) if page else nullcontext()
+        )
         try:
-            with _shown(progress, self.folder.path.name, self.status) as tell:
+            with live, _shown(progress, self.folder.path.name, self.status) as tell:
                 run_jobs(
                     partial(work_unit, os.path.abspath(self.path), other_code == "mix"),
                     units[offset:] + units[:offset],

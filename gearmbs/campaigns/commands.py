@@ -45,18 +45,22 @@ def run(
     queue: Annotated[str | None, typer.Option(help="Of Slurm or PBS.")] = None,
     minutes: Annotated[float | None, typer.Option(help="Start no further unit after so long.")] = None,
     other_code: Annotated[str, typer.Option(help=OTHER_CODE)] = "refuse",
+    page: Annotated[
+        Path | None, typer.Option(help="HTML file that says how it stands, for a browser that refreshes it.")
+    ] = None,
 ) -> None:
     """Work on what is not done yet; after an interruption, the same command goes on."""
     with guarded():
         from gearmbs.campaigns import Campaign, dask_client
 
         campaign = Campaign(folder)
+        how: dict[str, Any] = {"progress": True, "minutes": minutes, "other_code": other_code, "page": page or False}
         if dask is not None:
             jobs = {"walltime": walltime, "queue": queue} if dask in ("slurm", "pbs") else {}
             with dask_client(dask, workers, **jobs) as client:
-                status = campaign.run(client=client, progress=True, minutes=minutes, other_code=other_code)
+                status = campaign.run(client=client, **how)
         else:
-            status = campaign.run(workers, progress=True, minutes=minutes, other_code=other_code)
+            status = campaign.run(workers, **how)
         typer.echo(str(status))
         if status.failed:
             typer.echo(f"see gearmbs campaign failed {folder}")
@@ -83,21 +87,28 @@ def work(
 def status(
     folder: Place,
     watch: Annotated[bool, typer.Option(help="Say it again every five seconds until all is done.")] = False,
+    page: Annotated[
+        Path | None, typer.Option(help="Write it to this HTML file, too, with failures by cause and who is at work.")
+    ] = None,
 ) -> None:
     """Tell how far a campaign is, from any shell that sees its folder."""
     with guarded():
         import time
 
         from gearmbs.campaigns import Campaign
+        from gearmbs.campaigns.page import EVERY, LivePage
 
+        live = None if page is None else LivePage(lambda: Campaign(folder).folder, page)
         while True:
+            if live is not None:
+                live.write(live=watch)
             now = Campaign(folder).status()
             typer.echo(str(now))
             if now.done:
                 typer.echo(f"{now.processor_seconds:.4g} s of processor time, {now.overhead:.1%} outside simulations")
             if not watch or now.complete:
                 break
-            time.sleep(5.0)
+            time.sleep(EVERY)
 
 
 @app.command()

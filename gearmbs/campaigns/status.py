@@ -42,6 +42,10 @@ class CampaignStatus:
     late : tuple of str
         Who is at work and has given no sign of life for `LONG` seconds, or is at work for much longer than the last
         units took.
+    at_work : tuple of str
+        All who are at work, with their units.
+    rate : float or None
+        Cases a second at that pace; None as ``eta``.
     """
 
     cases: int
@@ -57,6 +61,8 @@ class CampaignStatus:
     not_numbers: int = 0
     codes: int = 1
     late: tuple[str, ...] = ()
+    at_work: tuple[str, ...] = ()
+    rate: float | None = None
 
     @property
     def fraction(self) -> float:
@@ -88,7 +94,7 @@ class CampaignStatus:
             parts.append(f"from {self.codes} different codes")
         if not self.complete:
             if self.eta is not None:
-                parts.append(f"about {_duration(self.eta)} left")
+                parts.append(f"about {duration(self.eta)} left")
             elif not self.running:
                 parts.append("nobody at work")
         return "; ".join([", ".join(parts), *self.late])
@@ -98,7 +104,8 @@ class CampaignStatus:
         return f"<progress value='{self.fraction:.4f}' max='1'></progress> {self}"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Return a duration in words."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
@@ -157,7 +164,9 @@ def read_status(folder: Folder) -> CampaignStatus:
     finished = sum(row.cases for row in rows)
     last = sorted(rows, key=lambda row: row.finished)[-RECENT:]
     usual = max((row.wall_seconds for row in last), default=float("inf"))
+    words = {u: f"unit {u}: {told(who)}" for u, who in at_work.items()}
     late = [u for u, who in at_work.items() if who["silent"] > LONG + BEAT or who["age"] > max(LONG, MUCH * usual)]
+    left, rate = folder.case_count - finished, None if late else _rate(last, len(at_work))
     return CampaignStatus(
         cases=folder.case_count,
         done=finished,
@@ -168,17 +177,16 @@ def read_status(folder: Folder) -> CampaignStatus:
         units_done=len(rows),
         processor_seconds=sum(row.processor_seconds for row in rows),
         simulation_seconds=sum(row.simulation_seconds for row in rows),
-        eta=None if late else _eta(last, folder.case_count - finished, len(at_work)),
+        eta=0.0 if left == 0 else left / rate if rate else None,
         not_numbers=sum(row.not_numbers for row in rows),
         codes=max(1, len({row.code for row in rows})),
-        late=tuple(f"unit {u}: {told(at_work[u])}" for u in late),
+        late=tuple(words[u] for u in late),
+        at_work=tuple(words.values()),
+        rate=rate,
     )
 
 
-def _eta(last: list[_Unit], left: int, at_work: int) -> float | None:
-    """Return the remaining time at the pace of the last units, by durations alone: clocks may differ."""
-    if left == 0:
-        return 0.0
-    if not last or not at_work:
-        return None
-    return left / at_work * sum(row.wall_seconds for row in last) / max(1, sum(row.cases for row in last))
+def _rate(last: list[_Unit], at_work: int) -> float | None:
+    """Return the cases a second at the pace of the last units, by durations alone: clocks may differ."""
+    seconds = sum(row.wall_seconds for row in last)
+    return at_work * sum(row.cases for row in last) / seconds if seconds > 0.0 and at_work else None

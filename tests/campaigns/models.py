@@ -55,6 +55,13 @@ def moody(x1: float, x2: float, x3: float, mood: str = "good") -> dict:
     return ishigami(x1, x2, x3)
 
 
+def picky(x1: float, x2: float, x3: float) -> dict:
+    """Return the same for half of the values of the first."""
+    if x1 > 0.0:
+        raise ValueError(f"x1 = {x1} is beyond 0; give less")
+    return ishigami(x1, x2, x3)
+
+
 def several(x1: float, x2: float, x3: float) -> dict[str, float]:
     """Return a result, what tells the same, what tells something else, and what hardly varies."""
     y = x1 + 0.3 * x2 + 0.2 * x3

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import json
+import os
+import socket
 from functools import partial
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, FunctionSubject, make_plan
 from gearmbs.campaigns.folder import sealed, unsealed
+from gearmbs.campaigns.page import page_text
 from gearmbs.campaigns.work import work_unit
 from gearmbs.files import write_whole
 from gearmbs.studies.run import claims
@@ -78,6 +81,30 @@ def test_equal_cases_of_another_campaign_are_taken_over(tmp_path):
     wrong = small(tmp_path / "third", keep=["record"])
     with pytest.raises(CampaignError, match="does not keep"):
         small(tmp_path / "fourth", reuse=[str(wrong.path)]).run(workers=0)
+
+
+def test_a_page_says_how_a_run_stands(tmp_path):
+    """While it goes on the page refreshes itself; failures of one cause count as one, whatever numbers they name."""
+    plan = make_plan(function("picky"), ranges(), n=16, unit=4, seed=3)
+    campaign, seen = Campaign(tmp_path / "c", plan), []
+    page = tmp_path / "c" / "page.html"
+    status = campaign.run(workers=0, page=True, progress=lambda status: seen.append(page.read_text()))
+    assert "http-equiv='refresh'" in seen[0]
+    assert "0 of 16" in seen[0]
+    text = page.read_text()
+    assert "http-equiv='refresh'" not in text
+    assert "<title>100% c</title>" in text
+    assert f"<td>{status.failed}</td><td>impossible</td><td>ValueError: x1 = # is beyond #" in text
+    # from another shell, while somebody is at work
+    campaign.folder.ledger(1).unlink()
+    claim = claims.take(campaign.folder.claim(1))
+    found = page_text(campaign.folder, every=5.0)
+    claim.release()
+    assert "12 of 16" in found
+    assert f"unit 1: host {socket.gethostname()}, process {os.getpid()}" in found
+    assert "cases a minute" in found
+    with pytest.raises(CampaignError, match=says("page", "x.html", "another folder")):
+        campaign.run(workers=0, page=page / "x.html")
 
 
 def moody(tmp_path, wall_limit=None, **moods) -> Campaign:
