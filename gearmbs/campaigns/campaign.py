@@ -13,10 +13,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearmbs.campaigns.folder import Folder, check_folder, extend_folder, litter, make_folder
+from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
 from gearmbs.campaigns.plans.plan import Plan
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, limit, whole
 from gearmbs.campaigns.status import CampaignStatus, read_status
+from gearmbs.campaigns.stored.checks import check_folder, litter
 from gearmbs.progress import alone, bars, watched
 from gearmbs.schema.described import chosen
 from gearmbs.studies.run.claims import owner, told
@@ -116,6 +117,8 @@ class Campaign:
         from gearmbs.studies.run.engine import here, processes
         from gearmbs.studies.run.parallel import available_cores
 
+        # others may have extended or packed it
+        self.folder = Folder(self.path)
         where: Any
         if workers is not None:
             workers = whole(workers, "workers", 0)
@@ -144,6 +147,7 @@ class Campaign:
         """
         from gearmbs.studies.run.engine import here
 
+        self.folder = Folder(self.path)
         if not 1 <= whole(part, "part", 0) <= whole(parts, "parts", 1):
             raise CampaignError(f"part {part} of {parts}: give a part from 1 to {parts}")
         mine = range(part - 1, self.folder.unit_count, parts)
@@ -221,6 +225,28 @@ class Campaign:
     def extend(self, n: int) -> Campaign:
         """Draw further points up to n, keep what is there; `run` then works on the new ones."""
         self.folder = extend_folder(self.folder, n)
+        return self
+
+    def pack(self, unit: int | None = None) -> Campaign:
+        """Store what is done in fewer, larger units: the same results in fewer files.
+
+        Former files go last, when what was written has been read back; a kill at any moment leaves the one or the
+        other whole.
+
+        Parameters
+        ----------
+        unit : int, optional
+            Cases of a unit, a multiple of what they are now; default the most that units have where a plan does not
+            say: 1024, or 64 MB of signals.
+
+        Raises
+        ------
+        CampaignError
+            If not all is done or something is damaged, results come from several codes, or units are as large already.
+        """
+        from gearmbs.campaigns.stored.packing import pack_folder
+
+        self.folder = pack_folder(self.folder, unit)
         return self
 
     @property
@@ -402,7 +428,7 @@ def _say_who(others: list[tuple[int, dict[str, Any]]]) -> None:
 
 def _driven(folder: Folder, units: list[int]) -> bool:
     """Whether somebody is at work on some of the units."""
-    return bool(units) and any(owner(claim) for claim in (folder.path / "units").glob("*.claim"))
+    return bool(units) and any(owner(claim) for claim in (folder.store / "units").glob("*.claim"))
 
 
 class _shown:

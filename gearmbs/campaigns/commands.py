@@ -157,6 +157,19 @@ def extend(folder: Place, to: Annotated[int, typer.Option(help="Points of the de
 
 
 @app.command()
+def pack(
+    folder: Place,
+    unit: Annotated[int | None, typer.Option(help="Cases of a unit; default: 1024, or 64 MB of signals.")] = None,
+) -> None:
+    """Store what is done in fewer, larger units; former files go when what was written has been read back."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        packed = Campaign(folder).pack(unit).folder
+        typer.echo(f"{packed.unit_count} units of {packed.unit_size} cases in {packed.store}")
+
+
+@app.command()
 def check(
     folder: Place,
     sweep: Annotated[bool, typer.Option(help="Remove litter, and put right what is damaged.")] = False,

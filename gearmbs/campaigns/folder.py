@@ -11,6 +11,8 @@
     table/00042.parquet  numbers of its cases
     signals.zarr/        one array a signal, a shard a unit
     records/, failed/    whole records, and what failed cases computed, as NetCDF
+    packed-1/            units, table, cases and signals.zarr of larger units, by `gearmbs.campaigns.stored.packing`;
+                         plan.json says whether they stand there, or here
 
 Everything that is read is held against a digest: ledgers and the plan against their own, tables of the design against
 that in the plan, results against those in the ledger. All but claims is written in an order in which a power cut at any
@@ -23,10 +25,10 @@ import errno
 import hashlib
 import json
 import shutil
-import time
 import uuid
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -36,7 +38,7 @@ import numpy as np
 
 from gearmbs.campaigns.plans.plan import FORMAT, Plan
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local, whole
-from gearmbs.campaigns.signals import Signals, check_store, shard, write_store
+from gearmbs.campaigns.signals import Signals, write_store
 from gearmbs.campaigns.subjects.base import SignalSpec
 from gearmbs.files import to_disk, whole_file, write_whole
 from gearmbs.studies.run.claims import owner, take, told
@@ -52,11 +54,12 @@ UNITS, MOST_CASES, MOST_BYTES = 128, 1024, 64e6
 cases than the second, which a kill would cost, nor more bytes of signals than the third."""
 
 FOLDERS = ("units", "table", "cases", "codes")
+"""The last stands in the campaign's folder, wherever the others do."""
+
+PACKED = 3
+"""Format of a campaign whose units were packed, which others would take for one without results."""
 
 REMEDY = "gearmbs campaign run puts it right"
-
-LITTER_AFTER = 60.0
-"""Seconds after which a temporary file belongs to nobody at work."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,13 @@ class Folder:
     Parameters
     ----------
     path : path-like
+    tree : dict, optional
+        What plan.json holds, or will hold; default read from there.
+
+    Attributes
+    ----------
+    store : Path
+        Where units, table, cases and signals stand.
 
     Raises
     ------
@@ -87,9 +97,10 @@ class Folder:
         If there is no campaign, or its plan was edited.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, tree: dict[str, Any] | None = None) -> None:
         self.path = local(path)
-        self.tree = _plan_tree(self.path)
+        self.tree = _plan_tree(self.path) if tree is None else tree
+        self.store = self.path / self.tree.get("store", "")
         self.extents = [Extent(**e) for e in self.tree["extents"]]
         plan = Plan.from_dict(self.tree["plan"], self.extents[-1].points)
         self.plan: Plan = replace(plan, unit=self.tree["unit"])
@@ -112,7 +123,7 @@ class Folder:
 
     def ledger(self, unit: int) -> Path:
         """Return the path of a unit's ledger."""
-        return self.path / "units" / f"{unit:05d}.json"
+        return self.store / "units" / f"{unit:05d}.json"
 
     def result(self, unit: int) -> bool | None:
         """Return True for a unit that is done, else None."""
@@ -120,20 +131,20 @@ class Folder:
 
     def claim(self, unit: int) -> Path:
         """Return the path of a unit's claim."""
-        return self.path / "units" / f"{unit:05d}.claim"
+        return self.store / "units" / f"{unit:05d}.claim"
 
     def table(self, unit: int) -> Path:
         """Return the path of a unit's table."""
-        return self.path / "table" / f"{unit:05d}.parquet"
+        return self.store / "table" / f"{unit:05d}.parquet"
 
     @property
     def signals(self) -> Path:
         """Return the path of the signals."""
-        return self.path / "signals.zarr"
+        return self.store / "signals.zarr"
 
     def done(self) -> list[int]:
         """Return the numbers of the units that are done."""
-        found = (int(p.stem) for p in (self.path / "units").glob("*.json") if p.stem.isdigit())
+        found = (int(p.stem) for p in (self.store / "units").glob("*.json") if p.stem.isdigit())
         return sorted(unit for unit in found if unit < self.unit_count)
 
     def entry(self, unit: int) -> dict[str, Any]:
@@ -198,7 +209,7 @@ class Folder:
         extent = self._extent(unit)
         block, place = divmod(unit - extent.first_unit, UNITS_A_FILE)
         name = _block_name(self.extents.index(extent), block)
-        path = self.path / "cases" / name
+        path = self.store / "cases" / name
         try:
             about = path.stat()
             table = _planned(path, self.tree["cases"][name], about.st_mtime_ns, about.st_ino)
@@ -272,7 +283,7 @@ def read_ledger(path: Path) -> dict[str, Any] | None:
 # The plan, under a digest of each of its entries, and its copy.
 
 
-def _write_plan(path: Path, tree: dict[str, Any]) -> None:
+def write_plan(path: Path, tree: dict[str, Any]) -> None:
     """Write the plan; the copy comes first, so that there is always one that holds."""
     text = json.dumps({**tree, "digests": _entries(tree)}, indent=1)
     for place in (path / "cases" / "plan.json", path / "plan.json"):
@@ -290,10 +301,10 @@ def _entries(tree: dict[str, Any]) -> dict[str, str]:
 def _plan_tree(path: Path) -> dict[str, Any]:
     """Return what a plan's file holds, or its copy, where the file is missing or damaged and the copy is whole."""
     place = path / "plan.json"
-    content, wrong = _look(place)
+    content, wrong = sound_plan(place)
     if not wrong:
         return json.loads(content)
-    copy, unsound = _look(path / "cases" / "plan.json")
+    copy, unsound = sound_plan(path / "cases" / "plan.json")
     if unsound:
         told = wrong if isinstance(wrong, str) else f"plan.json was edited or damaged ({', '.join(wrong)})"
         raise CampaignError(f"{path}: {told}; make the plan again in another folder")
@@ -308,7 +319,7 @@ def _plan_tree(path: Path) -> dict[str, Any]:
     return json.loads(copy)
 
 
-def _look(place: Path) -> tuple[bytes, str | list[str]]:
+def sound_plan(place: Path) -> tuple[bytes, str | list[str]]:
     """Return the content of a plan's file, and what is wrong with it: why it cannot be read, or which entries."""
     try:
         content = place.read_bytes()
@@ -324,8 +335,8 @@ def _look(place: Path) -> tuple[bytes, str | list[str]]:
     if not isinstance(noted, dict):
         return content, "plan.json is damaged (digests)"
     wrong = sorted(name for name in {*noted, *now} if noted.get(name) != now.get(name))
-    if not wrong and tree["format"] != FORMAT:
-        return content, f"format {tree['format']} is unknown; this version reads {FORMAT}"
+    if not wrong and tree["format"] not in (FORMAT, PACKED):
+        return content, f"format {tree['format']} is unknown; this version reads {FORMAT} and {PACKED}"
     return content, wrong
 
 
@@ -401,7 +412,7 @@ def _fill(path: Path, plan: Plan) -> None:
     for name in FOLDERS:
         (path / name).mkdir(parents=True, exist_ok=True)
     unit = plan.unit or _unit_size(plan, specs)
-    extent, digests = _write_cases(path, plan, unit, plan.n, [])
+    extent, digests = write_cases(path, plan, unit, plan.n, [])
     write_store(path / "signals.zarr", specs, unit, extent.units(unit), path)
     tree = {
         "format": FORMAT,
@@ -411,7 +422,7 @@ def _fill(path: Path, plan: Plan) -> None:
         "signals": [asdict(s) for s in specs],
         "cases": digests,
     }
-    _write_plan(path, tree)
+    write_plan(path, tree)
 
 
 def _unit_size(plan: Plan, specs: Iterable[SignalSpec]) -> int:
@@ -419,6 +430,29 @@ def _unit_size(plan: Plan, specs: Iterable[SignalSpec]) -> int:
     size = 4 * sum(len(spec.channels) * spec.samples for spec in specs)
     most = MOST_CASES if not size else int(MOST_BYTES / size)
     return max(1, min(-(-plan.size // UNITS), MOST_CASES, most))
+
+
+@contextmanager
+def alone(folder: Folder, what: str) -> Iterator[None]:
+    """Change the plan's file while nobody else does.
+
+    Raises
+    ------
+    CampaignError
+        If somebody is at it.
+    """
+    place = folder.path / "cases" / "plan.claim"
+    claim = take(place)
+    if claim is None:
+        who = owner(place)
+        raise CampaignError(
+            f"{what}: {folder.path} is being extended or packed by {told(who) if who else 'somebody else'}; try again "
+            "later"
+        )
+    try:
+        yield
+    finally:
+        claim.release()
 
 
 def extend_folder(folder: Folder, n: int) -> Folder:
@@ -430,32 +464,23 @@ def extend_folder(folder: Folder, n: int) -> Folder:
         If the design cannot go on, n is not above what there is, or somebody else extends it at this moment.
     """
     n = whole(n, "extend: n", 1)
-    place = folder.path / "units" / "extend.claim"
-    claim = take(place)
-    if claim is None:
-        who = owner(place)
-        raise CampaignError(
-            f"extend: {folder.path} is being extended by {told(who) if who else 'somebody else'}; try again later"
-        )
-    try:
+    with alone(folder, "extend"):
         folder = Folder(folder.path)
         plan, last, unit = folder.plan, folder.extents[-1], folder.unit_size
         if not plan.extends:
             raise CampaignError(f"extend: a {plan.design} design cannot go on where it stopped; a Sobol' sequence can")
         if n <= last.points:
             raise CampaignError(f"extend: n = {n}, but {last.points} points have been drawn; give more")
-        extent, digests = _write_cases(folder.path, plan, unit, n, folder.extents)
+        extent, digests = write_cases(folder.store, plan, unit, n, folder.extents)
         write_store(folder.signals, folder.specs, unit, extent.first_unit + extent.units(unit), folder.path)
         tree = {name: value for name, value in folder.tree.items() if name != "digests"}
         tree["extents"] = [*tree["extents"], asdict(extent)]
         tree["cases"] = {**tree["cases"], **digests}
-        _write_plan(folder.path, tree)
-    finally:
-        claim.release()
+        write_plan(folder.path, tree)
     return Folder(folder.path)
 
 
-def _write_cases(path: Path, plan: Plan, unit: int, n: int, before: list[Extent]) -> tuple[Extent, dict[str, str]]:
+def write_cases(store: Path, plan: Plan, unit: int, n: int, before: list[Extent]) -> tuple[Extent, dict[str, str]]:
     """Write the cases of the points that are new; return their extent and the digests of the files."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -475,7 +500,7 @@ def _write_cases(path: Path, plan: Plan, unit: int, n: int, before: list[Extent]
         index = np.arange(first + count, first + count + size)
         units = first_unit + (count + np.arange(size)) // unit
         name = _block_name(len(before), len(digests))
-        with whole_file(path / "cases" / name, durable=path) as part:
+        with whole_file(store / "cases" / name, durable=store) as part:
             table = pa.table({"index": index, "unit": units, **columns})
             pq.write_table(table, part, compression="zstd", write_page_checksum=True)
             digests[name] = hashlib.sha256(part.read_bytes()).hexdigest()
@@ -494,100 +519,3 @@ def _write_cases(path: Path, plan: Plan, unit: int, n: int, before: list[Extent]
     if count == 0:
         raise CampaignError("plan: not one of the points satisfies the constraints; widen them or the ranges")
     return Extent(n, first_point, first, first + count, first_unit), digests
-
-
-# Whether what is stored is what was computed.
-
-
-def check_folder(folder: Folder, units: Iterable[int] | None = None, *, sweep: bool = False) -> list[str]:
-    """Return what is wrong with what is stored, and put it right if that is wanted; see `Campaign.check`.
-
-    Parameters
-    ----------
-    units : iterable of int, optional
-        Look at these of the units that are done; default all.
-    sweep : bool
-        Write the plan, its cases and the arrays' descriptions again as they were, and take units whose results are
-        damaged out of the ledger, so that `run` does them again.
-    """
-    found = _check_plan(folder, sweep)
-    wanted = None if units is None else set(units)
-    for unit in folder.done():
-        if wanted is not None and unit not in wanted:
-            continue
-        wrong = _check_unit(folder, unit)
-        if wrong:
-            found.append(f"unit {unit}: {wrong}")
-            if sweep:
-                folder.ledger(unit).unlink(missing_ok=True)
-    return found
-
-
-def _check_plan(folder: Folder, sweep: bool) -> list[str]:
-    """Return what is wrong with plan, cases and the descriptions of arrays."""
-    found, path, unit = [], folder.path, folder.unit_size
-    gone = [name for name in FOLDERS if not (path / name).is_dir()]
-    if gone:
-        found.append(f"{', '.join(gone)}: missing")
-        for name in gone if sweep else ():
-            (path / name).mkdir()
-    contents = [_look(place) for place in (path / "plan.json", path / "cases" / "plan.json")]
-    if any(wrong for _, wrong in contents) or contents[0][0] != contents[1][0]:
-        found.append("plan.json or its copy: missing, damaged or not the same")
-        if sweep:
-            _write_plan(path, {name: value for name, value in folder.tree.items() if name != "digests"})
-    for number, extent in enumerate(folder.extents):
-        names = [name for name in folder.tree["cases"] if name.startswith(f"{number:03d}-")]
-        wrong = [name for name in names if _file_digest(path / "cases" / name) != folder.tree["cases"][name]]
-        if wrong:
-            found.append(f"cases/{', cases/'.join(wrong)}: missing, edited or damaged; made again from the plan by run")
-            if sweep:
-                before = folder.extents[:number]
-                _, digests = _write_cases(path, folder.plan, unit, extent.points, before)
-                if any(digests.get(name) != folder.tree["cases"][name] for name in names):
-                    raise CampaignError(
-                        f"{path}: {wrong[0]} cannot be made again, since the plan gives other cases with this version; "
-                        "take up the campaign with the version that made it"
-                    )
-    try:
-        check_store(folder.signals, folder.specs, unit, folder.unit_count)
-    except CampaignError as error:
-        found.append(str(error))
-        if sweep:
-            write_store(folder.signals, folder.specs, unit, folder.unit_count, path)
-    return found
-
-
-def _check_unit(folder: Folder, unit: int) -> str:
-    """Return what is wrong with the files of a unit, nothing if they are as the ledger says."""
-    try:
-        entry = folder.entry(unit)
-    except CampaignError:
-        return "the ledger is damaged"
-    places = {name: shard(folder.signals, name, unit) for name in entry["digests"]} | {"table": folder.table(unit)}
-    wrong = [name for name, digest in entry["digests"].items() if _file_digest(places[name]) != digest]
-    wrong += [name for name, digest in entry["files"].items() if _file_digest(folder.path / name) != digest]
-    return f"{', '.join(wrong)} not as the ledger says" if wrong else ""
-
-
-def _file_digest(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return ""
-
-
-def litter(folder: Folder, *, sweep: bool = False) -> list[str]:
-    """Return what killed workers have left, and remove it if that is wanted."""
-    found = []
-    files = [p for p in folder.path.rglob(".*") if p.is_file()]
-    files += [p for p in (folder.path / "units").glob("*.claim") if owner(p) is None]
-    for path in files:
-        # what is younger may belong to somebody at work
-        if path.suffix == ".claim" or time.time() - path.stat().st_mtime > LITTER_AFTER:
-            found.append(f"litter: {path.relative_to(folder.path)}")
-            # the claims of what is not done count its attempts
-            if sweep and (path.suffix != ".claim" or path.with_suffix(".json").exists()):
-                path.unlink(missing_ok=True)
-    return found

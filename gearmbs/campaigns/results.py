@@ -78,10 +78,9 @@ def read_record(folder: Folder, unit: int, index: int) -> xr.Dataset:
     """Return the record of a case, or what a failed one had computed; see `Campaign.record`."""
     import xarray as xr
 
-    names = [f"{kind}/{unit:05d}/{index:07d}.nc" for kind in ("records", "failed")]
     entry = folder.entry(unit) if folder.result(unit) else {"files": {}}
-    for name in names:
-        if name not in entry["files"]:
+    for name in entry["files"]:
+        if not name.endswith(f"/{index:07d}.nc"):
             continue
         try:
             content = (folder.path / name).read_bytes()

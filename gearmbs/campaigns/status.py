@@ -142,7 +142,7 @@ def read_status(folder: Folder) -> CampaignStatus:
         If a ledger is damaged.
     """
     rows, done, claims = [], set(), []
-    units = folder.path / "units"
+    units = folder.store / "units"
     with os.scandir(units) if units.is_dir() else nullcontext(()) as files:
         for file in files:
             stem, _, kind = file.name.partition(".")

@@ -334,7 +334,7 @@ def test_addresses_of_object_stores_are_refused(place):
 def test_two_extensions_at_once(tmp_path):
     """Of two that begin at the same time one is refused with who is at it; after it the other finds its points."""
     campaign = small(tmp_path / "c", n=8)
-    claim = take(campaign.path / "units" / "extend.claim")
+    claim = take(campaign.path / "cases" / "plan.claim")
     with pytest.raises(CampaignError, match=says("extended", f"process {os.getpid()}")):
         campaign.extend(16)
     claim.release()
