@@ -45,6 +45,9 @@ def transmission_error(
         float | None, typer.Option(help="RMS of the marks' errors by their pitch; default: from the record.")
     ] = None,
     probability: Annotated[float, typer.Option(help="Of the intervals.")] = 0.95,
+    harmonics: Annotated[
+        int | None, typer.Option(help="Highest mesh harmonic, also beyond half the lines where teeth are alike.")
+    ] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures as PNG and SVG.")] = None,
     out: ReportFile = None,
@@ -76,6 +79,7 @@ def transmission_error(
             free=free,
             mark_error=mark_error,
             probability=probability,
+            harmonics=harmonics,
         )
         files = save_tables(found.tables(), tables)
         if figures is not None:

@@ -136,20 +136,17 @@ def torsional_vibration(train: PulseTrain, marks: Any = None) -> xr.DataArray:
         rad, dimensions (angle, channel), angle in turns from mark 0, `lines` samples a turn: what
         `gearmbs.signals.order_spectrum` takes. The speed over time is `instantaneous_speed` of `angle_of_pulses`.
     """
-    found = _own(train)
-    values = found.values
-    if marks is not None:
-        values = values + errors_of(marks, train)[found.numbers % train.lines]
+    found = _own(train, None if marks is None else errors_of(marks, train))
     return xr.DataArray(
-        values[:, None],
+        found.values[:, None],
         dims=("angle", "channel"),
         coords={"angle": found.numbers / train.lines, "channel": [train.name], "units": ("channel", ["rad"])},
         attrs={"samples_per_rev": train.lines, "units": "rad", "mean_speed": train.mean_speed},
     )
 
 
-def _own(train: PulseTrain) -> Deviations:
-    """Return the deviations of a shaft from its own smooth angle, over whole turns."""
+def _own(train: PulseTrain, errors: np.ndarray | None = None) -> Deviations:
+    """Return the deviations of a shaft from its own smooth angle, over whole turns; errors of its marks or none."""
     course = smooth_angle(train)
     begin, end = float(course.angle(course.begin)), float(course.angle(course.end))
-    return deviations(train, course, begin, begin + TURN * math.floor((end - begin) / TURN) - 1e-9, 1.0)
+    return deviations(train, course, begin, begin + TURN * math.floor((end - begin) / TURN) - 1e-9, 1.0, errors=errors)

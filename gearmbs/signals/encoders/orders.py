@@ -29,6 +29,10 @@ SMOOTHINGS = 2
 """Courses of means over a turn, the second upon the first; each takes half a turn at either end."""
 FEWEST_TURNS = 4
 """Turns of the slower shaft within the smooth angle: a window of as many parts orders that lie one apart."""
+BRIDGINGS = 3
+"""Times that missing pulses are bridged: each leaves the part of the error that one pulse has in the known lines."""
+APART = 1.99
+"""Lines of the Hann window's spectrum from which two orders do not see each other."""
 HANN_NOISE = 1.5
 """Variance of a line with the Hann window by that without any, for noise."""
 WHOLE = 1e-9
@@ -142,18 +146,18 @@ def deviations(
     phi, ahead, there, spacing, numbers = (v[kept] for v in (phi, ahead, there, spacing, numbers))
     mean = float(ahead[there].mean())
     found = Deviations(phi, ahead - mean, mean, spacing, numbers, there)
-    if there.all() or not known:
+    if there.all():
         return found
-    turns = (end - begin) / TURN
-    model = np.zeros_like(phi)
-    weighted = found.window(begin, turns) * found.values
-    for order in known:
-        rotating = np.exp(1j * order * phi)
-        model += np.real((weighted @ rotating.conj()) * rotating)
-    holes = ~there
-    ahead = found.values.copy()
-    ahead[holes] = model[holes] + np.interp(phi[holes], phi[there], (found.values - model)[there])
-    return replace(found, values=ahead)
+    holes, values = ~there, found.values.copy()
+    values[holes] = np.interp(phi[holes], phi[there], values[there])
+    weights = found.window(begin, (end - begin) / TURN)
+    for _ in range(BRIDGINGS if known else 0):
+        model = np.zeros_like(phi)
+        for order in known:
+            rotating = np.exp(1j * order * phi)
+            model += np.real(((weights * values) @ rotating.conj()) * rotating)
+        values[holes] = model[holes] + np.interp(phi[holes], phi[there], (values - model)[there])
+    return replace(found, values=values)
 
 
 class Line(NamedTuple):
@@ -170,6 +174,7 @@ def lines(
     begin: float,
     turns: float,
     signs: Sequence[float],
+    mesh: Fraction | None = None,
 ) -> dict[Fraction, Line]:
     """Return lines of the sum of several encoders' deviations, with variances by the scatter from turn to turn.
 
@@ -185,22 +190,32 @@ def lines(
         Window of the common angle, rad and turns.
     signs : sequence of float
         Factors of the encoders.
+    mesh : Fraction, optional
+        Order of whose multiples among `orders` the lines are taken out first, as the largest.
     """
     wanted: dict[Fraction, dict[int, Fraction]] = {step: {} for step in steps}
     for order in orders:
         step = next(step for step in steps if (order / step).denominator == 1)
         wanted[step][int(order / step)] = order
+    # uneven marks leak a part of each line into all others: the lines of what is left make up for it
+    apart = float(min(np.diff([float(o) for o in sorted(orders)]), default=1.0)) * turns > APART
+    stages = [wanted, wanted] if apart else [wanted]
+    if mesh is not None:
+        large = {mesh: {int(order / mesh): order for order in orders if (order / mesh).denominator == 1}}
+        stages = [large, large, *stages]
     values = dict.fromkeys(orders, 0.0j)
     variances = dict.fromkeys(orders, 0.0)
     for one, sign in zip(found, signs):
         weights = one.window(begin, turns)
         # what is left beside all lines is noise: those of one shaft would scatter over turns of the other
         left = one.values.copy()
-        for step, places in wanted.items():
-            for order, rotating in _rotating(one.phi, step, places):
-                value = complex((weights * one.values) @ rotating)
-                values[order] += sign * value
-                left -= np.real(value * rotating.conj())
+        for stage in stages:
+            rest = weights * left
+            for step, places in stage.items():
+                for order, rotating in _rotating(one.phi, step, places):
+                    value = complex(rest @ rotating)
+                    values[order] += sign * value
+                    left -= np.real(value * rotating.conj())
         for step, places in wanted.items():
             length = TURN / float(step)
             whole = math.floor(turns * float(step) + WHOLE)
@@ -233,7 +248,12 @@ def folding(mesh_order: float, lines_of_turn: int, harmonics: int) -> Iterator[t
     """Yield the mesh harmonics that are not below half the lines, with the orders that they are seen at."""
     for k in range(1, harmonics + 1):
         if k * mesh_order >= 0.5 * lines_of_turn - WHOLE:
-            yield k, abs((k * mesh_order + 0.5 * lines_of_turn) % lines_of_turn - 0.5 * lines_of_turn)
+            yield k, folded(k * mesh_order, lines_of_turn)
+
+
+def folded(order: float, lines_of_turn: int) -> float:
+    """Return the order below half the lines that an order is seen at."""
+    return abs((order + 0.5 * lines_of_turn) % lines_of_turn - 0.5 * lines_of_turn)
 
 
 def beside(values: np.ndarray, turns: int, order: float, high: bool) -> np.ndarray:

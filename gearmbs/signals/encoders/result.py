@@ -29,7 +29,7 @@ SHAFTS = ("driver", "driven")
 
 
 class OrderLine(NamedTuple):
-    """What is known of one order; the first four as in `gearmbs.signals.encoders.transmission.Order`."""
+    """What is known of one order; the first four as in `gearmbs.signals.encoders.visible.Order`."""
 
     order: Fraction
     first: int | None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,21 +20,19 @@ from gearmbs.signals.encoders.orders import (
     Gearing,
     Line,
     deviations,
-    folding,
+    folded,
     lines,
     smooth_angle,
-    whole_number,
 )
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
+from gearmbs.signals.encoders.visible import MOST_HARMONICS, Order, visible_orders
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.signal.signal import check_teeth
 from gearmbs.units import Quantity, to_si
 
 LEVEL_LINES = 32
 """Orders beside one, at most, by whose median the level of the marks is told."""
-FOLDED_HARMONICS = 20
-"""Mesh harmonics that are looked at for where marks fold them to: of contact forces later ones are below a percent."""
 SLIPPED = 0.05
 """Pitches by which wheels and discs of two runs may stand otherwise than told: 1/20 is 18 degrees of the mesh."""
 LARGEST_TERM = 2000
@@ -60,15 +58,6 @@ class CoupledRun:
     driven: PulseTrain
     load: str = "load"
     shift: tuple[Quantity, Quantity] = (0.0, 0.0)
-
-
-class Order(NamedTuple):
-    """An order by turns of the first shaft; as a whole order of each shaft, or None; and as mesh harmonic, or None."""
-
-    order: Fraction
-    first: int | None
-    second: int | None
-    harmonic: int | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +88,7 @@ def transmission_error_from_pulses(
     free: Mapping[str, PulseTrain | Sequence[PulseTrain]] | None = None,
     mark_error: float | Sequence[float] | None = None,
     probability: float = 0.95,
+    harmonics: int | None = None,
 ) -> MeasuredTransmissionError:
     """Transmission error of two shafts, its mesh and shaft orders, with the interval that the marks leave.
 
@@ -123,6 +113,10 @@ def transmission_error_from_pulses(
         RMS of the errors of the marks as a share of their pitch; default: from the orders beside the mesh orders.
     probability : float
         Of the intervals.
+    harmonics : int, optional
+        Highest mesh harmonic. Those from half the lines on are taken, where teeth that are alike pass the marks in many
+        phases, at the orders they are folded to; what these orders have of their own, by those beside them, is in the
+        interval. Default: those below half the lines.
 
     Returns
     -------
@@ -148,7 +142,9 @@ def transmission_error_from_pulses(
     if stray:
         raise SignalError(f"free: has {sorted(stray)}; the shafts are 'driver' and 'driven'")
     _check_trains(runs, freed, gearing)
-    orders, refused, remarks = _orders(gearing, trains)
+    if harmonics is not None and (isinstance(harmonics, bool) or not 1 <= harmonics <= MOST_HARMONICS):
+        raise SignalError(f"harmonics: must be a whole number from 1 to {MOST_HARMONICS}, got {harmonics!r}")
+    orders, refused, remarks = visible_orders(gearing, trains, harmonics)
     remarks += _check_free(runs, freed, gearing)
     # known marks are put right where the pulses are, as the wheels' lag moves them; what is left of them is an unknown
     errors = {name: encoder_marks(trains).errors if trains else None for name, trains in freed.items()}
@@ -163,7 +159,7 @@ def transmission_error_from_pulses(
     found = []
     for order in orders:
         known = {name: level for name in marks if not marks[name] and (level := levels.at(order, name)) is not None}
-        rows = _rows(order, gearing, measured, shifts, marks, known.get("driven", 0.0))
+        rows = _rows(order, gearing, measured, shifts, marks, known.get("driven", 0.0), levels.folded(order, trains))
         solved = estimate(rows, known)
         calibrated = all(_is_calibrated(solved, known, name) for name in solved.names if name in known)
         freedom = 2.0 * sum(m.turns - 1 for m in measured) if calibrated else levels.freedom
@@ -266,65 +262,6 @@ SURELY = 3.0
 """Standard errors by which a share must be below it: of a disc whose share is 1 fewer than 1 in 800 are."""
 
 
-def _orders(gearing: Gearing, trains: Sequence[PulseTrain]) -> tuple[list[Order], list[str], list[str]]:
-    """Return the orders that both encoders see, what is refused of those that they do not, and remarks."""
-    limits = [Fraction(train.lines, 2) for train in trains]
-    top = min(limits[0], limits[1] / gearing.ratio)
-    asked: dict[Fraction, None] = {}
-    for step in (gearing.mesh, Fraction(1), 1 / gearing.ratio):
-        asked |= dict.fromkeys(step * k for k in range(1, math.ceil(top / step)))
-    refused = []
-    shadows: list[list[tuple[int, float]]] = []
-    for name, train, mesh in zip(("driver", "driven"), trains, (gearing.mesh, gearing.on_second(gearing.mesh))):
-        shadows.append(list(folding(float(mesh), train.lines, FOLDED_HARMONICS)))
-        if shadows[-1]:
-            first = shadows[-1][0][0]
-            refused.append(
-                f"Mesh harmonic {first} and later ones: order {float(first * mesh):g} of the {name} is half "
-                f"of its {train.lines} lines or more."
-            )
-    orders, remarks = [], []
-    lost: dict[str, list[tuple[float, int]]] = {"driver": [], "driven": []}
-    for order in sorted(asked):
-        own = {"driver": float(order), "driven": float(gearing.on_second(order))}
-        harmonic = whole_number(order / gearing.mesh)
-        cast = [
-            (name, h)
-            for name, train, shadow in zip(own, trains, shadows)
-            for h, at in shadow
-            if abs(at - own[name]) < SHADOW / max(train.turns, 1.0)
-        ]
-        dark = [(name, h) for name, h in cast if harmonic is None or h <= DARK * harmonic]
-        if dark:
-            lost[dark[0][0]].append((own[dark[0][0]], dark[0][1]))
-            continue
-        remarks += [
-            f"The marks of the {name} fold mesh harmonic {h} onto {harmonic}: lines that are no multiple of the teeth "
-            "part them."
-            for name, h in cast[:1]
-        ]
-        orders.append(Order(order, whole_number(order), whole_number(gearing.on_second(order)), harmonic))
-    for name, places in lost.items():
-        if places:
-            listed = ", ".join(f"{at:g} (harmonic {h})" for at, h in places[:LISTED])
-            more = f" and {len(places) - LISTED} more" if len(places) > LISTED else ""
-            refused.append(f"Orders of the {name} onto which its marks fold mesh harmonics: {listed}{more}.")
-    if not any(o.harmonic for o in orders):
-        raise SignalError(
-            f"lines: {trains[0].lines} and {trains[1].lines} marks show no mesh harmonic. {' '.join(refused)} Use "
-            "discs of more lines, no multiple of the teeth"
-        )
-    return orders, refused, remarks
-
-
-LISTED = 12
-DARK = 7
-"""A mesh harmonic is refused where one of up to so many times its number is folded onto it, and remarked on where one
-beyond is: amplitudes that fall as the number's square are then 2 % of it."""
-SHADOW = 2.0
-"""Width of a line with the Hann window, by the reciprocal of the turns: nearer orders are not parted."""
-
-
 def _window(gearing: Gearing, begin: float, end: float) -> float:
     """Return the turns of the first shaft that are evaluated: whole ones of both if they fit, else of the slower."""
     turns = (end - begin) / TURN
@@ -354,7 +291,7 @@ def _lines_of(
     first = deviations(run.driver, course, begin, end, 1.0, known, errors["driver"])
     second = deviations(run.driven, course, begin, end, scale, known, errors["driven"])
     steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
-    values = lines((first, second), [o.order for o in orders], steps, begin, turns, (1.0, -1.0))
+    values = lines((first, second), [o.order for o in orders], steps, begin, turns, (1.0, -1.0), gearing.mesh)
     mesh = [o.order for o in orders if o.harmonic]
     return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)))
 
@@ -423,8 +360,11 @@ def _rows(
     shifts: Sequence[tuple[float, float]],
     marks: Mapping[str, list[dict[Fraction, Line]]],
     unknown: float,
+    folded_onto: float,
 ) -> list[Row]:
     """Return what all runs measured at one order, and of what it consists.
+
+    Where the order is folded, what the shafts have of their own there is added to the noise.
 
     The wheels' lag moves the driven marks to and fro under the line: of unknown ones, whose lines have this variance,
     each run has another part (kappa lag)^2 of it.
@@ -432,6 +372,7 @@ def _rows(
     rows = []
     for one, shift in zip(measured, shifts):
         value, variance = one.values[order.order]
+        variance += folded_onto
         if unknown and order.second is not None:
             variance += unknown * (order.second * one.wander) ** 2 * float(gearing.ratio) ** 2
         if order.first is not None or order.second is None:
@@ -463,19 +404,9 @@ class _Levels:
         told: float | Sequence[float] | None, calibrated: set[str],
     ) -> None:  # fmt: skip
         self.told: dict[str, float] | None = None
-        self.freedom = math.inf
+        self.gearing, self.calibrated = gearing, calibrated
         self.orders: dict[str, np.ndarray] = {}
         self.squares: dict[str, np.ndarray] = {}
-        if told is not None:
-            shares = np.broadcast_to(np.asarray(told, dtype=float), (2,))
-            if not (np.isfinite(shares).all() and (shares >= 0.0).all()):
-                raise SignalError(f"mark_error: must be one or two shares of the pitch of the marks, got {told!r}")
-            # a line of L independent errors of variance s^2 has 2 s^2/L in each part
-            self.told = {
-                name: 2.0 * (share * TURN / train.lines) ** 2 / train.lines
-                for name, share, train in zip(("driver", "driven"), shares, trains)
-            }
-            return
         scales = {"driver": 1.0, "driven": float(gearing.ratio)}
         counted = []
         for shaft, name in enumerate(scales):
@@ -491,6 +422,16 @@ class _Levels:
             counted.append(min(LEVEL_LINES, at.size))
         # the median of squares has half the freedom of their mean, two for each
         self.freedom = float(max(2, min(counted, default=2)))
+        if told is not None:
+            self.freedom = math.inf
+            shares = np.broadcast_to(np.asarray(told, dtype=float), (2,))
+            if not (np.isfinite(shares).all() and (shares >= 0.0).all()):
+                raise SignalError(f"mark_error: must be one or two shares of the pitch of the marks, got {told!r}")
+            # a line of L independent errors of variance s^2 has 2 s^2/L in each part
+            self.told = {
+                name: 2.0 * (share * TURN / train.lines) ** 2 / train.lines
+                for name, share, train in zip(scales, shares, trains)
+            }
 
     def at(self, order: Order, name: str) -> float | None:
         """Return the variance of a disc's line at an order; None where the order is none of the disc's."""
@@ -499,6 +440,23 @@ class _Levels:
             return None
         if self.told is not None:
             return self.told[name]
-        near = np.argsort(np.abs(self.orders[name] - whole), kind="stable")[:LEVEL_LINES]
+        return self._beside(whole, name)
+
+    def _beside(self, order: float, name: str) -> float:
+        near = np.argsort(np.abs(self.orders[name] - order), kind="stable")[:LEVEL_LINES]
         # squares of a line of chance have the median 2 ln 2 times the variance of each part
         return float(np.median(self.squares[name][near])) / (2.0 * math.log(2.0)) if near.size else 0.0
+
+    def folded(self, order: Order, trains: Sequence[PulseTrain]) -> float:
+        """Return the variance (rad^2 of the first shaft) of what the shafts have where an order is folded to, if it is.
+
+        With marks that are known that is their own vibration and noise, else the marks are in it already.
+        """
+        total = 0.0
+        for name, own, scale, train in (
+            ("driver", order.order, 1.0, trains[0]),
+            ("driven", self.gearing.on_second(order.order), float(self.gearing.ratio), trains[1]),
+        ):
+            if order.harmonic and own >= Fraction(train.lines, 2) and name in self.calibrated:
+                total += scale**2 * self._beside(folded(float(own), train.lines), name)
+        return total
