@@ -44,6 +44,10 @@ PASSES = 6
 """Searches for spikes, each in the record with those before bridged."""
 HELD = 8
 """Equal samples in a row that are a value held, where the record otherwise changes from sample to sample."""
+FLAT, FLAT_TOPS = 3, 3
+"""Equal samples in a row at the end of a range, and stretches of them, that are no chance."""
+FLAT_SHARE = 6.0
+"""How many times as many samples are at the highest value as a step below: of a sine in steps it is 2.4."""
 ISLAND = 3
 """Half the samples between two lost ones that are bridged with them: a bridge that has to lead through one wrong sample
 follows it."""
@@ -112,6 +116,13 @@ def repair_vibrometer(
             "over the range": np.zeros_like(dark) if bound is None else np.abs(column) >= AT_RANGE * bound,
             "held": _held(column),
         }
+        if bound is None and (top := flat_top(column)) is not None:
+            limit, count = top
+            unit = units_of(signal)[names.index(name)]
+            notes.append(
+                f"CLIPPED: {name} stands at {limit:.6g} {unit} in {count} samples, as where a range is exceeded; its "
+                f"levels are wrong. Give full_scale='{abs(limit):.6g} {unit}' to bridge them, or take a larger range."
+            )
         told = np.any(list(found.values()), axis=0)
         lost = _widened(told)
         found["spikes"] = np.zeros_like(dark)
@@ -146,6 +157,27 @@ def repair_vibrometer(
         signal, np.stack(columns, axis=1), channels=kept, units=[units_of(signal)[k] for k in at], lost=shares
     )
     return result.assign_attrs(notes=notes) if notes else result
+
+
+def flat_top(column: np.ndarray) -> tuple[float, int] | None:
+    """Return the highest or lowest value and its count, where a record stands at it as no vibration does, or None.
+
+    Several stretches of equal samples must be there, and far more samples than a step below: vibration cut to coarse
+    steps has stretches at its peaks, too, but nearly as many samples one step below.
+    """
+    for sign in (1.0, -1.0):
+        x = sign * column
+        top = float(x.max())
+        at = x == top
+        lower = x[~at]
+        longer = sum(b - a >= FLAT for a, b in _stretches(at))
+        if longer < FLAT_TOPS or not lower.size:
+            continue
+        step = float(np.diff(np.unique(x)).min())
+        below = int(np.count_nonzero(lower >= top - 1.5 * step))
+        if np.count_nonzero(at) > FLAT_SHARE * below:
+            return sign * top, int(np.count_nonzero(at))
+    return None
 
 
 def _in_unit(bound: Quantity, unit: str) -> float:

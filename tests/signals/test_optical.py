@@ -78,6 +78,24 @@ def test_sound_records_and_shocks_are_left_alone():
     assert repair_vibrometer(record).attrs["lost"][0] < 0.02
 
 
+@pytest.mark.parametrize("bits", [8, 12, 24])
+def test_a_range_that_is_exceeded_is_told(bits):
+    """Flat tops are named with the range to give; the peaks of what is cut to coarse steps are no such tops."""
+    clean = add_noise(vibration(levels=(1.0, 0.4), seconds=1.0), seed=seed(3), rms=2e-5)
+    step = 2.2 * float(np.abs(clean.values).max()) / 2**bits
+    whole = np.round(clean.values / step) * step
+    limit = step * np.round(0.6 * np.abs(whole).max() / step)
+    sound, clipped = (
+        make_signal({"laser": x[:, 0]}, RATE, units="m/s") for x in (whole, np.clip(whole, -limit, limit))
+    )
+    assert not any("CLIPPED" in note for note in repair_vibrometer(sound).attrs.get("notes", ()))
+    told = [note for note in repair_vibrometer(clipped).attrs["notes"] if "CLIPPED" in note]
+    assert len(told) == 1
+    assert f"full_scale='{limit:.6g} m/s'" in told[0]
+    known = repair_vibrometer(clipped[: int(0.05 * RATE)], full_scale=1.2 * limit)
+    assert not any("CLIPPED" in note for note in known.attrs.get("notes", ()))
+
+
 def test_light_that_is_weak_tells_drop_outs_and_too_many_are_refused():
     clean = vibration(seconds=0.5)
     values, light = clean.values[:, 0].copy(), np.ones(clean.sizes["time"])

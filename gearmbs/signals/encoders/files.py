@@ -15,13 +15,17 @@ import numpy as np
 from gearmbs.progress import staged
 from gearmbs.signals.encoders.pulses import PulseTrain, pulse_train, pulses_of_channel
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
-from gearmbs.signals.files.formats import checked_format, damage_named, read_signal, write_record
+from gearmbs.signals.files.formats import checked_format, damage_named, format_to_write, read_signal, write_record
 from gearmbs.signals.files.table import Asked, format_of
 from gearmbs.signals.signal.record import SECONDS, Record
 from gearmbs.units import Quantity, to_si
 
 INDEX = " index"
 """End of the name of a column with the pulses once a turn."""
+COUNTER_BITS = (16, 24, 32)
+"""Of counters, after which they begin anew."""
+LONGEST_FIT = 10.0
+"""Usual steps up to which the one across an overflow may be: missing pulses are told and mended later."""
 COUNTS = frozenset({"ticks", "tick", "counts", "count"})
 KNOWN = "encoders"
 """Attribute of a file that says how many lines the encoders have, and which teeth are at mark 0."""
@@ -37,7 +41,18 @@ def write_pulses(trains: Mapping[str, PulseTrain] | Sequence[PulseTrain], path: 
         of index pulses, unless the disc itself tells.
     path : path-like
         The ending says as what (`gearmbs.write_signal`).
+
+    Raises
+    ------
+    SignalFileError
+        If the format keeps no attributes, among them the count of lines.
     """
+    path = Path(path)
+    written_as = format_of(format_to_write(path))
+    if not written_as.keeps_attributes:
+        raise SignalFileError(
+            path, "holds samples, and not how many lines an encoder has; write pulses as .csv, .npz, .mat or .nc"
+        )
     named = dict(trains) if isinstance(trains, Mapping) else {train.name: train for train in trains}
     if not named or (not isinstance(trains, Mapping) and len(named) < len(trains)):
         raise SignalError("trains: give at least one, and each another name")
@@ -57,7 +72,7 @@ def write_pulses(trains: Mapping[str, PulseTrain] | Sequence[PulseTrain], path: 
     for k, column in enumerate(columns.values()):
         values[: column.size, k] = column
     record = Record(values, list(columns), ["s"] * len(columns), rate=1.0, attrs={KNOWN: known})
-    return write_record(record, Path(path))
+    return write_record(record, path)
 
 
 @staged("reading")
@@ -115,6 +130,7 @@ def read_pulses(
     if missing:
         raise SignalFileError(path, f"has no column {missing[0]!r}; it holds {record.names}")
     found = {}
+    begin = None
     for name in wanted:
         about = told.get(name, {})
         count = lines[name] if isinstance(lines, Mapping) else lines or about.get("lines")
@@ -124,11 +140,13 @@ def read_pulses(
             )
         more = {"name": name, "tooth_at_zero": about.get("tooth_at_zero"), **known}
         factor = _factor(units[name], clock, unit, path)
+        once = name + INDEX if name + INDEX in table else None
+        if factor is not None:
+            begin = _unwrapped(table, name, once, count, begin, factor, path)
         if factor is None and np.all(np.diff(_present(table[name])) > 0.0):
             raise MissingMetadataError(
                 "unit", f"{name!r} in {path.name} (it rises throughout)", "pass unit='s' of times, or clock='20 MHz'"
             )
-        once = name + INDEX if name + INDEX in table else None
         if factor is None:
             signal = read_signal(path, rate=rate, channels=[name, once] if once else [name])
             found[name] = pulses_of_channel(signal, count, name, index=once, **more)
@@ -136,6 +154,52 @@ def read_pulses(
             index = None if once is None else factor * _present(table[once])
             found[name] = pulse_train(factor * _present(table[name]), count, index=index, **more)
     return found
+
+
+def _unwrapped(
+    table: dict[str, np.ndarray],
+    name: str,
+    once: str | None,
+    lines: int,
+    begin: float | None,
+    factor: float,
+    path: Path,
+) -> float | None:
+    """Add the periods of a counter that overflows to a column and its index pulses, in place.
+
+    A column falls where its counter begins anew. The fewest bits that hold all its counts are taken where they put the
+    next pulse among those beside it, the first pulse next to that of the first train (`begin`, in counts by factor).
+
+    Returns
+    -------
+    float
+        Time of the first pulse of all trains, s.
+    """
+    column = _present(table[name])
+    steps = np.diff(column)
+    falls = np.flatnonzero(steps < 0.0)
+    usual = float(np.median(steps))
+    period = next((2.0**bits for bits in COUNTER_BITS if 0.0 <= column.min() and column.max() < 2.0**bits), 0.0)
+    if begin is None:
+        begin = factor * float(column[0])
+    if not falls.size or usual <= 0.0:
+        return begin
+    wrapped = np.unwrap(column, period=period) if period else column
+    fits = np.diff(wrapped)[falls]
+    if not (np.all(np.diff(wrapped) > 0.0) and np.all((fits > 0.3 * usual) & (fits < LONGEST_FIT * usual))):
+        return begin
+    wrapped += period * round((begin / factor - wrapped[0]) / period)
+    table[name] = wrapped
+    if once is not None:
+        turn, marks = lines * usual, _present(table[once])
+        if turn > 0.5 * period:
+            raise SignalFileError(
+                path, f"{name!r} overflows faster than twice a turn, so that nothing tells the turns of {once!r}; "
+                "leave that column out, or unwrap both"
+            )  # fmt: skip
+        marks = np.unwrap(marks, period=period)
+        table[once] = marks + period * round((wrapped[0] + 0.5 * turn - marks[0]) / period)
+    return begin
 
 
 def _present(column: np.ndarray) -> np.ndarray:

@@ -24,6 +24,8 @@ FEWEST_TURNS = 2
 """Turns of a shaft that a train of pulses must cover: less, and nothing of it recurs."""
 SAME_MARK = 0.5
 """Share of the turns in which a mark must be missing to be one that the disc lacks, which numbers the others."""
+OVERFLOW = 0.5
+"""Share of the span of times by which each fall is more than disorder: a counter falls by nearly all of it."""
 INDEX_REACH = 1.0
 """Pitches within which a pulse must follow an index pulse to be that of mark 0."""
 
@@ -116,10 +118,18 @@ def pulse_train(
     if faults not in ("mend", "refuse", "keep"):
         raise SignalError(f"faults: must be 'mend', 'refuse' or 'keep', got {faults!r}")
     if at.ndim != 1 or not np.isfinite(at).all() or np.any(np.diff(at) <= 0.0):
-        back = int(np.argmax(np.diff(at) <= 0.0)) if at.ndim == 1 and at.size > 1 else 0
+        steps = np.diff(at) if at.ndim == 1 and at.size > 1 else np.zeros(1)
+        back = int(np.argmax(steps <= 0.0))
+        falls = -steps[steps < 0.0]
+        hint = (
+            f" (they fall by {falls.max():.6g} s, {falls.size} times: a counter that overflows? Add its period from "
+            "there on, as np.unwrap(counts, period=2**16) does, or let read_pulses(..., clock=...) do so)"
+            if falls.size and falls.min() > OVERFLOW * (at.max() - at.min())
+            else ""
+        )
         raise SignalError(
-            f"times: those of {name!r} must increase, but do not behind pulse {back}; give the times of rising edges "
-            "in s, in the order they came, of a shaft that turns one way"
+            f"times: those of {name!r} must increase, but do not behind pulse {back}{hint}; give the times of rising "
+            "edges in s, in the order they came, of a shaft that turns one way"
         )
     if at.size < FEWEST_TURNS * lines:
         raise SignalError(

@@ -226,6 +226,11 @@ def _format(path: Path, format: str | None, content: str | None = None) -> str:
     )
 
 
+def format_to_write(path: Path) -> str:
+    """Return the format that the ending of a file stands for; SignalFileError of one that stands for none."""
+    return _format(path, None)
+
+
 def _content(path: Path) -> str:
     """Return what the first bytes are, whatever the name says."""
     try:

@@ -147,6 +147,35 @@ def test_encoders_are_taken_by_their_names(tmp_path):
     assert "--columns" in done.output
 
 
+@pytest.mark.parametrize(("bits", "clock"), [(16, 1e6), (24, 20e6), (32, 20e6)])
+def test_counters_that_overflow_are_unwrapped(bits, clock, tmp_path):
+    """Counts that begin anew come back, both trains at one time; times that fall are told what to do."""
+    trains = {n: encoder(steady(20.0, speed), 64, name=n, index=bits > 16) for n, speed in (("a", 50.0), ("b", 40.0))}
+    columns, start = {}, 2.0**32 - 0.5 * clock if bits == 32 else 0.0
+    for name, train in trains.items():
+        columns[name] = train.times
+        if train.referenced:
+            columns[f"{name} index"] = np.interp(64.0 * np.arange(1, 19) - 0.5, train.numbers, train.times)
+    counts = {f"{n} [ticks]": pd.Series(np.mod(np.floor(c * clock) + start, 2.0**bits)) for n, c in columns.items()}
+    pd.DataFrame(counts).to_csv(tmp_path / "counts.csv", index=False)
+    found = read_pulses(tmp_path / "counts.csv", 64, clock=clock)
+    off = [found[n].times - trains[n].times for n in trains]
+    assert max(map(np.ptp, off)) < 2.0 / clock
+    assert abs(off[0].mean() - off[1].mean()) < 1.0 / clock
+    assert all(found[n].referenced == trains[n].referenced for n in trains)
+    assert all(np.all((found[n].numbers - trains[n].numbers) % 64 == 0) for n in trains if bits > 16)
+    with pytest.raises(SignalError, match=says("times", "overflows", "unwrap", "clock")):
+        pulse_train(np.mod(trains["a"].times, 0.3), 64)
+
+
+@pytest.mark.parametrize("ending", [".uff", ".parquet"])
+def test_files_that_keep_no_count_of_lines_are_not_written(ending, tmp_path):
+    with pytest.raises(SignalFileError, match=says(ending, "lines", ".npz")):
+        write_pulses([encoder(steady(), 64)], tmp_path / f"run{ending}")
+    assert not list(tmp_path.iterdir())
+    assert list(read_pulses(write_pulses([encoder(steady(), 64)], tmp_path / "run.npz"))) == ["encoder"]
+
+
 def test_counts_and_voltages_are_read_as_pulses(tmp_path):
     train = encoder(steady(), 32, index=True)
     counts = pd.DataFrame({"A [ticks]": np.round(train.times * 20e6)})
