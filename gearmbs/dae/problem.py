@@ -98,6 +98,8 @@ class Number:
     kind: str
     places: tuple[Place, ...]
     prescribes: tuple[tuple[str, int], ...] = ()
+    loads: bool = False
+    """Whether equations change with it as with a load, and derivatives by the unknowns do not."""
 
     def value(self, table: Table, t: float) -> float:
         """Return the value at a time."""

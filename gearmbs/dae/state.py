@@ -10,7 +10,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,20 @@ class History:
     equations: str = ""
 
 
+class Memory(NamedTuple):
+    """When a controller samples, and what it remembers.
+
+    Attributes
+    ----------
+    schedule : ndarray, shape (3,)
+        Start, s; sample time, s; samples taken.
+    numbers : ndarray
+    """
+
+    schedule: np.ndarray
+    numbers: np.ndarray
+
+
 def equations_of(problem: DAEProblem) -> str:
     """Return a digest of all that the equations of a problem, as assembled, depend on: tables and functions."""
     addressed = np.isin(problem.idata, np.fromiter(NAMES, dtype=np.int64))
@@ -74,6 +88,8 @@ class State:
         Places and values of what differs from these tables: Euler references, counted turns.
     history : History or None
         Of the integrator; without it a run starts afresh, at order one.
+    controllers : mapping of str to Memory
+        Of a simulator, by the inputs they set.
     """
 
     t: float
@@ -85,6 +101,7 @@ class State:
     integers: tuple[np.ndarray, np.ndarray]
     reals: tuple[np.ndarray, np.ndarray]
     history: History | None = field(default=None)
+    controllers: Mapping[str, Memory] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -209,6 +226,8 @@ class State:
         if self.history is not None:
             arrays |= {"method": np.array(self.history.method), "equations": np.array(self.history.equations)}
             arrays |= {f"history {name}": values for name, values in self.history.numbers.items()}
+        for name, memory in self.controllers.items():
+            arrays |= {f"schedule {name}": memory.schedule, f"memory {name}": memory.numbers}
         with whole_file(path) as part, open(part, "wb") as file:
             np.savez(file, **arrays)
         return path
@@ -242,11 +261,13 @@ class State:
                 numbers = {name.removeprefix(head): a for name, a in arrays.items() if name.startswith(head)}
                 history = History(str(arrays["method"]), numbers, equations=str(arrays["equations"]))
             names = tuple(map(str, arrays["names"]))
-            return cls(t, arrays["y"], arrays["yp"], names, t_model, sizes, integers, reals, history)
+            inputs = [name.removeprefix("memory ") for name in arrays if name.startswith("memory ")]
+            held = {name: Memory(arrays[f"schedule {name}"], arrays[f"memory {name}"]) for name in inputs}
+            return cls(t, arrays["y"], arrays["yp"], names, t_model, sizes, integers, reals, history, held)
         except ModelError:
             raise
         except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
             raise ModelError(f"{path}: not a whole file of a state, as State.save writes it ({error})") from None
 
 
-__all__ = ["History", "State"]
+__all__ = ["History", "Memory", "State"]

@@ -374,12 +374,12 @@ class _Compiler:
         row, functions = self.builder.forces[-1], self.builder.functions
         for what, setting in made.settings.items():
             place = Place(row[T.FORCE_REXTRA] + setting.at, factor=setting.factor, table=T.H_R_EXTRA)
-            self.builder.add_setting(f"{name}.{what}", setting.unit, place)
+            self.builder.add_setting(f"{name}.{what}", setting.unit, [place])
         for what, number in made.given.items():
             kind, at = functions[len(functions) - len(made.times) + number]
             if kind in SETTLED:
                 place = Place(at + SETTLED[kind], table=T.H_R_FUNCTION)
-                self.builder.add_setting(f"{name}.{what}", "N*m", place)
+                self.builder.add_setting(f"{name}.{what}", "N*m", [place], loads=True)
 
     def add_reaction(self, joint: jt.Joint) -> None:
         """Make the force and moment of a joint on its I marker's body unknowns."""

@@ -148,6 +148,59 @@ def test_going_back_is_exact(model, tmp_path):
             np.testing.assert_array_equal(other.result.y, wanted.result.y[at:])
 
 
+class PI:
+    """A controller of the speed of a disc that can tell what it remembers, and be told."""
+
+    def __init__(self):
+        self.sum = 0.0
+
+    def __call__(self, t, sim):
+        error = 10.0 - sim.get("angular_velocity", "a")[2]
+        self.sum += PERIOD * error
+        return 3.0 * error + 5.0 * self.sum
+
+    def state(self):
+        return [self.sum]
+
+    def restore(self, numbers):
+        (self.sum,) = numbers
+
+
+def test_a_state_holds_what_controllers_remember(tmp_path):
+    """Back in the same simulator, on in another one, and from a file, also between samples: the same bits."""
+
+    def made(**options):
+        sim = gm.Simulator(two_discs(), 1.0, **options)
+        sim.control("load", PI(), PERIOD)
+        return sim
+
+    sim = made()
+    sim.advance(0.0104)
+    state = sim.state()
+    sim.advance(0.02)
+    wanted = unknowns(sim)
+    sim.restore(state)
+    others = [sim, made(initial=state), made(initial=gm.State.load(state.save(tmp_path / "s.npz")))]
+    others.append(made())
+    others[-1].advance(0.005)
+    others[-1].restore(state)
+    for other in others:
+        other.advance(0.02)
+        np.testing.assert_array_equal(unknowns(other)[2:], wanted[2:])
+    # without what it remembers the torque is another one
+    bare = gm.Simulator(two_discs(), 1.0, initial=state)
+    pi = PI()
+    bare.control("load", lambda t, s: pi(t, s), PERIOD)
+    bare.advance(0.02)
+    assert abs(unknowns(bare)[2] - wanted[2]) > 1e-6
+    odd = PI()
+    odd.state = lambda: "much"
+    sim = gm.Simulator(two_discs(), 1.0)
+    sim.control("load", odd, PERIOD)
+    with pytest.raises(ModelError, match=says("load", "'much'", "numbers")):
+        sim.state()
+
+
 def driven(level):
     """A disc that a motion drives, and another on a shaft."""
     m = two_discs()

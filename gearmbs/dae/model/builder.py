@@ -120,9 +120,9 @@ class TableBuilder:
         self.extra_r.extend([0.0, value, 0.0] if kind == INPUT else [value])
         self.numbers[name] = Number(name, unit, kind, (Place(at, 2 if kind == INPUT else 0, table=T.H_R_EXTRA),))
 
-    def add_setting(self, name: str, unit: str, place: Place) -> None:
-        """Add a number of an element, which stands in one place."""
-        self.numbers[name] = Number(name, unit, PARAMETER, (place,))
+    def add_setting(self, name: str, unit: str, places: Iterable[Place], loads: bool = False) -> None:
+        """Add a number of an element, see `Number`."""
+        self.numbers[name] = Number(name, unit, PARAMETER, tuple(places), loads=loads)
 
     def add_place(self, name: str, place: Place, row: str | None = None) -> None:
         """Note a further place of a number, and the constraint row whose function it is if it is one."""

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import re
-import time
 from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import itemgetter
-from typing import Any
+from time import perf_counter
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gearmbs._lazy import uncollected
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.stepping.held_run import HeldRun
+from gearmbs.dae.integrators.stepping.held_run import HeldRun, Rows
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
-from gearmbs.dae.problem import EPS, INPUT, ModelError, Number, cells_of
+from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State, equations_of
@@ -26,6 +26,8 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import OwnAttributes
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
+from gearmbs.mechanism.solve.controllers import Control
+from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.mechanism.solve.simulate import ADVICE, checked, just_inside, prepared, start_time, with_brief_changes
 from gearmbs.wording import any_of, did_you_mean
 
@@ -36,43 +38,36 @@ AT_AN_INSTANT = (
     "constraint_violation", "transmission_error",
 )  # fmt: skip
 """What `Solution` tells of one instant alone."""
-ON_LINE = 8.0 * EPS
-"""Part of its value by which an input may leave a line by rounding alone."""
 COUNTED = ("joint_angle", "evaluate")
 """What it tells with full turns counted from the first point on."""
 COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 """AX, AY and AZ of the function language."""
 NOTHING = nullcontext()
 """What errors of functions are looked for in where there are none."""
-NO_NUMBERS = np.empty(0)
+new_point = tuple.__new__
+"""Makes a point of its parts in half the time that its class takes."""
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")
 """Options of integrators that are about outputs and events of a run that is told its end."""
 
 
-Point = tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Time, y, y', the table of integers, and what stands in the cells of named numbers and counted turns up to there."""
+class Point(NamedTuple):
+    """Where a simulation has stood: time, the row of what rows, the table of integers, and what named numbers were."""
 
-
-@dataclass
-class Control:
-    """A function that gives an input its value a sample time after the other."""
-
-    name: str
-    function: Callable[[float, Any], Any]
-    start: float
-    period: float
-    count: int = 0
+    t: float
+    rows: Rows
+    row: int
+    idata: np.ndarray
+    held: np.ndarray
 
     @property
-    def next(self) -> float:
-        """Time of the next sample, s."""
-        return self.start + self.count * self.period
+    def y(self) -> np.ndarray:
+        """Unknowns."""
+        return self.rows.y[self.row]
 
-    def go_back(self, t: float) -> None:
-        """Let the next sample be the first one that is not before a time."""
-        self.count = max(0, int((t - self.start) / self.period) - 1)
-        while self.next < t:
-            self.count += 1
+    @property
+    def yp(self) -> np.ndarray:
+        """Their rates."""
+        return self.rows.yp[self.row]
 
 
 class Simulator(OwnAttributes):
@@ -174,12 +169,9 @@ class Simulator(OwnAttributes):
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
         self.numbers = self._base.numbers
-        self._cells = cells_of(self.numbers)
-        # the same numbers where these cells alone are a table
-        self._own = {name: number.moved_to(self._cells) for name, number in self.numbers.items()}
-        self._inputs = [name for name, number in self.numbers.items() if number.kind == INPUT]
-        self._set: dict[str, tuple[float, int]] = {}
-        self._clock = [0.0, 0.0]
+        self._settings = Settings(mechanism, self.numbers)
+        self._simulated, self._took, self._since = 0.0, 0.0, 0.0
+        vars(self)["t"] = 0.0
         self._begin(initial)
         self._t_start = self.t
 
@@ -189,6 +181,7 @@ class Simulator(OwnAttributes):
         With ``repair`` velocities that a motion prescribes jump to it at once, and others with them, as at an impact
         without rebound.
         """
+        self._tell_clock()
         problem, history = self._base, None
         if state is not None:
             problem, history = state.problem(problem), state.history_for(problem, self._options.method)
@@ -196,10 +189,11 @@ class Simulator(OwnAttributes):
         with uncollected():
             self._run = HeldRun(problem, self.t_end, replace(self._options, history=history, check_start=not repair))
         nothing = np.empty((0, problem.n))
-        held = (self._cells, np.empty((0, self._cells.size)))
+        cells = self._settings.cells
+        held = (cells, np.empty((0, cells.size)))
         empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "", held=held)
-        self._led = self._on_lines(float(problem.t0))
-        """Inputs on a line, and when it ends: of a state where the state is."""
+        # lines end where a state is
+        self._settings.begin(problem.rdata, float(problem.t0))
         self._row = Solution(self._system, problem, empty, self._members)
         self._row.inside = just_inside(np.array([problem.t0, self.t_end]))
         self._row.share(1)
@@ -207,15 +201,16 @@ class Simulator(OwnAttributes):
         self._points: list[Point] = []
         self._counted: dict[tuple, tuple[int, float]] = {}
         self._failed: str | None = None
-        self._stand_at(float(problem.t0), problem.y0, problem.yp0, problem.idata)
+        place = self._run.place(problem.y0, problem.yp0)
+        self._stand_at(Point(float(problem.t0), *place, problem.idata, self._settings.held), self._records)
+        self._since = self.t
 
-    def _stand_at(self, t: float, y: np.ndarray, yp: np.ndarray, idata: np.ndarray, record: bool = True) -> None:
-        rdata = self._run.state.rdata
-        point = t, y, yp, idata, rdata[self._cells] if self._cells.size else NO_NUMBERS, rdata[self._run.state.kept]
+    def _stand_at(self, point: Point, record: bool) -> None:
         # past the look at names that are assigned, which takes as long as all the rest
-        vars(self).update(t=t, _point=point, _present=None)
-        if record and self._records:
-            self._points.append(point)
+        own = self.__dict__
+        own["t"], own["_point"], own["_present"] = point[0], point, None
+        if record:
+            own["_points"].append(point)
 
     # --- going on -----------------------------------------------------------------------------------
 
@@ -228,12 +223,13 @@ class Simulator(OwnAttributes):
             For a time that is no number, that lies behind or after the end, and where the integration fails: the
             simulator then stands where it stood, and can only be restored to an earlier state.
         """
-        if not (isinstance(t, float) and self.t <= t <= self.t_end and self._failed is None):
-            t = self._time(t)
-        t = float(t)
+        if not (type(t) is float and self.t <= t <= self.t_end and self._failed is None):
+            t = float(self._time(t))
+        settings = self._settings
         while self.t < t:
             end = self._sample(t) if self._controls else t
-            self._apply(t)
+            if settings.waiting or settings.led:
+                self._apply(t)
             self._go_to(end, record and end == t)
 
     def _time(self, t: Any) -> float:
@@ -253,18 +249,21 @@ class Simulator(OwnAttributes):
 
     def _go_to(self, t: float, record: bool) -> None:
         """Go on to a time with what is set, and keep it as a point of the solution."""
-        started = time.perf_counter()
-        with raised_errors(self._functions) if self._functions else NOTHING:
-            status, message = self._run.go_to(t)
-        if status is Status.INTERRUPTED:
-            raise KeyboardInterrupt
-        if status < 0:
-            self._failed = message
-            raise ModelError(message)
-        y, yp, idata = self._run.values_at(t)
-        self._clock[0] += t - self.t
-        self._clock[1] += time.perf_counter() - started
-        self._stand_at(t, y, yp, idata, record)
+        own = self.__dict__
+        run, keep, began = own["_run"], record and own["_records"], perf_counter()
+        rows, row = run.rows, run.row
+        if own["_functions"]:
+            with raised_errors(self._functions):
+                failure = run.go_to(t, keep)
+        else:
+            failure = run.go_to(t, keep)
+        own["_took"] += perf_counter() - began
+        if failure is not None:
+            if failure[0] is Status.INTERRUPTED:
+                raise KeyboardInterrupt
+            self._failed = failure[1]
+            raise ModelError(failure[1])
+        self._stand_at(new_point(Point, (t, rows, row, run.table, own["_settings"].held)), keep)
         if t >= self._next_look:
             self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
             found = self._now().find_conflict(np.array([0]))
@@ -280,8 +279,13 @@ class Simulator(OwnAttributes):
     @property
     def real_time_factor(self) -> float:
         """Seconds simulated in a second of the clock, in all calls of :meth:`advance`; 0 before the first."""
-        simulated, took = self._clock
-        return simulated / took if took > 0.0 else 0.0
+        self._tell_clock()
+        return self._simulated / self._took if self._took > 0.0 else 0.0
+
+    def _tell_clock(self) -> None:
+        """Count the time simulated since it was last told, or the run began."""
+        self._simulated += self.t - self._since
+        self._since = self.t
 
     # --- acting on it ---------------------------------------------------------------------------------
 
@@ -306,21 +310,7 @@ class Simulator(OwnAttributes):
             For a name that is not there, a value that is no number in its unit, and an input that would let a body
             jump: the position of a motion with ``hold=0``.
         """
-        number = self.number(name)
-        if isinstance(hold, bool) or hold not in (0, 1):
-            raise ModelError(f"set: hold = {hold!r} of {name!r}; 0 holds the value, 1 goes there evenly")
-        if hold == 1 and number.kind != INPUT:
-            raise ModelError(f"set: {name!r} is a {number.kind}, which jumps; hold=1 is for inputs")
-        given = quantity(value, number.unit, f"set: {name!r}")
-        if not np.isfinite(given):
-            raise ModelError(f"set: {name!r} = {given}; give a finite number")
-        for row, order in number.prescribes if hold == 0 else ():
-            if order == 0:
-                raise ModelError(
-                    f"set: {name!r} is the position of {row!r}, which cannot jump; give hold=1, or let it be the speed "
-                    "of the motion (level='velocity')"
-                )
-        self._set[number.name] = float(given), int(hold)
+        self._settings.set(name, value, hold)
 
     def take_effect(self) -> None:
         """Let values that have been set take effect now, and not with the next :meth:`advance`.
@@ -330,35 +320,15 @@ class Simulator(OwnAttributes):
         ModelError
             For a value that an input is led to: its way begins with the next advance.
         """
-        led = [name for name, (_, hold) in self._set.items() if hold]
-        led += [name for name, end in self._led.items() if end > self.t and name not in self._set]
-        if led:
-            raise ModelError(f"state: {led[0]!r} is on its way to a value; take the state before set, or after advance")
-        if self._set:
+        led = self._settings.on_the_way(self.t)
+        if led is not None:
+            raise ModelError(f"state: {led!r} is on its way to a value; take the state before set, or after advance")
+        if self._settings.waiting:
             self._apply(self.t)
 
     def number(self, name: str) -> Number:
         """Return what :meth:`set` changes under a name; raise a ModelError if there is nothing."""
-        name = self._mechanism.aliases.get(name, name)
-        if name not in self.numbers:
-            element, _, field = str(name).partition(".")
-            part = self._mechanism.elements.get(element) or self._mechanism.bodies.get(element)
-            if hasattr(part, field):
-                raise ModelError(
-                    f"{name!r} cannot be changed while a simulation goes on: other numbers follow from it; make "
-                    "another mechanism with it and go on there from the state (initial=)"
-                )
-            known = [*self._mechanism.aliases, *self.numbers]
-            hint = did_you_mean(name, known)
-            listed = f"there are {', '.join(known)}" if known else "the mechanism has none; add one with m.input(...)"
-            raise ModelError(f"there is no input or parameter {name!r}{': ' + hint if hint else ''}; {listed}")
-        return self.numbers[name]
-
-    def _value(self, name: str) -> float:
-        """Return the present value of an input or a parameter, the one that was set last."""
-        name = self.number(name).name
-        value, hold = self._set.get(name, (0.0, 1))
-        return self._own[name].value(self._run.state.rdata[self._cells], self.t) if hold == 1 else value
+        return self._settings.number(name)
 
     def control(self, name: str, function: Callable[[float, Simulator], Any], sample_time: float) -> None:
         """Let a function give an input its value at sample times, which is held in between.
@@ -369,8 +339,9 @@ class Simulator(OwnAttributes):
             An input or a parameter.
         function : callable
             ``function(t, simulator)`` returns the value. It is called at the present time and a sample time after the
-            other, where the simulation then stands: :meth:`get` tells of that instant. What it remembers is its own: a
-            state does not hold it.
+            other, where the simulation then stands: :meth:`get` tells of that instant. With methods ``state()``, which
+            returns numbers, and ``restore(numbers)``, which takes them as an array, what it remembers is in states of
+            the simulator; else it is its own.
         sample_time : float
             s.
 
@@ -387,7 +358,10 @@ class Simulator(OwnAttributes):
         period = quantity(sample_time, "time", "control: sample_time")
         if not (np.isfinite(period) and period > 0.0):
             raise ModelError(f"control: sample_time = {period} s for {name!r}; it must be positive")
-        self._controls.append(Control(name, function, self.t, period))
+        made = Control(name, function, self.t, period)
+        if self._origin is not None and self._origin.t == self.t and name in self._origin.controllers:
+            made.go_back(self.t, self._origin.controllers[name])
+        self._controls.append(made)
 
     def _sample(self, t: float) -> float:
         """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""
@@ -399,46 +373,25 @@ class Simulator(OwnAttributes):
 
     def _apply(self, end: float) -> None:
         """Let what has been set take effect at the present time; lines that were set end at ``end``."""
-        if not self._set and not self._led:
+        change = self._settings.take(self.t, end)
+        if change is None:
             return
-        t, y, yp, *_ = self._point
-        before = self._run.state.rdata[self._cells].tolist()
-        led = [name for name, last in self._led.items() if name not in self._set and last <= t]
-        after, changed = before.copy(), []
-        for name in (*self._set, *led):
-            own = self._own[name]
-            now, slope_before = own.value(before, t), own.slope(before)
-            value, hold = self._set.get(name, (now, 0))
-            slope = (value - now) / (end - t) if hold else 0.0
-            if hold and abs(slope - slope_before) * (end - t) <= ON_LINE * max(abs(now), abs(value)):
-                # the line goes on
-                slope = slope_before
-            if slope != slope_before or (not hold and value != now):
-                own.write(after, t, now if hold else value, slope)
-                changed.append((self.numbers[name], slope - slope_before))
-            self._led.pop(name, None)
-            if slope:
-                self._led[name] = end
-        self._set.clear()
-        if not changed:
+        if change.prescribes or not self._run.state.steps:
+            self._start_with(change.values)
             return
-        if any(number.prescribes for number, _ in changed) or not self._run.state.steps:
-            self._start_with(np.array(after))
-            return
-        started = time.perf_counter()
-        loads = all(number.kind == INPUT for number, _ in changed)
+        began = perf_counter()
         with raised_errors(self._functions) if self._functions else NOTHING:
-            self._run.change(t, y, yp, self._cells, np.array(after), loads, any(slope for _, slope in changed))
-        self._clock[1] += time.perf_counter() - started
+            self._run.change(self._point[:3], self._settings.cells, *change[:4])
+        self._took += perf_counter() - began
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""
-        t, y, yp, idata, *_ = point = self._point
+        point, led = self._point, self._settings.led
         rdata = self._run.state.rdata.copy()
-        rdata[self._cells] = values
-        first, points, started, led = (self._problem, self._origin), self._points, self._run.started, self._led
-        self._begin(State.of(self._base, t, y, yp, (idata, rdata)), repair=True)
-        self._led = led
+        rdata[self._settings.cells] = values
+        first, points, started = (self._problem, self._origin), self._points, self._run.started
+        self._begin(State.of(self._base, point.t, point.y, point.yp, (point.idata, rdata)), repair=True)
+        self._settings.led = led
         if started:
             self._problem, self._origin = first
             self._points = points
@@ -472,7 +425,7 @@ class Simulator(OwnAttributes):
             For a name that is not there; the message lists those that are.
         """
         if what == "input":
-            return self._value(*names)
+            return self._settings.value(self.t, *names)
         if what == "output":
             made = self._mechanism.measures(self._now()).named_output(*names)
             return made.of(self.get(*made.asked))
@@ -492,8 +445,10 @@ class Simulator(OwnAttributes):
     def _now(self) -> Solution:
         """Return the solution at the present time alone, valid until the next."""
         if self._present is None:
-            t, y, _, idata, held, _ = self._point
-            self._present = self._row.over(np.array([t]), y[None, :], [(0, idata)], held[None, :])
+            point = self._point
+            self._present = self._row.over(
+                np.array([point.t]), point.y[None, :], [(0, point.idata)], point.held[None, :]
+            )
             # turns as the run counts them at every step
             evaluator: Any = self._row._shared
             evaluator[0].rdata[:] = self._run.state.rdata
@@ -525,17 +480,21 @@ class Simulator(OwnAttributes):
 
     def _over(self, first: int) -> Solution:
         """Return the solution over the points from one on."""
-        t, y, yp, tables, held, counted = zip(*self._points[first:], strict=True)
+        points = self._points[first:]
+        t, rows, places, tables, held = zip(*points, strict=True)
+        y, yp, counted = (
+            np.array([getattr(r, name)[k] for r, k in zip(rows, places, strict=True)]) for name in ("y", "yp", "kept")
+        )
         epochs: list[tuple[int, np.ndarray]] = []
         for row, table in enumerate(tables):
             if not epochs or not (table is epochs[-1][1] or np.array_equal(table, epochs[-1][1])):
                 epochs.append((row, table))
-        stats = self._run._stats()
+        stats, cells = self._run._stats(), self._settings.cells
         told = Status.SUCCESS if self._failed is None else Status.SOLVER_FAILURE
         result = DAEResult(
-            np.array(t), np.array(y), np.array(yp), told, self._failed or f"Advanced to t = {self.t:.9g} s.", stats,
-            epochs=epochs, t_last=self.t, held=(self._cells, np.array(held)) if self._cells.size else None,
-            counted=np.array(counted),
+            np.array(t), y, yp, told, self._failed or f"Advanced to t = {self.t:.9g} s.", stats,
+            epochs=epochs, t_last=self.t, held=(cells, np.array(held)) if cells.size else None,
+            counted=counted,
         )  # fmt: skip
         solution = Solution(self._system, self._problem, result, self._members, self._remark)
         solution.initial = self._origin
@@ -549,12 +508,13 @@ class Simulator(OwnAttributes):
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
         self.take_effect()
-        t, y, yp, idata, *_ = self._point
-        run = self._run
+        point, run = self._point, self._run
         if not self._equations:
             self._equations = equations_of(self._base)
         history = run.history(self._equations) if run.started else None
-        return State.of(self._base, t, y, yp, (idata, run.state.rdata), history)
+        state = State.of(self._base, point.t, point.y, point.yp, (point.idata, run.state.rdata), history)
+        held = {control.name: control.memory() for control in self._controls if control.remembers}
+        return replace(state, controllers=held) if held else state
 
     def restore(self, state: State) -> None:
         """Go back, or on, to a state of the same mechanism.
@@ -578,7 +538,6 @@ class Simulator(OwnAttributes):
                 "start both simulators at the same time"
             )
         first, origin = self._own_point(state), (self._problem, self._origin)
-        self._set.clear()
         if (first is not None or not self._records) and self._go_back(state):
             if first is not None:
                 del self._points[first + 1 :]
@@ -590,13 +549,13 @@ class Simulator(OwnAttributes):
                 self._problem, self._origin = origin
                 self._points[:] = kept
         for control in self._controls:
-            control.go_back(self.t)
+            control.go_back(self.t, state.controllers.get(control.name))
 
     def _own_point(self, state: State) -> int | None:
         """Return which of the points a state is, or None."""
         at = bisect_left(self._points, state.t, key=itemgetter(0))
         while at < len(self._points) and self._points[at][0] == state.t:
-            if np.array_equal(self._points[at][1], state.y):
+            if np.array_equal(self._points[at].y, state.y):
                 return at
             at += 1
         return None
@@ -606,18 +565,13 @@ class Simulator(OwnAttributes):
         history = state.history
         if history is None or history.equations != self._equations or not self._run.go_back(history):
             return False
-        self._failed, self._counted, self._led = None, {}, {}
+        self._tell_clock()
+        self._failed, self._counted, self._since = None, {}, state.t
         self._next_look = state.t if self._system.has_dropped_rows else np.inf
-        self._led = self._on_lines(state.t)
-        self._stand_at(state.t, state.y, state.yp, state.tables(self._base)[0], record=False)
+        self._settings.begin(self._run.state.rdata, state.t)
+        place = self._run.place(state.y, state.yp, keep=False)
+        self._stand_at(Point(state.t, *place, state.tables(self._base)[0], self._settings.held), False)
         return True
-
-    def _on_lines(self, t: float) -> dict[str, float]:
-        """Return the inputs that stand on a line, each with the time at which it is to end."""
-        if not self._inputs:
-            return {}
-        now = self._run.state.rdata[self._cells].tolist()
-        return {name: t for name in self._inputs if self._own[name].slope(now) != 0.0}
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"

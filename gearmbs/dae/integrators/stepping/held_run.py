@@ -7,17 +7,17 @@ that was told all times ahead: what is asked does not change the steps.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gearmbs.dae.integrators.bdf import HISTORY
-from gearmbs.dae.integrators.driver import FIRST_CHUNK, REACHED, InterruptFlag, Run, StallWatch
+from gearmbs.dae.integrators.driver import FIRST_CHUNK, InterruptFlag, Run, StallWatch
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.run_state import RUNNING, RunState
-from gearmbs.dae.integrators.step import advance
+from gearmbs.dae.integrators.run_state import RunState
 from gearmbs.dae.integrators.stepping.jumps import TERMS, pass_jump
 from gearmbs.dae.integrators.stepping.memory import Held, LastStep, put_memory, record_window, value_in
+from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, reach
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
@@ -28,6 +28,10 @@ LOOK = 32 * FIRST_CHUNK
 looks for shows over thousands."""
 ROWS = 16 * HISTORY
 """Records between two calls of the compiled loop: enough for it to be called seldom, few enough for the cache."""
+
+BLOCK_BYTES = 1 << 18
+"""Of values of points that are allotted at a time: about what fits into the second cache."""
+FEWEST_ROWS = 8
 
 
 class LastRecords:
@@ -51,12 +55,7 @@ class LastRecords:
 
     def drain(self) -> None:
         """Make room for further records but keep the points of a polynomial."""
-        st = self.state
-        m = int(st.n_records)
-        kept = min(m, HISTORY)
-        for array in (st.record_t, st.record_h, st.record_order, st.record_y):
-            array[:kept] = array[m - kept : m].copy()
-        st.n_records = kept
+        direct(drain)(self.state)
 
     def change_table(self) -> None:
         """Note that coordinates have changed at the end of the last step."""
@@ -76,6 +75,16 @@ class LastRecords:
         return LastStep(nodes, rows, rows[0].copy(), st.yp.copy(), self.before)
 
 
+class Rows(NamedTuple):
+    """Memory for points, a row each, to which the compiled loop writes."""
+
+    t: np.ndarray
+    y: np.ndarray
+    yp: np.ndarray
+    kept: np.ndarray
+    """Counted turns."""
+
+
 class HeldRun(Run):
     """A run that goes to one time after the other.
 
@@ -86,71 +95,135 @@ class HeldRun(Run):
         Latest time that can be asked for.
     options : Options
         A ``history`` among them is that of the state in which the problem starts.
+
+    Attributes
+    ----------
+    rows : Rows
+        Where points are written to.
+    row : int
+        Of the next point.
+    table : ndarray
+        The integer table valid for the present one.
     """
 
     def __init__(self, problem: DAEProblem, t_end: float, options: Options) -> None:
         super().__init__(problem, None, t_end, replace(options, history=None))
         self.options = options
-        st = self.state
-        st.outputs, st.y_out, st.yp_out = np.empty(1), np.empty((1, problem.n)), np.empty((1, problem.n))
-        st.kept_out = np.empty((1, len(st.kept)))
-        st.next_output = 1
-        self._at, self._y, self._yp = st.outputs, st.y_out[0], st.yp_out[0]
-        self._looked = 0
-        self.last_records = LastRecords(st)
+        self._look_at = 0
+        self.last_records = LastRecords(self.state)
         self.records = self.last_records  # type: ignore[assignment]
+        self.table = self.last_records.table
         self._given: tuple[int, LastStep] | None = None
+        self._jumped: tuple[int, float, Rows, int] | None = None
+        """Steps, time and point behind which numbers of the equations have changed."""
         self._scratch: np.ndarray | None = None
         self.layout: dict[str, Any] | None = None
+        self._advance, self._reach, self._part = address_of_advance(), direct(reach), self.algebraic.part
+        self._make_rows()
         if options.history is not None:
             self.put_back(options.history)
 
-    def go_to(self, t: float) -> tuple[Status, str]:
-        """Take steps until one ends at ``t`` or later; return a success, or how the run has failed.
+    # --- points -------------------------------------------------------------------------------------
+
+    def _make_rows(self) -> None:
+        """Make room for further points; those that are kept stay where they are."""
+        st, n = self.state, self.problem.n
+        count = max(FEWEST_ROWS, BLOCK_BYTES // (16 * n))
+        # rows whose time has not come are looked at by each step
+        rows = Rows(np.full(count, np.inf), np.empty((count, n)), np.empty((count, n)), np.empty((count, len(st.kept))))
+        st.outputs, st.y_out, st.yp_out, st.kept_out = rows
+        st.next_output = count
+        self.rows, self.row, self._first, self._count = rows, 0, 0, count
+
+    def _stand(self, keep: bool) -> None:
+        """Let the point in ``row`` be the present one; the one before it is written over unless it is to be kept."""
+        row, times = self.row, self.rows.t
+        times[row] = np.inf
+        if keep:
+            self._first = self.row = row + 1
+            if row + 2 >= self._count:
+                self._make_rows()
+        else:
+            self.row = self._first + 1 if row == self._first else self._first
+
+    def place(self, y: np.ndarray, yp: np.ndarray, keep: bool = True) -> tuple[Rows, int]:
+        """Keep values at the time where the run stands; return rows and row."""
+        rows, row = self.rows, self.row
+        rows.y[row], rows.yp[row] = y, yp
+        rows.kept[row] = self.state.rdata[self.state.kept]
+        self._stand(keep)
+        return rows, row
+
+    # --- going on -----------------------------------------------------------------------------------
+
+    def go_to(self, t: float, keep: bool = True) -> tuple[Status, str] | None:
+        """Take steps until one ends at ``t`` or later; return how the run has failed, or None.
+
+        The values at ``t`` then stand in what was ``row`` of ``rows``, for good if they are to be kept, else until the
+        next but one; ``table`` is valid for them.
 
         Some steps are taken at once, whatever else there is to do, for which Python takes as long as they do. Ctrl-C
         comes in between then, after them: ``st.code`` knows what is left to do.
         """
-        st = self.state
+        st, row = self.state, self.row
         if self.started and t <= st.t:
-            return REACHED
-        self._at[0] = st.t_pause = t
-        st.next_output = 0
-        if self.started and st.code == RUNNING and st.steps - self._looked < LOOK and not self.stall.looking:
-            direct(advance)(self.functions, st, self.algebraic.part, self.plan, self.factors, FIRST_CHUNK)
-            if st.code == RUNNING and st.t >= t and not self.options.errors:
-                return REACHED
-        self._looked = st.steps
+            self._write_within(t)
+            self._stand_at(keep)
+            return None
+        code = NOT_BEGUN
+        if self.started:
+            code = self._reach(
+                self.functions, st, self._part, self.plan, self.factors, self._advance, t, row, self._look_at
+            )
+        if code == REACHED and not self.options.errors:
+            self.table = self.last_records.table
+            if keep and row + 2 < self._count:
+                self._first = self.row = row + 1
+            else:
+                self._stand(keep)
+            return None
+        if code == NOT_BEGUN:
+            self.rows.t[row] = st.t_pause = t
+            st.next_output = row
         with InterruptFlag() as interrupt:
-            return self._loop(interrupt)
+            told = self._loop(interrupt)
+        # before the first step there are no factors
+        self._look_at = 0 if self.stall.looking else st.steps + LOOK
+        if told[0] < 0:
+            return told
+        self._stand_at(keep)
+        return None
 
-    def values_at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return y, y' and the integer table valid for them at a time within the last step."""
-        st, records = self.state, self.last_records
-        if st.next_output == 1 and self._at[0] == t:
-            table = records.before if records.changed_at == st.steps else records.table
-            return self._y.copy(), self._yp.copy(), table
-        last = self._last_step()
-        return *value_in(self, last, t), last.idata
+    def _stand_at(self, keep: bool) -> None:
+        records = self.last_records
+        self.table = records.before if records.changed_at == self.state.steps else records.table
+        self._stand(keep)
+
+    def _write_within(self, t: float) -> None:
+        """Write values at a time within the last step."""
+        rows, row = self.rows, self.row
+        rows.y[row], rows.yp[row] = value_in(self, self._last_step(), t)
+        rows.kept[row] = self.state.rdata[self.state.kept]
 
     def change(
-        self, t: float, y: np.ndarray, yp: np.ndarray, cells: np.ndarray, values: np.ndarray, loads: bool, leads: bool
+        self, point: tuple, cells: np.ndarray, values: np.ndarray, loads: bool, jumps: bool, leads: bool
     ) -> None:
         """Cut the last step back to a time within it, and go on from there with other numbers in the equations.
 
         Parameters
         ----------
-        t : float
-        y, yp : ndarray, shape (n,)
-            Values there, as of :meth:`values_at`.
+        point : (float, Rows, int)
+            The time, and where the values there stand.
         cells, values : ndarray
             Places in the table of numbers, and what is to stand there.
         loads : bool
             Whether they only act as loads do, which leave the matrix as it is.
-        leads : bool
-            Whether the change grows with the time.
+        jumps, leads : bool
+            Whether equations change at the time, and whether the change grows with the time.
         """
         st, kept = self.state, True
+        t, rows, row = point
+        y, yp = rows.y[row], rows.yp[row]
         if self.last_records.changed_at == st.steps or (self._given is not None and self._given[0] == st.steps):
             last = self._last_step()
             kept = np.array_equal(last.idata, st.idata)
@@ -165,17 +238,18 @@ class HeldRun(Run):
             st.matrix_wanted = True
         if self._scratch is None:
             self._scratch = np.empty((TERMS + 3, len(st.y)))
-        direct(pass_jump)(
-            self.functions, st, self.plan, self.factors, t, y, yp, cells, values, leads, kept, self._scratch
+            self._pass_jump = direct(pass_jump)
+        self._pass_jump(
+            self.functions, st, self.plan, self.factors, t, y, yp, cells, values, jumps, leads, kept, self._scratch
         )
         if not kept:
             self.last_records.forget_changes()
-        self._given = int(st.steps), LastStep(np.array([t]), y[None, :], y, yp, self.last_records.table)
+        self._given, self._jumped = None, (int(st.steps), t, rows, row)
 
     def history(self, equations: str) -> History:
         """Return what the next steps of these equations depend on; a run that has not been started has nothing yet."""
         st = self.state
-        given = self._given is not None and self._given[0] == st.steps
+        given = any(one is not None and one[0] == st.steps for one in (self._given, self._jumped))
         told = given or self.last_records.changed_at == st.steps
         return History(self.options.method, Held(self, self._last_step() if told else None), self.plan, equations)
 
@@ -195,18 +269,23 @@ class HeldRun(Run):
     def _stand_behind(self, last: LastStep) -> None:
         """Keep the window as records, behind the last step."""
         st = self.state
-        st.n_records, st.next_output = 0, 1
+        # the record of another time knows the rows of then
+        st.outputs, st.y_out, st.yp_out, st.kept_out = self.rows
+        st.n_records, st.next_output = 0, len(self.rows.t)
         record_window(st)
-        self._at[0] = np.nan
-        self._looked = st.steps
+        self._look_at = st.steps + LOOK
         self.stall = StallWatch(st.steps, st.t)
         self.last_records.forget_changes()
-        self._given = int(st.steps), last
+        self._given, self._jumped = (int(st.steps), last), None
 
     def _last_step(self) -> LastStep:
         st = self.state
         if self._given is None or self._given[0] != st.steps:
-            if st.steps:
+            if self._jumped is not None and self._jumped[0] == st.steps:
+                _, t, rows, row = self._jumped
+                y = rows.y[row].copy()
+                last = LastStep(np.array([t]), y[None, :], y, rows.yp[row].copy(), self.last_records.table)
+            elif st.steps:
                 last = self.last_records.last_step()
             else:
                 last = LastStep(np.array([st.t]), st.y[None, :].copy(), st.y.copy(), st.yp.copy(), st.idata.copy())

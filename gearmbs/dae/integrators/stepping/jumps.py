@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from numba import boolean, float64, int64, types
 
+from gearmbs.dae.integrators.corrector import weighted_max
 from gearmbs.dae.integrators.run_state import STATE_TYPE, copy, record_history, rows_from, times_from
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
@@ -39,6 +40,8 @@ TERMS = 4
 """Terms of the series at most: with six a stiff contact takes the same steps beyond its jumps."""
 SPARE = 3
 """Points behind more than the order that the past keeps: two for a rise of the order."""
+UNSEEN = 0.2
+"""Tolerances by which a term may move the points that the present order takes, and be left out with all that follow."""
 CLOSE = 0.05
 """Part of the step before below which the point of a jump replaces the one behind it: differences over a shorter
 distance would amplify what the polynomial through both is off by."""
@@ -48,12 +51,12 @@ _VEC = float64[::1]
 
 @njit(
     types.void(FUNCTIONS_TYPE, STATE_TYPE, PLAN_TYPE, FACTORS_TYPE, float64, _VEC, _VEC, int64[::1], _VEC, boolean,
-               boolean, float64[:, ::1]),
+               boolean, boolean, float64[:, ::1]),
     cache=True,
     nogil=True,
     error_model="numpy",
 )  # fmt: skip
-def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, leads, follows, g):
+def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, follows, g):
     """Cut the last step back to ``t``, change numbers of the equations there, and the past along with them.
 
     Parameters
@@ -68,8 +71,8 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, leads, follows,
         Places in the table of numbers that change.
     values : ndarray
         What is to stand there.
-    leads : bool
-        Whether the change grows with the time, b_1.
+    jumps, leads : bool
+        Whether the equations change at once, b_0, and whether the change grows with the time, b_1.
     follows : bool
         Whether factors and past are of use: else the past is left to the test of the step.
     g : ndarray, shape (TERMS + 3, n)
@@ -92,26 +95,29 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, leads, follows,
     st.n_past = min(st.n_past, st.order + SPARE)
     first, later, d = g[TERMS], g[TERMS + 1], g[TERMS + 2]
     theta = st.h
-    if follows:
-        functions.residual(t, y, yp, first, st.idata, st.rdata, st.work)
-        if leads:
-            functions.residual(t + theta, y, yp, later, st.idata, st.rdata, st.work)
+    if follows and leads:
+        functions.residual(t + theta, y, yp, later, st.idata, st.rdata, st.work)
+        if jumps:
+            functions.residual(t, y, yp, st.delta, st.idata, st.rdata, st.work)
     for k in range(cells.shape[0]):
         st.rdata[cells[k]] = values[k]
-    if follows:
-        functions.residual(t, y, yp, st.res, st.idata, st.rdata, st.work)
-        jumps = False
+    if follows and leads:
+        functions.residual(t + theta, y, yp, st.res, st.idata, st.rdata, st.work)
         for i in range(n):
-            first[i] = st.res[i] - first[i]
-            jumps |= first[i] != 0.0
-        if jumps:
-            _follow(st, plan, factors, t, first, d, g, terms, False)
+            later[i] = st.res[i] - later[i]
+    if follows and jumps:
+        # what the polynomial has left of the equations is settled along with the jump
+        functions.residual(t, y, yp, first, st.idata, st.rdata, st.work)
         if leads:
-            functions.residual(t + theta, y, yp, st.res, st.idata, st.rdata, st.work)
             for i in range(n):
-                later[i] = (st.res[i] - later[i] - first[i]) / theta
-            _follow(st, plan, factors, t, later, d, g, terms, True)
-        st.residuals += 4 if leads else 2
+                later[i] -= first[i] - st.delta[i]
+        _follow(st, plan, factors, t, first, d, g, terms, False)
+    if follows and leads:
+        for i in range(n):
+            later[i] /= theta
+        _follow(st, plan, factors, t, later, d, g, terms, True)
+    if follows:
+        st.residuals += int(jumps) * (1 + int(leads)) + 2 * int(leads)
     copy(st.yp, st.yp_start)
     st.order = min(st.order, max(1, st.n_past - 1))
     st.restarts += 1
@@ -143,16 +149,25 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
     gamma = st.gamma_factored
     times, rows = times_from(st, 0), rows_from(st, 0)
     solve(plan, factors, b, d)
-    st.solves += 1 + terms
+    st.solves += 1
     for i in range(n):
         d[i] = -d[i]
+    # the furthest point that the order takes; Laguerre polynomials grow with the distance
+    reach = t - times[min(st.order, st.n_past - 1)]
+    scale = reach if integrated else 1.0
+    low, high = 1.0, 1.0 + gamma * reach
     for m in range(terms):
         before = d if m == 0 else g[m - 1]
+        if scale * high * weighted_max(before, st.w_error) <= UNSEEN:
+            terms = m
+            break
+        low, high = high, ((2.0 * m + 3.0 + gamma * reach) * high - (m + 1.0) * low) / (m + 2.0)
         st.res[:] = 0.0
         for k in range(st.n_carried):
             p = st.carried[k]
             st.res[st.entry_row[p]] += gamma * st.jac_slope[p] * before[st.entry_col[p]]
         solve(plan, factors, st.res, st.delta)
+        st.solves += 1
         for i in range(n):
             g[m, i] = st.delta[i] if m == 0 else before[i] - st.delta[i]
     # unknowns with a rate go on from where they are: the series begins with what it leaves of zero

@@ -1,0 +1,91 @@
+"""The compiled way from one communication point to the next, for as long as there is nothing else to do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import float64, int64
+
+from gearmbs.dae.integrators.algebraic import PART_TYPE
+from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.run_state import BUFFER_FULL, RUNNING, STATE_TYPE, copy
+from gearmbs.dae.integrators.step import advance
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
+from gearmbs.kernels.bound import FUNCTIONS_TYPE
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import address, caller, direct
+
+CHUNK = 16
+"""Accepted steps between two looks at the time reached."""
+ADVANCE = int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, PLAN_TYPE, FACTORS_TYPE, int64)
+advance_at = caller(ADVANCE)
+
+
+def address_of_advance() -> int:
+    """Return where the compiled loop of steps is found in this process."""
+    direct(advance)
+    return address(advance, ADVANCE)
+
+
+@njit(int64(STATE_TYPE), cache=True, nogil=True, error_model="numpy")
+def drain(st):
+    """Make room for further records but keep the points of a polynomial; return their number."""
+    m = st.n_records
+    kept = min(m, HISTORY)
+    for j in range(kept):
+        k = m - kept + j
+        st.record_t[j], st.record_h[j], st.record_order[j] = st.record_t[k], st.record_h[k], st.record_order[k]
+        if st.keep_rows:
+            copy(st.record_y[k], st.record_y[j])
+    st.n_records = kept
+    return kept
+
+
+NOT_BEGUN = 0
+REACHED = 1
+INTERRUPTED = 2
+"""What `reach` returns."""
+
+
+@njit(
+    int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, PLAN_TYPE, FACTORS_TYPE, int64, float64, int64, int64),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def reach(bound, st, part, plan, factors, advance_address, t, row, last):
+    """Take steps until one ends at ``t`` or later, and write the values there; say whether that is done.
+
+    Parameters
+    ----------
+    bound, st, part, plan, factors
+        Of a run, see `advance`.
+    advance_address : int
+        Of `advance`, which is compiled apart.
+    t : float
+        Beyond the last step; for any other nothing is done.
+    row : int
+        Of the outputs.
+    last : int
+        Steps from which on somebody has to look at how the run gets on.
+
+    Returns
+    -------
+    code : int
+        NOT_BEGUN; REACHED; INTERRUPTED where ``st.code`` has to be heeded, or a look is due.
+    """
+    if not st.t < t <= st.t_end or st.code != RUNNING or st.steps >= last:
+        return NOT_BEGUN
+    st.outputs[row] = t
+    st.t_pause = t
+    st.next_output = row
+    take = advance_at(advance_address)
+    while st.code == RUNNING and st.steps < last:
+        take(bound, st, part, plan, factors, CHUNK)
+        if st.code == BUFFER_FULL:
+            drain(st)
+            st.code = RUNNING
+        elif st.code == RUNNING and st.t >= t:
+            st.outputs[row] = np.inf
+            return REACHED
+    return INTERRUPTED

@@ -1,0 +1,146 @@
+"""Inputs and parameters of a simulation that is held between calls: what is set, and when it takes effect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.dae.problem import EPS, INPUT, ModelError, Number, cells_of
+from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.wording import did_you_mean
+
+ON_LINE = 8.0 * EPS
+"""Part of its value by which an input may leave a line by rounding alone."""
+
+
+class Change(NamedTuple):
+    """What is to stand in the places of named numbers, and how that differs from what stands there."""
+
+    values: np.ndarray
+    loads: bool
+    """Whether nothing changes but loads."""
+    jumps: bool
+    leads: bool
+    """Whether rates jump."""
+    prescribes: bool
+
+
+class Settings:
+    """Inputs and parameters of a simulation.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    numbers : mapping of str to Number
+
+    Attributes
+    ----------
+    cells : ndarray of int
+        All places in the table of numbers.
+    held : ndarray
+        What stands there from the last change on.
+    led : dict of str to float
+        Inputs on a line, and when it ends.
+    waiting : dict of str to (float, int)
+        What has been set and has not taken effect: value and hold.
+    """
+
+    def __init__(self, mechanism: Mechanism, numbers: Mapping[str, Number]) -> None:
+        self.mechanism, self.numbers = mechanism, numbers
+        self.cells = cells_of(numbers)
+        # the same numbers where these cells alone are a table
+        self._own = {name: number.moved_to(self.cells) for name, number in numbers.items()}
+        self._inputs = [name for name, number in numbers.items() if number.kind == INPUT]
+        self.waiting: dict[str, tuple[float, int]] = {}
+        self.led: dict[str, float] = {}
+        self._put(np.empty(self.cells.size))
+
+    def begin(self, rdata: np.ndarray, t: float) -> None:
+        """Take what stands in a table; lines end at its time, ``t``."""
+        self._put(rdata[self.cells])
+        self.waiting.clear()
+        self.led = {name: t for name in self._inputs if self._own[name].slope(self._table) != 0.0}
+
+    def _put(self, values: np.ndarray) -> None:
+        self.held, self._table = values, values.tolist()
+
+    def number(self, name: str) -> Number:
+        """Return what is set under a name; raise a ModelError if there is nothing."""
+        known = self.mechanism.aliases.get(name, name)
+        if known in self.numbers:
+            return self.numbers[known]
+        element, _, field = str(known).partition(".")
+        part = self.mechanism.elements.get(element) or self.mechanism.bodies.get(element)
+        if hasattr(part, field):
+            raise ModelError(
+                f"{known!r} cannot be changed while a simulation goes on: other numbers follow from it; make "
+                "another mechanism with it and go on there from the state (initial=)"
+            )
+        names = [*self.mechanism.aliases, *self.numbers]
+        hint = did_you_mean(known, names)
+        listed = f"there are {', '.join(names)}" if names else "the mechanism has none; add one with m.input(...)"
+        raise ModelError(f"there is no input or parameter {known!r}{': ' + hint if hint else ''}; {listed}")
+
+    def set(self, name: str, value: Any, hold: int = 0) -> None:
+        """Let a number take another value from the next change on; see `Simulator.set`."""
+        number = self.numbers.get(name) or self.number(name)
+        if hold != 0 or isinstance(hold, bool):
+            if isinstance(hold, bool) or hold != 1:
+                raise ModelError(f"set: hold = {hold!r} of {name!r}; 0 holds the value, 1 goes there evenly")
+            if number.kind != INPUT:
+                raise ModelError(f"set: {name!r} is a {number.kind}, which jumps; hold=1 is for inputs")
+        given = float(value if isinstance(value, float) else quantity(value, number.unit, f"set: {name!r}"))
+        if not math.isfinite(given):
+            raise ModelError(f"set: {name!r} = {given}; give a finite number")
+        for row, order in number.prescribes if hold == 0 else ():
+            if order == 0:
+                raise ModelError(
+                    f"set: {name!r} is the position of {row!r}, which cannot jump; give hold=1, or let it be the speed "
+                    "of the motion (level='velocity')"
+                )
+        self.waiting[number.name] = given, int(hold)
+
+    def value(self, t: float, name: str) -> float:
+        """Return the present value of an input or a parameter, the one that was set last."""
+        name = self.number(name).name
+        value, hold = self.waiting.get(name, (0.0, 1))
+        return self._own[name].value(self._table, t) if hold == 1 else value
+
+    def on_the_way(self, t: float) -> str | None:
+        """Return an input that is led to a value which it has not reached, None without one."""
+        led = [name for name, (_, hold) in self.waiting.items() if hold]
+        led += [name for name, end in self.led.items() if end > t and name not in self.waiting]
+        return led[0] if led else None
+
+    def take(self, t: float, end: float) -> Change | None:
+        """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""
+        waiting, before = self.waiting, self._table
+        after = before.copy()
+        loads, jumps, leads, prescribes = True, False, False, False
+        ended = [name for name, last in self.led.items() if last <= t and name not in waiting] if self.led else ()
+        for name in (*waiting, *ended):
+            own = self._own[name]
+            now, slope_before = own.value(before, t), own.slope(before)
+            value, hold = waiting.get(name, (now, 0))
+            slope = (value - now) / (end - t) if hold else 0.0
+            if hold and abs(slope - slope_before) * (end - t) <= ON_LINE * max(abs(now), abs(value)):
+                # the line goes on
+                slope = slope_before
+            jumped, turned = not hold and value != now, slope != slope_before
+            if jumped or turned:
+                own.write(after, t, now if hold else value, slope)
+                loads &= own.kind == INPUT or own.loads
+                prescribes |= bool(own.prescribes)
+                jumps, leads = jumps or jumped, leads or turned
+            self.led.pop(name, None)
+            if slope:
+                self.led[name] = end
+        waiting.clear()
+        if not (jumps or leads):
+            return None
+        self._put(np.array(after))
+        return Change(self.held, loads, jumps, leads, prescribes)
