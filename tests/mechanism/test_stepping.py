@@ -157,6 +157,24 @@ def test_a_state_brings_no_tolerance_and_no_order():
     assert low.stats.steps > 5 * usual.stats.steps
 
 
+@pytest.mark.parametrize(("model", "joint"), [(slider_crank, "pin"), (top, "foot")])
+def test_a_state_of_a_loose_run_is_moved_onto_the_constraints(model, joint):
+    """It leaves them open by its own tolerance: tighter runs close them, by no more, and go on with theirs."""
+    state = model().simulate(1.0, tol=1e-4, dense_output=True).state_at(0.5007)
+    runs = [model().simulate(1.0, t_eval=[state.t, 1.0], initial=state, tol=tol) for tol in (1e-8, 1e-10)]
+    body = runs[0].system.body_names[0]
+    for run in runs:
+        assert run.success
+        assert run.constraint_violation.max() < 1e-7
+        assert np.abs(run.result.y[0] - state.y).max() < 1e-4
+    assert "moved onto" in runs[1].message
+    np.testing.assert_allclose(runs[0].com_position(body)[-1], runs[1].com_position(body)[-1], atol=1e-6)
+    sim = gm.Simulator(model(), 1.0, initial=state, tol=1e-10)
+    np.testing.assert_allclose(sim.get("reaction", joint)[0], runs[1].reaction(joint)[0][0], rtol=1e-6, atol=1e-6)
+    sim.advance(1.0)
+    np.testing.assert_array_equal(sim.solution().result.y[-1], runs[1].result.y[-1])
+
+
 def test_branches_with_inputs():
     """A branch with another input leaves nothing behind in the state that it began in."""
     m = disc(0.0)

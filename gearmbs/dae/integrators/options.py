@@ -82,6 +82,9 @@ class Options:
         With outputs at every step: whether y' is wanted too; it costs as much memory as y.
     check_start : bool
         Refuse initial values that do not satisfy the equations.
+    repairs : float
+        Those that are off by no more than this as a tolerance are moved onto the equations instead, as by
+        ``check_start=False``; default 0, none.
     progress : callable, optional
         Called now and then as ``progress(t)``.
     consumer : callable, optional
@@ -121,6 +124,7 @@ class Options:
     dense_output: bool = False
     slopes: bool = True
     check_start: bool = True
+    repairs: float = 0.0
     progress: Callable[[float], None] | None = None
     consumer: Consumer | None = None
     pause: Pause | None = None

@@ -21,7 +21,7 @@ from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.watched import Stream, Watch
-from gearmbs.dae.state import State
+from gearmbs.dae.state import History, State
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
     locking_remark,
@@ -112,6 +112,9 @@ def stop_options(stops: Sequence[StopAt]) -> dict[str, Any]:
     """Return the options of the integrator that go with `with_stops`."""
     return {"event_direction": [stop.direction for stop in stops], "event_action": [STOP] * len(stops)}
 
+
+LOOSEST = 1e-3
+"""Tolerance of runs whose states others go on from: a looser one leaves constraints visibly open."""
 
 ADVICE = {
     Status.NOT_FINITE: (
@@ -261,7 +264,8 @@ def simulate(
         continued or initial is not None,
     )  # fmt: skip
     if initial is not None:
-        options |= {"history": history} if (history := initial.history_for(problem, name)) else {}
+        history = initial.history_for(problem, name)
+        options |= starting_options(name, history)
         problem = initial.problem(problem)
         # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there
         led = {name: number for name, number in problem.numbers.items() if number.slope(problem.rdata) != 0.0}
@@ -308,6 +312,13 @@ def simulate(
     warn_of_spin(mechanism.bodies, solution)
     warn_of_lost_torques(mechanism.elements, solution)
     return solution
+
+
+def starting_options(integrator: str, history: History | None) -> dict[str, Any]:
+    """Return the options of a run from a state: its history, or that a looser run may have left it off constraints."""
+    if history is not None:
+        return {"history": history}
+    return {"repairs": LOOSEST} if INTEGRATORS[integrator].can("repairs") else {}
 
 
 def with_brief_changes(system: System, start: float, end: float, options: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,7 +28,15 @@ from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.controllers import Control
 from gearmbs.mechanism.solve.settings import Settings
-from gearmbs.mechanism.solve.simulate import ADVICE, checked, just_inside, prepared, start_time, with_brief_changes
+from gearmbs.mechanism.solve.simulate import (
+    ADVICE,
+    checked,
+    just_inside,
+    prepared,
+    start_time,
+    starting_options,
+    with_brief_changes,
+)
 from gearmbs.wording import any_of, did_you_mean
 
 AT_AN_INSTANT = (
@@ -182,12 +190,13 @@ class Simulator(OwnAttributes):
         without rebound.
         """
         self._tell_clock()
-        problem, history = self._base, None
+        problem, options = self._base, self._options
         if state is not None:
-            problem, history = state.problem(problem), state.history_for(problem, self._options.method)
+            given = starting_options(options.method, state.history_for(problem, options.method))
+            problem, options = state.problem(problem), replace(options, **given)
         self._problem, self._origin = problem, state
         with uncollected():
-            self._run = HeldRun(problem, self.t_end, replace(self._options, history=history, check_start=not repair))
+            self._run = HeldRun(problem, self.t_end, replace(options, check_start=not repair))
         nothing = np.empty((0, problem.n))
         cells = self._settings.cells
         held = (cells, np.empty((0, cells.size)))
