@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.bearings import layout as B
 from gearmbs.bearings.bearing import Bearing, equivalent_load, mean_load, rating_life
 from gearmbs.bearings.clearance import ClearanceForce
 from gearmbs.bearings.defects import INNER, OUTER, Defect, LooseFit, as_defects
 from gearmbs.bearings.kinds import BearingError, require
-from gearmbs.bearings.settings import BearingSettings, bearing_settings, pack, reals_by
+from gearmbs.bearings.settings import BearingSettings, BearingTables, bearing_settings, pack, reals_by
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.mechanism.parts.bodies import Body
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting, State
 from gearmbs.mechanism.parts.quantities import Vector, frame_along
 
 if TYPE_CHECKING:
@@ -156,10 +157,12 @@ class RollingBearing(ForceElement):
 
     def compiled(self) -> Compiled:
         from gearmbs.bearings.kernel import bearing_force
-        from gearmbs.bearings.layout import scratch
 
         tables = self.tables
-        return Compiled(bearing_force, tables.integers, tables.reals, scratch=scratch(len(tables.spinning)))
+        return Compiled(
+            bearing_force, tables.integers, tables.reals, scratch=B.scratch(len(tables.spinning)),
+            settings=clearance_setting(self.settings, tables),
+        )  # fmt: skip
 
     def by_parameter(self, name: str, frames: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Return the exact derivatives of wrench and rates by a number of the settings or of the bearing.
@@ -212,6 +215,18 @@ class RollingBearing(ForceElement):
     def __repr__(self) -> str:
         name = self.bearing.designation or self.bearing.kind
         return f"RollingBearing({self.name!r}, {name}, {self.i.body.name!r} in {self.j.body.name!r})"
+
+
+def clearance_setting(settings: BearingSettings, tables: BearingTables) -> dict[str, Setting]:
+    """Return where the diametral clearance stands among the reals: in each path; of a preloaded bearing all follows."""
+    if settings.preload:
+        return {}
+    bearing, first = settings.bearing, int(tables.integers[B.AT_PATHS])
+    column, slope = (B.PATH_GAP, 0.5 * math.cos(bearing.contact_angle)) if bearing.rollers else (B.PATH_RADIAL, -0.5)
+    places = first + column + B.PATH_COLUMNS * np.arange(int(tables.integers[B.PATHS]))
+    found = [(int(at), slope, float(tables.reals[at]) - slope * bearing.clearance) for at in places]
+    (at, factor, offset), *others = found
+    return {"clearance": Setting(at, "m", factor, offset, tuple(others))}
 
 
 # A rolling bearing in a mechanism, its rings fixed or loose on their seats.

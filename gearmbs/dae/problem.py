@@ -35,8 +35,8 @@ class Place:
         Number of coefficients; 0: the number alone stands there.
     order : int
         How often it is integrated there.
-    factor : float
-        What stands there for a unit of the number; of places without coefficients.
+    factor, offset : float
+        What stands there for a unit of the number, and for none of it; of places without coefficients.
     table : int
         Which part of the table ``at`` counts in, as whoever makes the table knows; -1: the whole one.
     """
@@ -46,11 +46,12 @@ class Place:
     order: int = 0
     factor: float = 1.0
     table: int = -1
+    offset: float = 0.0
 
     def polynomial(self, table: Table, t: float) -> tuple[float, ...]:
         """Return the value at a time and all derivatives."""
         if self.size == 0:
-            return (float(table[self.at]) / self.factor,)
+            return ((float(table[self.at]) - self.offset) / self.factor,)
         c = list(map(float, table[self.at + 1 : self.at + 1 + self.size]))
         x = t - float(table[self.at])
         found = []
@@ -66,7 +67,7 @@ class Place:
         if self.order == 0:
             # the coefficients behind stay zero
             table[self.at : self.at + 1 + min(self.size, 2)] = (
-                (t, value, slope) if self.size else (self.factor * value,)
+                (t, value, slope) if self.size else (self.offset + self.factor * value,)
             )
             return
         known = self.polynomial(table, t)[: self.order]
@@ -107,7 +108,7 @@ class Number:
         at = place.at
         if self.kind == INPUT:
             return float(table[at + 1] + table[at + 2] * (t - table[at]))
-        return float(table[at]) / place.factor
+        return (float(table[at]) - place.offset) / place.factor
 
     def slope(self, table: Table) -> float:
         """Return the rate, zero of what is held."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearmbs._display import Written
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED, Diagnostic
+from gearmbs.gears.contact_element import law_settings
 from gearmbs.gears.geometry import turn_z
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import Mesh
@@ -20,7 +21,7 @@ from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.mechanism.parts.bodies import Marker
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
+from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting, State
 from gearmbs.units import Quantity, to_si
 
 Z = (0.0, 0.0, 1.0)
@@ -465,7 +466,9 @@ class RingMeshes(ForceElement):
         head: list[int] = [len(self.planets), m]
         # the address of the contact goes before the integers
         at_i, at_r = 3 + 4 * len(tables), 4 * m + 2 * m * m + 1
-        for integers, numbers, _ in tables:
+        found: list[dict[str, Setting]] = []
+        for pair, (integers, numbers, _) in zip(self.pairs, tables, strict=True):
+            found.append({what: one._replace(at=at_r + one.at) for what, one in law_settings(pair).items()})
             head += [at_i, integers.size, at_r, numbers.size]
             at_i, at_r = at_i + integers.size, at_r + numbers.size
         room = WORK + WORK_A_MODE * m + max(work for _, _, work in tables)
@@ -475,6 +478,10 @@ class RingMeshes(ForceElement):
             np.concatenate([*reals, *(r for _, r, _ in tables)]),
             ((gear_contact, GEAR_CONTACT_SIG),),
             scratch=room,
+            settings={
+                what: one._replace(others=tuple((other[what].at, other[what].factor, 0.0) for other in found[1:]))
+                for what, one in found[0].items()
+            },
         )
 
     def rim_motion(self, solution: Any, angle: float) -> dict[str, np.ndarray]:

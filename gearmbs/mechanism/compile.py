@@ -373,8 +373,10 @@ class _Compiler:
         """Add what of an element can be changed by its name; its tables have just been added."""
         row, functions = self.builder.forces[-1], self.builder.functions
         for what, setting in made.settings.items():
-            place = Place(row[T.FORCE_REXTRA] + setting.at, factor=setting.factor, table=T.H_R_EXTRA)
-            self.builder.add_setting(f"{name}.{what}", setting.unit, [place])
+            first = row[T.FORCE_REXTRA]
+            every = ((setting.at, setting.factor, setting.offset), *setting.others)
+            places = [Place(first + at, factor=f, offset=c, table=T.H_R_EXTRA) for at, f, c in every]
+            self.builder.add_setting(f"{name}.{what}", setting.unit, places)
         for what, number in made.given.items():
             kind, at = functions[len(functions) - len(made.times) + number]
             if kind in SETTLED:

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
+from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.drivetrain import ClearanceBearing, TorqueLoad
+from gearmbs.gears import ContactLaw, planetary_mechanism
 from gearmbs.mechanism import Mechanism, ModelError, make_input, polyline
 from gearmbs.studies.run.simulation import case_mechanism
 from tests.drivetrain.support import stage
+from tests.gears.test_elastic_ring import BOLTED, GEARS
 from tests.mechanism.test_setting import two_discs
 from tests.says import says
 
@@ -226,3 +229,54 @@ def test_a_clearance_that_is_set_is_that_of_the_part():
     assert number.value(table, 0.0) == pytest.approx(20e-6)
     number.write(table, 0.0, 80e-6)
     np.testing.assert_allclose(table, large.rdata, rtol=1e-14)
+
+
+def settles(make, name, values):
+    """What stands in the tables for all numbers of a kind that are set is what a mechanism made with them has there."""
+    first, other = (make(value).compile().problem() for value in values)
+    table = first.rdata.copy()
+    for number in (number for known, number in first.numbers.items() if known.endswith(name)):
+        assert number.value(table, 0.0) == pytest.approx(values[0], rel=1e-9)
+        number.write(table, 0.0, values[1])
+    np.testing.assert_allclose(table, other.rdata, rtol=1e-13, atol=1e-300)
+    assert (first.rdata != other.rdata).any()
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("deep groove", {}),
+        ("four point", {"contact_angle": "35 deg"}),
+        ("cylindrical roller", {"roller_length": "10 mm"}),
+        ("tapered roller", {"roller_length": "12 mm", "contact_angle": "15 deg"}),
+    ],
+)
+def test_the_clearance_of_rolling_bearings_is_set(kind, options):
+    def held(clearance):
+        m = Mechanism("shaft")
+        shaft = m.body("shaft", mass=1.0, inertia=(1e-3, 1e-3, 1e-3))
+        sizes = {"elements": 9, "element_diameter": "8 mm", "pitch_diameter": "40 mm", "clearance": clearance}
+        bearing = Bearing(kind=kind, **sizes, **options)
+        m.add(RollingBearing.between("A", shaft, m.ground, bearing, at=(0, 0, 0)))
+        return m
+
+    settles(held, "A.clearance", (10e-6, 35e-6))
+
+
+def test_ideal_and_elastic_meshes_are_set():
+    pair = gm.GearPair.paper()
+
+    def ideal(stiffness=4e8, damping=2e3):
+        m = case_mechanism(gm.Case())
+        element = m.elements["mesh"]
+        m.elements["mesh"] = gm.IdealMesh(pair, stiffness, damping).contact_element("mesh", element.i, element.j)
+        return m
+
+    settles(ideal, "mesh.stiffness", (4e8, 6e8))
+    settles(lambda damping: ideal(damping=damping), "mesh.damping", (2e3, 5e3))
+
+    def ring(stiffness):
+        gears = replace(GEARS, contact=replace(ContactLaw.impact(), stiffness=stiffness))
+        return planetary_mechanism(gears, torques={"carrier": -200.0}, rim=BOLTED)
+
+    settles(ring, ".stiffness", (ContactLaw.impact().stiffness, 1.3 * ContactLaw.impact().stiffness))

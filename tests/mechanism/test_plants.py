@@ -77,6 +77,15 @@ def test_a_plant_is_what_control_programs_take():
     assert answer == pytest.approx(plant.step(t)[:, 0], abs=1e-9)
 
 
+def test_python_control_takes_plants():
+    control = pytest.importorskip("control")
+    plant = two_masses().linearize([("torque", "motor bearing")], [("load", "shaft", "tz")])
+    system, f = control.ss(*plant), np.array([0.5, 3.0, 40.0])
+    assert system.nstates == len(plant.states)
+    answer = control.frequency_response(system, 2.0 * np.pi * f).complex
+    np.testing.assert_allclose(np.ravel(answer), plant.frequency_response(f)[:, 0, 0], rtol=1e-9)
+
+
 def test_outputs_may_share_the_acceleration_of_a_marker():
     """A free body, whatever outputs stand beside each other: m a = F."""
     m = gm.Mechanism("free")

@@ -19,11 +19,14 @@ if TYPE_CHECKING:
 
 
 class Setting(NamedTuple):
-    """A number of an element that can be changed: its place among the reals, its unit, and what stands there for 1."""
+    """A number x of an element that can be changed, where ``offset + factor x`` stands among the reals."""
 
     at: int
     unit: str
     factor: float = 1.0
+    offset: float = 0.0
+    others: tuple[tuple[int, float, float], ...] = ()
+    """Further places, factors and offsets."""
 
 
 @dataclass(frozen=True)
