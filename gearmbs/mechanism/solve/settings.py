@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearmbs.dae.problem import EPS, INPUT, ModelError, Number, cells_of
-from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.wording import did_you_mean
 
@@ -34,8 +33,11 @@ class Settings:
 
     Parameters
     ----------
-    mechanism : Mechanism
     numbers : mapping of str to Number
+    aliases : mapping of str to str
+        Further names, and what they stand for.
+    parts : mapping of str to object
+        What has numbers that cannot be set.
 
     Attributes
     ----------
@@ -49,8 +51,8 @@ class Settings:
         What has been set and has not taken effect: value and hold.
     """
 
-    def __init__(self, mechanism: Mechanism, numbers: Mapping[str, Number]) -> None:
-        self.mechanism, self.numbers = mechanism, numbers
+    def __init__(self, numbers: Mapping[str, Number], aliases: Mapping[str, str], parts: Mapping[str, Any]) -> None:
+        self.numbers, self.aliases, self.parts = numbers, aliases, parts
         self.cells = cells_of(numbers)
         # the same numbers where these cells alone are a table
         self._own = {name: number.moved_to(self.cells) for name, number in numbers.items()}
@@ -70,17 +72,16 @@ class Settings:
 
     def number(self, name: str) -> Number:
         """Return what is set under a name; raise a ModelError if there is nothing."""
-        known = self.mechanism.aliases.get(name, name)
+        known = self.aliases.get(name, name)
         if known in self.numbers:
             return self.numbers[known]
         element, _, field = str(known).partition(".")
-        part = self.mechanism.elements.get(element) or self.mechanism.bodies.get(element)
-        if hasattr(part, field):
+        if hasattr(self.parts.get(element), field):
             raise ModelError(
                 f"{known!r} cannot be changed while a simulation goes on: other numbers follow from it; make "
                 "another mechanism with it and go on there from the state (initial=)"
             )
-        names = [*self.mechanism.aliases, *self.numbers]
+        names = [*self.aliases, *self.numbers]
         hint = did_you_mean(known, names)
         listed = f"there are {', '.join(names)}" if names else "the mechanism has none; add one with m.input(...)"
         raise ModelError(f"there is no input or parameter {known!r}{': ' + hint if hint else ''}; {listed}")

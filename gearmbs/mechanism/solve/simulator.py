@@ -177,7 +177,8 @@ class Simulator(OwnAttributes):
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
         self.numbers = self._base.numbers
-        self._settings = Settings(mechanism, self.numbers)
+        parts = {**mechanism.bodies, **mechanism.elements}
+        self._settings = Settings(self.numbers, mechanism.aliases, parts)
         self._simulated, self._took, self._since = 0.0, 0.0, 0.0
         vars(self)["t"] = 0.0
         self._begin(initial)

@@ -180,7 +180,7 @@ class TapeBuilder:
         return self._numbers[name][0]
 
     def input(self, name: str, value: float) -> int:
-        """Return the register of an input, u_0 + u_1 (t - t_0); see `gearmbs.dae.numbers`."""
+        """Return the register of an input, u_0 + u_1 (t - t_0); see `gearmbs.dae.problem`."""
         if name not in self._numbers:
             at = len(self._floats)
             self._floats.extend([0.0, float(value), 0.0])
