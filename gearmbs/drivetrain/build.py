@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,13 @@ from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.kinematics import walk
 from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
-from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Shaft, SpeedSensor, TorqueSensor, Wheel
+from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Sensor, Shaft, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
 from gearmbs.gears.geometry import MM, turn_z
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.modal import Mode
 
 if TYPE_CHECKING:
@@ -274,7 +276,16 @@ def build(train: Drivetrain) -> Mechanism:
     for part in ends:
         with errors_named(part.label):
             part.add(builder.attached(part, "left" if part in train.drives else "right"))
+    for sensor in train.sensors:
+        m.outputs[sensor.name] = Output(sensor.name, partial(_text_of, train, m, sensor))
     return m
+
+
+def _text_of(train: Drivetrain, m: Mechanism, sensor: Sensor) -> str:
+    """Return what a sensor measures, in the mechanism's names; its markers are made where it is first asked for."""
+    from gearmbs.drivetrain.plants import sensed
+
+    return sensed(train, m, sensor).expression
 
 
 class _Builder:

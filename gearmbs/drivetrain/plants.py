@@ -111,7 +111,7 @@ def _output(train: Drivetrain, m: Mechanism, item: Any) -> Any:
     """Return an output in the names of the mechanism: that of a sensor, or the speed or angle of a shaft."""
     if isinstance(item, str):
         sensor = train.parts.get(item)
-        return _sensed(train, m, sensor) if isinstance(sensor, Sensor) else item
+        return sensed(train, m, sensor) if isinstance(sensor, Sensor) else item
     if isinstance(item, tuple | list) and len(item) == 2 and item[0] in ("speed", "angle"):
         shaft = train.part(item[1], Shaft, f"output {tuple(item)!r}")
         function, unit = ("WZ", "rad/s") if item[0] == "speed" else ("AZ", "rad")
@@ -132,7 +132,7 @@ def _marker(body: Body, name: str, place: np.ndarray, axes: np.ndarray) -> Marke
     return own_marker(body, name, body.marker_at, place, axes)
 
 
-def _sensed(train: Drivetrain, m: Mechanism, sensor: Sensor) -> Told:
+def sensed(train: Drivetrain, m: Mechanism, sensor: Sensor) -> Told:
     """Return what a sensor measures, along directions at rest."""
     if isinstance(sensor, SpeedSensor):
         text = _about_axis(train, m, sensor.shaft, "WZ")

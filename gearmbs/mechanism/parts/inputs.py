@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -82,25 +82,35 @@ class Output:
     Attributes
     ----------
     name : str
-    what : str or tuple
-        An expression, or a method of solutions, what it is asked for, and a component.
+    what : str, tuple or callable
+        An expression, or a method of solutions, what it is asked for, and a component; or what returns an expression
+        when it is first asked for, and makes the markers in it.
     """
 
     name: str
-    what: str | tuple[Any, ...]
+    what: str | tuple[Any, ...] | Callable[[], str]
 
     @property
     def asked(self) -> tuple[Any, ...]:
         """Method of solutions, and what it is asked for."""
-        if isinstance(self.what, str):
-            return ("evaluate", self.what)
+        if (text := self.text) is not None:
+            return ("evaluate", text)
+        assert isinstance(self.what, tuple)
         return self.what if self.component is None else self.what[:-1]
+
+    @property
+    def text(self) -> str | None:
+        """The expression, if it is one."""
+        made = self.what() if callable(self.what) else self.what
+        return made if isinstance(made, str) else None
 
     @property
     def component(self) -> str | None:
         """Component of it that is asked for, None for all."""
+        if callable(self.what) or isinstance(self.what, str):
+            return None
         last = self.what[-1]
-        return last if len(self.what) > 2 and not isinstance(self.what, str) and last in AXES + WRENCHES else None
+        return last if len(self.what) > 2 and last in AXES + WRENCHES else None
 
     def of(self, measured: Any) -> Any:
         """Return the component of what was measured, over time or at an instant.
@@ -123,7 +133,7 @@ class Output:
         raise ModelError(f"output {self.name!r}: {self.what[0]} has no component {name!r}; it has {known}")
 
     def __repr__(self) -> str:
-        return f"Output({self.name!r}, {self.what!r})"
+        return f"Output({self.name!r}, {'a sensor' if callable(self.what) else repr(self.what)})"
 
 
 def make_output(name: str, what: Any) -> Output:

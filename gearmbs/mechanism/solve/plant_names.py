@@ -225,7 +225,8 @@ class PlantNames:
         """
         named = self.mechanism.outputs.get(item) if isinstance(item, str) else item
         if isinstance(named, Output):
-            parts = [self._expression(named.what)] if isinstance(named.what, str) else self.outputs(named.what)
+            text = named.text
+            parts = self.outputs(named.what) if text is None else [self._expression(text)]
             return [replace(parts[0], name=named.name)] if len(parts) == 1 else parts
         if isinstance(item, str):
             from gearmbs.mechanism.language.library import CONSTANTS
