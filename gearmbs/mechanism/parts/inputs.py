@@ -130,7 +130,7 @@ class Output:
         if single and name in AXES:
             return measured[..., AXES.index(name)]
         known = ", ".join(WRENCHES if pair else AXES) if pair or single else "no components"
-        raise ModelError(f"output {self.name!r}: {self.what[0]} has no component {name!r}; it has {known}")
+        raise ModelError(f"output {self.name!r}: {self.asked[0]} has no component {name!r}; it has {known}")
 
     def __repr__(self) -> str:
         return f"Output({self.name!r}, {'a sensor' if callable(self.what) else repr(self.what)})"

@@ -264,7 +264,8 @@ def simulate(
         continued or initial is not None,
     )  # fmt: skip
     if initial is not None:
-        history = initial.history_for(problem, name)
+        # events in what is left of the last step would be missed
+        history = None if stops else initial.history_for(problem, name)
         options |= starting_options(name, history)
         problem = initial.problem(problem)
         # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from operator import itemgetter
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from gearmbs._lazy import uncollected
+from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.integrators.stepping.held_run import HeldRun, Rows
+from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
@@ -23,33 +24,24 @@ from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State, equations_of
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
-from gearmbs.mechanism.parts.bodies import OwnAttributes
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.controllers import Control
 from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.mechanism.solve.simulate import (
     ADVICE,
+    StopAt,
     checked,
     just_inside,
     prepared,
     start_time,
     starting_options,
     with_brief_changes,
+    with_stops,
 )
-from gearmbs.wording import any_of, did_you_mean
+from gearmbs.mechanism.solve.told import Point, Told
+from gearmbs.wording import any_of
 
-AT_AN_INSTANT = (
-    "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
-    "reaction", "reaction_force", "load", "diagnostics", "contact", "modal_coordinates", "modal_velocities",
-    "joint_displacement", "marker_position", "marker_velocity", "deflection", "state", "multipliers", "kinetic_energy",
-    "constraint_violation", "transmission_error",
-)  # fmt: skip
-"""What `Solution` tells of one instant alone."""
-COUNTED = ("joint_angle", "evaluate")
-"""What it tells with full turns counted from the first point on."""
-COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
-"""AX, AY and AZ of the function language."""
 NOTHING = nullcontext()
 """What errors of functions are looked for in where there are none."""
 new_point = tuple.__new__
@@ -58,27 +50,7 @@ REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_actio
 """Options of integrators that are about outputs and events of a run that is told its end."""
 
 
-class Point(NamedTuple):
-    """Where a simulation has stood: time, the row of what rows, the table of integers, and what named numbers were."""
-
-    t: float
-    rows: Rows
-    row: int
-    idata: np.ndarray
-    held: np.ndarray
-
-    @property
-    def y(self) -> np.ndarray:
-        """Unknowns."""
-        return self.rows.y[self.row]
-
-    @property
-    def yp(self) -> np.ndarray:
-        """Their rates."""
-        return self.rows.yp[self.row]
-
-
-class Simulator(OwnAttributes):
+class Simulator(Told):
     """A simulation that goes from one communication point to the next.
 
     The run behind it is that of `gearmbs.mechanism.simulate` with the same arguments: its steps pass the points, where
@@ -102,6 +74,9 @@ class Simulator(OwnAttributes):
         As of `simulate`.
     records : bool
         Whether all points are kept for :meth:`solution`.
+    stops : sequence of StopAt
+        :meth:`advance` ends early where a state of the mechanism passes a value, and returns which; steps are those
+        without it. Not with ``lump``.
     **options
         Handed to the integrator.
 
@@ -130,10 +105,6 @@ class Simulator(OwnAttributes):
     -0.0471
     """
 
-    t: float
-    _point: Point
-    _present: Solution | None
-
     def __init__(
         self,
         mechanism: Mechanism,
@@ -147,6 +118,7 @@ class Simulator(OwnAttributes):
         lump: bool | None = None,
         initial: State | None = None,
         records: bool = True,
+        stops: Sequence[StopAt] = (),
         advice: Mapping[Status, str] | None = None,
         **options: Any,
     ) -> None:
@@ -162,7 +134,10 @@ class Simulator(OwnAttributes):
             if option in options:
                 raise ModelError(f"Simulator has no option {option!r}; simulate() and initial= have what it is for")
         INTEGRATORS[name].load()
-        lump = mechanism.lump if lump is None else lump
+        lump = mechanism.lump and not stops if lump is None else lump
+        if stops and lump:
+            raise ModelError("stops: they need all bodies; give lump=False")
+        self._stops = list(stops)
         t_model = t_start if initial is None else initial.t_model
         self._system, self._base, self._members, self._remark = prepared(
             mechanism, t_model, lump, formulation, rate_scale, initial is not None
@@ -172,6 +147,11 @@ class Simulator(OwnAttributes):
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []
+        if stops:
+            first = int(self._base.idata[T.H_Z])
+            self._watched = partial(with_stops, names=mechanism.state_names, first=first, stops=stops)
+            self._watched(self._base)
+            options["event_direction"] = [stop.direction for stop in stops]
         self._options = Options.gather(name, None, {"corrector": "modified", "tol": tol, **options})
         self._records = records
         self._equations = ""
@@ -195,6 +175,8 @@ class Simulator(OwnAttributes):
         if state is not None:
             given = starting_options(options.method, state.history_for(problem, options.method))
             problem, options = state.problem(problem), replace(options, **given)
+        if self._stops:
+            problem = self._watched(problem)
         self._problem, self._origin = problem, state
         with uncollected():
             self._run = HeldRun(problem, self.t_end, replace(options, check_start=not repair))
@@ -224,8 +206,13 @@ class Simulator(OwnAttributes):
 
     # --- going on -----------------------------------------------------------------------------------
 
-    def advance(self, t: float, *, record: bool = True) -> None:
+    def advance(self, t: float, *, record: bool = True) -> StopAt | None:
         """Go on to time ``t``, s; with ``record`` it becomes a point of the :meth:`solution`.
+
+        Returns
+        -------
+        StopAt or None
+            The one of ``stops`` at which the simulation has stopped before.
 
         Raises
         ------
@@ -240,7 +227,20 @@ class Simulator(OwnAttributes):
             end = self._sample(t) if self._controls else t
             if settings.waiting or settings.led:
                 self._apply(t)
+            if self._stops and (hit := self._crossing(end)) is not None:
+                self._go_to(hit[0], record)
+                return self._stops[hit[1]]
             self._go_to(end, record and end == t)
+        return None
+
+    def _crossing(self, end: float) -> tuple[float, int] | None:
+        """Return time and number of the next stop up to a time that steps have come to, going on as far as needed."""
+        run = self._run
+        hit = run.crossing(self.t, end)
+        if hit is None and end > run.state.t:
+            self._run_to(end, False)
+            hit = run.crossing(self.t, end)
+        return hit
 
     def _time(self, t: Any) -> float:
         """Return a time to go on to, s; raise a ModelError for any other."""
@@ -260,8 +260,21 @@ class Simulator(OwnAttributes):
     def _go_to(self, t: float, record: bool) -> None:
         """Go on to a time with what is set, and keep it as a point of the solution."""
         own = self.__dict__
-        run, keep, began = own["_run"], record and own["_records"], perf_counter()
+        run, keep = own["_run"], record and own["_records"]
         rows, row = run.rows, run.row
+        self._run_to(t, keep)
+        self._stand_at(new_point(Point, (t, rows, row, run.table, own["_settings"].held)), keep)
+        if t >= self._next_look:
+            self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
+            found = self._now().find_conflict(np.array([0]))
+            if found is not None:
+                self._failed = found
+                raise ModelError(found)
+
+    def _run_to(self, t: float, keep: bool) -> None:
+        """Take steps; the simulator itself stays where it stands."""
+        own = self.__dict__
+        run, began = own["_run"], perf_counter()
         if own["_functions"]:
             with raised_errors(self._functions):
                 failure = run.go_to(t, keep)
@@ -273,13 +286,6 @@ class Simulator(OwnAttributes):
                 raise KeyboardInterrupt
             self._failed = failure[1]
             raise ModelError(failure[1])
-        self._stand_at(new_point(Point, (t, rows, row, run.table, own["_settings"].held)), keep)
-        if t >= self._next_look:
-            self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
-            found = self._now().find_conflict(np.array([0]))
-            if found is not None:
-                self._failed = found
-                raise ModelError(found)
 
     @property
     def failed(self) -> bool:
@@ -400,116 +406,12 @@ class Simulator(OwnAttributes):
         rdata = self._run.state.rdata.copy()
         rdata[self._settings.cells] = values
         first, points, started = (self._problem, self._origin), self._points, self._run.started
-        self._begin(State.of(self._base, point.t, point.y, point.yp, (point.idata, rdata)), repair=True)
+        self._begin(State.of(self._base, point.t, point.y, point.yp, self._plain(point.idata, rdata)), repair=True)
         self._settings.led = led
         if started:
             self._problem, self._origin = first
             self._points = points
             self._point = point
-
-    # --- looking at it ------------------------------------------------------------------------------
-
-    def get(self, what: str, *names: Any) -> Any:
-        """Return a quantity at the present time.
-
-        Parameters
-        ----------
-        what : str
-            A method or property of `Solution`: "com_position", "angular_velocity", "com_acceleration", "reaction",
-            "load", "diagnostics", "marker_position", "joint_angle", "state", "evaluate" and others.
-        *names
-            What the method takes: the name of a body, joint, element, marker or state, or an expression. "joint_angle"
-            and expressions with AX, AY or AZ count full turns from the first point on, which needs ``records``; what a
-            state has counted goes on.
-
-        Returns
-        -------
-        float, ndarray, tuple or dict
-            What `Solution` returns, without the axis of time; a copy.
-
-        Raises
-        ------
-        ModelError
-            For a quantity that is not there.
-        KeyError
-            For a name that is not there; the message lists those that are.
-        """
-        if what == "input":
-            return self._settings.value(self.t, *names)
-        if what == "output":
-            made = self._mechanism.measures(self._now()).named_output(*names)
-            return made.of(self.get(*made.asked))
-        if what not in AT_AN_INSTANT + COUNTED:
-            known = [*AT_AN_INSTANT, *COUNTED, "input", "output"]
-            hint = did_you_mean(what, known)
-            raise ModelError(f"get: there is no {what!r}{': ' + hint if hint else ''}; there are {', '.join(known)}")
-        if what == "joint_angle":
-            return self._joint_angle(*names)
-        if what == "evaluate" and COUNTED_FUNCTION.search(str(names[:1])):
-            return float(self.solution().evaluate(*names)[-1])
-        if what == "transmission_error":
-            return _last(self._mechanism.measures(self._now()).transmission_error(*names))
-        found = getattr(self._now(), what)
-        return _last(found(*names) if callable(found) else found)
-
-    def _now(self) -> Solution:
-        """Return the solution at the present time alone, valid until the next."""
-        if self._present is None:
-            point = self._point
-            self._present = self._row.over(
-                np.array([point.t]), point.y[None, :], [(0, point.idata)], point.held[None, :]
-            )
-            # turns as the run counts them at every step
-            evaluator: Any = self._row._shared
-            evaluator[0].rdata[:] = self._run.state.rdata
-        return self._present
-
-    def _joint_angle(self, joint: Any) -> float:
-        """Return the angle of a joint, counted from the point on at which it was last asked for."""
-        self._check_records("joint_angle")
-        first, value = self._counted.get(joint, (0, None))
-        angle = self._over(first).joint_angle(joint)
-        last = float(angle[-1] if value is None else value + (angle[-1] - angle[0]))
-        self._counted[joint] = len(self._points) - 1, last
-        return last
-
-    def solution(self) -> Solution:
-        """Return the motion and forces over all points so far, from the start on.
-
-        Raises
-        ------
-        ModelError
-            If no records are kept.
-        """
-        self._check_records("solution")
-        return self._over(0)
-
-    def _check_records(self, what: str) -> None:
-        if not self._records:
-            raise ModelError(f"{what}: it needs the points so far; make the simulator with records=True")
-
-    def _over(self, first: int) -> Solution:
-        """Return the solution over the points from one on."""
-        points = self._points[first:]
-        t, rows, places, tables, held = zip(*points, strict=True)
-        y, yp, counted = (
-            np.array([getattr(r, name)[k] for r, k in zip(rows, places, strict=True)]) for name in ("y", "yp", "kept")
-        )
-        epochs: list[tuple[int, np.ndarray]] = []
-        for row, table in enumerate(tables):
-            if not epochs or not (table is epochs[-1][1] or np.array_equal(table, epochs[-1][1])):
-                epochs.append((row, table))
-        stats, cells = self._run._stats(), self._settings.cells
-        told = Status.SUCCESS if self._failed is None else Status.SOLVER_FAILURE
-        result = DAEResult(
-            np.array(t), y, yp, told, self._failed or f"Advanced to t = {self.t:.9g} s.", stats,
-            epochs=epochs, t_last=self.t, held=(cells, np.array(held)) if cells.size else None,
-            counted=counted,
-        )  # fmt: skip
-        solution = Solution(self._system, self._problem, result, self._members, self._remark)
-        solution.initial = self._origin
-        solution.inside = just_inside(np.array([self._problem.t0, self.t_end]))
-        return solution
 
     # --- state --------------------------------------------------------------------------------------
 
@@ -522,9 +424,14 @@ class Simulator(OwnAttributes):
         if not self._equations:
             self._equations = equations_of(self._base)
         history = run.history(self._equations) if run.started else None
-        state = State.of(self._base, point.t, point.y, point.yp, (point.idata, run.state.rdata), history)
+        tables = self._plain(point.idata, run.state.rdata)
+        state = State.of(self._base, point.t, point.y, point.yp, tables, history)
         held = {control.name: control.memory() for control in self._controls if control.remembers}
         return replace(state, controllers=held) if held else state
+
+    def _plain(self, idata: np.ndarray, rdata: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return tables without what stops have added to them."""
+        return idata[: len(self._base.idata)], rdata[: len(self._base.rdata)]
 
     def restore(self, state: State) -> None:
         """Go back, or on, to a state of the same mechanism.
@@ -580,19 +487,10 @@ class Simulator(OwnAttributes):
         self._next_look = state.t if self._system.has_dropped_rows else np.inf
         self._settings.begin(self._run.state.rdata, state.t)
         place = self._run.place(state.y, state.yp, keep=False)
-        self._stand_at(Point(state.t, *place, state.tables(self._base)[0], self._settings.held), False)
+        idata = np.concatenate([state.tables(self._base)[0], self._problem.idata[len(self._base.idata) :]])
+        self._stand_at(Point(state.t, *place, idata, self._settings.held), False)
         return True
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"
         return f"Simulator({name!r}: t = {self.t:.9g} of {self.t_end:.9g} s, {len(self._points)} points)"
-
-
-def _last(value: Any) -> Any:
-    """Return the last row of what a solution tells over time, as a copy."""
-    if isinstance(value, tuple):
-        return tuple(_last(part) for part in value)
-    if isinstance(value, dict):
-        return {name: _last(part) for name, part in value.items()}
-    row = np.array(value[-1])
-    return float(row) if row.ndim == 0 else row

@@ -7,18 +7,21 @@ that was told all times ahead: what is asked does not change the steps.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.driver import FIRST_CHUNK, InterruptFlag, Run, StallWatch
+from gearmbs.dae.integrators.events import SAMPLES
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
 from gearmbs.dae.integrators.stepping.jumps import TERMS, pass_jump
 from gearmbs.dae.integrators.stepping.memory import Held, LastStep, put_memory, record_window, value_in
 from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, reach
-from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
 from gearmbs.kernels.pointers import direct
@@ -32,6 +35,8 @@ ROWS = 16 * HISTORY
 BLOCK_BYTES = 1 << 18
 """Of values of points that are allotted at a time: about what fits into the second cache."""
 FEWEST_ROWS = 8
+ROUNDED = 4.0 * EPS
+"""Part of the time within which a crossing is the one that has just been told."""
 
 
 class LastRecords:
@@ -118,6 +123,8 @@ class HeldRun(Run):
         """Steps, time and point behind which numbers of the equations have changed."""
         self._scratch: np.ndarray | None = None
         self.layout: dict[str, Any] | None = None
+        self.crossings: list[tuple[float, int]] = []
+        """Times and events in the last step."""
         self._advance, self._reach, self._part = address_of_advance(), direct(reach), self.algebraic.part
         self._make_rows()
         if options.history is not None:
@@ -172,6 +179,8 @@ class HeldRun(Run):
             return None
         code = NOT_BEGUN
         if self.started:
+            if self.crossings:
+                self.crossings.clear()
             code = self._reach(
                 self.functions, st, self._part, self.plan, self.factors, self._advance, t, row, self._look_at
             )
@@ -185,14 +194,60 @@ class HeldRun(Run):
         if code == NOT_BEGUN:
             self.rows.t[row] = st.t_pause = t
             st.next_output = row
+        if st.n_crossings:
+            self._note_crossings()
+            return None
+        if st.n_events:
+            # one step at a time, each of which may have an event
+            st.t_pause = np.nextafter(st.t, np.inf)
         with InterruptFlag() as interrupt:
             told = self._loop(interrupt)
         # before the first step there are no factors
         self._look_at = 0 if self.stall.looking else st.steps + LOOK
         if told[0] < 0:
             return told
-        self._stand_at(keep)
+        if st.n_crossings:
+            self._note_crossings()
+        elif st.t < t:
+            return self.go_to(t, keep)
+        else:
+            self._stand_at(keep)
         return None
+
+    def _note_crossings(self) -> None:
+        st = self.state
+        found = zip(st.crossing_t[: st.n_crossings].tolist(), st.crossing_event[: st.n_crossings].tolist(), strict=True)
+        self.crossings += found
+        st.n_crossings = 0
+
+    def crossing(self, after: float, until: float) -> tuple[float, int] | None:
+        """Return time and event of the first crossing of the last step in a span, None for none."""
+        ahead = [one for one in self.crossings if after + ROUNDED * abs(after) < one[0] <= until]
+        return min(ahead, default=None)
+
+    def _find_crossings(self, t: float) -> None:
+        """Find those behind a time in the last step, of which another run has told nothing."""
+        st, problem, last = self.state, self.problem, self._last_step()
+        self.crossings, st.n_crossings = [], 0
+        if problem.events is None:
+            return
+        run_events, signs = problem.events, np.empty(st.n_events)
+
+        def events(at: float) -> np.ndarray:
+            y, yp = value_in(self, last, at)
+            run_events(at, y, yp, signs, last.idata, st.rdata, st.work)
+            return signs.copy()
+
+        times = np.linspace(t, st.t, SAMPLES + 1)
+        values = [events(float(at)) for at in times] if t < st.t else []
+        for (a, fa), (b, fb) in pairwise(zip(times.tolist(), values, strict=False)):
+            for e in range(st.n_events):
+                rising, falling = fa[e] < 0.0 <= fb[e], fa[e] > 0.0 >= fb[e]
+                direction = st.event_direction[e]
+                if (rising and direction >= 0) or (falling and direction <= 0):
+                    root = brentq(lambda at, e=e: events(at)[e], a, b, xtol=4.0 * EPS * max(abs(b), EPS))
+                    self.crossings.append((float(root), e))
+        st.g_old[:] = events(float(st.t))
 
     def _stand_at(self, keep: bool) -> None:
         records = self.last_records
@@ -245,6 +300,12 @@ class HeldRun(Run):
         if not kept:
             self.last_records.forget_changes()
         self._given, self._jumped = None, (int(st.steps), t, rows, row)
+        if self.problem.events is not None and st.n_events:
+            fired = [e for at, e in self.crossings if at == t]
+            self.crossings.clear()
+            self.problem.events(t, st.y, st.yp, st.g_old, st.idata, st.rdata, st.work)
+            # what has just passed does so once
+            st.g_old[fired] = 0.0
 
     def history(self, equations: str) -> History:
         """Return what the next steps of these equations depend on; a run that has not been started has nothing yet."""
@@ -257,6 +318,7 @@ class HeldRun(Run):
         """Go on with a history; the tables are those of its state."""
         self.pivots, last = put_memory(self, history)
         self._stand_behind(last)
+        self._find_crossings(float(self.problem.t0))
 
     def go_back(self, history: History) -> bool:
         """Go on with a history of this run, in place and with its tables; return whether it is one that can be."""
@@ -264,6 +326,7 @@ class HeldRun(Run):
         if not (isinstance(held, Held) and held.belongs_to(self)):
             return False
         self._stand_behind(held.put_back(self))
+        self.crossings, self.state.n_crossings = list(held.crossings), 0
         return True
 
     def _stand_behind(self, last: LastStep) -> None:

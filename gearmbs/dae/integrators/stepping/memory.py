@@ -40,7 +40,7 @@ OWN = {
     "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one", "entry_row", "entry_col", "idata",
     "rdata", "stops", "outputs", "y_out", "yp_out", "kept", "kept_out", "record_t", "record_h", "record_order",
     "record_y", "g_new", "g_between", "event_direction", "event_action", "crossing_t", "crossing_event", "crossing_y",
-    "watched", "w_error", "w_newton",
+    "watched", "w_error", "w_newton", "g_old", "event_left",
 }  # fmt: skip
 """Arrays of a run that are its own, or scratch, or follow from the state."""
 ARRAYS = tuple(name for name in RunState.array_members if name not in OWN)
@@ -102,6 +102,7 @@ class Laid(Continued, Protocol):
     """The same, and where its arrays lie, found once."""
 
     layout: dict[str, Any] | None
+    crossings: list[tuple[float, int]]
 
 
 class Held(Mapping[str, np.ndarray]):
@@ -127,7 +128,7 @@ class Held(Mapping[str, np.ndarray]):
         self.part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else []
         self.counts, self.counted, self.pivots = (run.repivots, run.first_pivots), run.counted.copy(), run.pivots
         self.layout = _layout(run)
-        self.given = given
+        self.given, self.crossings = given, list(run.crossings)
 
     def belongs_to(self, run: Continued) -> bool:
         """Whether it is of this very run."""

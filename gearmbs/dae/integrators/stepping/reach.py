@@ -72,7 +72,7 @@ def reach(bound, st, part, plan, factors, advance_address, t, row, last):
     Returns
     -------
     code : int
-        NOT_BEGUN; REACHED; INTERRUPTED where ``st.code`` has to be heeded, or a look is due.
+        NOT_BEGUN; REACHED; INTERRUPTED where ``st.code`` has to be heeded, a look is due, or an event has come.
     """
     if not st.t < t <= st.t_end or st.code != RUNNING or st.steps >= last:
         return NOT_BEGUN
@@ -80,12 +80,13 @@ def reach(bound, st, part, plan, factors, advance_address, t, row, last):
     st.t_pause = t
     st.next_output = row
     take = advance_at(advance_address)
-    while st.code == RUNNING and st.steps < last:
-        take(bound, st, part, plan, factors, CHUNK)
+    chunk = 1 if st.n_events > 0 else CHUNK
+    while st.code == RUNNING and st.steps < last and st.n_crossings == 0:
+        take(bound, st, part, plan, factors, chunk)
         if st.code == BUFFER_FULL:
             drain(st)
             st.code = RUNNING
-        elif st.code == RUNNING and st.t >= t:
+        elif st.code == RUNNING and st.t >= t and st.n_crossings == 0:
             st.outputs[row] = np.inf
             return REACHED
     return INTERRUPTED

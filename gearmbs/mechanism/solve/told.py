@@ -1,0 +1,182 @@
+"""What a simulation that is held between calls tells: of the present instant by name, and of all its points."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.dae.integrators.stepping.held_run import HeldRun, Rows
+from gearmbs.dae.problem import ModelError
+from gearmbs.dae.result import DAEResult, Status
+from gearmbs.dae.results.solution import Solution
+from gearmbs.dae.state import State
+from gearmbs.mechanism.parts.bodies import OwnAttributes
+from gearmbs.mechanism.solve.settings import Settings
+from gearmbs.wording import did_you_mean
+
+AT_AN_INSTANT = (
+    "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
+    "reaction", "reaction_force", "load", "diagnostics", "contact", "modal_coordinates", "modal_velocities",
+    "joint_displacement", "marker_position", "marker_velocity", "deflection", "state", "multipliers", "kinetic_energy",
+    "constraint_violation", "transmission_error",
+)  # fmt: skip
+"""What `Solution` tells of one instant alone."""
+COUNTED = ("joint_angle", "evaluate")
+"""What it tells with full turns counted from the first point on."""
+COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
+"""AX, AY and AZ of the function language."""
+
+
+class Point(NamedTuple):
+    """Where a simulation has stood: time, the row of what rows, the table of integers, and what named numbers were."""
+
+    t: float
+    rows: Rows
+    row: int
+    idata: np.ndarray
+    held: np.ndarray
+
+    @property
+    def y(self) -> np.ndarray:
+        """Unknowns."""
+        return self.rows.y[self.row]
+
+    @property
+    def yp(self) -> np.ndarray:
+        """Their rates."""
+        return self.rows.yp[self.row]
+
+
+class Told(OwnAttributes):
+    """The part of a `gearmbs.Simulator` that looks at it."""
+
+    t: float
+    _mechanism: Any
+    _system: Any
+    _members: Any
+    _problem: Any
+    _remark: str
+    _run: HeldRun
+    _settings: Settings
+    _row: Solution
+    _point: Point
+    _present: Solution | None
+    _points: list[Point]
+    _counted: dict[tuple, tuple[int, float]]
+    _records: bool
+    _failed: str | None
+    _origin: State | None
+
+    def get(self, what: str, *names: Any) -> Any:
+        """Return a quantity at the present time.
+
+        Parameters
+        ----------
+        what : str
+            A method or property of `Solution`: "com_position", "angular_velocity", "com_acceleration", "reaction",
+            "load", "diagnostics", "marker_position", "joint_angle", "state", "evaluate" and others.
+        *names
+            What the method takes: the name of a body, joint, element, marker or state, or an expression. "joint_angle"
+            and expressions with AX, AY or AZ count full turns from the first point on, which needs ``records``; what a
+            state has counted goes on.
+
+        Returns
+        -------
+        float, ndarray, tuple or dict
+            What `Solution` returns, without the axis of time; a copy.
+
+        Raises
+        ------
+        ModelError
+            For a quantity that is not there.
+        KeyError
+            For a name that is not there; the message lists those that are.
+        """
+        if what == "input":
+            return self._settings.value(self.t, *names)
+        if what == "output":
+            made = self._mechanism.measures(self._now()).named_output(*names)
+            return made.of(self.get(*made.asked))
+        if what not in AT_AN_INSTANT + COUNTED:
+            known = [*AT_AN_INSTANT, *COUNTED, "input", "output"]
+            hint = did_you_mean(what, known)
+            raise ModelError(f"get: there is no {what!r}{': ' + hint if hint else ''}; there are {', '.join(known)}")
+        if what == "joint_angle":
+            return self._joint_angle(*names)
+        if what == "evaluate" and COUNTED_FUNCTION.search(str(names[:1])):
+            return float(self.solution().evaluate(*names)[-1])
+        if what == "transmission_error":
+            return _last(self._mechanism.measures(self._now()).transmission_error(*names))
+        found = getattr(self._now(), what)
+        return _last(found(*names) if callable(found) else found)
+
+    def _now(self) -> Solution:
+        """Return the solution at the present time alone, valid until the next."""
+        if self._present is None:
+            point = self._point
+            self._present = self._row.over(
+                np.array([point.t]), point.y[None, :], [(0, point.idata)], point.held[None, :]
+            )
+            # turns as the run counts them at every step
+            evaluator: Any = self._row._shared
+            evaluator[0].rdata[:] = self._run.state.rdata
+        return self._present
+
+    def _joint_angle(self, joint: Any) -> float:
+        """Return the angle of a joint, counted from the point on at which it was last asked for."""
+        self._check_records("joint_angle")
+        first, value = self._counted.get(joint, (0, None))
+        angle = self._over(first).joint_angle(joint)
+        last = float(angle[-1] if value is None else value + (angle[-1] - angle[0]))
+        self._counted[joint] = len(self._points) - 1, last
+        return last
+
+    def solution(self) -> Solution:
+        """Return the motion and forces over all points so far, from the start on.
+
+        Raises
+        ------
+        ModelError
+            If no records are kept.
+        """
+        self._check_records("solution")
+        return self._over(0)
+
+    def _check_records(self, what: str) -> None:
+        if not self._records:
+            raise ModelError(f"{what}: it needs the points so far; make the simulator with records=True")
+
+    def _over(self, first: int) -> Solution:
+        """Return the solution over the points from one on."""
+        points = self._points[first:]
+        t, rows, places, tables, held = zip(*points, strict=True)
+        y, yp, counted = (
+            np.array([getattr(r, name)[k] for r, k in zip(rows, places, strict=True)]) for name in ("y", "yp", "kept")
+        )
+        epochs: list[tuple[int, np.ndarray]] = []
+        for row, table in enumerate(tables):
+            if not epochs or not (table is epochs[-1][1] or np.array_equal(table, epochs[-1][1])):
+                epochs.append((row, table))
+        stats, cells = self._run._stats(), self._settings.cells
+        told = Status.SUCCESS if self._failed is None else Status.SOLVER_FAILURE
+        result = DAEResult(
+            np.array(t), y, yp, told, self._failed or f"Advanced to t = {self.t:.9g} s.", stats,
+            epochs=epochs, t_last=self.t, held=(cells, np.array(held)) if cells.size else None,
+            counted=counted,
+        )  # fmt: skip
+        solution = Solution(self._system, self._problem, result, self._members, self._remark)
+        solution.initial = self._origin
+        solution.inside = self._row.inside
+        return solution
+
+
+def _last(value: Any) -> Any:
+    """Return the last row of what a solution tells over time, as a copy."""
+    if isinstance(value, tuple):
+        return tuple(_last(part) for part in value)
+    if isinstance(value, dict):
+        return {name: _last(part) for name, part in value.items()}
+    row = np.array(value[-1])
+    return float(row) if row.ndim == 0 else row

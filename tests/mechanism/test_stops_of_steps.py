@@ -1,0 +1,58 @@
+"""A simulator that stops where a state passes a value."""
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism.solve.simulate import StopAt
+from tests.says import says
+
+
+def swinging():
+    """A mass that swings, x = 0.1 sin 10 t, with its place as a state."""
+    m = Mechanism("swing")
+    body = m.body("body", mass=2.0, inertia=(0.1, 0.1, 0.1), velocity=(1.0, 0.0, 0.0))
+    guide = m.translational("guide", body, m.ground, axis=(1, 0, 0))
+    m.spring_damper(
+        "spring", guide.i, m.ground.marker(name="far", position=(-10.0, 0, 0)), stiffness=200.0, length=10.0
+    )
+    m.algebraic_state("place", "DX(guide.I)")
+    m.torque("idle", body, m.input("load", "N m"), axis=(1, 0, 0))
+    return m
+
+
+def test_advance_ends_where_a_state_passes_a_value(tmp_path):
+    """At the zeros and at 0.05 m of the way, without another step; from states of before and behind too."""
+    stops = [StopAt("place", 0.05, 1), StopAt("place", 0.0, -1)]
+    sim, told, states = gm.Simulator(swinging(), 2.0, tol=1e-9, stops=stops), [], []
+    while sim.t < 1.0:
+        state = sim.state()
+        stop = sim.advance(1.0)
+        told.append((sim.t, None if stop is None else stops.index(stop)))
+        states.append(state)
+    turn = 0.2 * np.pi
+    wanted = [(np.pi / 60, 0), (0.1 * np.pi, 1), (turn + np.pi / 60, 0), (turn + 0.1 * np.pi, 1), (1.0, None)]
+    assert [which for _, which in told] == [which for _, which in wanted]
+    np.testing.assert_allclose([t for t, _ in told], [t for t, _ in wanted], atol=1e-7)
+    plain = gm.Simulator(swinging(), 2.0, tol=1e-9)
+    for t, _ in told:
+        plain.advance(t)
+    np.testing.assert_array_equal(sim.solution().result.y[1:], plain.solution().result.y[1:])
+    for k in (3, 1, 2):
+        sim.restore(states[k])
+        other = gm.Simulator(swinging(), 2.0, tol=1e-9, stops=stops, initial=states[k])
+        read = gm.State.load(states[k].save(tmp_path / "s.npz"))
+        for one in (sim, other, gm.Simulator(swinging(), 2.0, tol=1e-9, stops=stops, initial=read)):
+            assert stops.index(one.advance(1.0)) == told[k][1]
+            assert one.t == pytest.approx(told[k][0], rel=1e-13)
+    sim.restore(states[1])
+    sim.set("load", 0.3)
+    assert stops.index(sim.advance(1.0)) == 1
+    gone_on = gm.Simulator(swinging(), 2.0, tol=1e-9, initial=states[2])
+    assert gone_on.advance(1.0) is None
+    np.testing.assert_allclose(gone_on.get("com_position", "body"), plain.get("com_position", "body"), atol=1e-7)
+    with pytest.raises(ModelError, match=says("lump", "False")):
+        gm.Simulator(swinging(), 2.0, stops=stops, lump=True)
+    with pytest.raises(ModelError, match=says("plase", "place")):
+        gm.Simulator(swinging(), 2.0, stops=[StopAt("plase")])
