@@ -406,7 +406,7 @@ class Simulator(Told):
         rdata = self._run.state.rdata.copy()
         rdata[self._settings.cells] = values
         first, points, started = (self._problem, self._origin), self._points, self._run.started
-        self._begin(State.of(self._base, point.t, point.y, point.yp, self._plain(point.idata, rdata)), repair=True)
+        self._begin(State.of(self._base, point.t, point.y, point.yp, self._own_tables(point.idata, rdata)), repair=True)
         self._settings.led = led
         if started:
             self._problem, self._origin = first
@@ -424,12 +424,12 @@ class Simulator(Told):
         if not self._equations:
             self._equations = equations_of(self._base)
         history = run.history(self._equations) if run.started else None
-        tables = self._plain(point.idata, run.state.rdata)
+        tables = self._own_tables(point.idata, run.state.rdata)
         state = State.of(self._base, point.t, point.y, point.yp, tables, history)
         held = {control.name: control.memory() for control in self._controls if control.remembers}
         return replace(state, controllers=held) if held else state
 
-    def _plain(self, idata: np.ndarray, rdata: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _own_tables(self, idata: np.ndarray, rdata: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return tables without what stops have added to them."""
         return idata[: len(self._base.idata)], rdata[: len(self._base.rdata)]
 
