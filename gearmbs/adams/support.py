@@ -11,8 +11,9 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import READ_IN_DECKS
 from gearmbs.adams.parse.grammar import CHOICE, specs_of
 from gearmbs.adams.parse.statements import INSTEAD, INSTEAD_OF_ARGUMENTS, INSTEAD_OF_FUNCTIONS
-from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, FUNCTIONS, UNARY
-from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
+from gearmbs.mechanism.language.library import FUNCTIONS
+from gearmbs.mechanism.language.lowering import BINARY, ELEMENT_FORCES, UNARY
+from gearmbs.mechanism.language.lowering import UNSUPPORTED as REFUSED_FUNCTIONS
 
 READ, OVER, REFUSED = "read", "read over", "refused"
 READ_THERE = "read, see the last column"

@@ -10,7 +10,7 @@ from gearmbs.adams.parse import grammar as g
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import MEASURES
 from gearmbs.adams.parse.grammar import grammar_of
-from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, UNARY
+from gearmbs.mechanism.language.lowering import BINARY, ELEMENT_FORCES, UNARY
 
 SPICE = ["/", ",", "=", "\\", "(", ")", "!", "&", ";", "\n", "\n,", "D", "E", "90D", "1E400", "-", "0", "\x00", "\t",
          "'", '"', ":", "**", "PART/", "END", "é", "\x01", "9" * 30, "FUNCTION=", "I=", " "]  # fmt: skip

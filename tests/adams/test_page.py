@@ -10,7 +10,8 @@ import pytest
 
 from gearmbs.adams.parse import commands
 from gearmbs.adams.parse import statements as st
-from gearmbs.mechanism.language.library import BINARY, ELEMENT_FORCES, FUNCTIONS, UNARY, UNSUPPORTED
+from gearmbs.mechanism.language.library import FUNCTIONS
+from gearmbs.mechanism.language.lowering import BINARY, ELEMENT_FORCES, UNARY, UNSUPPORTED
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "howto" / "adams.md").read_text(encoding="utf-8")

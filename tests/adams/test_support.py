@@ -17,7 +17,7 @@ from gearmbs.adams.builders.routines import BINDERS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import UNSUPPORTED_COMMANDS
 from gearmbs.adams.parse.grammar import specs_of
-from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
+from gearmbs.mechanism.language.lowering import UNSUPPORTED as REFUSED_FUNCTIONS
 
 from .decks import PENDULUM
 

@@ -37,7 +37,7 @@ from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.language.library import ELEMENT_FORCES
+from gearmbs.mechanism.language.lowering import ELEMENT_FORCES
 from gearmbs.mechanism.language.syntax import Call, Name, Node, Number
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.curves import add_curve

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import EXPRESSION, RawStatement, specs_of
-from gearmbs.mechanism.language.library import UNSUPPORTED as REFUSED_FUNCTIONS
+from gearmbs.mechanism.language.lowering import UNSUPPORTED as REFUSED_FUNCTIONS
 from gearmbs.mechanism.language.syntax import Call, Number, Units, parse, walk
 
 if TYPE_CHECKING:

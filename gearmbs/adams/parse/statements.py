@@ -12,7 +12,7 @@ from typing import NamedTuple
 from gearmbs.adams.parse.data_statements import *  # noqa: F403
 from gearmbs.adams.parse.grammar import Statement, specs_of
 from gearmbs.adams.parse.model_statements import *  # noqa: F403
-from gearmbs.mechanism.language.library import ELEMENT_FORCES
+from gearmbs.mechanism.language.lowering import ELEMENT_FORCES
 
 STATEMENTS: dict[str, type[Statement]] = Statement.table
 """What is read, by name."""

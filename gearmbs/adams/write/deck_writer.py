@@ -31,7 +31,7 @@ from gearmbs.dae.methods import FORMULATIONS, INTEGRATORS
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.contacts import SolidContact
-from gearmbs.mechanism.language.library import ELEMENT_FORCES
+from gearmbs.mechanism.language.lowering import ELEMENT_FORCES
 from gearmbs.mechanism.language.syntax import (
     Call,
     Name,

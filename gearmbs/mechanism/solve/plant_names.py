@@ -229,7 +229,7 @@ class PlantNames:
             parts = self.outputs(named.what) if text is None else [self._expression(text)]
             return [replace(parts[0], name=named.name)] if len(parts) == 1 else parts
         if isinstance(item, str):
-            from gearmbs.mechanism.language.library import CONSTANTS
+            from gearmbs.mechanism.language.lowering import CONSTANTS
 
             m = self.mechanism
             if (
