@@ -168,3 +168,34 @@ def test_a_parameter_that_changes_what_there_is_is_refused():
     with pytest.raises(ModelError, match=says("parameter", "'mass'")):
         forward_sensitivities(maybe, {"mass": 1.0}, 0.1)
     assert forward_sensitivities(maybe, {"mass": 2.0}, 0.01).unknowns["mass"].shape[0] > 1
+
+
+def hooke(x, k):
+    return -k * x
+
+
+def with_function(law, k, m):
+    made = gm.Mechanism("own", gravity=(0, 0, 0))
+    body = made.body("body", mass=m, inertia=(1, 1, 1), position=(0.1, 0, 0))
+    made.translational("slide", body, made.ground, at=(0, 0, 0), axis=(1, 0, 0))
+    made.function("law", law)
+    place = body.marker(name="place")
+    made.load("spring", place, made.ground.marker(), rm=made.ground.marker(), fx=f"LAW(DX(place),{k!r})")
+    return made
+
+
+def test_functions_of_python_take_parameters_as_arguments():
+    """x = 0.1 cos(w t) with w^2 = k/m."""
+    run = forward_sensitivities(lambda k, m: with_function(hooke, k, m), {"k": K, "m": M_}, 1.0, rate=20, tol=1e-8)
+    t, w = run.solution.t, np.sqrt(K / M_)
+    by_speed = -0.1 * t * np.sin(w * t)
+    assert run.derivative("k", "DX(place)") == pytest.approx(by_speed * w / (2 * K), abs=2e-8)
+    assert run.derivative("m", "DX(place)") == pytest.approx(-by_speed * w / (2 * M_), abs=3e-6)
+    with pytest.raises(ModelError, match=says("'k'", "'law'", "outside")):
+        forward_sensitivities(lambda k: with_function(lambda x, _: -k * x, 1.0, M_), {"k": K}, 0.1)
+
+
+def test_a_parameter_without_effect_is_told():
+    with pytest.warns(UserWarning, match=says("'idle'", "zero")):
+        run = forward_sensitivities(lambda idle: oscillator(), {"idle": 1.0}, 0.05)
+    assert not run.derivative("idle", "DX(place)").any()

@@ -11,6 +11,7 @@ with the sensitivities s of the unknowns: solutions are made of both sides, and 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -30,6 +31,8 @@ from gearmbs.wording import did_you_mean
 TIGHTER = 0.1
 """Part of the usual tolerance at which a run is differentiated where none is given. Derivatives bend where the rates of
 the run do, and are as accurate as the unknowns at ten times the tolerance (docs/theory/tangents.md)."""
+LARGEST_COUNT = 2**32
+"""Above it integers of the tables are addresses; counts and places stay far below."""
 WITHOUT = ("every_step", "consumer", "watch", "stops", "initial", "inputs", "continued", "dense_output")
 """Options of `simulate` that belong to runs of another kind."""
 
@@ -139,9 +142,9 @@ def forward_sensitivities(
 
     Notes
     -----
-    Of S parameters the cost beside the run is that of a Jacobian and a factorisation, and of 2 S residuals and
-    S substitutions, for each step. Where forces jump with the state derivatives do too, which is not followed; contact
-    and friction here are continuous.
+    Of S parameters the cost beside the run is that of a Jacobian and a factorisation, and of S + 1 residuals and
+    S substitutions, for each step. Where forces jump with the state, or at a time that depends on a parameter, so do
+    derivatives, which is not followed; contact and friction here are continuous.
     """
     for option in WITHOUT:
         if option in options:
@@ -173,6 +176,7 @@ def forward_sensitivities(
     directions = []
     for key, value in values.items():
         by = MOST * scales[key]
+        _check_functions(key, mechanism, _built(build, values | {key: value + by}))
         plus, minus = made(key, value + by)[1], made(key, value - by)[1]
         directions.append(_direction(key, solution.problem, plus, minus, 2.0 * by / scales[key]))
     followed: Followed = follow(solution.problem, solution.result, directions)
@@ -214,10 +218,25 @@ def _built(build: Callable[..., Mechanism], values: Mapping[str, float]) -> Mech
     return made
 
 
+def _check_functions(name: str, mechanism: Mechanism, other: Mechanism) -> None:
+    """Refuse functions of Python that are other ones each time: what of the parameter is in them cannot be seen."""
+    for key, known in mechanism.functions.items():
+        found = other.functions.get(key)
+        if found is not None and (found.function, found.partials) != (known.function, known.partials):
+            raise ModelError(
+                f"parameter {name!r}: function {known.name!r} is another object in each mechanism that build returns: what "
+                "it takes from the parameter is not seen; define it outside of build, with parameters as its arguments"
+            )
+
+
 def _direction(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEProblem, width: float) -> Direction:
     """Return how tables and start change by the scale of a parameter; refuse one that changes what there is."""
     for side in (plus, minus):
-        same = side.n == problem.n and np.array_equal(side.idata, problem.idata)
+        same = side.n == problem.n and side.idata.shape == problem.idata.shape
+        if same:
+            # functions of Python have another address in each model
+            moved = side.idata != problem.idata
+            same = bool((np.minimum(side.idata, problem.idata)[moved] > LARGEST_COUNT).all())
         if not same or side.rdata.shape != problem.rdata.shape:
             raise ModelError(
                 f"parameter {name!r}: with another value the model has other parts or other tables, so that nothing "
@@ -225,4 +244,10 @@ def _direction(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEProbl
             )
     change = (plus.rdata - minus.rdata) / width
     places = np.flatnonzero(change)
-    return Direction(name, (plus.y0 - minus.y0) / width, places, change[places])
+    start = (plus.y0 - minus.y0) / width
+    if not places.size and not start.any():
+        warnings.warn(
+            f"parameter {name!r} changes no number of the model, nor its start: all derivatives by it are zero",
+            stacklevel=3,
+        )
+    return Direction(name, start, places, change[places])
