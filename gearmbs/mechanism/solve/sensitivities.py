@@ -224,8 +224,8 @@ def _check_functions(name: str, mechanism: Mechanism, other: Mechanism) -> None:
         found = other.functions.get(key)
         if found is not None and (found.function, found.partials) != (known.function, known.partials):
             raise ModelError(
-                f"parameter {name!r}: function {known.name!r} is another object in each mechanism that build returns: what "
-                "it takes from the parameter is not seen; define it outside of build, with parameters as its arguments"
+                f"parameter {name!r}: function {known.name!r} is another object in each mechanism that build returns, "
+                "and what it takes of the parameter is not seen; define it outside build, with parameters as arguments"
             )
 
 
