@@ -9,7 +9,7 @@ from pathlib import Path, PureWindowsPath
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.files import named_file
+from gearmbs.adams.parse.files import LONGEST_NAME, named_file
 from gearmbs.adams.parse.grammar import (
     CHOICE,
     CONTINUED,
@@ -172,8 +172,8 @@ class Script:
         path = model.parent / self.prefix.replace("\\", "/")
         if PureWindowsPath(self.prefix).drive or model.parent.resolve() not in path.resolve().parents:
             message = (
-                f"results would go to {self.prefix[:80]!r}, which is not in the folder of {model.name}; if that is "
-                f"meant, say so with --out {self.prefix[:80]}"
+                f"results would go to {self.prefix[:LONGEST_NAME]!r}, which is not in the folder of {model.name}; if "
+                f"that is meant, say so with --out {self.prefix[:LONGEST_NAME]}"
             )
             raise DeckError([Diagnostic(ERROR, message, self.file, self.prefix_line)])
         return path
@@ -254,7 +254,7 @@ def _include(script: Script, command: FileCommand, errors: list[Diagnostic], dep
     except (DeckError, ValueError, OSError) as error:
         places = error.diagnostics if isinstance(error, DeckError) else ()
         inner = [d for d in places if d.file == str(path)]
-        message = f"FILE: COMMAND = {name[:80]}: {places[0].message if places else error}"
+        message = f"FILE: COMMAND = {name[:LONGEST_NAME]}: {places[0].message if places else error}"
         errors.extend(inner or [Diagnostic(ERROR, message, script.file, command.line)])
         return
     script.commands.extend(other.commands)

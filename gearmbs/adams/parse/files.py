@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
+LONGEST_NAME = 400
+"""Characters of a file's name that a message shows: whole paths of real files."""
 _ADDED: ContextVar[tuple[Path, ...]] = ContextVar("added", default=())
 
 
@@ -38,7 +40,7 @@ def named_file(word: str, name: str, file: str | Path) -> Path:
     path = home / name.replace("\\", "/")
     if not any(folder in path.resolve().parents for folder in (home.resolve(), *_ADDED.get())):
         raise ValueError(
-            f"{word} = {name[:80]} is outside the folder of {Path(file).name}; copy it there, or allow its folder with "
-            "--read-from, in Python with gearmbs.adams.reading_from"
+            f"{word} = {name[:LONGEST_NAME]} is outside the folder of {Path(file).name}; copy it there, or allow its "
+            "folder with --read-from, in Python with gearmbs.adams.reading_from"
         )
     return path

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gearmbs.adams.parse.files import named_file
+from gearmbs.adams.parse.files import LONGEST_NAME, named_file
 from gearmbs.adams.parse.reader import read_text
 from gearmbs.adams.view.edits import Editor
 from gearmbs.adams.view.expressions import text_of
@@ -303,11 +303,11 @@ class Interpreter(Editor):
             If it is elsewhere, or cannot be read.
         """
         if self.folder is None:
-            raise ViewError(f"{name[:80]}: a text without a folder reads no files", line)
+            raise ViewError(f"{name[:LONGEST_NAME]}: a text without a folder reads no files", line)
         try:
             return read_text(named_file("file_name", name, self.folder / "this file").read_bytes())
         except (OSError, ValueError) as error:
-            raise ViewError(f"{name[:80]} cannot be read: {error}", line) from error
+            raise ViewError(f"{name[:LONGEST_NAME]} cannot be read: {error}", line) from error
 
     def _file(self, given: dict[str, Stored], line: int) -> None:
         name = text_of((self._now(given["file_name"]) or [""])[0]) if "file_name" in given else ""

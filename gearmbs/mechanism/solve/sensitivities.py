@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.methods import DEFAULT
+from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.tangents import MOST, MOVED, Direction, Followed, follow
@@ -26,7 +26,7 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.simulate import prepared, simulate
-from gearmbs.wording import did_you_mean
+from gearmbs.wording import any_of, did_you_mean
 
 TIGHTER = 0.1
 """Part of the usual tolerance at which a run is differentiated where none is given. Derivatives bend where the rates of
@@ -127,7 +127,7 @@ def forward_sensitivities(
     t_end : float
         End of the simulation, s.
     t_start, formulation, rate_scale, lump, **options
-        As of `gearmbs.mechanism.simulate`, with WSTIFF or GSTIFF.
+        As of `gearmbs.mechanism.simulate`, with an integrator that has dense output.
     tol : float, optional
         Of the run; default a tenth of that of `gearmbs.mechanism.simulate`: derivatives are less smooth than the run.
 
@@ -150,8 +150,9 @@ def forward_sensitivities(
         if option in options:
             raise ModelError(f"forward_sensitivities has no option {option!r}: it belongs to other runs; leave it out")
     name = str(options.get("integrator", DEFAULT)).upper()
-    if name not in ("WSTIFF", "GSTIFF"):
-        raise ModelError(f"integrator: {name!r} does not keep its steps for sensitivities; choose WSTIFF or GSTIFF")
+    if not INTEGRATORS.get(name, INTEGRATORS[DEFAULT]).can("dense_output"):
+        able = any_of(those_that("dense_output"))
+        raise ModelError(f"integrator: {name!r} does not keep its steps for sensitivities; choose {able}")
     if not parameters:
         raise ModelError("parameters: there is none; give names and values, as {'stiffness': 2e8}")
     values, scales = {}, {}

@@ -5,7 +5,7 @@ import pytest
 
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.studies import Case, simulate_case
-from gearmbs.studies.run.record import WATCHED
+from gearmbs.studies.run.recorder import WATCHED
 from gearmbs.studies.run.simulation import case_mechanism
 from tests.says import says
 
