@@ -269,9 +269,9 @@ def test_willis_in_a_simulation_with_tooth_contact():
     m = mechanism_of(gears, speeds={"sun": "300 rpm"}, torques={"carrier": "-60 N m"}, run_up="0.01 s")
     mesh = (5 - 5 / 4.5) * 24
     solution = m.simulate(20 / mesh, rate=8 * mesh, tol=1e-8)
-    turned = solution.joint_angle("carrier seat"), solution.joint_angle("sun seat")
-    ratio = (turned[0][160] - turned[0][128]) / (turned[1][160] - turned[1][128])
-    assert ratio == pytest.approx(1 / 4.5, rel=1e-9)
+    carrier, sun = (solution.joint_angle(f"{seat} seat")[[128, 160]] for seat in ("carrier", "sun"))
+    # angles are good to the tolerance of a step
+    assert np.ptp(carrier) / np.ptp(sun) == pytest.approx(1 / 4.5, rel=1e-8 / np.ptp(carrier))
     force = np.mean([solution.diagnostics(f"sun-planet {k}")["normal_force"][128:160].mean() for k in (1, 2, 3)])
     assert 3 * force * gears.sun.base_radius == pytest.approx(60 / 4.5, rel=0.01)
 

@@ -147,7 +147,8 @@ def test_chain_of_index_three_passes_at_the_level_of_rounding(loops, tol):
 
     What rounding moves the velocities by is told by the solver's own estimate for the matrix of each step. The error
     test knows positions alone. Where rounding moves those by more than their tolerance it lets the prediction stand,
-    so that the tolerance times gamma, the leading coefficient, is the most that a velocity takes over.
+    so that the tolerance times gamma, the leading coefficient, is the most that a velocity takes over. An output holds
+    what some steps before it have left, too, and which correctors rounding keeps from converging is chance.
     """
     reference = chain_problem(loops, 2.0)
     problem = reference.make("I3")
@@ -161,8 +162,8 @@ def test_chain_of_index_three_passes_at_the_level_of_rounding(loops, tol):
         if st.t > START_UP:
             noise = max(noise, min(moved_by_rounding(run, velocities), st.gamma * tol))
     assert code == DONE
-    assert reference.error(reference.times, st.y_out) < 400 * tol + max(5e-9, noise)
-    assert st.newton_rejections <= 2
+    assert reference.error(reference.times, st.y_out) < 400 * tol + 3 * max(5e-9, noise)
+    assert st.newton_rejections <= (2 if noise < tol else max(2, st.steps // 100))
     if tol >= 1e-8:
         assert st.noise_limited == 0
 
