@@ -296,6 +296,7 @@ def _preload_balls(settings: BearingSettings, rows: list[list[float]]) -> None:
         force = bearing.elements * series_stiffness(settings) * delta**1.5 * (axial + shift) / length
         return force - settings.preload
 
+    _check_preload(settings, missing(0.0))
     top = 1e-6
     while missing(top) < 0.0:
         top *= 2.0
@@ -328,6 +329,16 @@ def crown(bearing: Bearing, place: np.ndarray) -> np.ndarray:
     return 0.00035 * bearing.element_diameter * np.log(1.0 / (1.0 - (2.0 * place / length) ** 2))
 
 
+def _check_preload(settings: BearingSettings, excess: float) -> None:
+    """Refuse a preload below what a negative clearance presses already."""
+    require(
+        excess <= 0.0,
+        f"RollingBearing.preload is {settings.preload:g} N, and by its clearance of "
+        f"{1e6 * settings.bearing.clearance:g} um the bearing presses with {settings.preload + excess:.4g} N already; "
+        "leave one of the two away, or give a larger preload",
+    )
+
+
 def _roller_preload(settings: BearingSettings, rows: np.ndarray) -> float:
     from scipy.optimize import brentq
 
@@ -343,6 +354,7 @@ def _roller_preload(settings: BearingSettings, rows: np.ndarray) -> float:
         force = float(np.sum(rows[:, B.PATH_SHARE] * series_stiffness(settings) * delta**bearing.exponent))
         return bearing.elements * force * sine - settings.preload
 
+    _check_preload(settings, missing(0.0))
     top = 1e-6
     while missing(top) < 0.0:
         top *= 2.0

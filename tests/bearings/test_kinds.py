@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import gearmbs
-from gearmbs.bearings import Bearing, BearingError, BearingStatics
+from gearmbs.bearings import Bearing, BearingError, BearingStatics, RollingBearing
 from gearmbs.bearings.bearing import dynamic_rating, equivalent_load
 from gearmbs.bearings.kinds import KINDS, Known
+from gearmbs.mechanism import Mechanism
 from tests.says import says
 
 PACKAGE = Path(gearmbs.__file__).parent
@@ -76,3 +77,17 @@ def test_no_other_module_tells_kinds_apart():
         if path.name != "kinds.py"
     }
     assert found <= {"bearings/catalogue.py: angular contact", "bearings/bearing.py: deep groove"}
+
+
+@pytest.mark.parametrize("kind", ["angular contact", "tapered roller"])
+def test_a_preload_below_what_a_negative_clearance_presses_is_refused(kind):
+    rollers = {"roller_length": "9.5 mm"} if "roller" in kind else {}
+    bearing = Bearing(
+        kind=kind, elements=11, element_diameter="7.94 mm", pitch_diameter="38.5 mm", contact_angle="25 deg",
+        clearance="-20 um", **rollers,
+    )  # fmt: skip
+    m = Mechanism("seat")
+    shaft = m.body("shaft", mass=1.0, inertia=(1e-3, 1e-3, 1e-3))
+    with pytest.raises(BearingError, match=says("preload", "10", "clearance", "-20")):
+        RollingBearing("A", shaft.marker(), m.ground.marker(), bearing=bearing, preload="10 N")
+    assert RollingBearing("A", shaft.marker(), m.ground.marker(), bearing=bearing, preload="30 kN")
