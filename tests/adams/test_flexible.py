@@ -118,8 +118,9 @@ def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
     data = result.to_dataset()
     np.testing.assert_array_equal(data.flex_body_1_modal, result.modal(1)[0])
     whole = (tmp_path / "bar.res").read_text()
+    half = whole[: len(whole) // 2]
     for text, message in (
-        (whole[: len(whole) // 2], says("bad.res:89", "XRF", "cut off")),
+        (half, says(f"bad.res:{half.count(chr(10)) + 1}", "XRF", "cut off")),
         (
             whole.replace("<Step type", "<Step kind", 1).replace("</Step>", "1.0</Step>", 1),
             says("bad.res", "step 1", "50", "49"),

@@ -229,7 +229,9 @@ def test_poles_are_the_eigenvalues_of_the_linear_modes():
     plant = m.linearize([("torque", "elbow")], [("joint_angle", "elbow")])
     modes = m.linear_modes().eigenvalues
     both = np.concatenate([modes, modes[modes.imag > 0].conj()])
-    assert np.sort_complex(plant.poles) == pytest.approx(np.sort_complex(both), rel=1e-9)
+    # real parts of undamped ones are rounding, and order nothing
+    by_speed = [poles[np.argsort(poles.imag)] for poles in (plant.poles, both)]
+    assert by_speed[0] == pytest.approx(by_speed[1], rel=1e-9)
 
 
 def test_a_spinning_rotor_on_springs_whirls():
