@@ -172,12 +172,12 @@ def forward_sensitivities(
 
     def made(key: str, value: float):
         other = _built(build, values | {key: value})
+        _check_functions(key, mechanism, other)
         return prepared(other, start, lumped, formulation, rate_scale, True)
 
     directions = []
     for key, value in values.items():
         by = MOST * scales[key]
-        _check_functions(key, mechanism, _built(build, values | {key: value + by}))
         plus, minus = made(key, value + by)[1], made(key, value - by)[1]
         directions.append(_direction(key, solution.problem, plus, minus, 2.0 * by / scales[key]))
     followed: Followed = follow(solution.problem, solution.result, directions)
