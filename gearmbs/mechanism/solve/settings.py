@@ -125,7 +125,7 @@ class Settings:
         ended = [name for name, last in self.led.items() if last <= t and name not in waiting] if self.led else ()
         for name in (*waiting, *ended):
             own = self._own[name]
-            now, slope_before = own.value(before, t), own.slope(before)
+            now, slope_before = own.line(before, t)
             value, hold = waiting.get(name, (now, 0))
             slope = (value - now) / (end - t) if hold else 0.0
             if hold and abs(slope - slope_before) * (end - t) <= ON_LINE * max(abs(now), abs(value)):

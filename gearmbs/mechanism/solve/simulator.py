@@ -263,7 +263,10 @@ class Simulator(Told):
         run, keep = own["_run"], record and own["_records"]
         rows, row = run.rows, run.row
         self._run_to(t, keep)
-        self._stand_at(new_point(Point, (t, rows, row, run.table, own["_settings"].held)), keep)
+        own["t"], own["_present"] = t, None
+        own["_point"] = point = new_point(Point, (t, rows, row, run.table, own["_settings"].held))
+        if keep:
+            own["_points"].append(point)
         if t >= self._next_look:
             self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
             found = self._now().find_conflict(np.array([0]))
@@ -300,8 +303,9 @@ class Simulator(Told):
 
     def _tell_clock(self) -> None:
         """Count the time simulated since it was last told, or the run began."""
-        self._simulated += self.t - self._since
-        self._since = self.t
+        own = self.__dict__
+        own["_simulated"] += self.t - self._since
+        own["_since"] = own["t"]
 
     # --- acting on it ---------------------------------------------------------------------------------
 
@@ -336,10 +340,13 @@ class Simulator(Told):
         ModelError
             For a value that an input is led to: its way begins with the next advance.
         """
-        led = self._settings.on_the_way(self.t)
+        settings = self._settings
+        if not (settings.waiting or settings.led):
+            return
+        led = settings.on_the_way(self.t)
         if led is not None:
             raise ModelError(f"state: {led!r} is on its way to a value; take the state before set, or after advance")
-        if self._settings.waiting:
+        if settings.waiting:
             self._apply(self.t)
 
     def number(self, name: str) -> Number:
@@ -389,16 +396,18 @@ class Simulator(Told):
 
     def _apply(self, end: float) -> None:
         """Let what has been set take effect at the present time; lines that were set end at ``end``."""
-        change = self._settings.take(self.t, end)
+        own = self.__dict__
+        settings, run = own["_settings"], own["_run"]
+        change = settings.take(own["t"], end)
         if change is None:
             return
-        if change.prescribes or not self._run.state.steps:
+        if change.prescribes or not run.state.steps:
             self._start_with(change.values)
             return
         began = perf_counter()
         with raised_errors(self._functions) if self._functions else NOTHING:
-            self._run.change(self._point[:3], self._settings.cells, *change[:4])
-        self._took += perf_counter() - began
+            run.change(own["_point"], settings.cells, change)
+        own["_took"] += perf_counter() - began
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""
@@ -472,7 +481,7 @@ class Simulator(Told):
         """Return which of the points a state is, or None."""
         at = bisect_left(self._points, state.t, key=itemgetter(0))
         while at < len(self._points) and self._points[at][0] == state.t:
-            if np.array_equal(self._points[at].y, state.y):
+            if self._points[at].y.tobytes() == state.y.tobytes():
                 return at
             at += 1
         return None
@@ -483,12 +492,13 @@ class Simulator(Told):
         if history is None or history.equations != self._equations or not self._run.go_back(history):
             return False
         self._tell_clock()
-        self._failed, self._counted, self._since = None, {}, state.t
-        self._next_look = state.t if self._system.has_dropped_rows else np.inf
+        look = state.t if self._system.has_dropped_rows else np.inf
+        # past the look at names, as in `_stand_at`
+        self.__dict__.update(_failed=None, _counted={}, _since=state.t, _next_look=look)
         self._settings.begin(self._run.state.rdata, state.t)
+        table = self._run.table
         place = self._run.place(state.y, state.yp, keep=False)
-        idata = np.concatenate([state.tables(self._base)[0], self._problem.idata[len(self._base.idata) :]])
-        self._stand_at(Point(state.t, *place, idata, self._settings.held), False)
+        self._stand_at(Point(state.t, *place, table, self._settings.held), False)
         return True
 
     def __repr__(self) -> str:

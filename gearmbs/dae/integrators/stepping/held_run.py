@@ -19,14 +19,14 @@ from gearmbs.dae.integrators.events import SAMPLES
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
 from gearmbs.dae.integrators.stepping.jumps import TERMS, pass_jump
-from gearmbs.dae.integrators.stepping.memory import Held, LastStep, put_memory, record_window, value_in
-from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, reach
+from gearmbs.dae.integrators.stepping.memory import Held, LastStep, Layout, put_memory, value_in
+from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, reach, stand_behind
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
 from gearmbs.kernels.pointers import direct
 
-LOOK = 32 * FIRST_CHUNK
+LOOK = 64 * FIRST_CHUNK
 """Steps between two looks at whether the run gets on: a look takes as long as some steps of a small model, and what it
 looks for shows over thousands."""
 ROWS = 16 * HISTORY
@@ -53,9 +53,9 @@ class LastRecords:
             setattr(st, name, getattr(st, name)[:ROWS])
         self.forget_changes()
 
-    def forget_changes(self) -> None:
-        """Take the present integer table for that of the last step."""
-        self.table = self.before = self.state.idata.copy()
+    def forget_changes(self, table: np.ndarray | None = None) -> None:
+        """Take the present integer table, of which one may be a copy, for that of the last step."""
+        self.table = self.before = self.state.idata.copy() if table is None else table
         self.changed_at = -1
 
     def drain(self) -> None:
@@ -122,10 +122,11 @@ class HeldRun(Run):
         self._jumped: tuple[int, float, Rows, int] | None = None
         """Steps, time and point behind which numbers of the equations have changed."""
         self._scratch: np.ndarray | None = None
-        self.layout: dict[str, Any] | None = None
+        self.layout: Layout | None = None
         self.crossings: list[tuple[float, int]] = []
         """Times and events in the last step."""
         self._advance, self._reach, self._part = address_of_advance(), direct(reach), self.algebraic.part
+        self._errors = options.errors
         self._make_rows()
         if options.history is not None:
             self.put_back(options.history)
@@ -172,24 +173,23 @@ class HeldRun(Run):
         Some steps are taken at once, whatever else there is to do, for which Python takes as long as they do. Ctrl-C
         comes in between then, after them: ``st.code`` knows what is left to do.
         """
-        st, row = self.state, self.row
-        if self.started and t <= st.t:
-            self._write_within(t)
-            self._stand_at(keep)
-            return None
-        code = NOT_BEGUN
+        st, row, code = self.state, self.row, NOT_BEGUN
         if self.started:
-            if self.crossings:
+            if self.crossings and t > st.t:
                 self.crossings.clear()
             code = self._reach(
                 self.functions, st, self._part, self.plan, self.factors, self._advance, t, row, self._look_at
             )
-        if code == REACHED and not self.options.errors:
+        if code == REACHED and not self._errors:
             self.table = self.last_records.table
             if keep and row + 2 < self._count:
                 self._first = self.row = row + 1
             else:
                 self._stand(keep)
+            return None
+        if code == NOT_BEGUN and self.started and t <= st.t:
+            self._write_within(t)
+            self._stand_at(keep)
             return None
         if code == NOT_BEGUN:
             self.rows.t[row] = st.t_pause = t
@@ -260,24 +260,22 @@ class HeldRun(Run):
         rows.y[row], rows.yp[row] = value_in(self, self._last_step(), t)
         rows.kept[row] = self.state.rdata[self.state.kept]
 
-    def change(
-        self, point: tuple, cells: np.ndarray, values: np.ndarray, loads: bool, jumps: bool, leads: bool
-    ) -> None:
+    def change(self, point: tuple, cells: np.ndarray, change: tuple[np.ndarray, bool, bool, bool, Any]) -> None:
         """Cut the last step back to a time within it, and go on from there with other numbers in the equations.
 
         Parameters
         ----------
-        point : (float, Rows, int)
+        point : (float, Rows, int, ...)
             The time, and where the values there stand.
-        cells, values : ndarray
-            Places in the table of numbers, and what is to stand there.
-        loads : bool
-            Whether they only act as loads do, which leave the matrix as it is.
-        jumps, leads : bool
-            Whether equations change at the time, and whether the change grows with the time.
+        cells : ndarray
+            Places in the table of numbers.
+        change : (ndarray, bool, bool, bool, ...)
+            What is to stand there; whether that only acts as loads do, which leave the matrix as it is; whether
+            equations change at the time, and whether the change grows with the time.
         """
         st, kept = self.state, True
-        t, rows, row = point
+        t, rows, row, *_ = point
+        values, loads, jumps, leads, *_ = change
         y, yp = rows.y[row], rows.yp[row]
         if self.last_records.changed_at == st.steps or (self._given is not None and self._given[0] == st.steps):
             last = self._last_step()
@@ -310,14 +308,16 @@ class HeldRun(Run):
     def history(self, equations: str) -> History:
         """Return what the next steps of these equations depend on; a run that has not been started has nothing yet."""
         st = self.state
-        given = any(one is not None and one[0] == st.steps for one in (self._given, self._jumped))
-        told = given or self.last_records.changed_at == st.steps
+        given, jumped = self._given, self._jumped
+        told = self.last_records.changed_at == st.steps or (given and given[0] == st.steps)
+        told = told or (jumped and jumped[0] == st.steps)
         return History(self.options.method, Held(self, self._last_step() if told else None), self.plan, equations)
 
     def put_back(self, history: History) -> None:
         """Go on with a history; the tables are those of its state."""
         self.pivots, last = put_memory(self, history)
-        self._stand_behind(last)
+        self.last_records.forget_changes()
+        self._stand_behind(0, last)
         self._find_crossings(float(self.problem.t0))
 
     def go_back(self, history: History) -> bool:
@@ -325,21 +325,20 @@ class HeldRun(Run):
         held = history.numbers
         if not (isinstance(held, Held) and held.belongs_to(self)):
             return False
-        self._stand_behind(held.put_back(self))
+        order = held.put_back(self)
+        self.last_records.forget_changes(held.table)
+        self._stand_behind(order, held.given)
+        self.table = held.table if held.given is None else held.given.idata
         self.crossings, self.state.n_crossings = list(held.crossings), 0
         return True
 
-    def _stand_behind(self, last: LastStep) -> None:
-        """Keep the window as records, behind the last step."""
+    def _stand_behind(self, order: int, last: LastStep | None) -> None:
+        """Stand behind the last step, of an order, or as it is given."""
         st = self.state
-        # the record of another time knows the rows of then
-        st.outputs, st.y_out, st.yp_out, st.kept_out = self.rows
-        st.n_records, st.next_output = 0, len(self.rows.t)
-        record_window(st)
+        direct(stand_behind)(st, order)
         self._look_at = st.steps + LOOK
         self.stall = StallWatch(st.steps, st.t)
-        self.last_records.forget_changes()
-        self._given, self._jumped = (int(st.steps), last), None
+        self._given, self._jumped = None if last is None else (int(st.steps), last), None
 
     def _last_step(self) -> LastStep:
         st = self.state

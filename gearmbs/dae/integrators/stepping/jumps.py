@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from numba import boolean, float64, int64, types
 
-from gearmbs.dae.integrators.corrector import weighted_max
+from gearmbs.dae.integrators.corrector import renew_weights, weighted_max
 from gearmbs.dae.integrators.run_state import STATE_TYPE, copy, record_history, rows_from, times_from
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
@@ -90,6 +90,7 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
             times[j] = times[j + 1]
             copy(rows[j + 1], rows[j])
         st.n_past -= 1
+    renew_weights(st, y, st.h)
     terms = min(max(st.order, 1), TERMS)
     # points further back serve no step to come
     st.n_past = min(st.n_past, st.order + SPARE)

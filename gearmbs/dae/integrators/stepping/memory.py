@@ -17,7 +17,7 @@ from weakref import ref
 import numpy as np
 from numba import float64, int64, types
 
-from gearmbs.dae.integrators.algebraic import PART_TYPE, AlgebraicOutputs, settle_between, settle_output
+from gearmbs.dae.integrators.algebraic import PART_TYPE, AlgebraicOutputs, AlgebraicPart, settle_between, settle_output
 from gearmbs.dae.integrators.bdf import HISTORY, MAX_ORDER
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.records import Records
@@ -44,6 +44,8 @@ OWN = {
 }  # fmt: skip
 """Arrays of a run that are its own, or scratch, or follow from the state."""
 ARRAYS = tuple(name for name in RunState.array_members if name not in OWN)
+TABLES = ("idata", "rdata", "g_old", "event_left")
+"""Those among them that a run takes along where it goes back itself."""
 PART_SCALARS = ("factored", "t_start", "t_first", "t_last", "failures", "first_failure")
 PART_ARRAYS = ("lu", "scale", "pivots", "guess", "last", "known")
 FACTORS = tuple(LUFactors.array_members)
@@ -101,8 +103,28 @@ class Continued(Remembers, Protocol):
 class Laid(Continued, Protocol):
     """The same, and where its arrays lie, found once."""
 
-    layout: dict[str, Any] | None
+    layout: Layout | None
     crossings: list[tuple[float, int]]
+    last_records: Any
+
+
+class Layout(NamedTuple):
+    """Shape, type and place of arrays of the state of a run among those that are copied, and of those of its part.
+
+    Attributes
+    ----------
+    arrays, part : dict of str to tuple
+    span : slice
+        What is copied of the memory in which all arrays stand.
+    scalars, part_scalars : int
+        Bytes of both structs before the places of their arrays.
+    """
+
+    arrays: dict[str, tuple[tuple[int, ...], np.dtype, int]]
+    part: dict[str, tuple[tuple[int, ...], np.dtype]]
+    span: slice
+    scalars: int
+    part_scalars: int
 
 
 class Held(Mapping[str, np.ndarray]):
@@ -122,71 +144,75 @@ class Held(Mapping[str, np.ndarray]):
         st, factors, part = run.state, run.factors, run.algebraic.part
         assert factors is not None
         assert run.pivots is not None
+        self.layout = layout = run.layout or _layout(run)
         self._run, self._plan, self._factors = ref(run), run.plan, factors
-        self.record, self.block, self.factor_block = bytes(st), _block(st.y).copy(), _block(factors.x).copy()
-        self.part_scalars = [getattr(part, name) for name in PART_SCALARS]
-        self.part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else []
-        self.counts, self.counted, self.pivots = (run.repivots, run.first_pivots), run.counted.copy(), run.pivots
-        self.layout = _layout(run)
-        self.given, self.crossings = given, list(run.crossings)
+        self._scalars = bytes(st)[: layout.scalars]
+        self._part_scalars = bytes(part)[: layout.part_scalars]
+        self._block, self._factor_block = _block(st.y)[layout.span].copy(), _block(factors.x).copy()
+        self._part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else []
+        self._counts, self._counted, self._pivots = (run.repivots, run.first_pivots), run.counted.copy(), run.pivots
+        self._order = int(st.record_order[st.n_records - 1]) if given is None else 0
+        self.given, self.table, self.crossings = given, run.last_records.table, list(run.crossings)
 
     def belongs_to(self, run: Continued) -> bool:
         """Whether it is of this very run."""
         return self._run() is run
 
-    def put_back(self, run: Continued) -> LastStep:
-        """Let the run it is of remember what it did then, and return its last step."""
+    def put_back(self, run: Laid) -> int:
+        """Let the run it is of remember what it did then; return the order of its last step, 0 where it is given."""
         st, part, factors = run.state, run.algebraic.part, self._factors
         run.plan, run.factors = self._plan, factors
-        ctypes.memmove(ctypes.addressof(st), self.record, len(self.record))
-        _block(st.y)[:] = self.block
-        _block(factors.x)[:] = self.factor_block
-        for name, value in zip(PART_SCALARS, self.part_scalars, strict=True):
-            setattr(part, name, value)
-        for name, array in zip(PART_ARRAYS, self.part_arrays, strict=False):
+        ctypes.memmove(ctypes.addressof(st), self._scalars, self.layout.scalars)
+        ctypes.memmove(ctypes.addressof(part), self._part_scalars, self.layout.part_scalars)
+        _block(st.y)[self.layout.span] = self._block
+        _block(factors.x)[:] = self._factor_block
+        for name, array in zip(PART_ARRAYS, self._part_arrays, strict=False):
             getattr(part, name)[...] = array
-        run.counted[:] = self.counted
-        run.repivots, run.first_pivots = self.counts
-        run.pivots = self.pivots
-        return self.last
+        run.counted[:] = self._counted
+        run.repivots, run.first_pivots = self._counts
+        run.pivots = self._pivots
+        return self._order
 
     def _array(self, name: str) -> np.ndarray:
         """Return a copy of an array of the state of the run."""
-        shape, kind, offset = self.layout[name]
-        return np.ndarray(shape, kind, self.block, offset).copy()
+        shape, kind, offset = self.layout.arrays[name]
+        return np.ndarray(shape, kind, self._block, offset).copy()
 
-    @cached_property
-    def last(self) -> LastStep:
-        """The last step, from the window."""
+    def _last(self, newest: int) -> LastStep:
+        """Return the last step, from the window."""
         if self.given is not None:
             return self.given
-        st, n = RunState.from_buffer_copy(self.record), self.layout["y"][0][0]
-        first, count = int(st.newest), int(self._array("record_order")[st.n_records - 1]) + 1
-        rows = self._array("window_y")[first * n : (first + count) * n].reshape(count, n)
-        nodes = self._array("window_t")[first : first + count]
+        n, count = self.layout.arrays["y"][0][0], self._order + 1
+        rows = self._array("window_y")[newest * n : (newest + count) * n].reshape(count, n)
+        nodes = self._array("window_t")[newest : newest + count]
         return LastStep(nodes, rows, self._array("y"), self._array("yp"), self._array("idata"))
 
     @cached_property
     def _numbers(self) -> dict[str, np.ndarray]:
-        st, last, pivots, idata = RunState.from_buffer_copy(self.record), self.last, self.pivots, self._array("idata")
+        # only scalars are read
+        st, part = (
+            kind.from_buffer_copy(scalars.ljust(ctypes.sizeof(kind), b"\0"))
+            for kind, scalars in ((RunState, self._scalars), (AlgebraicPart, self._part_scalars))
+        )
+        last, pivots, idata = self._last(st.newest), self._pivots, self._array("idata")
         factors, start = self._factors, _address(_block(self._factors.x))
         numbers: dict[str, np.ndarray] = {
             "run": np.array([getattr(st, name) for name in SCALARS], dtype=float),
-            "part": np.array(self.part_scalars, dtype=float),
-            "counts": np.array(self.counts),
-            "counted": self.counted,
+            "part": np.array([getattr(part, name) for name in PART_SCALARS], dtype=float),
+            "counts": np.array(self._counts),
+            "counted": self._counted,
             "pivots": np.array([pivots.drop, pivots.negligible]),
             "pivots matrix": pivots.matrix,
             "pivots counted": np.zeros(0, dtype=bool) if pivots.counted is None else pivots.counted,
         }
         numbers |= {f"run {name}": self._array(name) for name in ARRAYS}
-        numbers |= {f"part {name}": array for name, array in zip(PART_ARRAYS, self.part_arrays, strict=False)}
-        if not self.part_arrays:
-            numbers |= {f"part {name}": np.zeros(shape, kind) for name, (shape, kind) in self.layout["part"].items()}
+        numbers |= {f"part {name}": array for name, array in zip(PART_ARRAYS, self._part_arrays, strict=False)}
+        if not self._part_arrays:
+            numbers |= {f"part {name}": np.zeros(shape, kind) for name, (shape, kind) in self.layout.part.items()}
         for name in FACTORS:
             array = getattr(factors, name)
             offset = _address(array) - start if array.size else 0
-            numbers[f"factors {name}"] = np.ndarray(array.shape, array.dtype, self.factor_block, offset).copy()
+            numbers[f"factors {name}"] = np.ndarray(array.shape, array.dtype, self._factor_block, offset).copy()
         numbers |= {"last nodes": last.nodes, "last rows": last.rows, "last y": last.y, "last yp": last.yp}
         changed = np.flatnonzero(last.idata != idata)
         return numbers | {"table at": changed, "table": idata[changed]}
@@ -215,18 +241,23 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]
 
 
-def _layout(run: Laid) -> dict[str, Any]:
-    """Return shape, type and place in the block of each array of the state of a run, found once."""
-    if run.layout is None:
-        st, part = run.state, run.algebraic.part
-        start = _address(_block(st.y))
-        places: dict[str, Any] = {}
-        for name in (*ARRAYS, "record_order", "idata"):
-            array = getattr(st, name)
-            assert array.base is _block(st.y)
-            places[name] = array.shape, array.dtype, _address(array) - start
-        places["part"] = {name: (getattr(part, name).shape, getattr(part, name).dtype) for name in PART_ARRAYS}
-        run.layout = places
+def _layout(run: Laid) -> Layout:
+    """Return where the arrays of a run lie that are copied, and keep it there."""
+    st, part = run.state, run.algebraic.part
+    block = _block(st.y)
+    start, places = _address(block), {}
+    for name in (*ARRAYS, *TABLES):
+        array = getattr(st, name)
+        assert array.base is block
+        places[name] = array.shape, array.dtype, _address(array) - start, array.nbytes
+    first = min(offset for *_, offset, _ in places.values())
+    last = max(offset + size for *_, offset, size in places.values())
+    run.layout = Layout(
+        {name: (shape, kind, offset - first) for name, (shape, kind, offset, _) in places.items()},
+        {name: (getattr(part, name).shape, getattr(part, name).dtype) for name in PART_ARRAYS},
+        slice(first, last),
+        *(getattr(type(struct), "words:").offset for struct in (st, part)),
+    )
     return run.layout
 
 

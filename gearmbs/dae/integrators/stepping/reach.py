@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64
+from numba import float64, int64, types
 
 from gearmbs.dae.integrators.algebraic import PART_TYPE
 from gearmbs.dae.integrators.bdf import HISTORY
-from gearmbs.dae.integrators.run_state import BUFFER_FULL, RUNNING, STATE_TYPE, copy
+from gearmbs.dae.integrators.run_state import (
+    BUFFER_FULL,
+    RUNNING,
+    STATE_TYPE,
+    copy,
+    record_history,
+    rows_from,
+    times_from,
+)
 from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
+from gearmbs.dae.result import combine, lagrange_weights
 from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import address, caller, direct
@@ -41,6 +50,40 @@ def drain(st):
     return kept
 
 
+@njit(types.void(STATE_TYPE, int64), cache=True, nogil=True, error_model="numpy")
+def stand_behind(st, order):
+    """Keep the window as records, the newest as the end of a step of an order, or 0 where the window does not tell it.
+
+    Parameters
+    ----------
+    st : RunState
+        With no step open.
+    order : int
+    """
+    st.n_records = 0
+    st.next_output = st.outputs.shape[0]
+    record_history(st, 0)
+    st.record_order[st.n_records - 1] = order
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def write_within(st, part, t, row):
+    """Write the values at ``t`` within the last step, as its outputs are, if the window tells them; return that."""
+    order = st.record_order[st.n_records - 1]
+    if order == 0 or part.count > 0:
+        return False
+    times, rows, y, yp = times_from(st, 0), rows_from(st, 0), st.y_out[row], st.yp_out[row]
+    if t == times[0]:
+        copy(st.y, y)
+        copy(st.yp, yp)
+    else:
+        lagrange_weights(t, times, order + 1, part.value, part.slope)
+        combine(part.value, part.slope, order + 1, rows, 0, y, yp)
+    for c in range(st.kept.shape[0]):
+        st.kept_out[row, c] = st.rdata[st.kept[c]]
+    return True
+
+
 NOT_BEGUN = 0
 REACHED = 1
 INTERRUPTED = 2
@@ -63,7 +106,7 @@ def reach(bound, st, part, plan, factors, advance_address, t, row, last):
     advance_address : int
         Of `advance`, which is compiled apart.
     t : float
-        Beyond the last step; for any other nothing is done.
+        Beyond the last step, or within it.
     row : int
         Of the outputs.
     last : int
@@ -72,9 +115,12 @@ def reach(bound, st, part, plan, factors, advance_address, t, row, last):
     Returns
     -------
     code : int
-        NOT_BEGUN; REACHED; INTERRUPTED where ``st.code`` has to be heeded, a look is due, or an event has come.
+        NOT_BEGUN where the values have to be told from Python; REACHED;
+        INTERRUPTED where ``st.code`` has to be heeded, a look is due, or an event has come.
     """
-    if not st.t < t <= st.t_end or st.code != RUNNING or st.steps >= last:
+    if t <= st.t:
+        return REACHED if write_within(st, part, t, row) else NOT_BEGUN
+    if t > st.t_end or st.code != RUNNING or st.steps >= last:
         return NOT_BEGUN
     st.outputs[row] = t
     st.t_pause = t
