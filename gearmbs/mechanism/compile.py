@@ -331,20 +331,22 @@ class _Compiler:
             return
         if not isinstance(element, ForceElement):
             raise ModelError(f"force element {element!r}: its type is unknown to the mechanism")
+        label, step = f"{element.kind} '{element.name}'", "compiled()"
         try:
             wrenches, acting, states, made = element.wrenches, element.markers, element.states, element.compiled()
+            _check_numbers(element, made, label)
+            if not type(element).__module__.startswith("gearmbs.") or getattr(element, "derivatives", None) is not None:
+                # those of the package's own elements are compared in its tests
+                from gearmbs.mechanism.forces.functions import check_derivatives
+
+                step = "kernel"
+                check_derivatives(element, made)
         except ModelError:
             raise
         except Exception as error:
             reason = f"{type(error).__name__}: {error}"
-            raise ModelError(f"{element.kind} '{element.name}': its compiled() fails with {reason}") from error
-        if type(element).__module__.partition(".")[0] != "gearmbs" or getattr(element, "derivatives", None) is not None:
-            # what the package's own elements have is tested with the package
-            from gearmbs.mechanism.forces.functions import check_derivatives
-
-            check_derivatives(element, made)
+            raise ModelError(f"{label}: its {step} fails with {reason}") from error
         self.force_names += [f"{element.name}[{k}]" for k in range(1, wrenches)]
-        label = f"{element.kind} '{element.name}'"
         turns = self.mechanism.turns
         self.builder.add_element(
             made.kernel,
@@ -449,6 +451,27 @@ def starting_angles(
     for function, i, j in tape.angles:
         found.append(float(turns.get((function, marker_named(i), marker_named(j)), 0.0)))
     return found
+
+
+def _check_numbers(element: ForceElement, made: Compiled, label: str) -> None:
+    """Refuse tables of a force element that hold something else than numbers, by the field that it comes from.
+
+    Raises
+    ------
+    ModelError
+    """
+    for table in ("integers", "reals"):
+        given = getattr(made, table)
+        for place, value in enumerate(() if isinstance(given, np.ndarray) else given):
+            try:
+                float(value)
+            except (TypeError, ValueError):
+                field = next((name for name, own in vars(element).items() if own is value), f"{table}[{place}]")
+                raise ModelError(
+                    f"{label}: {field} = {value!r} is no number among the {table} of its compiled(); give one, or "
+                    f"say in the class how a text is read: reads = {{'{field}': reader('N/m')}} with its unit, from "
+                    "gearmbs.mechanism.parts.quantities"
+                ) from None
 
 
 def _state_kind(state: State) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any, ClassVar
 from weakref import WeakSet
 
 import numpy as np
@@ -28,6 +29,7 @@ from gearmbs.mechanism import (
 from gearmbs.mechanism.forces import functions
 from gearmbs.mechanism.forces import functions as derivatives
 from gearmbs.mechanism.parts.joints import JOINTS, JointKind
+from gearmbs.mechanism.parts.quantities import reader
 from tests.says import says
 
 UNIT = (0.1, 0.1, 0.1)
@@ -346,6 +348,14 @@ def uses_objects(t, frames, states, parameters, wrench, rates, diagnostics):
     wrench[0, 0] = float(Mechanism is not None)
 
 
+def halved(x):
+    return 0.5 * x
+
+
+def calls_a_plain_function(t, frames, states, parameters, wrench, rates, diagnostics):
+    wrench[0, 0] = halved(t)
+
+
 def not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
     wrench[0, 0] = np.log(parameters[0])
 
@@ -363,6 +373,7 @@ def rate_not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
         (adds_text, {"parameters": [1.0]}, "its kernel fails with (UFunc|Type)"),
         (answers, {}, "its kernel returns 3.0; let it write"),
         (uses_objects, {}, "numba cannot compile kernel.*hand over what else it needs"),
+        (calls_a_plain_function, {}, "kernel.*halved.*numba.njit"),
         (nothing, {"parameters": {"stiffness": np.nan}}, "parameter stiffness = nan; give a finite number"),
         (nothing, {"parameters": ["a"]}, "give numbers, one a parameter"),
         (nothing, {"parameters": [[1.0]]}, r"parameters have the shape \(1, 1\)"),
@@ -507,6 +518,47 @@ def test_derivatives_given_beside_a_function_are_compared_too():
         else:
             with pytest.raises(ModelError, match=says("force 'magnet'", "jac[", "differences")):
                 m.compile()
+
+
+@dataclass(eq=False, repr=False)
+class Buffer(ForceElement):
+    """A bumper with a stiffness of its own."""
+
+    stiffness: float
+    kernel: Any = bumper
+
+    kind = "buffer"
+    has_torque = False
+
+    def compiled(self):
+        return Compiled(self.kernel, integers=(0,), reals=(self.stiffness, 3.0, 2.0))
+
+
+class ReadingBuffer(Buffer):
+    """One that reads texts with units."""
+
+    reads: ClassVar = {"stiffness": reader("N/m")}
+
+
+def buffered(kind, *given) -> ForceElement:
+    m = Mechanism("buffered")
+    block = m.body("block", 1.0, UNIT, position=(0.1, 0.0, 0.0))
+    m.add(kind("stop", block.marker(), m.ground.marker(), *given))
+    m.compile()
+    return m.elements["stop"]
+
+
+def test_texts_with_units_are_read_or_named():
+    with pytest.raises(ModelError, match=says("buffer 'stop'", "stiffness = '2 N/mm'", "reads", "reader")):
+        buffered(Buffer, "2 N/mm")
+    element = buffered(ReadingBuffer, "2 N/mm")
+    assert element.stiffness == 2000.0
+    element.stiffness = "3 N/mm"
+    assert element.stiffness == 3000.0
+    with pytest.raises(ModelError, match=says("ReadingBuffer 'stop'", "stiffness", "2 mm")):
+        buffered(ReadingBuffer, "2 mm")
+    with pytest.raises(ModelError, match=says("buffer 'stop'", "kernel", "TypeError")):
+        buffered(Buffer, 2000.0, njit("void(float64)")(lambda x: None))
 
 
 def test_failures_of_parts_that_a_user_wrote_name_the_part(monkeypatch):

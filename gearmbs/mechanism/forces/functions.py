@@ -282,9 +282,16 @@ def _compiled(label: str, what: str, function: Any, signature: Any, expected: tu
     except (CompilationError, KeyError, TypeError, RuntimeError) as error:
         lines = [line for line in str(error).splitlines() if line.strip()]
         text = "\n".join(lines[:8])
+        outside = inspect.getclosurevars(python)
+        plain = [name for name, value in {**outside.globals, **outside.nonlocals}.items() if inspect.isfunction(value)]
+        remedy = (
+            f"decorate what it calls, {', '.join(plain)}, with numba.njit"
+            if plain
+            else "hand over what else it needs as parameters"
+        )
         raise ModelError(
             f"{label}: numba cannot compile {what}, whose arguments are numbers and arrays of float64 "
-            f"({', '.join(expected)}); hand over what else it needs as parameters:\n{text}"
+            f"({', '.join(expected)}); {remedy}:\n{text}"
         ) from error
     if found != signature.return_type:
         raise ModelError(f"{label}: {what} returns {found}; let it return nothing")
@@ -406,7 +413,22 @@ def by_differences(ints, reals, t, frames, states, inputs, want, work, wrench, r
 
 
 def check_derivatives(element: ForceElement, made: Compiled) -> None:
-    """Compare the derivatives that a user has written with one-sided differences, near the start.
+    """Compare the derivatives that a user has written with differences, those of a kernel or function once.
+
+    Raises
+    ------
+    ModelError
+        See `compare_derivatives`.
+    """
+    written = element.derivatives if isinstance(element, FunctionForce) else made.kernel
+    if written is None or written in _TRIED:
+        return
+    compare_derivatives(element, made)
+    _TRIED.add(written)
+
+
+def compare_derivatives(element: ForceElement, made: Compiled) -> None:
+    """Compare an element's derivatives with one-sided differences of its wrench and rates, near the start.
 
     Between the two differences on either side any value is right: at a kink, or where a force jumps.
 
@@ -415,9 +437,6 @@ def check_derivatives(element: ForceElement, made: Compiled) -> None:
     ModelError
         Where a derivative is outside both; the message names the element, the entry and both values.
     """
-    written = element.derivatives if isinstance(element, FunctionForce) else made.kernel
-    if written is None or written in _TRIED:
-        return
     sees = element.markers if made.sees is None else made.sees
     start = np.array([frame_of(marker) for marker in sees])
     reach = float(np.linalg.norm(start[:, None, :3] - start[None, :, :3], axis=2).max(initial=0.0)) or 0.1
@@ -435,7 +454,6 @@ def check_derivatives(element: ForceElement, made: Compiled) -> None:
         times = [rng.normal() if function.is_expression else function(0.0) for function in made.times]
         inputs = np.concatenate([rng.normal(size=6 * len(made.reactions)), times, np.zeros(len(made.angles))])
         _compare(element, made, [marker.name for marker in sees], frames, states, inputs, units)
-    _TRIED.add(written)
 
 
 def _compare(element, made: Compiled, names: list[str], frames, states, inputs, units: np.ndarray) -> None:

@@ -21,6 +21,7 @@ from gearmbs.mechanism.parts.quantities import (
     Vector,
     cross,
     frame_along,
+    has_quantity,
     inertia_matrix,
     mass_of,
     reader,
@@ -32,11 +33,15 @@ from gearmbs.wording import did_you_mean
 
 
 class Made(ABCMeta):
-    """Metaclass that marks an object when its whole ``__init__`` has run, also that of a class derived by a user."""
+    """Metaclass that reads texts and marks an object when its whole ``__init__`` has run, also of a user's class."""
 
     def __call__(cls, *args: Any, **options: Any) -> Any:
         made = super().__call__(*args, **options)
-        vars(made)["_made"] = True
+        own = vars(made)
+        for key, read in cls.reads.items():  # type: ignore[attr-defined]
+            if isinstance(own.get(key), str) or has_quantity(own.get(key)):
+                own[key] = read(own[key], f"{cls.__name__} '{own.get('name', '')}': {key}")
+        own["_made"] = True
         return made
 
 
@@ -44,7 +49,7 @@ class OwnAttributes(metaclass=Made):
     """What a mechanism and its parts share: they take values of the attributes they have, and refuse others by name."""
 
     reads: ClassVar[Mapping[str, Reader]] = {}
-    """How values are read that are assigned, by attribute."""
+    """How values are read that are assigned, and texts that an object is made with, by attribute."""
     settled: ClassVar[tuple[str, ...]] = ()
     """Attributes from which other parts have been made already: another value would leave those as they are."""
 

@@ -26,8 +26,9 @@ Vector = npt.ArrayLike
 Reader = Callable[[Any, str], Any]
 """From a value that is given, and the name of its field for messages, to the one that is kept, or a ModelError."""
 
-QUANTITY = re.compile(rf"\s*(?>{NUMBER.pattern})\s*[A-Za-zµμ°]")
-"""Beginning of a number with a unit; an expression such as ``10*TIME`` has an operator there."""
+QUANTITY = re.compile(rf"\s*(?>{NUMBER.pattern})(?:\s*[A-Za-zµμ°]|\s+1\s*/)")
+"""Beginning of a number with a unit, as ``2 N/mm`` or ``3 1/s``; an expression such as ``10*TIME`` has an operator
+there."""
 
 
 def keeps_given(method: F) -> F:
