@@ -124,6 +124,21 @@ PAIR = record(
     "passing_slope",  # how much that falls at most with a change of the centre distance
     "edge",  # radius by which the mate's flank falls away behind its tip, m
 )
+PARALLEL = record(
+    "distance",  # of the two fixed axes, m
+    "offset",  # of the contact's plane along the axis, from the middle of wheel 1, m
+    "length",  # of the line of action, m
+    "alpha",  # operating angle, its sine and cosine
+    "sin",
+    "cos",
+    ("slack", 2),  # gap of the flanks of tooth 0 and one pair of the mate where nothing has turned; either side
+    ("roll", 2),  # and the length of roll there on wheel 1
+    "curve",  # lower bound of the corner gap's growth beyond the path of contact, 1/m
+    "shallow",  # depth up to which it bounds how far corners reach, m
+    ("sense", 2),  # 1 or -1: how a wheel's own axis points
+    ("frame", 3, 3),  # columns: along the line of centres, across it, along the axes
+)
+"""What two wheels on fixed parallel axes have all the time; see `gearmbs.contact.parallel.kernel`."""
 SLICES, FRICTION, LAW = place(OPTIONS, "slices"), place(OPTIONS, "friction"), place(OPTIONS, "law")
 
 LAW_IMPACT, LAW_HUNT_CROSSLEY = range(2)

@@ -207,6 +207,35 @@ def level_flanks(side, strip):
     put_gradient(side, strip, (-(s1 + s2), -half), -half, -rb1, -rb2)
 
 
+@inlined
+def level_normal(X, Y, rb, s0, c0):
+    """Find the normal of an involute through a corner at (X, Y) from the centre of its base circle, axes parallel.
+
+    Returns
+    -------
+    bears : bool
+        Whether the corner is where the involute is not too curved to bear on.
+    turn, sin, cos : float
+        Angle of the normal from that of flank on flank, whose sine and cosine are ``s0`` and ``c0``; its own ones.
+    """
+    R2 = X * X + Y * Y
+    square = R2 - rb * rb
+    bears = square > NEAR_BASE * NEAR_BASE * rb * rb
+    roll = np.copysign(np.sqrt(max(square, 0.0)), rb)
+    inverse = 1.0 / R2
+    sa, ca = (roll * X - rb * Y) * inverse, (rb * X + roll * Y) * inverse
+    over, beside = sa * c0 - ca * s0, 1.0 + (ca * c0 + sa * s0)
+    if abs(over) > LARGEST_TURN * beside:
+        turn = np.arctan2(over, beside - 1.0)
+    else:
+        # twice the arctangent of the tangent of half the turn
+        t = over / beside
+        u = t * t
+        series = 1.0 / 7.0 - u * (1.0 / 9.0 - u * (1.0 / 11.0 - u * (1.0 / 13.0 - u * (1.0 / 15.0 - u / 17.0))))
+        turn = 2.0 * t * (1.0 - u * (1.0 / 3.0 - u * (0.2 - u * series)))
+    return bears, turn, sa, ca
+
+
 @kernel
 def level_corner(side, corner, strip, kind, start):
     """Fill a tip corner on the mate's involute; False where the involute is too curved to bear on.
@@ -226,24 +255,9 @@ def level_corner(side, corner, strip, kind, start):
     first = kind == 1
     rb = side.base_2 if first else side.base_1
     r, rounding, se, ce = corner.radius[0], corner.rounding[0], corner.sin[0], corner.cos[0]
-    X, Y = side.x[L.A] - r * ce, -r * se
-    R2 = X * X + Y * Y
-    square = R2 - rb * rb
-    if not square > NEAR_BASE * NEAR_BASE * rb * rb:
+    bears, turn, sa, ca = level_normal(side.x[L.A] - r * ce, -r * se, rb, side.sin_0, side.cos_0)
+    if not bears:
         return False
-    roll = np.copysign(np.sqrt(square), rb)
-    inverse = 1.0 / R2
-    sa, ca = (roll * X - rb * Y) * inverse, (rb * X + roll * Y) * inverse
-    s0, c0 = side.sin_0, side.cos_0
-    over, beside = sa * c0 - ca * s0, 1.0 + (ca * c0 + sa * s0)
-    if abs(over) > LARGEST_TURN * beside:
-        turn = np.arctan2(over, beside - 1.0)
-    else:
-        # twice the arctangent of the tangent of half the turn
-        t = over / beside
-        u = t * t
-        series = 1.0 / 7.0 - u * (1.0 / 9.0 - u * (1.0 / 11.0 - u * (1.0 / 13.0 - u * (1.0 / 15.0 - u / 17.0))))
-        turn = 2.0 * t * (1.0 - u * (1.0 / 3.0 - u * (0.2 - u * series)))
     alpha = side.alpha_0 + turn
     s = rb * (start + alpha)
     sn, cs = sa * ce + ca * se, ca * ce - sa * se

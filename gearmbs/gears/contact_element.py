@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,16 @@ def contact_kernels() -> tuple[Any, tuple[Any, Any]]:
     from gearmbs.contact.kernel import contact_force
 
     return contact_force, (gear_contact, GEAR_CONTACT_SIG)
+
+
+def lean_contact(
+    integers: np.ndarray, reals: np.ndarray, frames: np.ndarray, axes: np.ndarray
+) -> tuple[Any, np.ndarray] | None:
+    """Offer the kernel of wheels on fixed parallel axes, as `Compiled.lean`; it is imported now."""
+    from gearmbs.contact.parallel.kernel import parallel_axes, parallel_contact
+
+    own = parallel_axes(integers, reals, frames, axes)
+    return None if own is None else (parallel_contact, own)
 
 
 def law_settings(pair: Mesh) -> dict[str, Setting]:
@@ -69,7 +80,9 @@ class GearContact(ForceElement):
     def compiled(self) -> Compiled:
         force, contact = contact_kernels()
         integers, reals, scratch = pack(self.pair)
-        return Compiled(force, integers, reals, (contact,), scratch=scratch, settings=law_settings(self.pair))
+        lean = partial(lean_contact, integers, reals)
+        settings = law_settings(self.pair)
+        return Compiled(force, integers, reals, (contact,), scratch=scratch, settings=settings, lean=lean)
 
     def check(self) -> None:
         """Check the initial distance of the two wheels.

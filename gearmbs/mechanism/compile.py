@@ -368,6 +368,7 @@ class _Compiler:
             ],
             scratch=made.scratch,
             diagnostics=element.diagnostics,
+            lean=made.lean,
         )
         self.add_settings(element.name, made)
 

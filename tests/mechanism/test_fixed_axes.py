@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gearmbs.dae.model.members import TURN_ROOT
+from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.lumping import lumped
 from gearmbs.studies import Case, simulate_case
@@ -118,6 +119,13 @@ def with_states() -> Mechanism:
     return m
 
 
+def dense(problem, vals):
+    """Return a matrix of a problem's pattern."""
+    out = np.zeros((problem.n, problem.n))
+    out[problem.indices, np.repeat(np.arange(problem.n), np.diff(problem.indptr))] = vals
+    return out
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [rotor, lambda: rotor(True), with_states])
 def test_jacobian(make):
@@ -126,11 +134,8 @@ def test_jacobian(make):
     y, yp = random.uniform(-1.0, 1.0, problem.n), random.uniform(-1.0, 1.0, problem.n)
     vals, t, cj = np.zeros(len(problem.indices)), 0.3, 7.0
     problem.jacobian(t, y, yp, cj, vals, problem.idata, problem.rdata, np.zeros(problem.work_size))
-    dense = np.zeros((problem.n, problem.n))
-    columns = np.repeat(np.arange(problem.n), np.diff(problem.indptr))
-    dense[problem.indices, columns] = vals
     expected = differences(problem, y, yp, t, cj)
-    np.testing.assert_allclose(dense, expected, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(dense(problem, vals), expected, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.slow
@@ -152,6 +157,50 @@ def test_gear_cases(setting, torque):
     assert lump.problem.n == 2
     for k in np.linspace(0, len(lump) - 1, 9).astype(int):
         exact_reactions(lump, k)
+
+
+def two_wheels(held: bool = False) -> Mechanism:
+    """A pair on two shafts with keys, driven by nothing; ``held`` by a spring that looks at a wheel's frame."""
+    pair = GearPair.paper(backlash="0.1 mm")
+    place = pair.placement(0.1)
+    m = Mechanism("wheels")
+    frames = []
+    for k, wheel in enumerate(pair.wheels):
+        origin, axes = (place.origin_1, place.axes_1) if k == 0 else (place.origin_2, place.axes_2)
+        body = m.body(f"wheel {k + 1}", wheel.mass, wheel.inertia, position=origin, orientation=axes)
+        shaft = m.body(f"shaft {k + 1}", 1.0, (0.1, 0.1, 0.1), position=origin + 0.1 * axes[:, 2])
+        m.fixed(f"key {k + 1}", body, shaft, at=origin)
+        # the second hinge is seen from its other end
+        m.revolute(f"hinge {k + 1}", shaft, m.ground, at=origin, axis=axes[:, 2] * (1.0 - 2.0 * k))
+        frames.append(body.marker())
+    m.gear_contact("mesh", *frames, pair)
+    if held:
+        m.spring_damper("stay", frames[0], m.ground.marker((0.4, 0.3, 0.2)), stiffness=10.0, damping=0.1, length=0.2)
+    return m
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_wheels_by_their_angles_have_the_equations_of_wheels_by_their_frames(held, monkeypatch):
+    lean, _ = reduced(two_wheels(held))
+    monkeypatch.setattr("gearmbs.gears.contact_element.lean_contact", lambda *tables: None)
+    whole, _ = reduced(two_wheels(held))
+    random = np.random.default_rng(4)
+    assert lean.rdata.size > whole.rdata.size
+    largest = 0.0
+    for _ in range(30):
+        turn, spin = random.uniform(-5.0, 5.0), random.uniform(-200.0, 200.0)
+        y = np.array([spin, spin + random.normal(), turn, turn + random.uniform(-4e-3, 4e-3)])
+        found = []
+        for problem in (lean, whole):
+            out, vals, work = np.zeros(4), np.zeros(problem.indices.size), np.zeros(problem.work_size)
+            problem.residual(0.0, y, np.zeros(4), out, problem.idata, problem.rdata, work)
+            problem.jacobian(0.0, y, np.zeros(4), 3.0, vals, problem.idata, problem.rdata, work)
+            found.append((out[:2], dense(problem, vals)[:2]))
+        (ours, by), (theirs, exact) = found
+        largest = max(largest, float(np.abs(theirs).max()))
+        assert ours == pytest.approx(theirs, rel=1e-8, abs=1e-8)
+        assert by == pytest.approx(exact, rel=1e-8, abs=1e-8 * np.abs(exact).max())
+    assert largest > 100.0
 
 
 def a_reaction_in_a_load() -> Mechanism:

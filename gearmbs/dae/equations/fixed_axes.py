@@ -10,9 +10,13 @@ in the unknowns y = [omega, phi, z]. Constraint forces do no work in the turn an
 multipliers, and Phi = 0 holds exactly. F and N are not unknowns but evaluated in place. A body whose turn a motion
 prescribes has no unknowns at all: phi = f(t) - f(t0).
 
+An element between two such bodies may have a leaner kernel, which takes phi and omega instead of frames, see
+`gearmbs.dae.equations.loads.forces`; bodies that nothing else looks at are not placed then.
+
 The tables are those of the model with all six coordinates, in which places of z are those in this y. Behind them
-stand, in ``idata``, the table of the axes (columns ``AXIS_*``, body b in row b - 1), the markers that anything looks
-at, the slots of the Jacobian and the three counts; in ``rdata`` the columns ``TURN_*`` of each axis.
+stand, in ``idata``, a row ``LEAN_*`` of each force element, the table of the axes (columns ``AXIS_*``, body b in row
+b - 1), the markers that anything looks at, the slots of the Jacobian and the counts; in ``rdata`` the tables of
+lean kernels and the columns ``TURN_*`` of each axis.
 """
 
 from __future__ import annotations
@@ -28,9 +32,17 @@ from gearmbs.dae.equations.kinematics import (
     update_functions,
     update_ground,
     update_marker,
+    update_markers,
 )
 from gearmbs.dae.equations.loads import expressions
-from gearmbs.dae.equations.loads.forces import DERIVATIVES, evaluate_element
+from gearmbs.dae.equations.loads.forces import (
+    DERIVATIVES,
+    LEAN_ADDRESS,
+    LEAN_COLUMNS,
+    LEAN_FIRST,
+    evaluate_element,
+    evaluate_lean,
+)
 from gearmbs.dae.equations.residual import S_VECTOR, S_WRENCH, add_own_states
 from gearmbs.dae.equations.rotation import KIN_A, KIN_FORCE, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed, put
@@ -44,7 +56,9 @@ AXIS_PHI = 1
 """Index in y of the angle, likewise."""
 AXIS_FUNCTION = 2
 """Function of time that prescribes the turn, or -1."""
-AXIS_COLUMNS = 3
+AXIS_SEEN = 3
+"""1 if the residual needs the place of the body, else 0."""
+AXIS_COLUMNS = 4
 
 TURN_AXIS = 0
 """Direction n, global."""
@@ -63,6 +77,8 @@ TURN_MATRIX = 19
 """A = a + b cos(phi) + c sin(phi): three matrices, row-major."""
 TURN_COLUMNS = 46
 
+S_TURNS = S_VECTOR + 30
+"""Scratch of `evaluate_lean`: two angles and their rates."""
 COUNTS = 4
 """Integers at the end of ``idata``: number of markers looked at, of slots, of axes; where in the work array stand the
 unknowns of the last evaluation and, behind them, the slopes of the wrenches, see `keep_slopes`, -1 for nowhere."""
@@ -70,11 +86,12 @@ unknowns of the last evaluation and, behind them, the slopes of the wrenches, se
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def axes_in(idata, rdata):
-    """Return the views of the axes, of the markers looked at, of the slots and of the axes' reals."""
+    """Return the views of the lean elements, axes, markers looked at, slots, and of the axes' reals."""
     end = idata.size - COUNTS
-    markers, slots, axes = idata[end], idata[end + 1], idata[end + 2]
+    markers, slots, axes, forces = idata[end], idata[end + 1], idata[end + 2], idata[T.H_FORCES]
     first = end - slots - markers - AXIS_COLUMNS * axes
     return (
+        matrix_at(idata, first - LEAN_COLUMNS * forces, forces, LEAN_COLUMNS),
         matrix_at(idata, first, axes, AXIS_COLUMNS),
         vector_at(idata, end - slots - markers, markers),
         vector_at(idata, end - slots, slots),
@@ -83,15 +100,19 @@ def axes_in(idata, rdata):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def turn_of(k, y, axes, turns, fval):
+    """Return phi and omega of body k + 1 at the unknowns y, or where its motion has it."""
+    if axes[k, AXIS_PHI] >= 0:
+        return y[axes[k, AXIS_PHI]], y[axes[k, AXIS_OMEGA]]
+    turn, function = turns[k], axes[k, AXIS_FUNCTION]
+    return turn[TURN_SENSE] * (fval[function, 0] - turn[TURN_START]), turn[TURN_SENSE] * fval[function, 1]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def turn_body(k, y, axes, turns, fval, kin):
     """Fill the kinematics of body k + 1 at the unknowns y, or where its motion has it."""
     turn, row = turns[k], kin[k + 1]
-    if axes[k, AXIS_PHI] >= 0:
-        phi, omega = y[axes[k, AXIS_PHI]], y[axes[k, AXIS_OMEGA]]
-    else:
-        function = axes[k, AXIS_FUNCTION]
-        phi = turn[TURN_SENSE] * (fval[function, 0] - turn[TURN_START])
-        omega = turn[TURN_SENSE] * fval[function, 1]
+    phi, omega = turn_of(k, y, axes, turns, fval)
     c, s = np.cos(phi), np.sin(phi)
     for q in range(9):
         at = TURN_MATRIX + q
@@ -115,14 +136,21 @@ def keep_unknowns(y, idata, work):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def update_axes(t, y, axes, markers, turns, tab):
-    """Bring functions of time, bodies, the markers looked at and expected angles up to date with t and y."""
+def update_axes(t, y, axes, markers, turns, tab, every):
+    """Bring functions of time, bodies, the markers looked at and expected angles up to date with t and y.
+
+    ``every`` places bodies and markers, too, that the residual does not look at.
+    """
     update_functions(t, tab)
     update_ground(tab.kin)
     for k in range(axes.shape[0]):
-        turn_body(k, y, axes, turns, tab.fval, tab.kin)
-    for q in range(markers.size):
-        update_marker(markers[q], tab.marker_body, tab.marker, tab.kin, tab.frame)
+        if every or axes[k, AXIS_SEEN] != 0:
+            turn_body(k, y, axes, turns, tab.fval, tab.kin)
+    if every:
+        update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    else:
+        for q in range(markers.size):
+            update_marker(markers[q], tab.marker_body, tab.marker, tab.kin, tab.frame)
     predict_angles(t, tab)
 
 
@@ -136,9 +164,12 @@ def lever(k, marker, turns, tab, s):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def weight_moment(k, turns, tab, s):
+def weight_moment(k, axes, turns, tab, s):
     """Return the moment of the weight of body k + 1 about its axis, and its derivative by the angle."""
     turn, body = turns[k], tab.kin[k + 1]
+    if axes[k, AXIS_SEEN] == 0:
+        # its centre of mass is on the axis
+        return 0.0, 0.0
     for c in range(3):
         s[c] = body[KIN_R + c] - turn[TURN_POINT + c]
     cross3(turn, TURN_AXIS, s, 0, s, 3)
@@ -163,18 +194,43 @@ def add_moments(row, wrench, axes, turns, tab):
         tab.kin[k + 1, KIN_FORCE] += moment if side == 0 else -moment
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_turns(row, y, axes, turns, tab):
+    """Leave the angles of the two bodies of an element and their rates where `evaluate_lean` looks for them."""
+    for side in range(2):
+        k = tab.marker_body[row[T.FORCE_I + side]] - 1
+        phi, omega = turn_of(k, y, axes, turns, tab.fval)
+        tab.scratch[S_TURNS + side], tab.scratch[S_TURNS + 2 + side] = phi, omega
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_lean_moments(row, lean, rdata, axes, turns, tab):
+    """Add the moments of an element with a lean kernel about its two axes; as `add_moments`."""
+    wrench = vector_at(tab.scratch, row[T.FORCE_WORK], 6)
+    for side in range(2):
+        k = tab.marker_body[row[T.FORCE_I + side]] - 1
+        if axes[k, AXIS_OMEGA] >= 0:
+            moment = dot3(rdata, lean[LEAN_FIRST] + 3 * side, wrench, 0) + dot3(turns[k], TURN_AXIS, wrench, 3)
+            tab.kin[k + 1, KIN_FORCE] += moment if side == 0 else -moment
+
+
 @njit(RESIDUAL_SIG, cache=True, error_model="numpy")
 def axes_residual(t, y, yp, out, idata, rdata, work):
     """Evaluate the residual of bodies that turn about fixed axes into ``out``."""
     y, yp, out, idata, rdata = uncounted(y), uncounted(yp), uncounted(out), uncounted(idata), uncounted(rdata)
     tab = T.unpack(idata, rdata, work)
-    axes, markers, _, turns = axes_in(idata, rdata)
-    update_axes(t, y, axes, markers, turns, tab)
+    leans, axes, markers, _, turns = axes_in(idata, rdata)
+    update_axes(t, y, axes, markers, turns, tab, False)
     keep_unknowns(y, idata, work)
     for k in range(axes.shape[0]):
         tab.kin[k + 1, KIN_FORCE] = 0.0
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
+        if leans[f, LEAN_ADDRESS] != 0:
+            put_turns(row, y, axes, turns, tab)
+            evaluate_lean(row, leans[f], S_TURNS, rdata, tab, row[T.FORCE_WANT])
+            add_lean_moments(row, leans[f], rdata, axes, turns, tab)
+            continue
         if row[T.FORCE_KIND] == T.COMPILED:
             if row[T.FORCE_PART] == 0:
                 evaluate_element(row, t, y, tab, row[T.FORCE_WANT])
@@ -189,7 +245,7 @@ def axes_residual(t, y, yp, out, idata, rdata, work):
     for k in range(axes.shape[0]):
         omega, phi = axes[k, AXIS_OMEGA], axes[k, AXIS_PHI]
         if omega >= 0:
-            weight, _ = weight_moment(k, turns, tab, s)
+            weight, _ = weight_moment(k, axes, turns, tab, s)
             out[omega] = turns[k, TURN_INERTIA] * yp[omega] - tab.kin[k + 1, KIN_FORCE] - weight
             out[phi] = y[omega] - yp[phi]
     for k in range(idata[T.H_STATES]):
@@ -204,9 +260,9 @@ def axes_residual(t, y, yp, out, idata, rdata, work):
 def axes_hook(t, hist, npast, idata, rdata, work):
     """Update the reference of each counted angle; coordinates never change."""
     tab = T.unpack(idata, rdata, work)
-    axes, markers, _, turns = axes_in(idata, rdata)
+    _, axes, markers, _, turns = axes_in(idata, rdata)
     if counts_angles(tab):
-        update_axes(t, hist[0], axes, markers, turns, tab)
+        update_axes(t, hist[0], axes, markers, turns, tab, True)
         track(t, hist[0], tab, True)
     return KEPT
 
@@ -225,7 +281,7 @@ S_LEVER = S_VECTOR
 S_CHAIN = S_LEVER + 9
 """rho, n x rho and n x (n x rho) of the body whose columns are formed."""
 S_FORCE = S_CHAIN + 9
-"""The way of a force's point and the force's moment by it."""
+"""The way of a force's point and the force's moment by it, then six weights."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -344,18 +400,10 @@ def element_axis_entries(mode, t, row, y, cj, idata, axes, turns, tab, slot, val
     ----------
     mode, slot, vals, k
         As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
-    t : float
-        S.
-    row : ndarray of int
-        Row of the force element.
-    y : ndarray
-    cj : float
-        Factor of dG/dy'.
-    idata : ndarray of int
-    axes, turns : ndarray
-        Of `gearmbs.dae.equations.fixed_axes`.
-    tab : Tables
-        Up to date with y.
+    t, y, cj, idata
+        As of `axes_jacobian`.
+    row, axes, turns, tab
+        As of `moment_entries`.
     """
     width, depends = row[T.FORCE_WIDTH], row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
@@ -424,6 +472,49 @@ def keep_slopes(f, y, idata, axes, turns, tab, work):
             slopes[r, tab.extra_i[after + q]] += rows[r, 12 * bodies + q]
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def lean_entries(mode, f, lean, y, idata, rdata, axes, turns, tab, slot, vals, k, work):
+    """Entries of the moments of an element with a lean kernel; keeps the slopes of its wrench as `keep_slopes` does.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
+    f, lean
+        The element, and its row ``LEAN_*``.
+    y, idata, rdata, axes, turns, tab, work
+        As of `keep_slopes`.
+    """
+    row, n, kept = tab.force[f], y.size, idata[idata.size - 1]
+    put_turns(row, y, axes, turns, tab)
+    evaluate_lean(row, lean, S_TURNS, rdata, tab, DERIVATIVES | row[T.FORCE_WANT])
+    by = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, 4)
+    slopes = matrix_at(work, kept + n + 6 * n * f, 6, n)
+    if kept >= 0:
+        slopes[:] = 0.0
+    for side in range(2):
+        b = tab.marker_body[row[T.FORCE_I + side]] - 1
+        omega, phi = axes[b, AXIS_OMEGA], axes[b, AXIS_PHI]
+        if omega < 0:
+            continue
+        if kept >= 0:
+            for r in range(6):
+                slopes[r, phi], slopes[r, omega] = by[r, side], by[r, 2 + side]
+        for q in range(2):
+            a = tab.marker_body[row[T.FORCE_I + q]] - 1
+            if axes[a, AXIS_OMEGA] < 0:
+                continue
+            by_phi = by_omega = 0.0
+            for c in range(3):
+                arm, along = rdata[lean[LEAN_FIRST] + 3 * side + c], turns[b, TURN_AXIS + c]
+                by_phi += arm * by[c, q] + along * by[3 + c, q]
+                by_omega += arm * by[c, 2 + q] + along * by[3 + c, 2 + q]
+            sign = 1.0 - 2.0 * side
+            k = put(mode, slot, vals, k, omega, axes[a, AXIS_PHI], -sign * by_phi)
+            k = put(mode, slot, vals, k, omega, axes[a, AXIS_OMEGA], -sign * by_omega)
+    return k
+
+
 @njit(cache=True, error_model="numpy")
 def axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, vals, k):
     """Entries of the equation of one user-defined state that an expression gives.
@@ -432,18 +523,12 @@ def axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, val
     ----------
     mode, slot, vals, k
         As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
-    t : float
-        S.
     state : int
         Number of the state.
-    y : ndarray
-    cj : float
-        Factor of dG/dy'.
-    idata : ndarray of int
-    axes, turns : ndarray
-        Of `gearmbs.dae.equations.fixed_axes`.
-    tab : Tables
-        Up to date with y.
+    t, y, cj, idata
+        As of `axes_jacobian`.
+    axes, turns, tab
+        As of `moment_entries`.
     """
     z, tape = idata[T.H_Z] + state, tab.state[state, T.STATE_TAPE]
     row = tab.tape[tape]
@@ -465,9 +550,9 @@ def axes_jacobian(t, y, yp, cj, vals, idata, rdata, work):
     """Evaluate dG/dy + cj dG/dy' into ``vals``, or count the entries or note their places; see `unknowns.put`."""
     y, vals, idata, rdata = uncounted(y), uncounted(vals), uncounted(idata), uncounted(rdata)
     tab = T.unpack(idata, rdata, work)
-    axes, markers, slot, turns = axes_in(idata, rdata)
+    leans, axes, markers, slot, turns = axes_in(idata, rdata)
     mode = idata[T.H_MODE]
-    update_axes(t, y, axes, markers, turns, tab)
+    update_axes(t, y, axes, markers, turns, tab, False)
     if mode == NUMBERS:
         for p in range(vals.size):
             vals[p] = 0.0
@@ -478,13 +563,16 @@ def axes_jacobian(t, y, yp, cj, vals, idata, rdata, work):
         omega, phi = axes[a, AXIS_OMEGA], axes[a, AXIS_PHI]
         if omega < 0:
             continue
-        _, turned = weight_moment(a, turns, tab, s)
+        _, turned = weight_moment(a, axes, turns, tab, s)
         k = put(mode, slot, vals, k, omega, omega, cj * turns[a, TURN_INERTIA])
         k = put(mode, slot, vals, k, omega, phi, -turned)
         k = put(mode, slot, vals, k, phi, omega, 1.0)
         k = put(mode, slot, vals, k, phi, phi, -cj)
     keep_unknowns(y, idata, work)
     for f in range(idata[T.H_FORCES]):
+        if leans[f, LEAN_ADDRESS] != 0:
+            k = lean_entries(mode, f, leans[f], y, idata, rdata, axes, turns, tab, slot, vals, k, work)
+            continue
         k = element_axis_entries(mode, t, tab.force[f], y, cj, idata, axes, turns, tab, slot, vals, k)
         keep_slopes(f, y, idata, axes, turns, tab, work)
     for state in range(idata[T.H_STATES]):

@@ -54,6 +54,8 @@ class TableBuilder:
         self.angles: list[tuple[int, int, int, int]] = []
         self.kernels: dict[int, Any] = {}
         """Kernel of each compiled force element by its row."""
+        self.lean: dict[int, Any] = {}
+        """What offers a leaner kernel for bodies that turn about fixed axes, by the row of its element."""
         self.own_functions: dict[int, tuple[Any, Any]] = {}
         """Compiled functions of elements, with their signatures, by the place of their address in the integers."""
         self.diagnostics: list[tuple[Diagnostic, ...]] = []
@@ -222,6 +224,7 @@ class TableBuilder:
         angles: Sequence[int] = (),
         scratch: int = 0,
         diagnostics: Sequence[Diagnostic] = (),
+        lean: Any = None,
     ) -> int:
         """Add a compiled force element, see `gearmbs.dae.equations.loads.forces`; return its (first) row.
 
@@ -243,6 +246,10 @@ class TableBuilder:
             Places in y, functions of time and counted angles that make up the inputs.
         scratch : int
         diagnostics : sequence of Diagnostic
+        lean : callable, optional
+            Called with the frames of two acting markers where nothing has turned, shape (2, 18), and point and
+            direction of either fixed axis, shape (2, 2, 3). Returns a kernel of signature ``TURNING_SIG`` that does the
+            same for bodies that turn about these axes, and its own table, or None.
         """
         sees = acting if sees is None else sees
         wrenches = len(acting) if len(acting) > 2 else 1
@@ -268,6 +275,8 @@ class TableBuilder:
                 self.largest_jac = max(self.largest_jac, (6 * wrenches + len(states)) * row[T.FORCE_WIDTH])
             self._append(row, tuple(diagnostics) if part == 0 else ())
         self.kernels[number] = kernel
+        if lean is not None:
+            self.lean[number] = lean
         return number
 
     def _force_row(
@@ -325,6 +334,7 @@ class TableBuilder:
             tape_work=self.tape_work,
             angles=_integers(self.angles, T.ANGLE_COLUMNS),
             kernels=MappingProxyType(dict(self.kernels)),
+            lean=MappingProxyType(dict(self.lean)),
             own_functions=MappingProxyType(dict(self.own_functions)),
             diagnostics=tuple(self.diagnostics),
             largest_jac=self.largest_jac,

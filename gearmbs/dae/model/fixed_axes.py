@@ -27,7 +27,15 @@ from gearmbs.dae.equations.fixed_axes import (
     axes_pattern,
     update_axes,
 )
-from gearmbs.dae.equations.kinematics import track, turns_are_counted, update_markers
+from gearmbs.dae.equations.kinematics import track, turns_are_counted
+from gearmbs.dae.equations.loads.forces import (
+    FRAME_A,
+    FRAME_COLUMNS,
+    FRAME_P,
+    LEAN_ADDRESS,
+    LEAN_COLUMNS,
+    TURNING_SIG,
+)
 from gearmbs.dae.equations.rotation import KIN_R, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.equations.unknowns import SI2
 from gearmbs.dae.model.members import (
@@ -46,6 +54,7 @@ from gearmbs.dae.model.records import RECORDS_TYPE, Records
 from gearmbs.dae.model.system import counted_angles, turns_of_one
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.pointers import address
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:
@@ -53,6 +62,9 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
 
 TRAILING = ("omega", "phi")
+
+ON_AXIS = 1e-12
+"""Distance of a centre of mass from its axis, m, that is rounding: the weight of a tonne makes a moment of 1e-8 N m."""
 
 
 @dataclass(frozen=True)
@@ -221,12 +233,14 @@ def _turn(system: System, k: int, axis: Axis) -> np.ndarray:
     return row
 
 
-def _watched_markers(idata: np.ndarray) -> np.ndarray:
-    """Return the markers whose frames loads and counted angles look at."""
-    extra, forces = idata[int(idata[T.H_I_EXTRA]) :], T.forces_in(idata)
+def _watched_markers(idata: np.ndarray, lean: np.ndarray) -> np.ndarray:
+    """Return the markers whose frames loads and counted angles look at; loads with a lean kernel look at none."""
+    extra, forces = idata[int(idata[T.H_I_EXTRA]) :], T.forces_in(idata)[lean[:, LEAN_ADDRESS] == 0]
     seen = [extra[row[T.FORCE_SEES] + 1 :][: extra[row[T.FORCE_SEES]]] for row in forces if row[0] == T.COMPILED]
     angles = T.rows_in(idata, int(idata[T.H_I_ANGLE]), int(idata[T.H_ANGLES]), T.ANGLE_COLUMNS)
-    ends = [forces[:, [T.FORCE_I, T.FORCE_J]].ravel(), angles[:, [T.ANGLE_I, T.ANGLE_J]].ravel()]
+    # a torque of a compiled element acts wherever its markers are
+    placed = forces[(forces[:, T.FORCE_KIND] != T.COMPILED) | (forces[:, T.FORCE_F] >= 0)]
+    ends = [placed[:, [T.FORCE_I, T.FORCE_J]].ravel(), angles[:, [T.ANGLE_I, T.ANGLE_J]].ravel()]
     directions = forces[forces[:, T.FORCE_KIND] == T.EXPRESSION, T.FORCE_RM]
     return np.unique(np.concatenate([*seen, *ends, directions])).astype(np.int64)
 
@@ -247,10 +261,47 @@ def _with_axes(
     for place, k in enumerate(free):
         table[k, fx.AXIS_OMEGA], table[k, fx.AXIS_PHI] = place, len(free) + place
     table[:, fx.AXIS_FUNCTION] = _functions(model, axes)
-    markers = _watched_markers(idata)
-    rdata = np.concatenate([rdata, turns.ravel()])
+    lean, own = _lean_elements(model, turns, rdata.size)
+    markers = _watched_markers(idata, lean)
+    table[:, fx.AXIS_SEEN] = _bodies_seen(idata, model.marker_body[markers], turns)
+    rdata = np.concatenate([rdata, own, turns.ravel()])
     ends = [len(markers), 0, len(axes), -1]
-    return np.concatenate([idata, table.ravel(), markers, ends]), rdata, size
+    return np.concatenate([idata, lean.ravel(), table.ravel(), markers, ends]), rdata, size
+
+
+def _lean_elements(model: Model, turns: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows ``LEAN_*`` of all force elements, and their tables, of which the first will be at ``first``."""
+    rows, tables = np.zeros((len(model.forces), LEAN_COLUMNS), dtype=np.int64), [np.zeros(0)]
+    for number, offer in model.lean.items():
+        markers = model.forces[number, [T.FORCE_I, T.FORCE_J]]
+        bodies = model.marker_body[markers] - 1
+        if (bodies < 0).any():
+            continue
+        # point and direction
+        axes = turns[bodies, : fx.TURN_INERTIA].reshape(2, 2, 3)[:, ::-1]
+        frames = np.zeros((2, FRAME_COLUMNS))
+        for frame, marker, turn in zip(frames, model.marker_frame[markers], turns[bodies], strict=True):
+            # a + b: where nothing has turned
+            arm, turned = turn[fx.TURN_ARM : fx.TURN_MATRIX], turn[fx.TURN_MATRIX :].reshape(3, 3, 3)[:2].sum(axis=0)
+            centre = turn[fx.TURN_POINT : fx.TURN_INERTIA] + arm.reshape(3, 3)[:2].sum(axis=0)
+            frame[FRAME_P : FRAME_P + 3] = centre + turned @ marker[:3]
+            frame[FRAME_A : FRAME_A + 9] = (turned @ marker[3:].reshape(3, 3)).ravel()
+        made = offer(frames, axes)
+        if made is not None:
+            kernel, own = made
+            levers = np.cross(axes[:, 1], frames[0, FRAME_P : FRAME_P + 3] - axes[:, 0])
+            rows[number] = address(kernel, TURNING_SIG), first + sum(map(len, tables)), own.size
+            tables += [levers.ravel(), own]
+    return rows, np.concatenate(tables)
+
+
+def _bodies_seen(idata: np.ndarray, bodies: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Return of which bodies the residual needs the place: ``bodies`` are those of the markers that are looked at."""
+    if idata[T.H_TAPES] > 0:
+        # expressions look at any marker
+        return np.ones(len(turns), dtype=bool)
+    arms = turns[:, fx.TURN_ARM + 3 : fx.TURN_ARM + 6]
+    return np.isin(np.arange(len(turns)) + 1, bodies) | (np.linalg.norm(arms, axis=1) > ON_AXIS)
 
 
 def _with_slots(idata: np.ndarray, slots: np.ndarray) -> np.ndarray:
@@ -419,7 +470,7 @@ def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turn
     idata, t, rdata, work = uncounted(idata), uncounted(t), uncounted(rdata), uncounted(work)
     own, turning, s = uncounted(own), uncounted(turning), uncounted(s)
     tab = T.unpack(idata, rdata, work)
-    axes, markers, _, turns = axes_in(idata, rdata)
+    _, axes, markers, _, turns = axes_in(idata, rdata)
     n, count = y.shape[1], members.group.size
     all_y, wrench = matrix_at(y, 0, y.shape[0], n), matrix_at(wrench, 0, count, 6)
     elements, columns = records.loads.shape[1], records.loads.shape[2]
@@ -434,7 +485,7 @@ def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turn
         phi = vector_at(records.phi, ROW_RECORD * rows * k, ROW_RECORD * rows)
         force = matrix_at(records.force, 3 * rows * k, rows, 3)
         moment = matrix_at(records.moment, 3 * rows * k, rows, 3)
-        update_axes(t[k], at, axes, markers, turns, tab)
+        update_axes(t[k], at, axes, markers, turns, tab, True)
         if counts_turns:
             track(t[k], at, tab, True)
         for c in range(own.size):
@@ -442,7 +493,6 @@ def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turn
         apply_loads(t[k], at, own, loads, idata, tab)
         for a in range(axes.shape[0]):
             accelerate(a, axes, turns, tab, own, turning, s)
-        update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
         for m in range(count):
             move_member(m, members, tab, turning, pose, solution, wrench, s)
         deduct_loads(loads, members, tab, wrench, s)

@@ -147,6 +147,8 @@ class Model:
         Angles that force elements count through full turns.
     kernels : mapping of int to compiled function
         Kernel of each compiled force element by its row.
+    lean : mapping of int to callable
+        Of elements with a leaner kernel for bodies that turn about fixed axes: what offers it, see `add_element`.
     own_functions : mapping of int to (compiled function, signature)
         Functions that elements call, by the place of their address in ``extra_i``.
     diagnostics : tuple
@@ -194,6 +196,7 @@ class Model:
     shape_at: tuple[int, ...] = ()
     names: Names = field(default_factory=Names)
     numbers: Mapping[str, Number] = field(default_factory=dict)
+    lean: Mapping[int, Any] = field(default_factory=dict)
 
     @cached_property
     def rows_of_joint(self) -> dict[str, list[int]]:

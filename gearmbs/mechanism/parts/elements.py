@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -54,6 +54,9 @@ class Compiled:
         Numbers among ``reals`` that can be changed while a simulation goes on, by the name of what they are.
     given : mapping of str to int
         Which of ``times`` can be changed so, N m; of a STEP what it ends at.
+    lean : callable, optional
+        Offers a leaner kernel for bodies that turn about fixed axes; see
+        `gearmbs.dae.model.builder.TableBuilder.add_element`.
     """
 
     kernel: Any
@@ -67,6 +70,7 @@ class Compiled:
     scratch: int = 0
     settings: Mapping[str, Setting] = field(default_factory=dict)
     given: Mapping[str, int] = field(default_factory=dict)
+    lean: Callable[[np.ndarray, np.ndarray], tuple[Any, np.ndarray] | None] | None = None
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,21 @@ from gearmbs.kernels.structs import matrix_at, vector_at
 
 FORCE_SIG = types.void(IVEC, VEC, F8, MAT, VEC, VEC, I8, VEC, MAT, VEC, MAT, VEC)
 """Signature of a force element's kernel."""
+TURNING_SIG = types.void(IVEC, VEC, VEC, VEC, I8, VEC, VEC, MAT, VEC)
+"""Signature of a leaner kernel of an element between two bodies that do nothing but turn about fixed axes,
+
+    kernel(ints, reals, own, turns, want, work, wrench, slopes, diagnostics)
+
+with the element's tables, a table of what its two axes imply, the angles by which I's and J's body have turned and
+their rates. ``slopes``, shape (6, 4), are the wrench's derivatives by these, ``work`` has 36 places."""
+LEAN_ADDRESS = 0
+"""Address of an element's lean kernel in this process, or 0."""
+LEAN_FIRST = 1
+"""Where in ``rdata`` its own table is: behind n x (P - C) for the axes of I's and J's body, six numbers."""
+LEAN_SIZE = 2
+"""Length of that table."""
+LEAN_COLUMNS = 3
+LEVERS = 6
 
 DERIVATIVES = 1
 DIAGNOSTICS = 2
@@ -112,6 +127,7 @@ class Diagnostic:
 
 
 force_at = caller(FORCE_SIG)
+turning_at = caller(TURNING_SIG)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -206,6 +222,39 @@ def evaluate_element(row, t, y, tab, want):
     if want & DERIVATIVES:
         for k in range(frames):
             shift_to_body(extra_i[sees + 1 + k], tab.marker_body, tab.kin, tab.frame, jac, 12 * k)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def evaluate_lean(row, lean, at, rdata, tab, want):
+    """Call the lean kernel of an element; wrench and diagnostics are left where `evaluate_element` has them.
+
+    The derivatives by the two angles and their rates, shape (6, 4), stand at ``SCRATCH_FIXED``.
+
+    Parameters
+    ----------
+    row, lean : ndarray of int
+        The element's rows ``FORCE_*`` and ``LEAN_*``.
+    at : int
+        Where in the scratch the angles and rates stand.
+    rdata : ndarray
+    tab : Tables
+    want : int
+    """
+    scratch, first, ints = tab.scratch, row[T.FORCE_WORK], row[T.FORCE_IEXTRA]
+    work = first + 6 + row[T.FORCE_DIAGNOSTICS]
+    for k in range(first, work):
+        scratch[k] = 0.0
+    turning_at(lean[LEAN_ADDRESS])(
+        vector_at(tab.extra_i, ints + 2, tab.extra_i[ints]),
+        vector_at(tab.extra_r, row[T.FORCE_REXTRA], tab.extra_i[ints + 1]),
+        vector_at(rdata, lean[LEAN_FIRST] + LEVERS, lean[LEAN_SIZE]),
+        vector_at(scratch, at, 4),
+        want,
+        vector_at(scratch, work, 2 * FRAME_COLUMNS),
+        vector_at(scratch, first, 6),
+        matrix_at(scratch, T.SCRATCH_FIXED, 6, 4),
+        vector_at(scratch, first + 6, row[T.FORCE_DIAGNOSTICS]),
+    )
 
 
 @njit(cache=True, error_model="numpy")
