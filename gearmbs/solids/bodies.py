@@ -24,10 +24,10 @@ PART_NUMBER = "UG2/ADAMS_ID"
 
 TOLERANCE = 1e-3
 """Default chord tolerance over the diagonal of the body's box."""
-FINER = 8.0
-"""By what the tolerance of edges whose chains cross is divided."""
-FINEST = 3
-"""Times that this is done for a face."""
+AGAIN = (1 / 8, 1 / 64, 1 / 512, 2.0, 4.0, 8.0)
+"""By what the tolerance of the edges of a face is multiplied whose chains cross, one after the other."""
+SHORT = 0.1
+"""Of the length of all edges of a face: no longer ones are cut coarser."""
 TRIES = 30
 """Times that a body is cut."""
 
@@ -373,23 +373,36 @@ def faceted(body: Body, tolerance: float | None = None) -> tuple[np.ndarray, np.
     """
     if tolerance is None:
         tolerance = TOLERANCE * float(np.linalg.norm(np.ptp(body.corners, axis=0)))
-    finer: dict[int, float] = {}
+    cuts: dict[int, float] = {}
+    left: dict[int, Iterator[float]] = {}
+    vertices, triangles, why = np.zeros((0, 3)), np.zeros((0, 3), int), ""
     for _ in range(TRIES):
         try:
-            vertices, triangles = _attempt(body, tolerance, finer)
+            vertices, triangles = _attempt(body, tolerance, cuts)
             break
         except _CrossedFace as crossed:
-            # arcs that come closer to each other than the tolerance cross as chains: these edges are cut finer
-            edges = {e for loop in crossed.face.loops for e, _ in loop}
-            finest = min(finer.get(edge, tolerance) for edge in edges) / FINER
-            if finest < tolerance / FINER**FINEST:
-                raise ModelError(f"{crossed}; save the solid as .stl") from None
-            finer |= dict.fromkeys(edges, finest)
+            # arcs that come closer to each other than the tolerance cross as chains: these edges are cut finer; at the
+            # tip of a sliver the file's own curves cross, within its tolerance: short edges are cut coarser
+            factor = next(left.setdefault(crossed.face.number, iter(AGAIN)), None)
             why = str(crossed)
-    else:
+            if factor is None:
+                break
+            for edge, share in _shares(body, crossed.face, tolerance).items():
+                if factor < 1.0:
+                    cuts[edge] = min(cuts.get(edge, tolerance), factor * tolerance)
+                else:
+                    cuts[edge] = (factor if share < SHORT else 1.0) * tolerance
+    if not len(triangles):
         raise ModelError(f"{why}; save the solid as .stl")
     check_closed(body.name, triangles)
     return vertices, triangles
+
+
+def _shares(body: Body, face: Face, tolerance: float) -> dict[int, float]:
+    """Return the edges of a face with their shares of the length of all of them."""
+    chains = {e: np.diff(body.edge_points(e, tolerance), axis=0) for loop in face.loops for e, _ in loop}
+    lengths = {e: float(np.linalg.norm(steps, axis=1).sum()) for e, steps in chains.items()}
+    return {e: length / sum(lengths.values()) for e, length in lengths.items()}
 
 
 class _CrossedFace(Exception):
@@ -398,11 +411,11 @@ class _CrossedFace(Exception):
         self.face = face
 
 
-def _attempt(body: Body, tolerance: float, finer: dict[int, float]) -> tuple[np.ndarray, np.ndarray]:
+def _attempt(body: Body, tolerance: float, cuts: dict[int, float]) -> tuple[np.ndarray, np.ndarray]:
     points = _Points()
     chains: dict[int, np.ndarray] = {}
     for edge in sorted({edge for face in body.faces for loop in face.loops for edge, _ in loop}):
-        chains[edge] = points.chain(body.edge_points(edge, finer.get(edge, tolerance)))
+        chains[edge] = points.chain(body.edge_points(edge, cuts.get(edge, tolerance)))
     places = points.array()
     triangles, added, total = [], [places], len(places)
     for face in body.faces:

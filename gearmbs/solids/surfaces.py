@@ -145,9 +145,13 @@ class InSurface(Curve):
 
     def __post_init__(self) -> None:
         self.low, self.high, self.period = self.curve.low, self.curve.high, self.curve.period
+        first, last = self.points(np.array([self.low, self.high]))
+        if self.period is None and np.linalg.norm(last - first) < 1e-9:
+            # around the surface: open in its parameters
+            self.period = self.high - self.low
 
     def points(self, t: np.ndarray) -> np.ndarray:
-        return self.surface.points(self.curve.points(t))
+        return self.surface.points(self.curve.points(_wrapped(t, self.low, self.period)))
 
 
 def _wrapped(t: np.ndarray, low: float, period: float | None) -> np.ndarray:
@@ -412,7 +416,7 @@ class Searched(Surface):
             sv = (self.points(up) - self.points(down)) / _step(up[:, 1] - down[:, 1], 2 * step[1])
             a, b, c = (np.sum(p * q, axis=1) for p, q in ((su, su), (su, sv), (sv, sv)))
             f, g = np.sum(su * r, axis=1), np.sum(sv * r, axis=1)
-            det = np.maximum(a * c - b * b, 1e-30 * np.maximum(a * c, 1e-300))
+            det = np.maximum(a * c - b * b, np.maximum(1e-30 * a * c, 1e-300))
             move = np.column_stack([(c * f - b * g) / det, (a * g - b * f) / det])
             limit = 0.1 * (self.high - self.low)
             uv = self._inside(uv + np.clip(move, -limit, limit))

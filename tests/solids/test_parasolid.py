@@ -6,8 +6,9 @@ import pytest
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts import Box, Cylinder, Frustum, Mesh, Sphere, Torus, read_solid
 from gearmbs.mechanism.contacts.shapes import volume
-from gearmbs.solids import read_bodies
+from gearmbs.solids import bodies, read_bodies
 from gearmbs.solids.bodies import faceted, primitive
+from gearmbs.solids.faces import Crossed
 from gearmbs.solids.procedural import Blend, Bound
 from tests.says import says
 from tests.solids.transmit_files import (
@@ -179,6 +180,42 @@ def test_arcs_closer_than_the_tolerance_are_cut_finer(tmp_path):
     solid.faces.append((inner, "-", [[(3, True)], [(2, False)]]))
     vertices, triangles = facets_of(tmp_path, solid, 0.05)
     assert volume(vertices, triangles) == pytest.approx(np.pi * (1.0 - 0.995**2) * 2.0, rel=0.2)
+
+
+def test_edges_that_cross_by_themselves_are_cut_coarser(tmp_path, monkeypatch):
+    """The hole is the short edge of its face; what is cut finer first goes on crossing."""
+    lengths = []
+
+    def cut(surface, outward, loops, *rest):
+        if len(loops) == 2 and len(loops[1]) > 25:
+            lengths.append(len(loops[1]))
+            raise Crossed("its edges cross")
+        return whole(surface, outward, loops, *rest)
+
+    solid = block()
+    drilled(solid, radius=0.08)
+    whole = bodies.cut
+    fine = facets_of(tmp_path, solid, 1e-4)
+    monkeypatch.setattr(bodies, "cut", cut)
+    coarse = facets_of(tmp_path, solid, 1e-4)
+    assert max(lengths) > 4 * lengths[0]
+    assert volume(*coarse) == pytest.approx(volume(*fine), rel=1e-3)
+
+
+def test_an_edge_around_a_surface_may_be_trimmed_backwards(tmp_path):
+    """A curve in the parameters of a cylinder is open there and closed in space."""
+    nurbs = {
+        "degree": 1, "n_vertices": 2, "vertex_dim": 2, "n_knots": 2, "periodic": "F", "closed": "F", "rational": "F",
+        "bspline_vertices": ("BSPLINE_VERTICES", {"vertices": [0.0, 2.0, 2.0 * np.pi, 2.0]}),
+        "knot_mult": ("KNOT_MULT", {"mult": [2, 2]}), "knots": ("KNOT_SET", {"knots": [0.0, 1.0]}),
+    }  # fmt: skip
+    around = "SP_CURVE", {"surface": cylinder(0.4)[0], "b_curve": ("B_CURVE", {"nurbs": ("NURBS_CURVE", nurbs)})}
+    at = (0.4, 0.0, 2.0)
+    solid = turned(0.4, 0.4, 2.0)
+    trimmed = {"basis_curve": around, "sense": "-", "point_1": at, "point_2": at, "parm_1": 0.0, "parm_2": -1.0}
+    solid.edges[1] = (("TRIMMED_CURVE", trimmed), None, None)
+    found = facets_of(tmp_path, solid, 1e-4)
+    assert volume(*found) == pytest.approx(np.pi * 0.16 * 2.0, rel=1e-3)
 
 
 def test_bodies_are_found_by_name_and_part(tmp_path):
