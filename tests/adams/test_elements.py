@@ -149,6 +149,43 @@ def test_point_motion_and_general_constraint():
     np.testing.assert_allclose(result.request(2)[:, 2], 2 * (2 * rate**2 + 2 * x * curve), atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "motion",
+    ["FUNCTION=5*TIME+TIME**2", "VELOCITY,FUNCTION=5+2*TIME", "ACCELERATION,ICVEL=5,FUNCTION=2"],
+    ids=["angle", "velocity", "acceleration"],
+)
+@pytest.mark.parametrize("body", ["I=20,J=10", "I=20,J=11"], ids=["from zero", "from a quarter"])
+def test_a_third_angle_is_driven_through_whole_turns(body, motion):
+    """Both ends of a revolute joint: 14 rad, with the torque I a."""
+    given = BLOCK + f"MARKER/11,PART=1,REULER=-90D,0,0\nJOINT/1,REVOLUTE,I=20,J=10\nMOTION/1,B3,{body},{motion}\n"
+    moved = given.replace("FUNCTION=5", "FUNCTION=PI/2+5") if "," not in motion and "11" in body else given
+    result = run(model(moved + "REQUEST/1,F2=AZ(20,10)\\F3=WZ(20,10)\\F4=MOTION(1,0,8,10)"), 2.0)
+    t = result.t
+    np.testing.assert_allclose(result.request(1)[:, 1], 5 * t + t**2, atol=1e-7)
+    np.testing.assert_allclose(result.request(1)[:, 2], 5 + 2 * t, atol=1e-6)
+    np.testing.assert_allclose(result.request(1)[:, 3], 0.6, atol=1e-6)
+
+
+def test_the_first_two_angles_of_a_free_body_are_driven_by_their_velocities():
+    body = BLOCK + "MOTION/1,B1,VELOCITY,I=20,J=10,FUNCTION=4\nMOTION/2,B2,VELOCITY,I=20,J=10,FUNCTION=COS(TIME)\n"
+    body += "ACCGRAV/IGRAV=0\nREQUEST/1,F2=ORIENT(1,1,20,10)\\F3=ORIENT(1,2,20,10)\n"
+    result = run(model(body), 2.0)
+    first = np.unwrap(result.request(1)[:, 1])
+    np.testing.assert_allclose(first, 4 * result.t, atol=1e-7)
+    np.testing.assert_allclose(result.request(1)[:, 2], np.sin(result.t), atol=1e-7)
+
+
+@pytest.mark.parametrize("motion", ["JOINT=1,FUNCTION=3*TIME", "I=20,J=10,B3,FUNCTION=3*TIME"])
+def test_initial_conditions_of_a_driven_joint_give_way(motion):
+    body = BLOCK + f"JOINT/1,REVOLUTE,I=20,J=10,IC=0,6\nMOTION/1,{motion}\nREQUEST/1,F3=WZ(20,10)\n"
+    deck = parse_deck(model(body))
+    result = run_deck(deck, end=1.0, steps=2)
+    np.testing.assert_allclose(result.request(1)[:, 2], 3.0, atol=1e-7)
+    assert any("JOINT/1: IC is left out" in str(m) for m in result.messages)
+    agreeing = run_deck(parse_deck(model(body.replace("IC=0,6", "IC=0,3"))), end=1.0, steps=2)
+    assert not any("left out" in str(m) for m in agreeing.messages)
+
+
 def test_joint_initial_conditions():
     body = BLOCK + "JOINT/1,REVOLUTE,I=20,J=10,IC=30D,2\nREQUEST/1,F2=AZ(20,10)\\F3=WZ(20,10)\n"
     result = run(model(body + "ACCGRAV/IGRAV=0"), 1.0)

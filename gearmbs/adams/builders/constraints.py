@@ -174,17 +174,16 @@ def add_motion(b: Builder, s: st.Motion) -> None:
     name = b.model.names["motion", s.id]
     text = b.text(s.function or "")
     if s.joint is None:
-        measures = {"X": "DX", "Y": "DY", "Z": "DZ"}
-        if s.direction in measures:
-            shown = f"{measures[s.direction]}({s.i},{s.j},{s.j})"
-            start = _start(b, b.markers[s.i or 0], b.markers[s.j or 0], "XYZ".index(s.direction), False)
-        elif s.level in ("VELOCITY", "ACCELERATION"):
-            b.unsupported(s, f"{s.direction} of a motion given by its {s.level}")
-            return
+        i, j = b.markers[s.i or 0], b.markers[s.j or 0]
+        if s.direction in ("X", "Y", "Z"):
+            moved = _displacement(b, s, text, _start(b, i, j, "XYZ".index(s.direction), False))
+            apart = f"D{s.direction}({s.i},{s.j},{s.j}) - ({moved})"
         else:
-            shown = f"ORIENT(1,{(s.direction or 'B1')[1]},{s.i},{s.j})"
-            start = (0.0, 0.0)
-        b.mechanism.general_constraint(name, f"{shown} - ({_displacement(b, s, text, start)})")
+            axis = (s.direction or "B1")[1]
+            angle = f"(ORIENT(1,{axis},{s.i},{s.j}) - ({_displacement(b, s, text, _turned(b, i, j, int(axis)))}))"
+            # the angle begins anew after a turn
+            apart = f"{angle} - 2*PI*ANINT({angle}/(2*PI))"
+        b.mechanism.general_constraint(name, apart)
         return
     joint = b.joints.get(s.joint)
     if joint is None:
@@ -219,6 +218,18 @@ def _start(b: Builder, i: Marker, j: Marker, axis: int, rotational: bool) -> tup
     velocities = [m.velocity_at(m.global_position()) for m in (i, j)]
     rate = float(e @ (velocities[0] - velocities[1]) + apart @ np.cross(j.body.angular_velocity, e))
     return float(e @ apart) / b.units.length, rate / b.units.factor("velocity")
+
+
+def _turned(b: Builder, i: Marker, j: Marker, axis: int) -> tuple[float, float]:
+    """Return an angle of I in J by turns about the body's axes 1, 2 and 3, and its rate, in the deck's units."""
+    a = j.global_orientation().T @ i.global_orientation()
+    first = np.arctan2(-a[1, 2], a[2, 2])
+    second = np.arctan2(a[0, 2], np.hypot(a[0, 0], a[0, 1]))
+    angles = first, second, np.arctan2(-a[0, 1], a[0, 0])
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(first), np.sin(first)], a[:, 2]])
+    spin = j.global_orientation().T @ (i.body.angular_velocity - j.body.angular_velocity)
+    rates = np.linalg.lstsq(axes.T, spin, rcond=None)[0]
+    return float(angles[axis - 1]), float(rates[axis - 1]) / b.units.factor("angular_velocity")
 
 
 def _displacement(b: Builder, s: st.Motion, text: str, start: tuple[float, float]) -> str:

@@ -30,8 +30,8 @@ from gearmbs.mechanism.parts.modal import ModalBody
 def with_initial_motions(model: AdamsModel) -> dict[tuple[str, int], BodyState]:
     """Return the state in which every joint with initial conditions has them.
 
-    Speeds along curves that contradict the others are left out, with a remark in the deck: where something else
-    drives the point, there is no choice.
+    Speeds along curves, and conditions of joints that a MOTION drives, are left out, with a remark in the deck, if they
+    contradict the others: where something else drives the joint, there is no choice.
 
     Raises
     ------
@@ -39,21 +39,30 @@ def with_initial_motions(model: AdamsModel) -> dict[tuple[str, int], BodyState]:
         If those of joints cannot be met.
     """
     deck, sources = model.deck, model.sources
-    of_joints = [m for m in model.initial_motions if not isinstance(sources[m[0].name], st.Ptcv)]
-    along = [sources[m[0].name] for m in model.initial_motions if m not in of_joints]
-    if along:
+    driven = [sources[m[0].name] for m in model.initial_motions if _is_driven(deck, sources[m[0].name])]
+    free = [m for m in model.initial_motions if sources[m[0].name] not in driven]
+    if driven:
         try:
             return _started(model, model.initial_motions)
         except ModelError:
-            for s in along:
-                message = f"{s.label()}: VEL is left out: it contradicts other constraints, motions or initial speeds"
-                deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, s.given["vel"]))
+            for s in driven:
+                key = next(key for key in ("vel", "ic", "icrot", "ictran") if key in s.given)
+                message = f"{s.label()}: {key.upper()} is left out: it contradicts constraints, motions or other speeds"
+                deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, s.given[key]))
     try:
-        return _started(model, of_joints)
+        return _started(model, free)
     except ModelError as error:
-        joint = sources[of_joints[0][0].name] if of_joints else along[0]
+        joint = sources[free[0][0].name] if free else driven[0]
         message = f"{joint.label()}: its initial conditions cannot be met: {error}"
         raise DeckError([Diagnostic(ERROR, message, deck.file, joint.line)]) from error
+
+
+def _is_driven(deck: Deck, s: st.Statement) -> bool:
+    """Return whether a point on a curve, or a joint that a MOTION drives."""
+    if not isinstance(s, st.Joint):
+        return True
+    ends = {s.i, s.j}
+    return any(m.joint == s.id or (m.joint is None and {m.i, m.j} == ends) for m in deck.of(st.Motion).values())
 
 
 Motions = Sequence[tuple[Joint, str, tuple[float, ...]]]
