@@ -296,6 +296,21 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> Mesh:
     ModelError
         If the file cannot be read, holds no triangles, or its surface is not closed.
     """
+    vertices, triangles = read_triangles(path)
+    try:
+        return Mesh(scale * vertices, triangles)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def read_triangles(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices, in the file's unit of length, and triangles of a surface, which need not close.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read or holds no triangles.
+    """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -308,10 +323,7 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> Mesh:
         raise ModelError(f"{path}: it is not a whole {path.suffix} file: {error}") from None
     if len(triangles) == 0:
         raise ModelError(f"{path}: it holds no triangles")
-    try:
-        return Mesh(scale * vertices, triangles)
-    except ModelError as error:
-        raise ModelError(f"{path}: {error}") from None
+    return vertices, triangles
 
 
 def _stl(data: bytes) -> tuple[np.ndarray, np.ndarray]:

@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from gearmbs.adams import parse_view
+from gearmbs.adams import parse_view, read_view
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.view import solids
+from gearmbs.adams.view import masses, solids
 from tests.says import says
 
 CELLS = 120
@@ -228,3 +228,54 @@ def test_what_has_no_formula_is_refused_and_with_a_mass_runs():
     assert "center_of_mass_marker" in refused.unsupported[0].message
     given = parse_view(PART + MASSES % ("mass = 2 ixx = 1 iyy = 1 izz = 1 center_of_mass_marker = .m.P.A", csg)).deck
     assert not given.unsupported
+
+
+def unwelded_box(gap=0.0):
+    """A box of 2 by 3 by 4 as facets that share no corners: some turned inwards, one side a bit off the others."""
+    corners = np.array([[x, y, z] for x in (0, 2.0) for y in (0, 3.0) for z in (0, 4.0)])
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
+    places = corners[np.array([t[::-1] if k % 3 == 1 else t for k, t in enumerate(triangles)])]
+    places[-2:, :, 2] += gap
+    return places.reshape(-1, 3), np.arange(36).reshape(-1, 3)
+
+
+def test_facets_are_turned_outwards_whatever_gaps_are_between_them():
+    places, triangles = unwelded_box(gap=1e-5)
+    found, box = solids.polyhedron(places, masses.facing_outward(places, triangles)), solids.box(2, 3, 4)
+    assert found.volume == pytest.approx(box.volume, rel=1e-5)
+    assert found.first == pytest.approx(box.first, rel=1e-5)
+
+
+SHELL = """\
+marker create marker_name = .m.P.cm location = %s
+part create rigid_body mass_properties part_name = .m.P density = 2
+geometry create shape shell shell_name = .m.P.S reference_marker = .m.P.A file_name = "C:\\library\\HULL.shl"
+"""
+
+
+def shell_file(folder):
+    places, triangles = unwelded_box()
+    rows = [f"{len(places)} {len(triangles)} 1.000000", *(" ".join(f"{x:.6f}" for x in p) for p in places)]
+    rows += [f"3 {a + 1} {b + 1} {c + 1}" for a, b, c in triangles]
+    (folder / "hull.shl").write_text("\n".join(rows))
+
+
+def test_a_shell_counts_if_it_has_the_centre_that_the_file_gives(tmp_path):
+    shell_file(tmp_path)
+    path = tmp_path / "a.cmd"
+    path.write_text(PART + SHELL % "2, 1.5, 2")
+    deck = read_view(path).deck
+    assert deck.of(st.Part)[2].mass == pytest.approx(48.0)
+    assert deck.of(st.Part)[2].ip[:3] == pytest.approx(np.array([25.0, 20.0, 13.0]) * 48.0 / 12.0)
+    assert any(re.search(says(".m.P.S", "centre of mass"), str(d)) for d in deck.diagnostics)
+    path.write_text(PART + SHELL % "2, 1.5, 2.01")
+    assert re.search(says(".m.P", "shell", "center_of_mass_marker"), read_view(path).deck.unsupported[0].message)
+
+
+def test_a_shell_without_its_file_is_refused(tmp_path):
+    path = tmp_path / "a.cmd"
+    path.write_text(PART + SHELL % "2, 1.5, 2")
+    assert re.search(says("HULL.shl", ".m.P.S", "mass"), read_view(path).deck.unsupported[0].message)
+    (tmp_path / "hull.shl").write_text("8 12 1.0\n0 0 0\n")
+    assert re.search(says("hull.shl", "mass"), read_view(path).deck.unsupported[0].message)
