@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import roll_of_flanks
 from gearmbs.contact.kernel import relative_twist, slopes_of_sums, wheel_frame, wrench_of_sums
+from gearmbs.contact.law_kinds import LAW_IMPACT
 from gearmbs.contact.laws import normal_law
 from gearmbs.contact.loads import clear_sums, mirror
 from gearmbs.contact.pose import pose_rates, relative_pose
@@ -95,7 +95,7 @@ def side_spring(options, wheels, own, scratch, diagnostics, sign, want):
     if linear:
         force, by_depth, by_rate, elastic = k * depth + c * rate, k, c, k * depth
     else:
-        force, by_depth, by_rate, _, elastic = normal_law(L.LAW_IMPACT, k, 1.0, c, own[DEPTH], depth, rate)
+        force, by_depth, by_rate, _, elastic = normal_law(LAW_IMPACT, k, 1.0, c, own[DEPTH], depth, rate)
     energy = 0.5 * own[STIFFNESS] * depth * depth  # per relative stiffness
     diagnostics[ENERGY] += energy * share
     diagnostics[POWER] += (force - elastic) * rate

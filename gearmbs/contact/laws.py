@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.law_kinds import LAW_HUNT_CROSSLEY, LAW_IMPACT, LAW_KUWABARA_KONO
 from gearmbs.contact.records import inlined, kernel
 from gearmbs.dae.equations.loads.forces import friction_over_speed, impact, stored_energy
 
-LAW_HUNT_CROSSLEY = L.LAW_HUNT_CROSSLEY
 FRICTION_ADAMS = L.FRICTION_ADAMS
 MANTISSA = 52  # bits of a double's fraction
 ROOT_HALF = 0x3FE6A09E667F3BCD  # bits of the square root of a half
@@ -49,6 +49,18 @@ def power(x, e):
 
 
 @inlined
+def elastic_pressure(k, e, delta):
+    """Elastic part of the pressure at a positive penetration: the same of all laws."""
+    return k * delta if e == 1.0 else k * delta**e
+
+
+@inlined
+def damping_of_share(law, c, share):
+    """Return the damping where a share of the stiffness is at work: a force goes with it, a factor on one does not."""
+    return share * c if law == LAW_IMPACT else c
+
+
+@inlined
 def pressure(law, elastic, e, c, d, delta, rate):
     """Pressure per unit face width and its derivatives at a positive penetration from its elastic part.
 
@@ -62,6 +74,12 @@ def pressure(law, elastic, e, c, d, delta, rate):
         p = elastic * factor if pushes else 0.0
         p_delta = slope * factor if pushes else 0.0
         p_rate = elastic * c if pushes else 0.0
+    elif law == LAW_KUWABARA_KONO:
+        damped = elastic + c * slope * rate
+        pushes = damped > 0.0
+        p = damped if pushes else 0.0
+        p_delta = slope + c * (e - 1.0) * slope / delta * rate if pushes else 0.0
+        p_rate = c * slope if pushes else 0.0
     else:
         p, p_delta, p_rate = impact(elastic, slope, c, d, delta, rate)
     return p, p_delta, p_rate, energy, elastic
@@ -73,12 +91,13 @@ def normal_law(law, k, e, c, d, delta, rate):
 
     IMPACT is the paper's eq. (10) and (11) with the damping acting on the penetration rate and no adhesion:
     ``p = max(0, k delta^e + c STEP(delta, 0, 0, d, 1) rate)``. The Hunt-Crossley law is
-    ``p = max(0, k delta^e (1 + c rate))``. Linear and Hertz line contact are IMPACT with their own exponents.
+    ``p = max(0, k delta^e (1 + c rate))``, that of Kuwabara and Kono ``p = max(0, k delta^e + c d(k delta^e)/dt)``.
+    Linear and Hertz line contact are IMPACT with their own exponents.
 
     Parameters
     ----------
     law : int
-        One of ``layout.LAW_*``.
+        One of ``law_kinds.LAW_*``.
     k, e, c, d : float
         Stiffness, exponent, damping and penetration of full damping, per unit face width.
     delta, rate : float
@@ -90,8 +109,7 @@ def normal_law(law, k, e, c, d, delta, rate):
     """
     if delta <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0
-    elastic = k * delta if e == 1.0 else k * delta**e
-    return pressure(law, elastic, e, c, d, delta, rate)
+    return pressure(law, elastic_pressure(k, e, delta), e, c, d, delta, rate)
 
 
 @kernel

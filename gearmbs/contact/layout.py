@@ -59,7 +59,7 @@ def place(table: np.dtype, name: str) -> int:
 OPTIONS = record(
     ("teeth", 2),
     "slices",  # along the face; 1: a single plane at mid-face, no end effects
-    "law",  # one of LAW_*
+    "law",  # one of law_kinds.LAW_*
     "friction",  # one of FRICTION_*
     "drive",  # +1: wheel 1 drives turning positive about its z axis, -1: negative
     "load",  # one of LOAD_*
@@ -101,7 +101,7 @@ PAIR = record(
     "pitch",  # base pitch, m
     "stiffness",  # per unit face width, N/m^(1+e)
     "exponent",
-    "damping",  # per unit face width, N s/m^2 (IMPACT), or rate factor (Hunt-Crossley), s/m
+    "damping",  # per unit face width, N s/m^2, or a factor on the elastic force, see law_kinds.LAW_KINDS
     "damping_depth",  # penetration of full damping, m
     "static_friction",
     "dynamic_friction",
@@ -141,7 +141,6 @@ PARALLEL = record(
 """What two wheels on fixed parallel axes have all the time; see `gearmbs.contact.parallel.kernel`."""
 SLICES, FRICTION, LAW = place(OPTIONS, "slices"), place(OPTIONS, "friction"), place(OPTIONS, "law")
 
-LAW_IMPACT, LAW_HUNT_CROSSLEY = range(2)
 FRICTION_NONE, FRICTION_ADAMS, FRICTION_SMOOTH = range(3)
 LOAD_SLICES, LOAD_ADAMS = range(2)
 

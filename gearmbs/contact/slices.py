@@ -13,8 +13,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.laws import normal_law, power, pressure
+from gearmbs.contact.laws import damping_of_share, elastic_pressure, normal_law, power, pressure
 from gearmbs.contact.records import inlined, kernel, strip_at, summing
+from gearmbs.dae.equations.loads.forces import stored_energy
 from gearmbs.kernels.views import before
 
 POINTS = (0.1127016653792583, 0.5, 0.8872983346207417)
@@ -45,11 +46,8 @@ class Cut(NamedTuple):
 @inlined
 def law_of(options, wheels, soft):
     """Normal law of a tooth pair whose stiffness is a multiple of the nominal one."""
-    kind = options.law
-    c = wheels.damping
-    return Law(
-        kind, soft * wheels.stiffness, wheels.exponent, soft * c if kind == L.LAW_IMPACT else c, wheels.damping_depth
-    )
+    c = damping_of_share(options.law, wheels.damping, soft)
+    return Law(options.law, soft * wheels.stiffness, wheels.exponent, c, wheels.damping_depth)
 
 
 @inlined
@@ -355,7 +353,8 @@ def end_force(law, strip, i, width, u, sign, limit, pair, sums, want):
     delta = d0 + slope * u
     if delta <= 0.0:
         return
-    _, _, _, energy, elastic = normal_law(L.LAW_IMPACT, law.k, law.e, 0.0, 1.0, delta, 0.0)
+    elastic = elastic_pressure(law.k, law.e, delta)
+    energy = stored_energy(elastic, law.e, delta)
     grad, hess = limit.grad, limit.hess
     for m in range(6):
         sums.q[m] -= sign * energy * grad[m]

@@ -280,12 +280,6 @@ def _ideal(
     return kind.with_damping_ratio(pair, law.mean_mesh_stiffness, ratio, backlash=parting, **curves)
 
 
-LAWS: dict[str, Any] = {
-    "impact": ContactLaw.impact, "hunt-crossley": ContactLaw.hunt_crossley, "linear": ContactLaw.linear,
-    "hertz": ContactLaw.hertz_line,
-}  # fmt: skip
-
-
 def contact_law(value: Any, key: str = "kind") -> ContactLaw:
     """Return the law that a table such as ``{"kind": "linear", "stiffness": "3e8 N/m"}`` stands for, or a law itself.
 
@@ -304,7 +298,7 @@ def contact_law(value: Any, key: str = "kind") -> ContactLaw:
         return value
     table = dict(value)
     name = str(table.pop(key, "impact")).replace("_", "-")
-    return chosen(LAWS, name, "contact: ", DrivetrainError, key)(**table)
+    return chosen(ContactLaw.makers(), name, "contact: ", DrivetrainError, key)(**table)
 
 
 def flank_friction(value: Any) -> FlankFriction:

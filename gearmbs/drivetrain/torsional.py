@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import scipy.linalg
 
-from gearmbs.dae.equations.loads.time_functions import smooth_step
 from gearmbs.drivetrain.drives import SpeedDrive
 from gearmbs.drivetrain.part import errors_named, require
 from gearmbs.gears.ideal_mesh import IdealMesh
@@ -24,7 +23,6 @@ from gearmbs.kernels.jit import njit
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
-    from gearmbs.gears.mesh import ContactModel
 
 CURVE_POINTS = 200
 """Along the path of contact, for the mean of a stiffness that varies."""
@@ -380,7 +378,7 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
         curve = pair_stiffness(geometry, path)
         one *= float(curve.mean() / curve.max())
     stiffness = float(transverse * one * geometry.contact_ratio)
-    damping = float(transverse * _mesh_damping(law, force / share, face) * geometry.contact_ratio)
+    damping = float(transverse * law.tangent_damping(force / share, face) * geometry.contact_ratio)
     # an ideal mesh is one spring, however its wheels stand
     if geometry.misalignment and not isinstance(pair, IdealMesh):
         tilted = _tilted_stiffness(train, mesh, stiffness, force)
@@ -416,18 +414,6 @@ def _tilted_stiffness(train: Drivetrain, mesh: str, parallel: float, force: floa
         # faults of single teeth need not pass
         warnings.simplefilter("ignore")
         return float(loaded_transmission_error(pair, points=CYCLE_POINTS).stiffness.mean())
-
-
-def _mesh_damping(model: ContactModel, force: float, face: float) -> float:
-    """Return the damping of one tooth pair at its mean penetration, N s/m; without load that of half the depth.
-
-    ``face`` is the share of the face in mesh.
-    """
-    law = model.law
-    if law.kind == "hunt-crossley":
-        return law.damping * force
-    depth = model.penetration(force, share=face) if force > 0.0 else 0.5 * law.depth
-    return face * law.damping * smooth_step(depth / law.depth, 0)[1]
 
 
 # A chain of inertias and springs with backlash, integrated by the classical Runge-Kutta method.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.law_kinds import LAW_KINDS
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.dae.problem import ModelError
 from gearmbs.gears.mesh import Mesh
@@ -46,10 +47,9 @@ def law_settings(pair: Mesh) -> dict[str, Setting]:
     geometry, law = pair.geometry, pair.contact_model.law
     cosine = math.cos(geometry.wheels[0].base_helix_angle)
     stiff, damped = law_factors(pair.contact_model, geometry.narrower_face_width, cosine)
-    unit = "s/m" if law.kind == "hunt-crossley" else "N*s/m"
     return {
         "stiffness": Setting(L.place(L.PAIR, "stiffness"), f"N/m^{law.exponent:g}", stiff),
-        "damping": Setting(L.place(L.PAIR, "damping"), unit, damped),
+        "damping": Setting(L.place(L.PAIR, "damping"), LAW_KINDS[law.kind].damping_unit, damped),
     }
 
 

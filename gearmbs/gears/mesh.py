@@ -5,15 +5,18 @@ from __future__ import annotations
 import html
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import InitVar, dataclass, field
+from functools import partial
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from gearmbs._display import Written, html_table
+from gearmbs.contact.law_kinds import LAW_KINDS
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.modifications import Fault
 from gearmbs.units import Given, Quantity, shown, to_si, truth
+from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -22,8 +25,6 @@ if TYPE_CHECKING:
 
 # Contact and friction laws as users define them; the compiled forms are in ``gearmbs.contact.laws``.
 
-
-LawKind = Literal["impact", "hunt-crossley", "linear", "hertz"]
 
 DAMPING_RATIO = 0.07
 """Of a mesh where none is given: the geometric mean of 0.03 and 0.17, a range that is quoted for meshes of steel gears
@@ -39,31 +40,34 @@ gears carry; below it damping falls to nothing, so that flanks meet without a bl
 class ContactLaw(Written):
     """Normal force of one tooth pair over its face, against penetration and its rate.
 
-    Use the class methods; each states its own formula. ``stiffness`` and ``damping`` refer to the whole face of a
-    pair of parallel wheels whose faces stand opposite, that of the narrower one, and are distributed evenly over it:
-    what an axial shift takes out of mesh is missing.
+    Use the class methods; each states its own formula. Kinds without one are made by the class. ``stiffness`` and
+    ``damping`` refer to the whole face of a pair of parallel wheels whose faces stand opposite, that of the narrower
+    one, and are distributed evenly over it: what an axial shift takes out of mesh is missing.
 
     Attributes
     ----------
-    kind : {"impact", "hunt-crossley", "linear", "hertz"}
+    kind : str
+        One of `gearmbs.contact.law_kinds.LAW_KINDS`.
     stiffness : float or str
         K, N/m^exponent.
     exponent : float
     damping : float or str
-        C, N s/m; for Hunt-Crossley the factor on the penetration rate, s/m.
+        C, N s/m; for Hunt-Crossley the factor on the penetration rate, s/m; of others in the unit of their row.
     depth : float or str
-        Penetration at which the damping is fully on, m.
+        Penetration at which the damping is fully on, m; of laws whose damping is a factor on the elastic force, any.
     """
 
-    kind: LawKind
+    kind: str
     stiffness: Quantity
     exponent: float
     damping: Quantity
-    depth: Quantity
+    depth: Quantity = 1.0
 
     def __post_init__(self) -> None:
-        rate = "s/m" if self.kind == "hunt-crossley" else "N*s/m"
-        for name, unit in (("stiffness", f"N/m^{self.exponent!r}"), ("damping", rate), ("depth", "length")):
+        if self.kind not in LAW_KINDS:
+            raise ValueError(f"ContactLaw.kind is {self.kind!r}; choose {any_of(map(repr, LAW_KINDS))}")
+        units = f"N/m^{self.exponent!r}", LAW_KINDS[self.kind].damping_unit, "length"
+        for name, unit in zip(("stiffness", "damping", "depth"), units):
             object.__setattr__(self, name, to_si(getattr(self, name), unit, f"ContactLaw.{name}"))
         for name, low in (("stiffness", 0.0), ("exponent", 0.0), ("depth", 0.0)):
             value = getattr(self, name)
@@ -78,14 +82,24 @@ class ContactLaw(Written):
 
     def __str__(self) -> str:
         """Law, stiffness and damping in a line, in the units of a drawing."""
-        if self.kind == "hunt-crossley":
-            damping = f"Hunt-Crossley factor {self.damping:.4g} s/m"
-        elif self.damping == 0.0:
+        if self.damping == 0.0:
             damping = "no damping"
+        elif LAW_KINDS[self.kind].damps_by_factor:
+            damping = f"damping factor {self.damping:.4g} {LAW_KINDS[self.kind].damping_unit}"
         else:
             damping = f"damping {1e-3 * self.damping:.4g} N s/mm, fully on at {1e6 * self.depth:.4g} um"
         unit = "N/mm" if self.exponent == 1.0 else f"N/mm^{self.exponent:.4g}"
         return f"{self.kind}, {self.stiffness * 1e-3**self.exponent:.5g} {unit} a tooth pair, {damping}"
+
+    @property
+    def is_impact(self) -> bool:
+        """Whether it is ADAMS's IMPACT, with some stiffness and exponent."""
+        return LAW_KINDS[self.kind].is_impact
+
+    @classmethod
+    def makers(cls) -> dict[str, Callable[..., ContactLaw]]:
+        """Return by kind what makes a law from its settings."""
+        return {kind: getattr(cls, row.maker, partial(cls, kind)) for kind, row in LAW_KINDS.items()}
 
     @classmethod
     def impact(
@@ -324,6 +338,19 @@ class ContactModel(Written):
         ``share`` is that of the face in mesh, `face_share`.
         """
         return self.law.exponent * force / self.penetration(force, pairs, share)
+
+    def tangent_damping(self, force: float, share: float = 1.0) -> float:
+        """Damping along the line of action of one tooth pair under a normal force (N), N s/m.
+
+        ``share`` is that of the face in mesh, `face_share`. Without load it is that of half the depth of full damping.
+        """
+        from gearmbs.contact.laws import damping_of_share, normal_law
+
+        law, kind = self.law, LAW_KINDS[self.law.kind]
+        unloaded = 0.0 if kind.damps_by_factor else 0.5 * law.depth
+        depth = self.penetration(force, share=share) if force > 0.0 else unloaded
+        damping = damping_of_share(kind.code, law.damping, share)
+        return normal_law(kind.code, share * law.stiffness, law.exponent, damping, law.depth, depth, 0.0)[2]
 
 
 # How a pair of wheels is driven and loaded.

@@ -15,18 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.law_kinds import LAW_KINDS
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import ContactModel, Mesh
 from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, Fault, ToothDeviations
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 
-LAWS = {
-    "impact": L.LAW_IMPACT,
-    "hunt-crossley": L.LAW_HUNT_CROSSLEY,
-    "linear": L.LAW_IMPACT,
-    "hertz": L.LAW_IMPACT,
-}
 FRICTIONS = {"none": L.FRICTION_NONE, "adams": L.FRICTION_ADAMS, "smooth": L.FRICTION_SMOOTH}
 END_BLEND = 1e-6
 """Length over which the ends of two faces are blended where they tie, m."""
@@ -117,7 +112,7 @@ def _pack(pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int]:
     first, second = geometry.wheels
     integers["teeth"] = first.teeth, second.teeth
     integers["slices"] = slices
-    integers["law"] = LAWS[model.law.kind]
+    integers["law"] = LAW_KINDS[model.law.kind].code
     integers["friction"] = FRICTIONS[model.friction.kind]
     integers["drive"] = point.rotation
     integers["load"] = L.LOAD_ADAMS if model.load == "adams" else L.LOAD_SLICES
@@ -179,7 +174,7 @@ def _pack_laws(model: ContactModel, width: float, cosine: float, reals: np.void)
 def law_factors(model: ContactModel, width: float, cosine: float) -> tuple[float, float]:
     """Return what stands in the table for a unit of the law's stiffness and damping."""
     law = model.law
-    return cosine**law.exponent / width, cosine if law.kind == "hunt-crossley" else cosine / width
+    return cosine**law.exponent / width, LAW_KINDS[law.kind].section_damping(cosine, width)
 
 
 SPARE_PAIRS = 4

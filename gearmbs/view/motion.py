@@ -334,9 +334,7 @@ class ContactProbe:
         law = int(self.gi[layout.LAW])
         table = self.gr[: layout.PAIR.itemsize // self.gr.itemsize].view(layout.PAIR)[0]
         numbers = [float(table[name]) for name in ("stiffness", "exponent", "damping", "damping_depth")]
-        values = [
-            normal_law(law, numbers[0] * f, *numbers[1:], float(d), float(r))[0] for d, r, f in zip(depth, rate, factor)
-        ]
+        values = [f * normal_law(law, *numbers, float(d), float(r))[0] for d, r, f in zip(depth, rate, factor)]
         return np.array(values)
 
 

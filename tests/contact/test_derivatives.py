@@ -36,6 +36,10 @@ CASES = {
     "far apart": ({"centre_distance_error": "3 mm"}, 1),
     "smooth friction": ({"friction": FlankFriction(kind="smooth")}, 4),
     "Hunt-Crossley": ({"contact": ContactLaw.hunt_crossley(), "misalignment": "0.3 deg"}, 5),
+    "Kuwabara-Kono": (
+        {"contact": ContactLaw("kuwabara-kono", 1.1e9, 1.3, "20 us"), "misalignment": "0.3 deg"},
+        5,
+    ),
     "linear": ({"contact": ContactLaw.linear("1.3e8 N/m"), "misalignment": "0.3 deg"}, 5),
     "centroid load": ({"misalignment": "1 deg", "load": "adams"}, 9),
     "centroid load, parallel": ({"load": "adams"}, 4),

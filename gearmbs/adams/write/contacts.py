@@ -273,7 +273,7 @@ def normal_law_of(name: str, pair: GearPair) -> Impact:
     ModelError
     """
     law = pair.contact
-    if law.kind == "hunt-crossley":
+    if not law.is_impact:
         raise ModelError(f"gear contact '{name}': the law {law.kind!r} has no form in ADAMS; use ContactLaw.impact")
     return Impact(float(law.stiffness), law.exponent, float(law.damping), float(law.depth))
 

@@ -99,7 +99,7 @@ REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "GearPair.faults": (lambda pair: bool(pair.faults), SOLIDS),
     "GearSpec.helix_angle": (lambda pair: pair.driver.helix_angle != 0.0, f"spur wheels only; {SOLIDS}"),
     "ContactLaw.kind": (
-        lambda pair: pair.contact.kind == "hunt-crossley",
+        lambda pair: not pair.contact.is_impact,
         "it has no form in ADAMS; use ContactLaw.impact",
     ),
 }
