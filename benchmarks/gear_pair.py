@@ -12,6 +12,7 @@ from numba import njit
 
 from benchmarks.markdown import number, table
 from benchmarks.timing import seconds_per_call
+from gearmbs.dae.linalg.entry_lists import NEGLIGIBLE, NEGLIGIBLE_IN_NEWTON
 from gearmbs.dae.linalg.lu_plan import analyse
 from gearmbs.dae.linalg.sparse_lu import factor, new_factors
 from gearmbs.dae.linalg.sparse_lu import solve as substitute
@@ -103,7 +104,10 @@ def call_costs(solution) -> dict[str, float]:
         y[:] = solution.result.y[row]
         p.jacobian(float(solution.t[row]), y, yp, 1e5, vals, p.idata, p.rdata, work)
         # a run may end where the matrix is nearly singular; the cost is the same with a row set aside
-        plan = analyse(p.indptr, p.indices, vals, p.scale, drop=1e-9, counted=counted)
+        negligible = NEGLIGIBLE_IN_NEWTON[0] if p.small_entries else NEGLIGIBLE
+        plan = analyse(
+            p.indptr, p.indices, vals, p.scale, 1e-9, counted, negligible, p.small_entries, p.couplings
+        )  # fmt: skip
     factors = new_factors(plan)
     factor(plan, factors, vals)
     p.residual(t, y, yp, out, p.idata, p.rdata, work)

@@ -272,6 +272,8 @@ class DAEProblem:
     small_entries : bool
         Whether many entries of the Jacobian are small beside others, as second derivatives by modal coordinates beside
         the stiffness of the modes, so that a corrector converges without them.
+    couplings : ndarray of bool, optional
+        Entries of the pattern between the modes of a body: small ones of these are left out first.
     finite_rates : bool
         Whether no equation makes a rate infinite: steps are not looked at for poles that they have got over then, which
         costs two evaluations wherever an unknown turns against its prediction.
@@ -319,6 +321,7 @@ class DAEProblem:
     restart_rates: Callable | None = None
     jacobian_residuals: int = 0
     small_entries: bool = False
+    couplings: np.ndarray | None = None
     finite_rates: bool = False
     solved_at_outputs: np.ndarray | None = None
     solved_if_needed: np.ndarray | None = None

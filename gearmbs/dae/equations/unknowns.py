@@ -263,6 +263,15 @@ def velocities(at: dict[str, int]) -> np.ndarray:
     return np.concatenate([np.arange(at["u"], at["p"]), np.arange(at["eps"], at["R"])])
 
 
+def between_modes(at: dict[str, int], indptr: np.ndarray, indices: np.ndarray) -> np.ndarray:
+    """Return which entries of a CSC pattern are in the equation of one mode and by an unknown of another."""
+    mode, count = np.full(at["n"], -1), at["lambda"] - at["q_f"]
+    for block in MODAL:
+        mode[at[block] : at[block] + count] = np.arange(count)
+    row, column = mode[indices], np.repeat(mode, np.diff(indptr))
+    return (row >= 0) & (column >= 0) & (row != column)
+
+
 def scales(
     counts: Counts, formulation: int, bodies: np.ndarray, modes: np.ndarray, length: float, largest_force: float
 ) -> np.ndarray:

@@ -166,10 +166,14 @@ NEGLIGIBLE = 1e-13
 NEGLIGIBLE_IN_NEWTON = (1e-4, 1e-5, 1e-6)
 """The same of a Newton matrix with many small entries: the first with which the corrector converges without them, see
 `RATE_ALLOWED`."""
+COUPLING_LIMIT = 0.3
+"""Size up to which an entry between modes stays left out where the others do up to the first of these. At 1000 1/min
+those of a shaft, gyroscopic most of them, reach 1e-3."""
 WHEN_PLANNED = 0.01
 """Share of that size from which on an entry counts when a plan is made."""
 RATE_ALLOWED = 0.02
-"""Largest part of an error that a correction may leave for lack of these entries: the corrector expects no less."""
+"""Largest part of an error that one of the first two corrections may leave for lack of these entries: the corrector
+expects no less."""
 WORTH_LEAVING = 0.8
 """Largest share of entries that count with which the others are left out: fewer would not pay for looking at them."""
 FEWEST_ENTRIES = 200

@@ -16,9 +16,11 @@ from gearmbs.dae.linalg.dense_tail import (
     without_tail,
 )
 from gearmbs.dae.linalg.entry_lists import (
+    COUPLING_LIMIT,
     FIELDS_BY_COLUMNS,
     L_POS,
     NEGLIGIBLE,
+    NEGLIGIBLE_IN_NEWTON,
     WHEN_PLANNED,
     entry_lists,
     limits,
@@ -362,6 +364,7 @@ def analyse(
     counted: np.ndarray | None = None,
     negligible: float = NEGLIGIBLE,
     with_tail: bool = False,
+    couplings: np.ndarray | None = None,
 ) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
@@ -383,6 +386,9 @@ def analyse(
         Size of an entry of the equilibrated matrix up to which it may stay left out.
     with_tail : bool
         Whether the last pivots may be taken as a full block, as is worth it with modes.
+    couplings : ndarray of bool, optional
+        Entries that are left out up to `COUPLING_LIMIT`, unless they have counted before, if ``negligible`` is the
+        first of `NEGLIGIBLE_IN_NEWTON`.
 
     Returns
     -------
@@ -401,6 +407,8 @@ def analyse(
     n = len(indptr) - 1
     size = 3 * len(indices) + 4 * n
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted
+    spared = None if couplings is None or negligible < NEGLIGIBLE_IN_NEWTON[0] else couplings & ~counted
+    whole, vals = vals, vals if spared is None else np.where(spared, 0.0, vals)
     while True:
         columns, rows = new_lines(n, size)
         rank, *chosen = choose(indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, columns, rows)
@@ -412,4 +420,25 @@ def analyse(
     if rank < n and drop == 0.0:
         rows, cols = chosen[:2]
         raise SingularMatrixError(rows[rank:], cols[rank:])
-    return plan_from_pivots(with_tail, rank, *chosen)
+    plan = plan_from_pivots(with_tail, rank, *chosen)
+    if spared is None or not len(plan.limit):
+        return plan
+    plan.limit[spared] *= COUPLING_LIMIT / negligible
+    large = spared & (np.abs(whole) > WHEN_PLANNED * plan.limit)
+    if not large.any():
+        return plan
+    counted |= large
+    return analyse(indptr, indices, whole, scale, drop, counted, negligible, with_tail, couplings)
+
+
+def parity(order: np.ndarray) -> float:
+    """Return 1 for an even permutation and -1 for an odd one."""
+    seen, sign = np.zeros(len(order), dtype=bool), 1.0
+    for first in range(len(order)):
+        at, length = first, 0
+        while not seen[at]:
+            seen[at] = True
+            at, length = int(order[at]), length + 1
+        if length and length % 2 == 0:
+            sign = -sign
+    return sign

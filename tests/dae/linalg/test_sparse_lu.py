@@ -6,6 +6,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gearmbs.dae.linalg.entry_lists import NEGLIGIBLE_IN_NEWTON
 from gearmbs.dae.linalg.lu_plan import SingularMatrixError, analyse, new_lines
 from gearmbs.dae.linalg.pivoting import GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors, solve
@@ -286,6 +287,38 @@ def test_negligible_entries_are_left_out_until_they_count(n):
     np.testing.assert_allclose(whole @ x, b, rtol=1e-12)
     vals[plan.left_src[0]] = np.nan
     assert factor(plan, factors, vals) == np.inf
+
+
+@pytest.mark.parametrize("negligible", NEGLIGIBLE_IN_NEWTON[:2])
+def test_couplings_are_left_out_with_the_first_limit_until_they_are_large(negligible):
+    """Of five couplings one is too large from the start; those left out may grow to `COUPLING_LIMIT`."""
+    n, rng = 30, np.random.default_rng(5)
+    a = np.diag(rng.uniform(1.0, 1.5, n)) + np.diag(rng.uniform(0.3, 0.5, n - 1), 1)
+    couplings = np.zeros((n, n), dtype=bool)
+    for k, size in enumerate((1e-3, 5e-4, 1e-3, 2e-3, 0.05)):
+        a[20 + k, k], couplings[20 + k, k] = size, True
+    # others of the same size count
+    a[5, 25] = 1e-3
+    a[a == 0.0] = 1e-9
+    indptr, indices, vals = csc(a)
+    between, counted = couplings.T.ravel(), np.zeros(n * n, dtype=bool)
+    plan = analyse(indptr, indices, vals, np.ones(n), 0.0, counted, negligible, couplings=between)
+    small = between & (np.abs(vals) < 0.01)
+    leaves = negligible == NEGLIGIBLE_IN_NEWTON[0]
+    assert not counted[small].any() if leaves else counted[between].all()
+    assert counted[between & ~small].all()
+    assert counted[vals == a[5, 25]].any()
+    factors = new_factors(plan)
+    assert factor(plan, factors, vals) < GROWTH_LIMIT
+    grown = int(np.flatnonzero(small)[0])
+    vals[grown] = 0.1
+    assert factor(plan, factors, vals) < GROWTH_LIMIT
+    if leaves:
+        vals[grown] = 1.0
+        assert factor(plan, factors, vals) == np.inf
+        plan = analyse(indptr, indices, vals, np.ones(n), 0.0, counted, negligible, couplings=between)
+        assert counted[grown]
+        assert factor(plan, new_factors(plan), vals) < GROWTH_LIMIT
 
 
 def test_what_only_rounding_keeps_from_being_singular_is_not_left_out():
