@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, int64, types
 
+from gearmbs.dae.integrators.differences import colour_columns
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
@@ -36,11 +37,13 @@ _BOOLS = types.boolean[:, ::1]
 
 
 @njit(
-    types.boolean(FUNCTIONS_TYPE, float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
+    types.boolean(
+        FUNCTIONS_TYPE, float64, _VEC, _VEC, _VEC, _IVEC, _IVEC, _IVEC, _IVEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC
+    ),
     cache=True,
 )
-def _probe(functions, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
-    """Mark which rows each unknown and each rate changes at one point.
+def _probe(functions, t, y, yp, sizes, indptr, indices, columns, groups, by_y, by_rate, idata, rdata, work):
+    """Mark which rows each unknown and each rate changes at one point, those moved together that share no row.
 
     Parameters
     ----------
@@ -50,6 +53,10 @@ def _probe(functions, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
         The point.
     sizes : ndarray, shape (n,)
         Least sizes that unknowns are changed by a part of.
+    indptr, indices : ndarray of int64
+        CSC pattern of the matrix.
+    columns, groups : ndarray of int64
+        Unknowns that are moved together, one group after the other, and where these begin and end.
     by_y, by_rate : ndarray of bool, shape (n, n)
         Marked where row i changes with unknown, or rate, j; marks that are there stay.
     idata, rdata, work : ndarray
@@ -66,17 +73,21 @@ def _probe(functions, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
     if not np.isfinite(base).all():
         return False
     y_moved, yp_moved = y.copy(), yp.copy()
-    for j in range(n):
-        y_moved[j] = y[j] + PROBE * max(abs(y[j]), sizes[j])
+    for g in range(groups.shape[0] - 1):
+        together = columns[groups[g] : groups[g + 1]]
+        for j in together:
+            y_moved[j] = y[j] + PROBE * max(abs(y[j]), sizes[j])
         functions.residual(t, y_moved, yp, moved, idata, rdata, work)
-        y_moved[j] = y[j]
-        for i in range(n):
-            by_y[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
-        yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
+        for j in together:
+            y_moved[j] = y[j]
+            for i in indices[indptr[j] : indptr[j + 1]]:
+                by_y[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
+            yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
         functions.residual(t, y, yp_moved, moved, idata, rdata, work)
-        yp_moved[j] = yp[j]
-        for i in range(n):
-            by_rate[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
+        for j in together:
+            yp_moved[j] = yp[j]
+            for i in indices[indptr[j] : indptr[j + 1]]:
+                by_rate[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
     return True
 
 
@@ -93,9 +104,16 @@ def dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
     y, yp = problem.y0.astype(float), problem.yp0.astype(float)
     away = np.where(yp == 0.0, PROBE_OF_RATE * generic, yp)
     functions = bind(problem.residual, problem.jacobian, no_hook, no_events)
+    pattern = np.asarray(problem.indptr, dtype=np.int64), np.asarray(problem.indices, dtype=np.int64)
+    colours = np.empty(n, dtype=np.int64)
+    count = colour_columns(*pattern, colours)
+    columns = np.argsort(colours, kind="stable").astype(np.int64)
+    groups = np.searchsorted(colours[columns], np.arange(count + 1)).astype(np.int64)
     places = [(y, yp)] + [(np.where(y == 0.0, part * np.abs(problem.scale) * generic, y), away) for part in GENERIC]
     for k, place in enumerate(places):
-        found = direct(_probe)(functions, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
+        found = direct(_probe)(
+            functions, float(problem.t0), *place, sizes, *pattern, columns, groups, by_y, by_rate, idata, rdata, work
+        )
         if k > 0 and found:
             break
     return by_y, by_rate
@@ -166,7 +184,7 @@ class Graph:
 
     def __init__(self, *lists: np.ndarray) -> None:
         self.lists = lists
-        self._content = tuple(items.tobytes() for items in lists)
+        self._content = tuple((np.packbits(items) if items.dtype == bool else items).tobytes() for items in lists)
 
     def __hash__(self) -> int:
         return hash(self._content)

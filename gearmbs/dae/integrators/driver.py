@@ -137,7 +137,7 @@ class Run:
                 with_tail=problem.small_entries, couplings=problem.couplings,
             )  # fmt: skip
             st.gamma_planned = st.gamma
-            st.plan_sign = parity(self.plan.row_from) * parity(self.plan.col_to)
+            st.plan_sign = direct(parity)(self.plan.row_from) * direct(parity)(self.plan.col_to)
         except SingularMatrixError as error:
             if st.drop_failed and st.singular_fails < SINGULAR_RETRIES:
                 self._retry_smaller()

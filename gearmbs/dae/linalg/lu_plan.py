@@ -431,14 +431,15 @@ def analyse(
     return analyse(indptr, indices, whole, scale, drop, counted, negligible, with_tail, couplings)
 
 
-def parity(order: np.ndarray) -> float:
+@njit(float64(_UVEC), cache=True, nogil=True, error_model="numpy")
+def parity(order):
     """Return 1 for an even permutation and -1 for an odd one."""
-    seen, sign = np.zeros(len(order), dtype=bool), 1.0
-    for first in range(len(order)):
-        at, length = first, 0
+    seen, sign = np.zeros(order.shape[0], dtype=np.bool_), 1.0
+    for first in range(order.shape[0]):
+        at, length = np.int64(first), 0
         while not seen[at]:
             seen[at] = True
-            at, length = int(order[at]), length + 1
-        if length and length % 2 == 0:
+            at, length = np.int64(order[at]), length + 1
+        if length > 0 and length % 2 == 0:
             sign = -sign
     return sign
