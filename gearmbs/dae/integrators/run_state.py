@@ -153,6 +153,10 @@ class RunState(Struct):
     blocks: int  # blocks of points tried behind it, see `restart.take_block`
     h_block: float  # distance of the points of the next one
     since_refused: int  # steps since the error test refused one
+    turned: int  # place of the input whose line has turned last, -1 for none
+    turn_moves: float  # tolerances that points move by for a turn of one, at the reach of the points then
+    turn_reach: float
+    turns_trusted: int  # turns since that was found
     # the open step
     open: bool  # its row is taken
     t_old: float

@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.problem import EPS, INPUT, ModelError, Number, cells_of
+from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED, ON_LINE
+from gearmbs.dae.problem import INPUT, ModelError, Number, cells_of
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.wording import did_you_mean
-
-ON_LINE = 8.0 * EPS
-"""Part of its value by which an input may leave a line by rounding alone."""
 
 
 class Change(NamedTuple):
@@ -49,6 +47,9 @@ class Settings:
         Inputs on a line, and when it ends.
     waiting : dict of str to (float, int)
         What has been set and has not taken effect: value and hold.
+    plain : dict of str to ndarray of int
+        Inputs that stand nowhere as integrals, and all their places among the cells: of the time before the
+        coefficients, and the number of these.
     """
 
     def __init__(self, numbers: Mapping[str, Number], aliases: Mapping[str, str], parts: Mapping[str, Any]) -> None:
@@ -57,18 +58,20 @@ class Settings:
         # the same numbers where these cells alone are a table
         self._own = {name: number.moved_to(self.cells) for name, number in numbers.items()}
         self._inputs = [name for name, number in numbers.items() if number.kind == INPUT]
+        self.plain = {
+            name: np.array([(place.at, place.size) for place in self._own[name].places])
+            for name in self._inputs
+            if not numbers[name].prescribes and all(p.size and p.order == 0 for p in numbers[name].places)
+        }
         self.waiting: dict[str, tuple[float, int]] = {}
         self.led: dict[str, float] = {}
-        self._put(np.empty(self.cells.size))
+        self.held = np.empty(self.cells.size)
 
     def begin(self, rdata: np.ndarray, t: float) -> None:
         """Take what stands in a table; lines end at its time, ``t``."""
-        self._put(rdata[self.cells])
+        self.held = rdata[self.cells]
         self.waiting.clear()
-        self.led = {name: t for name in self._inputs if self._own[name].slope(self._table) != 0.0}
-
-    def _put(self, values: np.ndarray) -> None:
-        self.held, self._table = values, values.tolist()
+        self.led = {name: t for name in self._inputs if self._own[name].line(self.held, t)[1] != 0.0}
 
     def number(self, name: str) -> Number:
         """Return what is set under a name; raise a ModelError if there is nothing."""
@@ -109,7 +112,7 @@ class Settings:
         """Return the present value of an input or a parameter, the one that was set last."""
         name = self.number(name).name
         value, hold = self.waiting.get(name, (0.0, 1))
-        return self._own[name].value(self._table, t) if hold == 1 else value
+        return self._own[name].value(self.held, t) if hold == 1 else value
 
     def on_the_way(self, t: float) -> str | None:
         """Return an input that is led to a value which it has not reached, None without one."""
@@ -117,10 +120,29 @@ class Settings:
         led += [name for name, end in self.led.items() if end > t and name not in self.waiting]
         return led[0] if led else None
 
+    def plainly_set(self) -> tuple[str, np.ndarray, float, int] | None:
+        """Return name, places, value and hold if one of ``plain`` alone is waiting and no line of another may end."""
+        if len(self.waiting) != 1:
+            return None
+        name, (value, hold) = next(iter(self.waiting.items()))
+        places = self.plain.get(name)
+        if places is None or (self.led and (len(self.led) > 1 or name not in self.led)):
+            return None
+        return name, places, value, hold
+
+    def has_taken(self, name: str, end: float, code: int, held: np.ndarray) -> None:
+        """Note that it has taken effect, see `gearmbs.dae.integrators.stepping.jumps.steer`."""
+        self.waiting.clear()
+        if code & CHANGED:
+            self.held = held
+        if code & LED:
+            self.led[name] = end
+        elif self.led:
+            self.led.clear()
+
     def take(self, t: float, end: float) -> Change | None:
         """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""
-        waiting, before = self.waiting, self._table
-        after = before.copy()
+        waiting, before, after = self.waiting, self.held, self.held.copy()
         loads, jumps, leads, prescribes = True, False, False, False
         ended = [name for name, last in self.led.items() if last <= t and name not in waiting] if self.led else ()
         for name in (*waiting, *ended):
@@ -143,5 +165,5 @@ class Settings:
         waiting.clear()
         if not (jumps or leads):
             return None
-        self._put(np.array(after))
+        self.held = after
         return Change(self.held, loads, jumps, leads, prescribes)

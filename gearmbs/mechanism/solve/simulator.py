@@ -398,6 +398,8 @@ class Simulator(Told):
         """Let what has been set take effect at the present time; lines that were set end at ``end``."""
         own = self.__dict__
         settings, run = own["_settings"], own["_run"]
+        if not own["_functions"] and self._steer(end):
+            return
         change = settings.take(own["t"], end)
         if change is None:
             return
@@ -408,6 +410,21 @@ class Simulator(Told):
         with raised_errors(self._functions) if self._functions else NOTHING:
             run.change(own["_point"], settings.cells, change)
         own["_took"] += perf_counter() - began
+
+    def _steer(self, end: float) -> bool:
+        """Let what has been set take effect in one compiled call, where it is one input of loads; return that."""
+        own = self.__dict__
+        settings, point, began = own["_settings"], own["_point"], perf_counter()
+        plain = settings.plainly_set()
+        if plain is None:
+            return False
+        name, places, value, hold = plain
+        done = own["_run"].steer(point, places, value, end if hold else point[0], settings.cells)
+        if done is None:
+            return False
+        settings.has_taken(name, end, *done)
+        own["_took"] += perf_counter() - began
+        return True
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""

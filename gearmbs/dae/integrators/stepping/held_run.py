@@ -18,7 +18,7 @@ from gearmbs.dae.integrators.driver import FIRST_CHUNK, InterruptFlag, Run, Stal
 from gearmbs.dae.integrators.events import SAMPLES
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
-from gearmbs.dae.integrators.stepping.jumps import TERMS, pass_jump
+from gearmbs.dae.integrators.stepping.jumps import CHANGED, TERMS, pass_jump, steer
 from gearmbs.dae.integrators.stepping.memory import Held, LastStep, Layout, put_memory, value_in
 from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, reach, stand_behind
 from gearmbs.dae.problem import EPS, DAEProblem
@@ -121,7 +121,8 @@ class HeldRun(Run):
         self._given: tuple[int, LastStep] | None = None
         self._jumped: tuple[int, float, Rows, int] | None = None
         """Steps, time and point behind which numbers of the equations have changed."""
-        self._scratch: np.ndarray | None = None
+        self._scratch = np.empty((TERMS + 3, problem.n))
+        self._pass_jump, self._steer = direct(pass_jump), direct(steer)
         self.layout: Layout | None = None
         self.crossings: list[tuple[float, int]] = []
         """Times and events in the last step."""
@@ -289,11 +290,22 @@ class HeldRun(Run):
                 st.window_y[first * n : (first + count) * n] = last.rows.ravel()
         if not (kept and loads):
             st.matrix_wanted = True
-        if self._scratch is None:
-            self._scratch = np.empty((TERMS + 3, len(st.y)))
-            self._pass_jump = direct(pass_jump)
         self._pass_jump(
-            self.functions, st, self.plan, self.factors, t, y, yp, cells, values, jumps, leads, kept, self._scratch
+            self.functions,
+            st,
+            self.plan,
+            self.factors,
+            t,
+            y,
+            yp,
+            cells,
+            values,
+            jumps,
+            leads,
+            kept,
+            -1,
+            0.0,
+            self._scratch,
         )
         if not kept:
             self.last_records.forget_changes()
@@ -304,6 +316,33 @@ class HeldRun(Run):
             self.problem.events(t, st.y, st.yp, st.g_old, st.idata, st.rdata, st.work)
             # what has just passed does so once
             st.g_old[fired] = 0.0
+
+    def steer(
+        self, point: tuple, places: np.ndarray, value: float, end: float, cells: np.ndarray
+    ) -> tuple[int, np.ndarray] | None:
+        """Do the same for an input that only loads depend on, see `jumps.steer`.
+
+        Returns
+        -------
+        (int, ndarray) or None
+            The code, and what stands in the cells then; None where that has to be done by `change`.
+        """
+        st = self.state
+        steps, given = st.steps, self._given
+        if not steps or st.n_events:
+            return None
+        told = self.last_records.changed_at == steps or (given is not None and given[0] == steps)
+        if told and not np.array_equal(self._last_step().idata, st.idata):
+            return None
+        t, rows, row = point[0], point[1], point[2]
+        values = np.empty(len(cells))
+        code = self._steer(
+            self.functions, st, self.plan, self.factors, t, rows.y[row], rows.yp[row], places, value, end, cells,
+            values, self._scratch,
+        )  # fmt: skip
+        if code & CHANGED:
+            self._given, self._jumped = None, (steps, t, rows, row)
+        return code, values
 
     def history(self, equations: str) -> History:
         """Return what the next steps of these equations depend on; a run that has not been started has nothing yet."""

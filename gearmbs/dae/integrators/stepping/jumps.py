@@ -33,30 +33,39 @@ from gearmbs.dae.integrators.corrector import renew_weights, weighted_max
 from gearmbs.dae.integrators.run_state import STATE_TYPE, copy, record_history, rows_from, times_from
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
+from gearmbs.dae.problem import EPS
 from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
 from gearmbs.kernels.jit import njit
 
 TERMS = 4
 """Terms of the series at most: with six a stiff contact takes the same steps beyond its jumps."""
-SPARE = 3
-"""Points behind more than the order that the past keeps: two for a rise of the order."""
+SPARE = 2
+"""Points behind more than the order that the past keeps, for a rise of the order."""
 UNSEEN = 0.2
-"""Tolerances by which a term may move the points that the present order takes, and be left out with all that follow."""
+"""Tolerances by which a term may move the points that the present order takes, and be left out with all that follow. Of
+lines, of which many turn one way, 2^-k: differences of order k + 1 amplify it by as much."""
+TRUSTED = 16
+"""Turns of a line that are foretold to be unseen, by half as much, before one is looked at again."""
 CLOSE = 0.05
 """Part of the step before below which the point of a jump replaces the one behind it: differences over a shorter
 distance would amplify what the polynomial through both is off by."""
+ON_LINE = 8.0 * EPS
+"""Part of its value by which an input may leave a line by rounding alone."""
+CHANGED = 1
+LED = 2
+"""What `steer` returns, added up."""
 
 _VEC = float64[::1]
 
 
 @njit(
     types.void(FUNCTIONS_TYPE, STATE_TYPE, PLAN_TYPE, FACTORS_TYPE, float64, _VEC, _VEC, int64[::1], _VEC, boolean,
-               boolean, boolean, float64[:, ::1]),
+               boolean, boolean, int64, float64, float64[:, ::1]),
     cache=True,
     nogil=True,
     error_model="numpy",
 )  # fmt: skip
-def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, follows, g):
+def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, follows, place, turn, g):
     """Cut the last step back to ``t``, change numbers of the equations there, and the past along with them.
 
     Parameters
@@ -75,6 +84,10 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
         Whether the equations change at once, b_0, and whether the change grows with the time, b_1.
     follows : bool
         Whether factors and past are of use: else the past is left to the test of the step.
+    place : int
+        Of the one input whose line turns, -1 where more change.
+    turn : float
+        By how much its rate jumps.
     g : ndarray, shape (TERMS + 3, n)
         Scratch.
     """
@@ -94,6 +107,9 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     terms = min(max(st.order, 1), TERMS)
     # points further back serve no step to come
     st.n_past = min(st.n_past, st.order + SPARE)
+    reach = t - times[min(st.order + 1, st.n_past - 1)]
+    if place >= 0 and not jumps and _foresees(st, place, turn, reach):
+        follows = False
     first, later, d = g[TERMS], g[TERMS + 1], g[TERMS + 2]
     theta = st.h
     if follows and leads:
@@ -116,7 +132,9 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     if follows and leads:
         for i in range(n):
             later[i] /= theta
-        _follow(st, plan, factors, t, later, d, g, terms, True)
+        moves = _follow(st, plan, factors, t, later, d, g, terms, True)
+        if place >= 0 and not jumps:
+            st.turned, st.turn_moves, st.turn_reach, st.turns_trusted = place, moves / turn, reach, 0
     if follows:
         st.residuals += int(jumps) * (1 + int(leads)) + 2 * int(leads)
     copy(st.yp, st.yp_start)
@@ -127,6 +145,89 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     st.passing = True
     st.n_records = 0
     record_history(st, 0)
+
+
+@njit(
+    int64(FUNCTIONS_TYPE, STATE_TYPE, PLAN_TYPE, FACTORS_TYPE, float64, _VEC, _VEC, int64[:, ::1], float64, float64,
+          int64[::1], _VEC, float64[:, ::1]),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)  # fmt: skip
+def steer(bound, st, plan, factors, t, y, yp, places, value, end, cells, values, g):
+    """Let an input that only loads depend on jump to a value, or go there evenly from where it is: see `pass_jump`.
+
+    Parameters
+    ----------
+    bound, st, plan, factors, t, y, yp, cells, g
+        As there.
+    places : ndarray of int, shape (p, 2)
+        Its places among the cells: of the time before the coefficients, and the number of these.
+    value, end : float
+        Where it goes, and when it is there: ``t`` for a jump.
+    values : ndarray
+        Written: what stands in the cells then.
+
+    Returns
+    -------
+    code : int
+        CHANGED where it was not so before, and LED where it has a rate.
+    """
+    for k in range(cells.shape[0]):
+        values[k] = st.rdata[cells[k]]
+    at = places[0, 0]
+    slope_before = values[at + 2]
+    now = values[at + 1] + slope_before * (t - values[at])
+    slope, jumps = 0.0, value != now
+    if end > t:
+        slope, jumps = (value - now) / (end - t), False
+        if abs(slope - slope_before) * (end - t) <= ON_LINE * max(abs(now), abs(value)):
+            # the line goes on
+            slope = slope_before
+    leads = slope != slope_before
+    if jumps or leads:
+        for p in range(places.shape[0]):
+            at = places[p, 0]
+            values[at], values[at + 1] = t, now if end > t else value
+            if places[p, 1] > 1:
+                values[at + 2] = slope
+        pass_jump(
+            bound,
+            st,
+            plan,
+            factors,
+            t,
+            y,
+            yp,
+            cells,
+            values,
+            jumps,
+            leads,
+            True,
+            places[0, 0],
+            abs(slope - slope_before),
+            g,
+        )
+    return CHANGED * int(jumps or leads) + LED * int(slope != 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _unseen_turn(st):
+    """Return the tolerances by which a turn of a line may move points, and be left out."""
+    return min(UNSEEN, 0.5**st.order)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _foresees(st, place, turn, reach):
+    """Return whether a turn of a line will not be seen, by what was found at one of the same input lately.
+
+    It moves the points in proportion, and by the square of their distance in velocities, by its cube in positions.
+    """
+    if place != st.turned or st.turns_trusted >= TRUSTED:
+        return False
+    longer = reach / st.turn_reach
+    st.turns_trusted += 1
+    return st.turn_moves * turn * longer * longer * max(longer, 1.0) <= 0.5 * _unseen_turn(st)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -145,6 +246,11 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
         Terms of the Laguerre series.
     integrated : int
         Whether the jump is one of the rate.
+
+    Returns
+    -------
+    moves : float
+        Tolerances by which it moves the points at most.
     """
     n = st.y.shape[0]
     gamma = st.gamma_factored
@@ -153,13 +259,15 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
     st.solves += 1
     for i in range(n):
         d[i] = -d[i]
-    # the furthest point that the order takes; Laguerre polynomials grow with the distance
-    reach = t - times[min(st.order, st.n_past - 1)]
+    # the furthest point that the order takes, and of lines, of which more are to come, a higher one; Laguerre
+    # polynomials grow with the distance
+    reach = t - times[min(st.order + int(integrated), st.n_past - 1)]
     scale = reach if integrated else 1.0
     low, high = 1.0, 1.0 + gamma * reach
+    moves, unseen = scale * high * weighted_max(d, st.w_error), _unseen_turn(st) if integrated else UNSEEN
     for m in range(terms):
         before = d if m == 0 else g[m - 1]
-        if scale * high * weighted_max(before, st.w_error) <= UNSEEN:
+        if scale * high * weighted_max(before, st.w_error) <= unseen:
             terms = m
             break
         low, high = high, ((2.0 * m + 3.0 + gamma * reach) * high - (m + 1.0) * low) / (m + 2.0)
@@ -198,3 +306,4 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
         for m in range(terms):
             for i in range(n):
                 st.yp[i] += gamma * (m + 1.0) * g[m, i] * st.differential[i]
+    return moves
