@@ -29,7 +29,6 @@ from gearmbs.signals.files.table import (
 from gearmbs.signals.signal.record import Record
 from tests.docs.support import DOCS
 from tests.says import says
-from tests.signals.test_io import assert_same, example
 
 PACKAGE = Path(gm.__file__).parent
 MARK = b"FAKE"
@@ -134,20 +133,6 @@ def test_rows_fit_together():
     assert len(known_endings()) == sum(len(row.endings.split()) for row in TABLE.values())
     with pytest.raises(ValueError, match=says("endings", "X", "'xyz'", "'.abc'")):
         Row("X", "x", ".x xyz")
-
-
-NEEDED = {"tdms": "nptdms", "uff58": "pyuff", "parquet": "pyarrow"}
-
-
-@pytest.mark.parametrize("name", [name for name in TABLE if format_of(name).write])
-def test_formats_keep_what_they_say(name, tmp_path):
-    if name in NEEDED:
-        pytest.importorskip(NEEDED[name])
-    ending = next((e for e in TABLE[name].endings.split() if e in written_endings()), ".bin")
-    known = format_of(name)
-    back = read_signal(write_signal(example(), tmp_path / f"x{ending}", format=name), format=name)
-    assert_same(back, example(), attrs=known.keeps_attributes)
-    assert ("place" in back.attrs) == known.keeps_attributes
 
 
 def test_the_page_shows_the_table(monkeypatch):

@@ -24,24 +24,23 @@ from gearmbs.signals import (
     units_of,
     write_signal,
 )
+from gearmbs.signals.files.formats import written_endings
+from gearmbs.signals.files.table import TABLE, format_of
 from tests.generators import cases, seed
 from tests.says import says
 
-NAMES = {
-    "csv": "x.csv",
-    "csv.gz": "x.csv.gz",
-    "mat5": "x.mat",
-    "mat7.3": "x73.mat",
-    "uff58": "x.uff",
-    "wav": "x.wav",
-    "netcdf": "x.nc",
-    "hdf5": "x.h5",
-    "tdms": "x.tdms",
-}
-KEEPS_ATTRS = set(NAMES) - {"uff58"}
+
+def file_name(format: str) -> str:
+    """Return a name of a file of a format; of one without an ending that of another whose files may hold the same."""
+    own, held = TABLE[format].endings, {*format_of(format).also}
+    others = [row.endings for name, row in TABLE.items() if held & {*format_of(name).also}]
+    return "x" + next(ending for ending in (own or " ".join(others)).split() if ending in written_endings())
 
 
-EXTRAS = {"tdms": "nptdms", "uff58": "pyuff"}
+NAMES = {format: file_name(format) for format in TABLE if format_of(format).write}
+KEEPS_ATTRS = {format for format in NAMES if format_of(format).keeps_attributes}
+EXTRAS = {"tdms": "nptdms", "uff58": "pyuff", "parquet": "pyarrow", "feather": "pyarrow"}
+"""Libraries that are optional."""
 
 
 @pytest.fixture(autouse=True)
@@ -521,14 +520,10 @@ def turning(n=600):
     )
 
 
-@pytest.mark.parametrize("format", [*NAMES, "npy", "parquet"])
+@pytest.mark.parametrize("format", NAMES)
 def test_speed_and_angle_over_time_read_back(tmp_path, format):
-    if format == "parquet":
-        pytest.importorskip("pyarrow")
     signal = turning()
-    path = write_signal(
-        signal, tmp_path / {"npy": "x.npz", "parquet": "x.pq"}.get(format, NAMES.get(format)), format=format
-    )
+    path = write_signal(signal, tmp_path / NAMES[format], format=format)
     for back in (read_signal(path, format=format), read_signal(path, format=format, channels=["force, y"], teeth=29)):
         for name in ("speed", "angle"):
             np.testing.assert_array_equal(back[name], signal[name])
