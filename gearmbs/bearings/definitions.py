@@ -2,7 +2,7 @@
 
 In the plane of an element the inner ring is displaced by u along e_r and by w along z, and leans by phi. What touches
 at a path of the radius R and the height z is told by (X, Y), from the groove centre of the outer to that of the inner
-ring, and by the missing material h, which hangs on the angles psi, theta and beta:
+ring, and by the missing material h, which depends on the angles psi, theta and beta:
 
     X = A_r + u + z phi,    Y = A_z + w - R phi,    Q = K s(delta)^n,    n = (cos alpha, sin alpha),
 

@@ -166,12 +166,12 @@ def bearing_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
         diagnostics[3], diagnostics[4], diagnostics[5] = work[B.S_SUMS], work[B.S_SUMS + 3], work[B.S_SUMS + 5]
         diagnostics[6] = np.ceil(work[B.S_SUMS + 4] - 1e-9)
     if want & DERIVATIVES:
-        vary_locally(ints, reals, frames, work, by_total, by_speed)
-        spread(ints, reals, frames, work, wrench, jac)
+        local_jacobian(ints, reals, frames, work, by_total, by_speed)
+        to_global_jacobian(ints, reals, frames, work, wrench, jac)
 
 
 @njit(cache=True, error_model="numpy")
-def vary_locally(ints, reals, frames, work, by_total, by_speed):
+def local_jacobian(ints, reals, frames, work, by_total, by_speed):
     """Write the derivatives of F and N, in the axes of J, by the local variations and the states.
 
     Parameters
@@ -226,7 +226,10 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
 def by_variations(ints, reals, work, by_q, by_rate, by_cage, bend, out):
     """Write the derivatives of one generalised force by the local variations and the states.
 
-    With a turn p of the inner ring da = p x a and da' = w x (p x a), with its angular velocity da' = dw x a.
+    With a turn p of the inner ring da = p x a and da' = w x (p x a), with its angular velocity da' = dw x a. With the
+    derivatives s = (s_x, s_y, 0) by a and r = (r_x, r_y, 0) by a' that makes
+
+        p . [a x s + r (w . a) - w (r . a)],        dw . (a x r).
 
     Parameters
     ----------
@@ -267,8 +270,19 @@ def by_variations(ints, reals, work, by_q, by_rate, by_cage, bend, out):
 
 
 @njit(cache=True, error_model="numpy")
-def spread(ints, reals, frames, work, wrench, jac):
-    """Turn the local derivatives into those by the variations of both frames, in global components."""
+def to_global_jacobian(ints, reals, frames, work, wrench, jac):
+    """Turn the local derivatives into those by the variations of both frames, in global components.
+
+    Local coordinates are A_J^T x, so that they change with a turn of J by A_J^T (x x dpi_J). With D, V, P and W for a
+    row's derivatives by d, d', the turn of I in J and w, in global components, and s for that by w_J . z:
+
+        dR_I    D - V x w_J                                       dR_J    the opposite
+        dpi_I   P                                                 dpi_J   D x d + V x d' + W x w - P + s z x w_J
+        dv_I    V                                                 dv_J    the opposite
+        dw_I    W                                                 dw_J    -W + V x d + s z
+
+    F and N themselves turn with J: dpi_J x F, dpi_J x N.
+    """
     spins = ints[B.SPINS]
     n, m, states = B.BETA + spins, B.VARIATIONS, 1 + spins
     at = B.variations(n) + (n + 1) * (m + states)

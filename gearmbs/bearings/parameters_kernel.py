@@ -5,7 +5,7 @@ elements. With dp along a setting, forces and coordinates q change by
 
     dG = G_p dp + K q_p dp + D q'_p dp;
 
-q and q' hang on parameters where rings are misaligned, and by the speeds of cage and elements.
+q and q' depend on parameters where rings are misaligned, and by the speeds of cage and elements.
 """
 
 from __future__ import annotations

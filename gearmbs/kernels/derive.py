@@ -3,7 +3,7 @@
 A law is a plain Python function of numbers. Called with `Value` objects it is traced: each operation becomes a node of
 a graph in which no node is there twice, so that whatever intermediate results derivatives have in common is computed
 once. `derivative` adds nodes, `given` adds a number that somebody else computes together with its derivatives (a table,
-the solution of an iteration), and `Function.text` writes nodes as a kernel.
+the solution of an iteration), and `Function.source` writes nodes as a kernel.
 
 A module ``definitions.py`` has a function ``functions()`` that returns `Function` objects; ``derived.py`` beside it is
 what they become:
@@ -202,7 +202,7 @@ ZERO, ONE = _number(0.0), _number(1.0)
 
 
 def start() -> None:
-    """Forget all nodes, so that what is written does not hang on what was traced before."""
+    """Forget all nodes, so that what is written does not depend on what was traced before."""
     _nodes.clear()
     _slopes.clear()
     for number in (ZERO, ONE):

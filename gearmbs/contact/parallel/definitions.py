@@ -143,7 +143,7 @@ def forces() -> list[Function]:
     turn(alpha, sin, cos)
     approach, speed = by_1 * rate_1 + by_2 * rate_2, sliding(a, sin, normal, rate_1, rate_2)
     given(force, {gap: -stiffness, approach: -damping})
-    # the ratio hangs on the size of the speed; its slope is over that
+    # the ratio depends on the size of the speed; its slope is over that
     given(ratio, {speed: ratio_slope * speed})
     wrench = planar_wrench(a, force, -(ratio * force * speed), by_a, by_1, by_2, sin, cos, normal)
     sums = [derivative(row, x) for row in wrench for x in (phi_1, phi_2, rate_1, rate_2)]

@@ -29,7 +29,7 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     Parameters
     ----------
     t
-        S.
+        Time, s.
     y, yp
         Unknowns and their derivatives.
     cj

@@ -682,7 +682,7 @@ class AlgebraicOutputs:
     left : ndarray of int
         Algebraic unknowns outside error control that the equations do not determine at an instant.
     coupled : ndarray of int
-        Those that hang on too many others.
+        Those that depend on too many others.
     """
 
     def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float, ends: tuple[float, float]) -> None:
@@ -788,7 +788,7 @@ class AlgebraicOutputs:
         remedy = "" if of_mechanism else " State a problem of index one or two, or put it under error_mask."
         for unknowns, why in (
             (self.left, f"no equation and no derivative of one determines it at an instant.{remedy}"),
-            (self.coupled, f"it hangs on more than {MOST_TOGETHER} others. Put it under error_mask."),
+            (self.coupled, f"it depends on more than {MOST_TOGETHER} others. Put it under error_mask."),
         ):
             if len(unknowns):
                 names = list_names(problem, unknowns)

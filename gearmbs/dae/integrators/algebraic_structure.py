@@ -194,7 +194,7 @@ class Graph:
 
 
 class Structure(NamedTuple):
-    """Unknowns left, unknowns that hang on too many others; equations, unknowns and entries of an `AlgebraicPart`."""
+    """Unknowns left, unknowns that depend on too many others; equations, unknowns and entries of an `AlgebraicPart`."""
 
     left: np.ndarray
     coupled: np.ndarray

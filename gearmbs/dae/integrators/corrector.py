@@ -141,13 +141,10 @@ def apply_correction(delta, gamma, weight, y, yp):
     y, yp : ndarray, shape (n,)
         Changed.
     """
-    top = int64(0)
     for i in range(delta.shape[0]):
-        d = delta[i]
-        y[i] -= d
-        yp[i] -= gamma * d
-        top = max(top, bits_of(abs(d * weight[i])))
-    return double_of(top)
+        y[i] -= delta[i]
+        yp[i] -= gamma * delta[i]
+    return weighted_max(delta, weight)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -333,8 +330,9 @@ def accept_noise(st, plan, factors, from_prediction):
 
     That is a result too far from its prediction, which is noisy itself, or else a correction that will not get
     smaller. No step would mend it near a singular position, so the run has to go through as it is. The noise passed on
-    to the past, ``st.noise`` in units of the tolerance, comes back amplified by 2^k in predictions of order k.
-    Where that is less than the noise of the corrector, the prediction stands for the solution.
+    to the past, ``st.noise`` in units of the tolerance, comes back about 2^k times in predictions of order k, the root
+    of the sum of the squares of their coefficients C(k + 1, j), and at most twice that, the sum. Where it is less
+    than the noise of the corrector, the prediction stands for the solution.
 
     Parameters
     ----------

@@ -29,6 +29,7 @@ from gearmbs.dae.integrators.corrector import (
     remember_noise,
     renew_weights,
     weighted_argmax,
+    weighted_max,
 )
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
 from gearmbs.dae.integrators.newton_matrix import MATRIX_MAX_AGE, SLOPE_MAX_AGE, form_matrix, renew_matrix
@@ -49,7 +50,6 @@ from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.dae.problem import HISTORY_CHANGED
 from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import bits_of, double_of
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE
 
 MAX_FAILS = 16
@@ -297,21 +297,15 @@ def refuse_by_newton(st, code):
 @njit(cache=True, nogil=True, error_model="numpy")
 def correction_norm(st, row):
     """Store the corrector's result in ``row`` and its distance from the prediction in ``st.delta``; return its norm."""
-    y, y_pred, delta, weight = st.y, st.y_pred, st.delta, st.w_error
-    top = int64(0)
+    y, y_pred, delta = st.y, st.y_pred, st.delta
     for i in range(y.shape[0]):
-        d = y[i] - y_pred[i]
-        delta[i] = d
+        delta[i] = y[i] - y_pred[i]
         row[i] = y[i]
-        top = max(top, bits_of(abs(d * weight[i])))
-    if st.n_past > 1:
-        return double_of(top)
-    # algebraic unknowns may jump where a run starts afresh
-    top = int64(0)
-    for i in range(y.shape[0]):
-        delta[i] *= st.differential[i]
-        top = max(top, bits_of(abs(delta[i] * weight[i])))
-    return double_of(top)
+    if st.n_past <= 1:
+        # algebraic unknowns may jump where a run starts afresh
+        for i in range(y.shape[0]):
+            delta[i] *= st.differential[i]
+    return weighted_max(delta, st.w_error)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -322,9 +316,11 @@ def passes_error_test(st, plan, factors):
     times_from(st, 0)[0] = st.t_new
     before = st.error
     st.error = constant * correction_norm(st, row)
-    allowed = 1.0 + constant * 2.0 ** (st.order + 1) * st.noise
+    # the coefficients of a prediction of order k, C(k + 1, j), add up to 2^(k + 1) - 1
+    noise = 2.0 ** (st.order + 1) * st.noise
+    allowed = 1.0 + constant * noise
     if st.passing and st.n_past > 1:
-        allowed = min(allowed, constant * (FORESEEN + 2.0 ** (st.order + 1) * st.noise))
+        allowed = min(allowed, constant * (FORESEEN + noise))
     if st.error <= allowed:
         return True
     if st.n_past == 1 and st.error_fails > 1 and st.error <= constant * JUMP_LIMIT:

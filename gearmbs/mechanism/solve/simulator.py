@@ -43,7 +43,7 @@ from gearmbs.mechanism.solve.told import Point, Told
 from gearmbs.wording import any_of
 
 NOTHING = nullcontext()
-"""What errors of functions are looked for in where there are none."""
+"""Null context, used when the mechanism has no functions of Python."""
 new_point = tuple.__new__
 """Makes a point of its parts in half the time that its class takes."""
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")

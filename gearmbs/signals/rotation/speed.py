@@ -23,7 +23,7 @@ LOCAL_BINS = 256
 SIGNIFICANT = 4.0
 """Robust standard deviations above the local median from which a height is a line."""
 LEAST_SPREAD_DB = 1.0
-"""Without noise nothing spreads: a decibel is less than any line has."""
+"""Least standard deviation: without noise there is none, and a decibel is less than any line has."""
 WANDER = 5e-4
 """Relative change of the speed, over which the line of a harmonic is spread."""
 MISSING = 0.22
@@ -60,6 +60,8 @@ FEWER_WEIGHT = 0.05
 NEARLY_BEST = 0.97
 """Part of the best score from which combs are told apart by the power they carry."""
 SLOWEST = 8.0 * math.pi
+"""rad/s, 4 turns a second, where no range is given: sidebands are then eight bins of the segments' spectra apart, twice
+the main lobe of their window."""
 MIN_QUALITY = 0.05
 """Least quality of a line by which a changing speed is followed; see `phase_from_line`."""
 MIN_SCORE_DB = 12.0
@@ -67,6 +69,8 @@ MIN_SCORE_DB = 12.0
 SAME_COMB = 0.01
 """Relative difference of frequencies up to which candidates belong to one comb."""
 MIN_OTHERS = 100
+"""Combs of other frequencies, at least, of which the best tells what chance gives: among a hundred it is at 2.5
+standard deviations, and of fewer their own standard deviation is known badly."""
 
 
 HOLLOW_POWER, HOLLOW_HEIGHT = 1.0 / 64.0, 0.5
@@ -87,7 +91,7 @@ AHEAD = 4.5
 """Robust standard deviations over the median of those combs; the best of ninety in noise reaches three."""
 FEWEST_ELSEWHERE = 20
 FEWEST_BESIDE_ZERO = 4
-"""Bins from zero on that are left to the window and to the mean."""
+"""Lowest bins, ignored because window leakage and the mean dominate them."""
 
 
 class Explained(NamedTuple):
@@ -135,8 +139,8 @@ class Lines:
         starts = np.arange(0, max(1, peaks.size - LOCAL_BINS // 2), LOCAL_BINS)
         usual = np.interp(index, starts + LOCAL_BINS / 2, [np.median(largest[s : s + LOCAL_BINS]) for s in starts])
         over = largest - usual
-        spread = max(LEAST_SPREAD_DB, 1.4826 * float(np.median(np.abs(over - np.median(over)))))
-        self.evidence = np.where(over >= SIGNIFICANT * spread, over, 0.0)
+        sigma = max(LEAST_SPREAD_DB, 1.4826 * float(np.median(np.abs(over - np.median(over)))))
+        self.evidence = np.where(over >= SIGNIFICANT * sigma, over, 0.0)
         self.peaks, self.level, self.radius, self.bin_width = peaks, level, radius, bin_width
 
     def at(self, frequency: float) -> float:
@@ -161,7 +165,11 @@ class Lines:
         return [self.place(i * self.bin_width) for i in chosen.tolist() if found[i] > 0.0]
 
     def explained(self, gmf: float, teeth: int) -> Explained:
-        """What a mesh line of about this frequency explains, at the frequency at which its harmonics are."""
+        """What a mesh line of about this frequency explains, at the frequency at which its harmonics are.
+
+        With the places f_k of the harmonics k that are there and their evidence w_k that is the least-squares frequency
+        ``sum(w_k k f_k) / sum(w_k k^2)``.
+        """
         top = (self.evidence.size - 2) * self.bin_width
         weight = moment = strength = 0.0
         there: list[int] = []
@@ -455,9 +463,8 @@ def line_near(signal: xr.DataArray, gmf: float, tolerance: float) -> float | Non
     found, frequency = best(gmf)
     chance = np.array([best(other)[0] for other in others])
     middle = float(np.median(chance))
-    # without noise nothing spreads: a decibel is less than any line has
-    spread = max(1.0, 1.4826 * float(np.median(np.abs(chance - middle))))
-    return frequency if found > chance.max() and found - middle > AHEAD * spread else None
+    sigma = max(LEAST_SPREAD_DB, 1.4826 * float(np.median(np.abs(chance - middle))))
+    return frequency if found > chance.max() and found - middle > AHEAD * sigma else None
 
 
 def own_lines_missing(signal: xr.DataArray, gmf: float, stronger: float) -> bool:
@@ -539,11 +546,11 @@ def _comb(height: np.ndarray, candidates: np.ndarray, bin_width: float, count: i
 
 def _lead(score: np.ndarray, candidates: np.ndarray, best: int) -> float:
     """How far the best comb is ahead of the best of another frequency, in robust standard deviations of all scores."""
-    spread = 1.4826 * float(np.median(np.abs(score - np.median(score))))
+    sigma = 1.4826 * float(np.median(np.abs(score - np.median(score))))
     others = score[np.abs(candidates / candidates[best] - 1.0) > SAME_COMB]
-    if others.size < MIN_OTHERS or spread == 0.0:
+    if others.size < MIN_OTHERS or sigma == 0.0:
         return 0.0
-    return float(score[best] - others.max()) / spread
+    return float(score[best] - others.max()) / sigma
 
 
 def _at(line: np.ndarray, frequency: np.ndarray, bin_width: float) -> np.ndarray:

@@ -70,7 +70,7 @@ def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
     mode, slot, vals, k
         As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
     t
-        S.
+        Time, s.
     s : int
         Number of the state.
     y
@@ -224,7 +224,7 @@ def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
     mode, slot, vals, k
         As of `gearmbs.dae.equations.unknowns.put`; returned is the number of the next entry.
     t
-        S.
+        Time, s.
     row : ndarray of int
         Row of the force element.
     y, yp
