@@ -291,7 +291,7 @@ class Bearing(Described):
 STANDARD_GROOVE = 0.52
 """Radius of the inner ring's groove, in ball diameters, that ISO 281 and ISO 76 state their ratings for."""
 PRESSURE = 4.2e9
-"""Of the static rating of ball bearings, Pa."""
+"""Contact pressure of the static rating of ball bearings, Pa (ISO 76)."""
 
 
 def dynamic_rating(bearing: Bearing) -> float:

@@ -90,8 +90,8 @@ CLEARANCES = (
     (40, (1, 11), (6, 20), (15, 33), (28, 46), (40, 64)), (50, (1, 11), (6, 23), (18, 36), (30, 51), (45, 73)),
     (65, (1, 15), (8, 28), (23, 43), (38, 61), (55, 90)), (80, (1, 15), (10, 30), (25, 51), (46, 71), (65, 105)),
 )  # fmt: skip
-"""Of deep groove bearings up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3, C4, C5 by
-ISO 5753-1, um."""
+"""Clearances of deep groove bearings up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3,
+C4, C5 by ISO 5753-1, um."""
 ROLLER_CLEARANCES = (
     (24, (0, 25), (20, 45), (35, 60), (50, 75), (65, 90)), (30, (0, 25), (20, 45), (35, 60), (50, 75), (70, 95)),
     (40, (5, 30), (25, 50), (45, 70), (60, 85), (80, 105)), (50, (5, 35), (30, 60), (50, 80), (70, 100), (95, 125)),

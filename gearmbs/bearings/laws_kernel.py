@@ -35,7 +35,7 @@ from gearmbs.kernels.jit import njit
 
 
 BALL_EXPONENT = 1.5
-"""Of the deflection in the force of a point contact (Hertz)."""
+"""Exponent of the deflection in the force of a point contact (Hertz)."""
 ROLLER_EXPONENT = 10.0 / 9.0
 PALMGREN = 3.84e-5
 """mm of approach per contact for Q = 1 N on a line of 1 mm: delta = 3.84e-5 Q^0.9/L^0.8, mm and N, steel."""

@@ -118,13 +118,14 @@ S_SUMS = 29
 """Sums over the elements: normal forces, energy, damping power, largest force, number loaded, largest deflection."""
 SUMS = 6
 S_LAW = 35
-"""Of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load, then of both by the
-tilt phi, as far as it moves the other path of the element against this one."""
+"""Results of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load, then of
+both by the tilt phi, as far as it moves the other path of the element against this one."""
 LAW = 13
 S_PROFILE = 48
-"""Of one contact: slopes of the outer ring's, the inner ring's and the element's profile, then their curvatures."""
+"""Profiles at one contact: slopes of the outer ring's, the inner ring's and the element's profile, then their
+curvatures."""
 S_PLANE = 54
-"""Of one element, in its plane: u, w, phi, the rates of these and of the angles psi, theta, beta."""
+"""Coordinates of one element in its plane: u, w, phi, the rates of these and of the angles psi, theta, beta."""
 PLANE = 9
 S_PLANE_SUMS = 63
 """Sums over the paths of one element: six forces in its plane and f, their derivatives by the six coordinates, by the

@@ -17,7 +17,7 @@ from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import matrix_at, vector_at
 
 COUPLED = 1e-10
-"""Of the largest entry of a block of derivatives, the part up to which others are rounding."""
+"""Part of the largest entry of a block of derivatives up to which others are rounding."""
 VEC = types.float64[::1]
 MAT = types.float64[:, ::1]
 GEAR_CONTACT_SIG = types.void(

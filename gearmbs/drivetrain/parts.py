@@ -21,7 +21,7 @@ LONG = 30.0
 """Lengths of a shaft from here on, m, look like millimetres: no gearbox has such; a ship has several."""
 
 DIAMETER = 0.030
-"""Of a shaft that gives none, m: the usual one of a gearbox of this size, as in the bench of Fig. 2."""
+"""Diameter of a shaft that gives none, m: the usual one of a gearbox of this size, as in the bench of Fig. 2."""
 
 
 Length = Annotated[Quantity, Measure("length", above=0)]

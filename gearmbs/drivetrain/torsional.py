@@ -300,7 +300,7 @@ class MeshDynamics(NamedTuple):
 
     @property
     def damping_ratio(self) -> float:
-        """Of that motion: c / (2 sqrt(k m)); above 1 it does not oscillate."""
+        """Damping ratio of that motion, c / (2 sqrt(k m)); above 1 it does not oscillate."""
         size = 2.0 * math.sqrt(self.stiffness * self.mass)
         return self.damping / size if size > 0.0 else math.nan
 

@@ -16,7 +16,7 @@ from gearmbs.flexible.material import FlexibleError
 
 
 SIDES = 32
-"""Of the prism that is drawn for a round shaft."""
+"""Number of sides of the prism that is drawn for a round shaft."""
 
 
 @dataclass(frozen=True, eq=False)

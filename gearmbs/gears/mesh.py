@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
 
 DAMPING_RATIO = 0.07
-"""Of a mesh where none is given: the geometric mean of 0.03 and 0.17, a range that is quoted for meshes of steel gears
-without the measurement behind it, which has not been found; 0.07 itself is what models of gears in the literature take.
-It is a convention, no measurement of the gears at hand: their own ratio, if known, is the one to give, and amplitudes
-at a resonance are in inverse proportion to it."""
+"""Damping ratio of a mesh where none is given: the geometric mean of 0.03 and 0.17, a range that is quoted for meshes
+of steel gears without the measurement behind it, which has not been found; 0.07 itself is what models of gears in the
+literature take. It is a convention, no measurement of the gears at hand: their own ratio, if known, is the one to
+give, and amplitudes at a resonance are in inverse proportion to it."""
 RATIO_DEPTH = 2e-6
 """Penetration, m, at which the damping by a ratio is fully on: what a tooth pair yields under 25 to 30 N/mm, less than
 gears carry; below it damping falls to nothing, so that flanks meet without a blow."""

@@ -407,7 +407,7 @@ class RimModes:
 
     @property
     def frequencies(self) -> np.ndarray:
-        """Of the rim with its bolts, without teeth in contact, Hz, ascending."""
+        """Frequencies of the rim with its bolts, without teeth in contact, Hz, ascending."""
         scale = 1 / np.sqrt(self.mass)
         return np.sqrt(np.linalg.eigvalsh(scale[:, None] * self.stiffness * scale)) / (2 * np.pi)
 

@@ -44,7 +44,7 @@ SAINSOT = {
 SHEAR = 1.2
 """Shear correction of a rectangular section."""
 RIM_STATIONS = 400
-"""Of the integration along a half of a ring's rim between two bolts."""
+"""Stations of the integration along a half of a ring's rim between two bolts."""
 SPECIFIC_LOAD = 3e5
 """Load per face width at which the flattening is taken where none is given, N/m: ISO 6336-1 has c'_th at 300 N/mm."""
 FLATTEST = 1e-3

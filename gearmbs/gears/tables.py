@@ -34,7 +34,7 @@ MOST_OF_PARABOLA = 0.45
 """Share of a corner's parabola that bounds its gap at poses near the drawing's, where gaps grow no slower than it."""
 
 SHARE_KEPT = 0.6
-"""Of the share found for the drawing, what is counted on at other poses."""
+"""Part of the share found for the drawing that is counted on at other poses."""
 
 MOVED = 0.05
 """Change of the centre distance, in modules, over which the passing gap's slope is taken."""

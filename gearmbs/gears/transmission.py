@@ -31,7 +31,7 @@ TOUCHING = 1e-9  # m
 UNBALANCED = 1e-6
 """Share of the torque that may be missing where the search for its angle has ended: found are 1e-12 of it."""
 LAST_DIGITS = 1e-15
-"""Of an angle, as a share: a few units of the last place."""
+"""Share of an angle that is rounding: a few units of the last place."""
 MOST_YIELDING = 0.2
 """Deflection of teeth, in modules, beyond which no tooth is elastic. By Lewis' formula the root's stress is about
 2.5 F/(b m), and the deflection F/(b c') with c' = 14 kN/(mm mm) of steel (ISO 6336-1), in proportion to the modulus of

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gearmbs.studies import Case
 
 TOLERANCE = 1e-8
-"""Of the integrator, so that differences over a step of 1e-2 are right to a few percent."""
+"""Tolerance of the integrator, so that differences over a step of 1e-2 are right to a few percent."""
 
 COLUMNS = ("case", "channel", "harmonic", "value", "sigma")
 """Columns of a table of harmonics: which case, channel or component, harmonic, RMS, relative standard deviation."""

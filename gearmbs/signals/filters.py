@@ -145,7 +145,7 @@ def _each_of_several(values: np.ndarray, taps: np.ndarray, every: int) -> np.nda
 
 Edges = Literal["trim", "extend"]
 ATTENUATION_DB = 100.0
-"""Of what filters stop, where nothing else is asked for: below the noise of a recorder of 16 bits, 98 dB."""
+"""Attenuation of the stop band, where nothing else is asked for: below the noise of a recorder of 16 bits, 98 dB."""
 DECIMATE_PASS = 0.4
 """Part of the new rate up to which decimation leaves a signal as it is: 2.5 samples a period, as analysers have it
 (2.56)."""

@@ -31,7 +31,7 @@ from gearmbs.view.solid import title_of
 UP = (0.0, 0.0, 1.0)
 DOWN = (0.0, 0.0, -1.0)
 STATIONS_PER_RADIAN = 12
-"""Of the splines of sine and cosine along a helix: off by 1e-10 with degree 5."""
+"""Stations of the splines of sine and cosine along a helix: off by 1e-10 with degree 5."""
 
 
 class Writer:

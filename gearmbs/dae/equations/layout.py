@@ -164,7 +164,8 @@ FORCE_IEXTRA = 5
 FORCE_REXTRA = 6
 FORCE_RM = 7
 FORCE_WANT = FORCE_RM
-"""Of a compiled element, which has no marker RM: what its kernel is asked for whenever the equations are evaluated."""
+"""Column of a compiled element, which has no marker RM: what its kernel is asked for whenever the equations are
+evaluated."""
 FORCE_WORK = 8
 """Offset in the scratch of the element's wrenches, rates, diagnostics, frames and inputs, then its own."""
 FORCE_DEPENDS = 9

@@ -119,7 +119,7 @@ class Records:
         self.every_step = every_step
         self.consumed_time = 0.0
         self.processor_time = 0.0
-        """Of the consumer, s."""
+        """Processor time of the consumer, s."""
         self.steps: list[tuple[np.ndarray, ...]] = []
         self.row_blocks: list[np.ndarray] = []
         self.crossings: list[tuple[float, int, np.ndarray]] = []

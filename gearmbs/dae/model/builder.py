@@ -59,10 +59,11 @@ class TableBuilder:
         self.own_functions: dict[int, tuple[Any, Any]] = {}
         """Compiled functions of elements, with their signatures, by the place of their address in the integers."""
         self.diagnostics: list[tuple[Diagnostic, ...]] = []
-        """Of each force element."""
+        """Diagnostics of each force element."""
         self.largest_jac = 0
         self.numbers: dict[str, Number] = {}
-        """Of each name, with places among the tables `H_R_EXTRA` and `H_R_FUNCTION`; see `Model.numbers`."""
+        """Inputs and parameters by name, with places among the tables `H_R_EXTRA` and `H_R_FUNCTION`; see
+        `Model.numbers`."""
         self._ground_marker: int | None = None
         self.add_body(0.0, np.zeros((3, 3)))
 

@@ -30,24 +30,25 @@ _IVEC = int64[::1]
 
 EDGE_CHILD, EDGE_PARENT, EDGE_I, EDGE_J, EDGE_CHILD_HAS_I = range(5)
 EDGE_AXES = 5
-"""Of the three rows that keep the orientation: 3 * axis of I + axis of J."""
+"""Axes of the three rows that keep the orientation: 3 * axis of I + axis of J."""
 EDGE_ROWS = 8
 """Six rows in the order of the joint: coincident x, y, z, then the orientation."""
 EDGE_COLUMNS = 14
-"""Of a fixed joint inside a group; members count from 0, -1 is the ground."""
+"""Columns of a fixed joint inside a group; members count from 0, -1 is the ground."""
 
 TURN_I, TURN_J, TURN_SIDE, TURN_ROOT = range(4)
-"""Of an axis: markers I and J; 1 where I's body turns and -1 where J's does; 1, or -1 where I starts half a turn off
-what the motion says."""
+"""Columns of an axis: markers I and J; 1 where I's body turns and -1 where J's does; 1, or -1 where I starts half a
+turn off what the motion says."""
 TURN_ROWS = 4
 """Six rows: coincident x, y, z, the two that keep the axis, and that of the motion or -1."""
 TURN_COLUMNS = 10
-"""Of the revolute joint on the ground in which a group turns about a fixed axis, where that is all it can do."""
+"""Columns of the revolute joint on the ground in which a group turns about a fixed axis, where that is all it can
+do."""
 
 PLACE_R, PLACE_A = 0, 3
 PLACE_MASS, PLACE_INERTIA = 12, 13
 PLACE_COLUMNS = 22
-"""Of a member: its centre of mass and axes in the frame of its group, mass, inertia in its own axes."""
+"""Columns of a member: its centre of mass and axes in the frame of its group, mass, inertia in its own axes."""
 
 PART = 512
 """Output times evaluated at a time, whose records fit the processor's cache."""

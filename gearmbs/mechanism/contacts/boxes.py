@@ -24,8 +24,8 @@ EDGES_WORSE = 0.95
 VERTEX, ON_EDGE, CORNER = 0, 1, 2
 """Kinds of corners of the cut face: see above."""
 X, ALONG, NEXT, KIND, SIDE, NEXT_SIDE = 0, 3, 6, 9, 10, 11
-"""Of a corner: place, direction of the edge it lies on, direction of the edge to the next, kind, side that made it,
-side that made the edge to the next (-1: none, it is one of the face's own)."""
+"""Record of a corner: place, direction of the edge it lies on, direction of the edge to the next, kind, side that
+made it, side that made the edge to the next (-1: none, it is one of the face's own)."""
 CORNER_COLUMNS = 12
 CORNERS = 12
 LEAST = 1e-12

@@ -21,7 +21,7 @@ BEARING = 0.8
 """Part of the largest depth below which a vertex bears less than 1e-17 of the load, by the norm in `loads`, whatever
 the weights."""
 LESS = 1.0 - 1e-9
-"""Of a distance, what certainly is clear of a surface."""
+"""Part of a distance that is certainly clear of a surface."""
 
 
 @njit(cache=True, error_model="numpy")

@@ -42,15 +42,15 @@ D_SHARE = LEVEL + 1
 """Derivatives of the share, then of the level, by the variations of bodies I and J, whichever is a."""
 D_LEVEL = D_SHARE + 12
 VERTEX = D_LEVEL + 12
-"""Of a vertex: its number, where it is, and the Hessian (9) of its distance in the frame of the other solid."""
+"""Record of a vertex: its number, where it is, and the Hessian (9) of its distance in the frame of the other solid."""
 VERTEX_PLACE = VERTEX + 1
 HESSIAN = VERTEX_PLACE + 3
 GAIN = HESSIAN + 9
 """Length of the gradient of the depth, by which the point bears less than its share where edges cross; else 1."""
 D_GAIN = GAIN + 1
 ALONG = D_GAIN + 12
-"""Of the deepest point of an edge: the edge, zero of other points, and by what the gradient changes along it, in the
-other solid's frame; then the plane faces that meet at the edge."""
+"""Record of the deepest point of an edge: the edge, zero of other points, and by what the gradient changes along it,
+in the other solid's frame; then the plane faces that meet at the edge."""
 BENT = ALONG + 3
 FACES = BENT + 3
 COLUMNS = FACES + 2

@@ -168,9 +168,9 @@ def convex_and_plane(row, kind, sizes, pose_a, pose_b, origin_a, origin_b, deriv
 STARTS = 10
 """Directions to start from."""
 LEAST = 1e-9
-"""Of directions to start from: length, also of a component, that is taken for zero."""
+"""Length of a direction to start from, also of a component, that is taken for zero."""
 TRIED = 2
-"""Of these, the ones along which the solids overlap least."""
+"""Directions that are tried: those along which the solids overlap least."""
 NORMAL, BEST, CANDIDATES = ov.WORK, ov.WORK + 3, ov.WORK + 6
 PLANE = CANDIDATES + 4 * STARTS
 MOTION = PLANE + 12

@@ -18,7 +18,7 @@ from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.units import DIMENSIONS, powers_of
 
 COEFFICIENTS = tf.PIECE_SIZE - 1
-"""Of the polynomial that an input is as a function of time."""
+"""Number of coefficients of the polynomial that an input is as a function of time."""
 RESERVED = ("TIME", "PI", "DTOR", "RTOD")
 """Names that mean something else in expressions."""
 

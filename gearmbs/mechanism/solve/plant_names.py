@@ -22,7 +22,7 @@ LEVELS = ("position", "rate", "acceleration")
 AXES = ("x", "y", "z")
 WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
 COMPONENT = (2, 3, 4, 6, 7, 8)
-"""Of JOINT and its kin: force and torque along x, y and z."""
+"""Components of JOINT and its kin: force and torque along x, y and z."""
 MOTIONS = {"rotation": "rad", "translation": "m"}
 """Kinds of motions and the units of what they prescribe."""
 ACCELERATIONS = {"ACC": False, "WDT": True}

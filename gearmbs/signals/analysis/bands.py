@@ -22,7 +22,8 @@ not."""
 TRANSITION = 0.25
 """Over which the band falls, in mesh frequencies: with the half width it ends in the middle between two harmonics."""
 ATTENUATION_DB = 100.0
-"""Of what lies beyond: a line a hundred thousand times larger than the band's own counts as much."""
+"""Attenuation of what lies beyond the band: a line a hundred thousand times larger than the band's own counts as
+much."""
 MIN_PERIODS = 4
 RAMP = 4.0
 """Samples beyond one period from which its ends are joined by ramps: they lower what folds to 1e-4, straight joints to

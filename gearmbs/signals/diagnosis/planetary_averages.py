@@ -33,7 +33,7 @@ from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.signal.signal import make_signal
 
 SHARPNESS = 4.0
-"""Of the default path function exp(sharpness (cos - 1)): a planet is heard to a tenth at 65 degrees."""
+"""Exponent of the default path function exp(sharpness (cos - 1)): a planet is heard to a tenth at 65 degrees."""
 
 
 def path_weight(angle: np.ndarray, sharpness: float = SHARPNESS) -> np.ndarray:

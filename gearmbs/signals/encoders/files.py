@@ -23,7 +23,7 @@ from gearmbs.units import Quantity, to_si
 INDEX = " index"
 """End of the name of a column with the pulses once a turn."""
 COUNTER_BITS = (16, 24, 32)
-"""Of counters, after which they begin anew."""
+"""Widths of counters, which begin anew after as many bits."""
 LONGEST_FIT = 10.0
 """Usual steps up to which the one across an overflow may be: missing pulses are told and mended later."""
 COUNTS = frozenset({"ticks", "tick", "counts", "count"})

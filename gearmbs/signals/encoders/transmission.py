@@ -36,7 +36,7 @@ LEVEL_LINES = 32
 SLIPPED = 0.05
 """Pitches by which wheels and discs of two runs may stand otherwise than told: 1/20 is 18 degrees of the mesh."""
 LARGEST_TERM = 2000
-"""Of a ratio given as a decimal number, as a fraction."""
+"""Largest denominator that a ratio given as a decimal number is taken for."""
 
 
 @dataclass(frozen=True, eq=False)

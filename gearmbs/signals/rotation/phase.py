@@ -22,13 +22,14 @@ from gearmbs.signals.signal.given import speed_curve
 from gearmbs.signals.signal.signal import rate_of
 
 LINE_ATTENUATION_DB = 60.0
-"""Of all beside the line that is followed: a thousandth of a neighbour as large moves its phase by a milliradian."""
+"""Attenuation of all beside the line that is followed: a thousandth of a neighbour as large moves its phase by a
+milliradian."""
 PULSE_HYSTERESIS = 0.2
 """Part of its range by which a tacho's signal must have fallen below the threshold before the next pulse counts."""
 SIDE = 3
 """Intervals on each side that say how long those between them should be."""
 FEWEST_BESIDE = 4
-"""Of both sides together, each with at least one: two would follow any course of the speed."""
+"""Lines of both sides together, each with at least one: two would follow any course of the speed."""
 UNLIKE = math.log(1.4)
 """An interval that differs more than this from the median around it is looked at; half of a doubled one is log 2."""
 MEDIAN_REACH, SCATTER_REACH = 4, 12

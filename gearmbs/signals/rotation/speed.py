@@ -32,8 +32,8 @@ the first of 2, 3, 4 one; with this the better of each two is ahead by the same 
 ALIKE = 0.8
 """Part of the best sum from which another mesh line explains a spectrum as well."""
 SIDE = 0.25
-"""Of the first sidebands and shaft orders beside harmonics; the k-th counts 1 / k of it, as half the speed makes the
-first ones second ones."""
+"""Weight of the first sidebands and shaft orders beside harmonics; the k-th counts 1 / k of it, as half the speed
+makes the first ones second ones."""
 ORDERS = 3
 STRONGEST = 12
 PARTS = 4
@@ -52,9 +52,9 @@ RANGE_DB = 120.0
 HARMONICS = 4
 SIDEBANDS = 3
 SIDEBAND_WEIGHT = 0.5
-"""Of sidebands in the score of a comb, beside its harmonics: they tell the right shaft, but are weaker."""
+"""Weight of sidebands in the score of a comb, beside its harmonics: they tell the right shaft, but are weaker."""
 BETWEEN_WEIGHT = 0.5
-"""Of what stands midway between harmonics, taken off the score: half the frequency would have lines there."""
+"""Weight of what stands midway between harmonics, taken off the score: half the frequency would have lines there."""
 FEWER_WEIGHT = 0.05
 """Part of its score that a comb loses for each harmonic beyond the end of the spectrum, which has not been seen."""
 NEARLY_BEST = 0.97

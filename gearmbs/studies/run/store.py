@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BYTES, COLUMNS, PACKED = 8, 13, 0.6
-"""Of a number, numbers an output time holds, and what compression leaves of them at best."""
+"""Bytes of a number, numbers that an output time holds, and the share that compression leaves of them at best."""
 
 
 def write_dataset(path: str | Path, dataset: xr.Dataset, *, durable: Path | None = None) -> Path:

@@ -47,7 +47,7 @@ SHOWN = 0.1
 """Share of a body's size that the largest deflection of a picture has where no factor is given."""
 DASHES = {"forward": "-", "backward": (0, (6, 2)), "planar": (0, (1, 1))}
 PICTURES = 24
-"""Of one cycle of a mode."""
+"""Pictures of one cycle of a mode."""
 
 
 def fitting_factor(model: ModalModel, coordinates: npt.ArrayLike) -> float:
