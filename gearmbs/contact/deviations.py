@@ -319,7 +319,7 @@ def tip_roll(options, wheels, wheel, k, flank, zeta):
 
 
 @kernel
-def pair_softness(options, wheels, side, pair, lookup):
+def pair_stiffness_factor(options, wheels, side, pair, lookup):
     """Stiffness factor of a tooth pair from relative compliances along its profiles, with derivatives.
 
     The factor is one over the sum of the pair's own curve and of what each of the two teeth adds to it, looked up
@@ -344,10 +344,10 @@ def pair_softness(options, wheels, side, pair, lookup):
     slope /= ds
     curve /= ds * ds
     m = 1.0 / total
-    pair.soft = m
+    pair.stiffness_factor = m
     m1 = -slope * m * m
     m2 = (2.0 * slope * slope * m - curve) * m * m
     for i in range(6):
-        pair.soft_x[i] = m1 * lookup.grad[i]
+        pair.stiffness_factor_x[i] = m1 * lookup.grad[i]
         for j in range(6):
-            pair.soft_xx[i, j] = m2 * lookup.grad[i] * lookup.grad[j] + m1 * lookup.hess[i, j]
+            pair.stiffness_factor_xx[i, j] = m2 * lookup.grad[i] * lookup.grad[j] + m1 * lookup.hess[i, j]

@@ -53,7 +53,7 @@ def helical_normals(side, strip, n):
     s1_0, s2_0 = rb1 * side.start_1, rb2 * side.start_2
     for j in range(n):
         strip.good[j] = 1.0
-    if side.spread == 0.0:
+    if side.pitch_mismatch_bound == 0.0:
         strip.step[0] = 0.0
         return
     for _ in range(NEWTON_STEPS):
@@ -185,7 +185,7 @@ def edge_normals(side, corner, strip, n, first, s0, rb):
     s0, rb : float
         The mate's ``rb (phi + psi)``, and its base radius.
     """
-    if side.spread == 0.0:
+    if side.pitch_mismatch_bound == 0.0:
         return
     tilt = tilt_of(side)
     i_w, m = tilt.i_w, tilt.m

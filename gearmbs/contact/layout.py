@@ -215,7 +215,7 @@ SIDE = record(
     "turn_2",  # angle between neighbouring teeth of wheel 2, rad; negative for an internal one
     "twist_1",  # tangents of the base helix angles as seen on the side of the teeth at work
     "twist_2",
-    "spread",  # how much the gap of helical flanks may differ from tooth pair to tooth pair under a tilt, m
+    "pitch_mismatch_bound",  # how much gaps of helical flanks may differ between tooth pairs under a tilt, m
     "reference",  # number of the tooth of wheel 1 whose flanks the sections of the face describe
     "facing",  # number of the tooth of wheel 2 that faces tooth 0 of wheel 1
     "first",  # nodes of the face that may touch
@@ -240,9 +240,9 @@ TOOTH_PAIR = record(
     "high",
     "roll",  # length of roll on wheel 1 where the flanks meet, axes taken as parallel
     "corner_bears",  # 1: the corner of wheel 1 bears in some section
-    "soft",  # stiffness factor, its gradient and Hessian
-    ("soft_x", 6),
-    ("soft_xx", 6, 6),
+    "stiffness_factor",  # along the path of contact; its gradient and Hessian
+    ("stiffness_factor_x", 6),
+    ("stiffness_factor_xx", 6, 6),
     ("moved", 6),  # derivative of the elastic energy by the pose as the centroid moves along the face
 )
 LIMIT = record("value", ("grad", 6), ("hess", 6, 6))

@@ -102,34 +102,34 @@ def face_end(wheels, scratch, law, strip, i, u, end, share, want):
 
 
 @kernel
-def add_softness(sums, pair, strip, loads, n, want):
+def add_stiffness_gradient(sums, pair, strip, loads, n, want):
     """Complete the derivatives of nodal forces for a stiffness that varies along the path of contact."""
     if want == 0:
         return
-    inverse = 1.0 / pair.soft
+    inverse = 1.0 / pair.stiffness_factor
     for k in range(6):
-        soft_x = pair.soft_x[k] * inverse
+        relative = pair.stiffness_factor_x[k] * inverse
         for j in range(n):
-            loads.force_x[k, j] += loads.force[j] * soft_x
+            loads.force_x[k, j] += loads.force[j] * relative
     for j in range(n):
         elastic = loads.elastic[j] * inverse
         for k in range(6):
             for i in range(6):
-                sums.q_x[i, k] += elastic * strip.grad[k, j] * pair.soft_x[i]
+                sums.q_x[i, k] += elastic * strip.grad[k, j] * pair.stiffness_factor_x[i]
 
 
 @kernel
-def finish_softness(sums, pair, energy, want):
+def finish_stiffness_gradient(sums, pair, energy, want):
     """Add the force of a stiffness that varies along the path, from the pair's elastic energy."""
-    ratio = energy / pair.soft
+    ratio = energy / pair.stiffness_factor
     for i in range(6):
-        sums.q[i] -= ratio * pair.soft_x[i]
+        sums.q[i] -= ratio * pair.stiffness_factor_x[i]
     if want == 0:
         return
     for i in range(6):
         for k in range(6):
-            moved = pair.moved[k] / pair.soft
-            sums.q_x[i, k] -= ratio * pair.soft_xx[i, k] + moved * pair.soft_x[i]
+            moved = pair.moved[k] / pair.stiffness_factor
+            sums.q_x[i, k] -= ratio * pair.stiffness_factor_xx[i, k] + moved * pair.stiffness_factor_x[i]
 
 
 # Products of small matrices, and sums over the sections of a strip of products of rows.

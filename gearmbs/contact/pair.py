@@ -6,13 +6,13 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.corners import copy_corner, corner_gaps, set_corner
-from gearmbs.contact.deviations import add_deviations, pair_softness, tip_roll, tooth_flank
+from gearmbs.contact.deviations import add_deviations, pair_stiffness_factor, tip_roll, tooth_flank
 from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edges
 from gearmbs.contact.loads import (
     add_friction,
     add_normal,
-    add_softness,
-    finish_softness,
+    add_stiffness_gradient,
+    finish_stiffness_gradient,
     mirror,
     strip_forces,
     total_force,
@@ -286,7 +286,7 @@ def strip_contact(options, wheels, scratch, law, strip, node, low, high, totals,
     depth = strip_forces(wheels, scratch, law, strip, node, low, high, 1.0, totals, want)
     if depth > 0.0:
         if options.compliances != 0:
-            add_softness(scratch.sums, scratch.pair, strip, scratch.loads, L.LANES, want)
+            add_stiffness_gradient(scratch.sums, scratch.pair, strip, scratch.loads, L.LANES, want)
         add_loads(options, wheels, scratch, strip, L.LANES, totals, want)
     return depth
 
@@ -340,13 +340,13 @@ def divided_contact(options, wheels, scratch, law, flanks, own, node, low, high,
         helical_normals(side, fine, n)
         helical_flanks(side, fine, n, want)
         bent = 0.0
-        if side.spread != 0.0:
+        if side.pitch_mismatch_bound != 0.0:
             bent = bending(flanks, fine, n, int(start - parts * node))
         if not strip_in_reach(wheels, side, pair, fine, start, int(count), bent):
             continue
         chosen = pair_sections(options, wheels, scratch, fine, own, n, 0, int(count) - 1, want)
         strip = own if chosen else fine
-        if side.spread != 0.0:
+        if side.pitch_mismatch_bound != 0.0:
             straighten(flanks, fine, strip, n, int(start - parts * node), want)
         gap_rates(side, strip, n, want)
         depth = max(depth, strip_contact(options, wheels, scratch, law, strip, start, 0.0, count - 1.0, totals, want))
@@ -408,14 +408,14 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
     middle_section(options, wheels, side, middle, want if single else 0)
     wander = 0.0
     if single:
-        depth = wheels.added_material - middle.gap[0] + side.spread
+        depth = wheels.added_material - middle.gap[0] + side.pitch_mismatch_bound
         if depth <= 0.0:
             return False
         gap_rates(side, middle, 1, want)
     else:
         if not reach_of_face(options, wheels, side, middle):
             return False
-        depth = wheels.added_material - flank_strips(scratch, options.slices, want) + side.spread
+        depth = wheels.added_material - flank_strips(scratch, options.slices, want) + side.pitch_mismatch_bound
         if depth <= 0.0:
             return False
         turn = 2.0 * (side.x[L.Q] * middle.sin[0] - side.x[L.P] * middle.cos[0]) / (side.w * side.length)
@@ -425,7 +425,7 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
     first, last = teeth_in_reach(wheels, side, depth, wander)
     for i in range(first, last + 1):
         set_pair(options, scratch, sign, i)
-        if side.spread != 0.0:
+        if side.pitch_mismatch_bound != 0.0:
             own_flanks(options, wheels, scratch, want)
         if single:
             depth = plane_contact(options, wheels, scratch, totals, want)
@@ -469,9 +469,9 @@ def set_pair(options, scratch, sign, i):
     if options.flanks != 0:
         pair.flank_1 = tooth_flank(options, 0, sign, i)
         pair.flank_2 = tooth_flank(options, 1, sign, mate if side.base_2 > 0.0 else -mate)
-    pair.soft = 1.0
+    pair.stiffness_factor = 1.0
     for k in range(6):
-        pair.soft_x[k] = 0.0
+        pair.stiffness_factor_x[k] = 0.0
         pair.moved[k] = 0.0
 
 
@@ -487,12 +487,12 @@ def plane_contact(options, wheels, scratch, totals, want):
         return 0.0
     varying = options.compliances != 0
     if varying:
-        pair_softness(options, wheels, side, pair, scratch.lookup_1)
+        pair_stiffness_factor(options, wheels, side, pair, scratch.lookup_1)
     energy = totals.energy
-    depth = plane_force(law_of(options, wheels, pair.soft), wheels.width, strip, loads, totals, want)
+    depth = plane_force(law_of(options, wheels, pair.stiffness_factor), wheels.width, strip, loads, totals, want)
     if varying:
-        add_softness(scratch.sums, pair, strip, loads, 1, want)
-        finish_softness(scratch.sums, pair, totals.energy - energy, want)
+        add_stiffness_gradient(scratch.sums, pair, strip, loads, 1, want)
+        finish_stiffness_gradient(scratch.sums, pair, totals.energy - energy, want)
     add_loads(options, wheels, scratch, strip, 1, totals, want)
     return depth
 
@@ -505,16 +505,16 @@ def face_contact(options, wheels, scratch, totals, want):
         return 0.0
     varying = options.compliances != 0
     if varying:
-        pair_softness(options, wheels, side, pair, scratch.lookup_1)
+        pair_stiffness_factor(options, wheels, side, pair, scratch.lookup_1)
     set_limits(wheels, side, pair)
-    law = law_of(options, wheels, pair.soft)
+    law = law_of(options, wheels, pair.stiffness_factor)
     energy = totals.energy
     if options.load == L.LOAD_ADAMS:
         depth = centroid_contact(options, wheels, scratch, law, totals, want)
     else:
         depth = slice_contact(options, wheels, scratch, law, totals, want)
     if varying and depth > 0.0:
-        finish_softness(scratch.sums, pair, totals.energy - energy, want)
+        finish_stiffness_gradient(scratch.sums, pair, totals.energy - energy, want)
     return depth
 
 
@@ -550,6 +550,6 @@ def centroid_contact(options, wheels, scratch, law, totals, want):
         own = strip_at(scratch, own_strips + k)
         pair_sections(options, wheels, scratch, strip_at(scratch, k), own, L.LANES, int(low), int(high), want)
         if options.compliances != 0:
-            add_softness(scratch.sums, pair, own, scratch.loads, L.LANES, want)
+            add_stiffness_gradient(scratch.sums, pair, own, scratch.loads, L.LANES, want)
         add_loads(options, wheels, scratch, own, L.LANES, totals, want)
     return depth

@@ -6,7 +6,7 @@ import numpy as np
 from numba import float64, int64
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.deviations import add_deviations, pair_softness, roll_under_corner
+from gearmbs.contact.deviations import add_deviations, pair_stiffness_factor, roll_under_corner
 from gearmbs.contact.helical_sections import helical_flanks, helical_normals
 from gearmbs.contact.pair import pair_corners, pair_kinds, set_pair
 from gearmbs.contact.places import contact_points, end_roll, helical_points, limit_value, roll_difference
@@ -106,7 +106,7 @@ def pair_rows(options, wheels, scratch, sign, i, sections, rows, count):
     side, pair = scratch.side, scratch.pair
     strip, loads = scratch.middle, scratch.loads
     if options.compliances != 0:
-        pair_softness(options, wheels, side, pair, scratch.lookup_1)
+        pair_stiffness_factor(options, wheels, side, pair, scratch.lookup_1)
     sig = roll_difference(side, wheels, pair.f_1, pair.f_2)
     mate = int(side.facing) - i
     if side.base_2 < 0.0:
@@ -134,7 +134,7 @@ def pair_rows(options, wheels, scratch, sign, i, sections, rows, count):
         rows[count, NORMAL] = loads.normal[0]
         rows[count, TANGENT] = loads.tangent[0]
         rows[count, ALPHA] = strip.alpha[0]
-        rows[count, STIFFNESS] = pair.soft
+        rows[count, STIFFNESS] = pair.stiffness_factor
         count += 1
     return count
 

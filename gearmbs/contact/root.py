@@ -177,9 +177,9 @@ def root_part(options, wheels, scratch, part, tip, f_tip, f_root, totals, want):
         return depth if share > 0.0 else 0.0
     pair.f_1 = f_tip if tip == 1 else f_root
     pair.f_2 = f_root if tip == 1 else f_tip
-    pair.soft = 1.0
+    pair.stiffness_factor = 1.0
     for i in range(6):
-        pair.soft_x[i] = 0.0
+        pair.stiffness_factor_x[i] = 0.0
     set_limits(wheels, side, pair)
     count = strip_count(slices)
     for k in range(count):

@@ -54,9 +54,11 @@ def open_side(wheels, side):
     side.sin_0 = length / a
     side.cos_0 = Rb / a
     lean = abs(wheels.wheel_1.twist) * np.sqrt(lean)
-    side.spread = 0.0
+    side.pitch_mismatch_bound = 0.0
     if lean > SAME_PITCH:
-        side.spread = PITCHES_APART * lean * (abs(length) + 2.0 * wheels.pitch + wheels.face_high - wheels.face_low)
+        side.pitch_mismatch_bound = (
+            PITCHES_APART * lean * (abs(length) + 2.0 * wheels.pitch + wheels.face_high - wheels.face_low)
+        )
     return True
 
 
@@ -91,7 +93,7 @@ def facing_teeth(options, wheels, side):
     side.start_1 = side.x[L.F1] + half_1
     side.start_2 = side.x[L.F2] + n * side.turn_2 + half_2
     side.reference = 0.0
-    if side.spread != 0.0:
+    if side.pitch_mismatch_bound != 0.0:
         # where gaps differ from pair to pair, they are bounded from the pair in the middle of the path of contact
         middle = 0.5 * (side.length - wheels.wheel_2.tip_roll + wheels.wheel_1.tip_roll)
         i = np.floor((middle - side.base_1 * (side.start_1 + side.alpha_0)) / pitch + 0.5)
@@ -129,7 +131,7 @@ def reach_of_face(options, wheels, side, middle):
     x, slices = side.x, options.slices
     p, q = x[L.P], x[L.Q]
     low, high = wheels.face_low, wheels.face_high
-    deepest = wheels.added_material - middle.gap[0] + side.spread
+    deepest = wheels.added_material - middle.gap[0] + side.pitch_mismatch_bound
     slope = 2.0 * (p * middle.sin[0] + q * middle.cos[0]) / side.w
     if side.twist_1 != 0.0:
         c = 1.0 + side.twist_1 * side.twist_1

@@ -44,10 +44,10 @@ class Cut(NamedTuple):
 
 
 @inlined
-def law_of(options, wheels, soft):
+def law_of(options, wheels, factor):
     """Normal law of a tooth pair whose stiffness is a multiple of the nominal one."""
-    c = damping_of_share(options.law, wheels.damping, soft)
-    return Law(options.law, soft * wheels.stiffness, wheels.exponent, c, wheels.damping_depth)
+    c = damping_of_share(options.law, wheels.damping, factor)
+    return Law(options.law, factor * wheels.stiffness, wheels.exponent, c, wheels.damping_depth)
 
 
 @inlined
@@ -360,12 +360,12 @@ def end_force(law, strip, i, width, u, sign, limit, pair, sums, want):
         sums.q[m] -= sign * energy * grad[m]
     if want == 0:
         return
-    softened = energy / pair.soft
+    softened = energy / pair.stiffness_factor
     for j in range(6):
         dd = slope / width * grad[j] - (1.0 - u) * strip.grad[j, i] - u * strip.grad[j, i + 1]
         for m in range(6):
             moved = elastic * dd * grad[m] + energy * hess[m, j]
-            moved += softened * (grad[m] * pair.soft_x[j] + grad[j] * pair.soft_x[m])
+            moved += softened * (grad[m] * pair.stiffness_factor_x[j] + grad[j] * pair.stiffness_factor_x[m])
             sums.q_x[m, j] -= sign * moved
 
 

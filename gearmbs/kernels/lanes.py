@@ -44,7 +44,7 @@ class LanesModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, _VECTOR)
 
 
-def _spread(builder: Any, value: Any) -> Any:
+def _broadcast(builder: Any, value: Any) -> Any:
     """Return a vector with the same number in all places."""
     nothing = ir.Constant(_VECTOR, ir.Undefined)
     one = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
@@ -65,7 +65,7 @@ def _define(operation: Callable, instruction: str) -> None:
 
         @lower_builtin(operation, *kinds)
         def lower(context: Any, builder: Any, sig: Any, args: tuple) -> Any:
-            both = (a if kind == LANES_TYPE else _spread(builder, a) for a, kind in zip(args, sig.args))
+            both = (a if kind == LANES_TYPE else _broadcast(builder, a) for a, kind in zip(args, sig.args))
             return getattr(builder, instruction)(*both)
 
 
@@ -117,7 +117,7 @@ def all_lanes(typingctx, number):
     """Return lanes that all hold the same number."""
 
     def codegen(context, builder, sig, args):
-        return _spread(builder, args[0])
+        return _broadcast(builder, args[0])
 
     return LANES_TYPE(types.float64), codegen
 

@@ -281,7 +281,7 @@ S_LEVER = S_VECTOR
 S_CHAIN = S_LEVER + 9
 """rho, n x rho and n x (n x rho) of the body whose columns are formed."""
 S_FORCE = S_CHAIN + 9
-"""The way of a force's point and the force's moment by it, then six weights."""
+"""(n x (P - C)) x F, by which the moment of a force changes as its point moves with its body; from 6 on six weights."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -363,7 +363,7 @@ def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
     tab : Tables
         Up to date with y.
     """
-    s, way = vector_at(tab.scratch, S_LEVER, 9), vector_at(tab.scratch, S_FORCE, 6)
+    s, moment_rate = vector_at(tab.scratch, S_LEVER, 9), vector_at(tab.scratch, S_FORCE, 3)
     weights, point = vector_at(tab.scratch, S_FORCE + 6, 6), row[T.FORCE_I]
     depends = row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
@@ -386,8 +386,8 @@ def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
         if has_force and owner >= 0 and axes[owner, AXIS_OMEGA] >= 0:
             # the point moves with the body that it is on
             lever(owner, point, turns, tab, s)
-            cross3(s, 3, wrench, 0, way, 0)
-            moved = sign * dot3(turns[b], TURN_AXIS, way, 0)
+            cross3(s, 3, wrench, 0, moment_rate, 0)
+            moved = sign * dot3(turns[b], TURN_AXIS, moment_rate, 0)
             k = put(mode, slot, vals, k, axes[b, AXIS_OMEGA], axes[owner, AXIS_PHI], -moved)
     return k
 

@@ -145,7 +145,7 @@ class RunState(Struct):
     starting: bool  # whether order and size still grow after a start, see `controller.after_start`
     passing: bool  # whether the open step is the first beyond a stop or an event
     landing: bool  # whether the open step ends at a stop
-    withdrawn: bool  # whether the equations jump before the next stop, by rounding: steps look at them before that
+    jump_before_stop: bool  # by rounding, so that steps that land on the stop take the equations before it
     start_tries: int  # attempts of a first step that the error test has refused
     h_tried: float  # size of the last of them
     rate_jumped: int  # unknown whose rate the first of them has found to have jumped the most, -1 for none

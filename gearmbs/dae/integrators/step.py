@@ -165,7 +165,7 @@ def choose_end(st):
     # at a stop the equations may have jumped already
     st.landing = st.next_stop < st.stops.shape[0] and t >= st.stops[st.next_stop]
     st.t_seen = np.nextafter(t, t_old) if st.landing else t
-    if st.landing and st.withdrawn:
+    if st.landing and st.jump_before_stop:
         st.t_seen = t - min(BESIDE * abs(t), 0.5 * h)
     st.step = h
     st.h_wanted = st.h
@@ -235,14 +235,14 @@ def solve_step(functions, st, plan, factors):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def withdraw(st):
+def step_before_jump(st):
     """Try a refused step that lands on a stop once more, with the equations as they are a little before; return so.
 
     The time at which they jump may be computed in another way than that of the stop, and come before it by rounding.
     """
-    if not st.landing or st.withdrawn:
+    if not st.landing or st.jump_before_stop:
         return False
-    st.withdrawn = True
+    st.jump_before_stop = True
     st.matrix_wanted = True
     st.h = st.h_wanted
     return True
@@ -262,7 +262,7 @@ def refuse_by_newton(st, code):
         st.h = st.h_wanted
         return s.RUNNING
     st.newton_rejections += 1
-    if withdraw(st) or start_afresh(st):
+    if step_before_jump(st) or start_afresh(st):
         return s.RUNNING
     st.h = NEWTON_SHRINK * st.step
     if code == NOT_FINITE:
@@ -338,7 +338,7 @@ def refuse_by_error(st):
     """Choose order and size of the next attempt after the error test failed."""
     forget_noise(st)
     st.error_rejections += 1
-    if withdraw(st):
+    if step_before_jump(st):
         return
     st.since_refused = 0
     st.error_fails += 1
@@ -409,7 +409,7 @@ def deliver(functions, st, part):
     at_stop = st.next_stop < st.stops.shape[0] and st.t >= st.stops[st.next_stop]
     if at_stop:
         st.next_stop += 1
-        st.withdrawn = False
+        st.jump_before_stop = False
     afresh = at_stop or action != RECORD
     if afresh:
         st.restarts += 1
