@@ -11,7 +11,7 @@ import numpy as np
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.lexer import Command, ViewError
-from gearmbs.adams.view.model import JOINTS, PARTS, PLACED, Database, Item
+from gearmbs.adams.view.model import BLOCKS, JOINTS, PARTS, PLACED, Database, Item
 from gearmbs.adams.view.values import ORIENTATIONS, Stored, Values, fixed, is_ground
 from gearmbs.adams.view.vocabulary import Row, argument_of
 
@@ -113,9 +113,20 @@ class Editor:
                 self.database.move(part, f"{item.path}.{part.name}", line)
         if item.kind in PARTS:
             self.database.part = item
+        if item.kind == "ude" and row.verb == "create":
+            self._block_of_controls(item, line)
         if row.kind == "model":
             self._new_model(item, line)
         self.database.version += 1
+
+    def _block_of_controls(self, item: Item, line: int) -> None:
+        """Make the state variables, and the state, of a block of Controls, which commands may go on to name."""
+        definition = (self.values.text(item, "definition_name") or "").lower()
+        kind = ".".join(definition.split(".")[-2:])
+        for ending in BLOCKS.get(kind, ()):
+            self.database.add("state_variable", f"{item.path}.{item.name}{ending}", line)
+        if kind.endswith("pid"):
+            self.database.add("diff", f"{item.path}.{item.name}_sys", line)
 
     def _of_name(self, row: Row, name: str | None, line: int) -> Item:
         """Return the object of a command, made if it is to be made."""

@@ -7,7 +7,8 @@ from typing import Any
 
 from gearmbs.adams.view.deckmaker import Deckmaker, translated
 from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.model import Item
+from gearmbs.adams.view.model import BLOCKS, Item
+from gearmbs.adams.view.values import fixed
 from gearmbs.adams.write.text import number
 
 
@@ -96,6 +97,49 @@ def _general_motion(m: Deckmaker, item: Item) -> None:
         )
 
 
+def _block(m: Deckmaker, item: Item) -> None:
+    """Functions of the state variables of a block of Controls, as in decks that View exported."""
+
+    def own(ending: str) -> Item:
+        return m.db.items[f"{item.path}.{item.name}{ending}".lower()]
+
+    def value(ending: str) -> str:
+        return f"VARVAL({own(ending).path})"
+
+    def says(ending: str, text: str) -> None:
+        own(ending).fields["function"] = fixed(text, line=item.line)
+
+    def gain(name: str) -> str:
+        found = _variable(m, item, name)
+        if not isinstance(found, (int, float)):
+            raise ViewError(f"its {name} is missing")
+        return number(float(found))
+
+    kind = definition_of(m, item).rpartition("_")[2]
+    inputs = [ending for ending in BLOCKS[definition_of(m, item)] if ending]
+    if kind == "input":
+        says("", value("_input"))
+        return
+    given = _variable(m, item, "input_obj", [])
+    sources = given if isinstance(given, list) else [given]
+    for ending, source in zip(inputs, sources):
+        output = m.db.items.get(f"{source.path}.{source.name}".lower()) if isinstance(source, Item) else None
+        if output is None:
+            raise ViewError("its input_obj is no block of Controls that is modelled")
+        says(ending, f"VARVAL({output.path})")
+    if len(sources) != len(inputs):
+        raise ViewError(f"its input_obj has {len(sources)} blocks; {len(inputs)} are needed")
+    if kind == "gain":
+        says("", f"{gain('gain')} * {value('_input')}")
+    elif kind == "sum":
+        says("", f"{gain('gain1')} * {value('_input1')} + {gain('gain2')} * {value('_input2')}")
+    else:
+        says("_sys", value("_input"))
+        own("_sys").fields["initial_condition"] = fixed(float(_variable(m, item, "initial_condition", 0.0)))
+        parts = (gain("p_gain"), value("_input")), (gain("i_gain"), f"DIF({own('_sys').path})")
+        says("", " + ".join(f"{k} * {x}" for k, x in (*parts, (gain("d_gain"), value("_input_d")))))
+
+
 def _nothing(m: Deckmaker, item: Item) -> None:
     """Lists of inputs and outputs for a control program: the deck has them as PINPUT and POUTPUT."""
 
@@ -105,8 +149,14 @@ DEFINITIONS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "forces.torsion_spring": _spring(turning=True),
     "constraints.general_motion": _general_motion,
     "controls.controls_plant": _nothing,
+    **dict.fromkeys(BLOCKS, _block),
 }
 """By the last two parts of a definition's name."""
+
+
+def definition_of(m: Deckmaker, item: Item) -> str:
+    """Return the last two parts of the name of an instance's definition."""
+    return ".".join((m.values.text(item, "definition_name") or "").lower().split(".")[-2:])
 
 
 def make_instance(m: Deckmaker, item: Item) -> None:
@@ -118,7 +168,7 @@ def make_instance(m: Deckmaker, item: Item) -> None:
         If its definition is not known.
     """
     name = m.values.text(item, "definition_name") or ""
-    make = DEFINITIONS.get(".".join(name.lower().split(".")[-2:]))
+    make = DEFINITIONS.get(definition_of(m, item))
     if make is None:
         raise ViewError(
             f"instances of {name[:60]} are not modelled; write what it stands for: joints, forces, variables"

@@ -114,6 +114,11 @@ JOINTS = frozenset(
     "revolute translational cylindrical spherical fixed universal hooke convel planar screw rackpin".split()
 )
 """Commands that make joints."""
+BLOCKS = {
+    "acontrols.controls_input": ("_input", ""), "acontrols.controls_sum": ("_input1", "_input2", ""),
+    "acontrols.controls_gain": ("_input", ""), "acontrols.controls_pid": ("_input", "_input_d", ""),
+}  # fmt: skip
+"""State variables that blocks of Controls have, by the last two parts of their definition's name: endings of names."""
 PLACED = (*PARTS, "marker", "floating_marker", "point", "model")
 """Kinds that have a place, and may be what others are placed relative to."""
 

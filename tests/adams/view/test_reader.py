@@ -170,6 +170,54 @@ def test_results_that_are_not_made_are_remarked():
     assert any("left out" in str(d) for d in deck.diagnostics)
 
 
+BLOCKS = """
+ude create instance instance_name = .swing.{0} definition_name = .MDI.Acontrols.controls_{1}
+variable modify variable_name = .swing.{0}.input_obj object_value = {2}
+"""
+
+
+def gained(block, **gains):
+    lines = "variable modify variable_name = .swing.{}.{} real_value = {}\n"
+    return "".join(lines.format(block, name, value) for name, value in gains.items())
+
+
+def controlled(pid_of=".swing.SUM, .swing.AMP"):
+    text = PENDULUM
+    for block, function in (("WANTED", "0.5"), ("IS", "TIME")):
+        text += f"ude create instance instance_name = .swing.{block} definition_name = .MDI.Acontrols.controls_input\n"
+        text += f'data_element modify variable variable_name = .swing.{block}.{block}_input function = "{function}"\n'
+    text += BLOCKS.format("SUM", "sum", ".swing.WANTED, .swing.IS") + gained("SUM", gain1=1.0, gain2=-1.0)
+    text += BLOCKS.format("AMP", "gain", ".swing.SUM") + gained("AMP", gain=7.0)
+    text += BLOCKS.format("PID", "pid", pid_of)
+    return text + gained("PID", p_gain=3.0, i_gain=2.0, d_gain=0.25, initial_condition=0.1)
+
+
+def test_blocks_of_controls_are_what_view_exports():
+    view = parse_view(controlled())
+    names = ("WANTED_input", "IS_input", "SUM_input1", "SUM_input2", "SUM", "AMP_input", "AMP", "PID_input", "PID")
+    ids = {by_name(view, st.Variable, name).id: name for name in names}
+    state = by_name(view, st.Diff, "PID_sys")
+    assert state.ic == (0.1,)
+    assert "VARVAL" in state.function.upper()
+    assert ids[int(re.search(r"\d+", by_name(view, st.Variable, "AMP_input").function)[0])] == "SUM"
+    result = run_deck(parse_view(controlled() + MEASURED).deck, end=1.0, steps=4)
+    t, out = result.t, result.request(1)[:, 1]
+    error, integral = 0.5 - t, 0.1 + 0.5 * t - t**2 / 2
+    np.testing.assert_allclose(out, 3 * error + 2 * integral + 0.25 * 7 * error, atol=1e-6)
+
+
+MEASURED = (
+    "output_control create request request_name = .swing.OUT adams_id = 1 f2 = VARVAL(.swing.PID.PID) f3 = 0 f4 = 0\n"
+)
+
+
+@pytest.mark.parametrize("source", [".swing.SUM", ".swing.SUM, .swing.ROD"])
+def test_blocks_of_controls_without_their_inputs_are_refused(source):
+    deck = parse_view(controlled(source)).deck
+    assert len(deck.unsupported) == 1
+    assert re.search(says(".swing.PID", "input_obj"), deck.unsupported[0].message)
+
+
 def test_inactive_objects_are_not_there():
     deck = parse_view(PENDULUM + "constraint attributes constraint_name = .swing.HINGE active = off\n").deck
     assert not deck.of(st.Joint)
