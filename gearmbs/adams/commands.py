@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from gearmbs.adams import Script, ViewModel
 
 
+ReadFrom = Annotated[
+    list[Path] | None, typer.Option(help="Folder whose files the model may read, too; may be given again.")
+]
+
+
 def adams(
     model: Annotated[Path, typer.Argument(help="ADAMS/Solver deck (.adm), or command file of View (.cmd).")],
     script: Annotated[Path | None, typer.Argument(help="Commands (.acf).")] = None,
@@ -36,10 +41,7 @@ def adams(
     variable: Annotated[
         list[str] | None, typer.Option(help="NAME=VALUE of a design variable of a .cmd; may be given again.")
     ] = None,
-    read_from: Annotated[
-        list[Path] | None,
-        typer.Option(help="Folder whose files the model may read, too; may be given again."),
-    ] = None,
+    read_from: ReadFrom = None,
     to_deck: Annotated[
         Path | None, typer.Option(help="Write the deck of a .cmd here, and its simulations beside; run nothing.")
     ] = None,
@@ -138,15 +140,17 @@ def plant(
     equilibrium: Annotated[bool, typer.Option("--equilibrium", help="Look for an equilibrium first.")] = False,
     skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is not supported.")] = False,
     routines: Annotated[Path | None, typer.Option(help="Python file with functions for USER(...).")] = None,
+    read_from: ReadFrom = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File for A, B, C, D: .mat or .npz; default: MODEL_plant.mat.")
     ] = None,
 ) -> None:
     """Linearise an ADAMS deck from its PINPUT to its POUTPUT; write A, B, C and D."""
-    with guarded():
-        from gearmbs.adams import linear_plant, load_routines
+    with guarded(), ExitStack() as stack:
+        from gearmbs.adams import linear_plant, load_routines, reading_from
         from gearmbs.dae.analyses.plant import check_format
 
+        stack.enter_context(reading_from(*(read_from or [])))
         path = check_format(out or model.with_name(f"{model.stem}_plant.mat"))
         found = linear_plant(
             model,

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from gearmbs.adams import DeckError, parse_deck, parse_script, read_deck, read_results, run_deck
+from gearmbs.adams import DeckError, parse_deck, parse_script, read_deck, read_results, reading_from, run_deck
 from gearmbs.adams.builders.flexible import has_momentum, modal_ratios
+from gearmbs.cli import app
 from gearmbs.flexible import Shaft, ShaftSection, mnf_of, read_mnf, reduce_model, write_mnf
 from gearmbs.mechanism import Mechanism
 from tests.says import says
@@ -64,6 +66,32 @@ def test_a_bar_from_a_file_swings_as_the_same_bar_in_python(folder):
     np.testing.assert_allclose(q_f, expected.modal_coordinates("bar"), atol=1e-6 * np.abs(q_f).max() + 1e-9)
     assert np.abs(q_f).max() > 0
     assert v_f.shape == q_f.shape == (21, 8)
+
+
+def test_the_file_of_a_body_in_another_folder_is_read_when_that_is_said(folder, tmp_path):
+    text = DECK.format(pivot="0,90D,0").replace("MNF_FILE=bar.mnf", f"MNF_FILE={folder / 'bar.mnf'}")
+    (tmp_path / "bar.adm").write_text(text)
+    with pytest.raises(DeckError, match=says("FLEX_BODY/1", "MNF_FILE", "bar.mnf", "--read-from")):
+        run_deck(read_deck(tmp_path / "bar.adm"), end=0.01, steps=2)
+    with reading_from(folder):
+        found = run_deck(read_deck(tmp_path / "bar.adm"), end=0.01, steps=2)
+    beside = run_deck(read_deck(folder / "bar.adm"), end=0.01, steps=2)
+    np.testing.assert_array_equal(found.request(1), beside.request(1))
+
+
+def test_a_plant_reads_from_folders_that_are_named(folder, tmp_path):
+    text = DECK.format(pivot="0,90D,0").replace("MNF_FILE=bar.mnf", f"MNF_FILE={folder / 'bar.mnf'}")
+    inputs = "VARIABLE/1,FUNCTION=0\nVARIABLE/2,FUNCTION=AZ(100,11)\nPINPUT/1,VARIABLES=1\nPOUTPUT/1,VARIABLES=2\n"
+    torque = "SFORCE/1,ROTATION,ACTIONONLY,I=100,J=11,FUNCTION=VARVAL(1)\nEND\n"
+    (tmp_path / "bar.adm").write_text(text.replace("END\n", inputs + torque))
+    given = ["plant", str(tmp_path / "bar.adm"), "-o", str(tmp_path / "bar.npz")]
+    refused = CliRunner().invoke(app, given)
+    assert refused.exit_code
+    assert "--read-from" in refused.output
+    done = CliRunner().invoke(app, [*given, "--read-from", str(folder)])
+    assert done.exit_code == 0, done.output
+    with np.load(tmp_path / "bar.npz") as found:
+        assert found["D"].shape == (1, 1)
 
 
 @pytest.mark.parametrize(
