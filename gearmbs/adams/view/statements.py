@@ -133,13 +133,17 @@ def make_motion(m: Deckmaker, item: Item) -> None:
         where = [*m.pair(item), axis.upper()]
         turning = axis.startswith("b")
     level = m.values.word(item, "time_derivative", "displacement").upper()
-    start = m.values.number(item, "rotational_displacement_ic" if turning else "displacement_ic")
-    speed = m.values.number(item, "rotational_velocity_ic" if turning else "velocity_ic")
+    own, other = ("rotational_", "") if turning else ("", "rotational_")
+    start, speed = (m.values.number(item, f"{own}{what}_ic") for what in ("displacement", "velocity"))
     scale = m.radian if turning else 1.0
     # without effect where the displacement itself is given
     at = None if start is None or level == "DISPLACEMENT" else f"ICDISP = {number(start * scale)}"
     rate = None if speed is None or level != "ACCELERATION" else f"ICVEL = {number(speed * scale)}"
-    item.used |= {key for key in item.fields if key.endswith("_ic")}
+    wrong = next(
+        (key for what in ("displacement", "velocity") if m.values.number(item, key := f"{other}{what}_ic")), None
+    )
+    if wrong is not None and level != "DISPLACEMENT":
+        raise ViewError(f"{wrong} is of a motion of the other kind; give {own}{wrong.removeprefix(other)}")
     m.add(item, f"MOTION/{m.id(item)}", *where, level if level != "DISPLACEMENT" else None, at, rate, *function)
 
 

@@ -218,6 +218,17 @@ def test_blocks_of_controls_without_their_inputs_are_refused(source):
     assert re.search(says(".swing.PID", "input_obj"), deck.unsupported[0].message)
 
 
+@pytest.mark.parametrize(
+    ("given", "icdisp"), [("rotational_displacement_ic = 90", np.pi / 2), ("displacement_ic = 0", None)]
+)
+def test_a_motion_by_velocity_starts_where_it_says(given, icdisp):
+    motion = "constraint create motion_generator motion_name = .swing.M joint_name = .swing.HINGE  &\n"
+    text = PENDULUM + motion + f'   type_of_freedom = rotational time_derivative = velocity {given} function = "1"\n'
+    assert by_name(parse_view(text), st.Motion, "M").icdisp == icdisp
+    deck = parse_view(text.replace(given, "displacement_ic = 90")).deck
+    assert re.search(says(".swing.M", "displacement_ic"), deck.unsupported[0].message)
+
+
 def test_inactive_objects_are_not_there():
     deck = parse_view(PENDULUM + "constraint attributes constraint_name = .swing.HINGE active = off\n").deck
     assert not deck.of(st.Joint)
