@@ -33,6 +33,7 @@ ANGULAR = frozenset(
     ax_ay_az_projection_angles""".split()
 )
 """What View gives in its unit of angle, and the solver in radians."""
+ANGLES = KINEMATIC["ax_ay_az_projection_angles"]
 EULER = {"psi": "PSI", "theta": "THETA", "phi": "PHI", "yaw": "YAW", "pitch": "PITCH", "roll": "ROLL"}
 
 
@@ -121,19 +122,31 @@ def _kinematic(m: Deckmaker, item: Item) -> str | None:
     functions = KINEMATIC.get(what)
     if functions is None or not functions[_component(m, item)]:
         return None
-    name = functions[_component(m, item)]
     if item.kind == "pt2pt_measure":
         ends = [_marker(m, m.values.ref(item, key)) for key in ("to_point", "from_point")]
     else:
         ends = [_marker(m, m.values.ref(item, "point"))]
-    frame = m.values.ref(item, "coordinate_rframe", MARKERS)
-    if len(ends) == 1 and (reference := m.values.ref(item, "motion_rframe", MARKERS)) is not None:
-        ends.append(m.id(reference))
-    along = [] if frame is None or name.endswith("M") else [m.id(frame)]
-    if along and len(ends) == 1:
-        ends.append(0)
-    found = f"{name}({', '.join(str(one) for one in (*ends, *along))})"
-    return _angle(m, found) if what in ANGULAR else found
+    return _call(m, item, functions[_component(m, item)], ends)
+
+
+def _call(m: Deckmaker, item: Item, name: str, ends: list[int]) -> str | None:
+    """Return a function of one marker or two, along the axes and relative to the frame that a measure names.
+
+    None where a velocity is seen from a frame that moves: no public model shows which derivative View takes.
+    """
+    frame, seen = (m.values.ref(item, f"{what}_rframe", MARKERS) for what in ("coordinate", "motion"))
+    if seen is not None:
+        part = m.db.owner(seen)
+        if name in ANGLES or (not name.startswith("D") and (part is None or not is_ground(part))):
+            return None
+        ends = ends if len(ends) > 1 else [*ends, m.id(seen)]
+    along: list[int] = []
+    if frame is not None and not name.endswith("M"):
+        if name in ANGLES:
+            return None
+        along = [m.id(frame)] if len(ends) > 1 else [0, m.id(frame)]
+    found = f"{name}({', '.join(map(str, (*ends, *along)))})"
+    return _angle(m, found) if m.values.word(item, "characteristic") in ANGULAR else found
 
 
 def _object(m: Deckmaker, item: Item) -> str | None:
@@ -148,23 +161,31 @@ def _object(m: Deckmaker, item: Item) -> str | None:
             return None
         k = (1 if what == "element_force" else 5) + (_component(m, item) + 1) % 4
         frame = m.values.ref(item, "coordinate_rframe", MARKERS)
-        at_j = 0 if m.values.word(item, "from_first", "yes") in ("yes", "on", "true") else 1
-        return f"{function}({m.id(found)}, {at_j}, {k}, {m.id(frame) if frame is not None else 0})"
+        ends = f"{m.id(found)}, {0 if _from_first(m, item) else 1}"
+        return f"{function}({ends}, {k}, {m.id(frame) if frame is not None else 0})"
     functions = KINEMATIC.get(what)
     if functions is not None and functions[_component(m, item)]:
-        name = functions[_component(m, item)]
-        ends = [_marker(m, found)] if found.kind in PARTS else _ends(m, found)
-        return (
-            _angle(m, f"{name}({', '.join(map(str, ends))})")
-            if what in ANGULAR
-            else f"{name}({', '.join(map(str, ends))})"
-        )
+        return _call(m, item, functions[_component(m, item)], _seen(m, item, found))
     if found.kind == "spring" and what in ("deformation", "deformation_velocity"):
         name = "VR" if what.endswith("velocity") else "DM"
         base = f"{name}({', '.join(map(str, _ends(m, found)))})"
         free = m.values.number(found, "displacement_at_preload", 0.0) or 0.0
         return base if name == "VR" or not free else f"{base} - {number(free)}"
     return None
+
+
+def _from_first(m: Deckmaker, item: Item) -> bool:
+    return m.values.word(item, "from_first", "yes") in ("yes", "on", "true")
+
+
+def _seen(m: Deckmaker, item: Item, found: Item) -> list[int]:
+    """Return the marker of a part, or those of a joint or force: the second from the first, or the other way round."""
+    if found.kind in PARTS:
+        return [_marker(m, found)]
+    ends = _ends(m, found) or _ends(m, m.values.ref(found, "joint_name") or found)
+    if len(ends) != 2:
+        raise ViewError(f"{found.path} has no markers I and J to measure between")
+    return ends[::-1] if _from_first(m, item) else ends
 
 
 def _ends(m: Deckmaker, item: Item) -> list[int]:

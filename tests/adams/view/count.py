@@ -65,7 +65,23 @@ def differences(ours: Deck, theirs: Deck) -> tuple[list[str], float, list[str]]:
                         others.append(f"{a[key].label()} {name}: {x} for {y}")
                 elif spec.kind in (3, 4) and x != y:
                     others.append(f"{a[key].label()} {name}: {x} for {y}")
+    mine, given = functions(ours), functions(theirs)
+    others += [f"{key}: {mine[key]} for {given[key]}" for key in mine.keys() & given.keys() if mine[key] != given[key]]
     return tables, worst, others
+
+
+def functions(deck: Deck) -> dict[str, str]:
+    """Return the functions of named statements, without what their writing leaves open, variables by their names."""
+    found = {}
+    names = {v.id: (v.name or str(v.id)).rsplit(".", 1)[-1].lower() for v in deck.of(st.Variable).values()}
+    for kind in (st.Variable, st.Sforce, st.Motion, st.Diff, st.Gcon):
+        for one in deck.of(kind).values():
+            text = re.sub(r"\s", "", str(one.function)).lower()
+            text = re.sub(r"varval\((\d+)\)", lambda m: f"varval({names.get(int(m[1]))})", text)
+            # frames that are the global one
+            text = re.sub(r"(,0)+\)", ")", text)
+            found[f"{one.keyword} {(one.name or str(one.id)).rsplit('.', 1)[-1]}"] = text
+    return found
 
 
 def turned(marker: st.Marker) -> np.ndarray:

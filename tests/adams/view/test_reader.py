@@ -229,6 +229,38 @@ def test_a_motion_by_velocity_starts_where_it_says(given, icdisp):
     assert re.search(says(".swing.M", "displacement_ic"), deck.unsupported[0].message)
 
 
+MEASURE = (
+    "measure create object measure_name = .swing.SEEN object = .swing.{} characteristic = {} {}  &\n"
+    "   component = z_component\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("of", "characteristic", "how", "expected"),
+    [
+        ("HINGE", "ax_ay_az_projection_angles", "from_first = yes", "RTOD * AZ({1}, {0})"),
+        ("HINGE", "ax_ay_az_projection_angles", "from_first = no", "RTOD * AZ({0}, {1})"),
+        ("HINGE", "angular_velocity", "from_first = no coordinate_rframe = .swing.ROD.cm", "RTOD * WZ({0}, {1}, {2})"),
+        ("HINGE", "translational_velocity", "motion_rframe = .swing.ground.PIVOT", "VZ({1}, {0})"),
+        ("HINGE", "element_torque", "from_first = yes", "JOINT({3}, 0, 8, 0)"),
+        ("HINGE", "element_torque", "from_first = no", "JOINT({3}, 1, 8, 0)"),
+        ("ROD", "cm_velocity", "from_first = yes", "VZ({2})"),
+        ("ROD", "cm_acceleration", "coordinate_rframe = .swing.ROD.TOP", "ACCZ({2}, 0, {0})"),
+    ],
+)
+def test_measures_of_objects_are_those_of_exported_decks(of, characteristic, how, expected):
+    """From the first marker View gives the second one's motion seen from the first."""
+    view = parse_view(PENDULUM + MEASURE.format(of, characteristic, how))
+    ids = [by_name(view, st.Marker, name).id for name in ("TOP", "PIVOT", "cm")]
+    ids.append(by_name(view, st.Joint, "HINGE").id)
+    assert by_name(view, st.Variable, "SEEN").function == expected.format(*ids)
+
+
+def test_velocities_seen_from_a_frame_that_moves_are_remarked():
+    deck = parse_view(PENDULUM + MEASURE.format("HINGE", "angular_velocity", "motion_rframe = .swing.ROD.cm")).deck
+    assert any("SEEN" in str(d) and "left out" in str(d) for d in deck.diagnostics)
+
+
 def test_inactive_objects_are_not_there():
     deck = parse_view(PENDULUM + "constraint attributes constraint_name = .swing.HINGE active = off\n").deck
     assert not deck.of(st.Joint)
