@@ -34,20 +34,15 @@ from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, factor, new_factors, solve
 from gearmbs.dae.problem import HISTORY_CHANGED, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, DenseOutput, lagrange_weights
+from gearmbs.dae.tangent_jumps import look_for_jumps
+from gearmbs.dae.tangent_track import TRACK_TYPE, Track, size_of_move
 from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
-from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 
 BY = 1e-8
 """Part of a parameter's own scale, and of the rates along the past, by which the residual is moved: where it is not
 linear in both together this leaves 1e-8, and the rounding 1e-16/1e-8, of the terms."""
-MOST = 1e-4
-"""Part of a parameter's own scale by which models are made beside each other: central differences of their tables are
-off by 1e-8, and by the rounding of 1e-16/1e-4."""
-MOVED = 1e-6
-"""Largest part of their typical magnitude by which unknowns are moved along their sensitivities: from 1e-7 to 1e-5 the
-derivative of a mesh force is the same in four digits, below rounding shows."""
 GROWTH, GROWING_ORDER = 1.4, 3
 """Ratio of a step to the one before it, and order, with which steps grow behind a restart: for ever at this ratio the
 formula of order three is stable up to 1.53, that of order four up to 1.28."""
@@ -59,91 +54,21 @@ NO_SOLUTION = (
     "sensitivities at t = {:.6g} s: the linearised equations have no unique solution there, as at a singular position; "
     "end the run before it"
 )
+JUMPS = (
+    "parameter {!r}: at t = {:.6g} s the equations jump, at a time that depends on it, and its derivatives with them, "
+    "which is not followed; let what jumps take a width (STEP), or a time that does not depend on the parameter"
+)
+JUMP_COUNTS = 1e-3
+"""Part of the largest sensitivity of an unknown by which a jump that is not followed may falsify it: what the steps
+leave of it is as much."""
 END_OF_STEP, AFRESH = 1, 2
 """Flags of a point: it ends a step of the run; no point before it but the last counts."""
 
+SCRATCH = (
+    "plus", "minus", "yp_moved", "rate", "found", "most_rate", "between", "first_seen", "seen_between", "last_seen"
+)  # fmt: skip
+"""Members of a track that start as zeros, one of each unknown."""
 _VEC, _MAT, _IVEC = float64[::1], float64[:, ::1], int64[::1]
-
-
-class Track(Struct):
-    """Sensitivities along a run: their history, where parameters stand, and scratch.
-
-    Attributes
-    ----------
-    times : ndarray, shape (HISTORY,)
-        Of the points of the history, newest first.
-    y : ndarray, shape (HISTORY, n)
-        The run there, in the coordinates that are valid now.
-    s : ndarray, shape (HISTORY * p, n)
-        Sensitivities there, of all parameters point after point.
-    place, weight : ndarray
-        Places in the table of numbers that parameters change, and the change by one of the parameter.
-    first : ndarray of int64, shape (p + 1,)
-        Where the places of each parameter begin.
-    scale, differential : ndarray, shape (n,)
-        Typical magnitude of each unknown; 1 for those whose derivative appears.
-    vals : ndarray
-        CSC values of the matrix.
-    plus, minus, yp_moved, rate, found : ndarray, shape (n,)
-        Scratch.
-    value, slope, nodes : ndarray, shape (HISTORY + 1,)
-        Coefficients.
-    kept : ndarray
-        Table of numbers while a parameter is moved.
-    before : ndarray, shape (HISTORY, n)
-        History before a change of coordinates.
-    rows : ndarray, shape (HISTORY * (1 + 2 p), n)
-        Points of the history, each followed by those moved along its sensitivities.
-    old : ndarray of int64
-        The integer table before the last change.
-    table : ndarray of int64
-        Scratch of the same size.
-    error, largest : ndarray, shape (p, n)
-        Largest local error and largest value of each sensitivity.
-    """
-
-    parameters: int
-    n_past: int
-    seen: int  # outputs written
-    has_hook: bool
-    nonlinear_rates: bool
-    growth_limit: float
-    times: Vector
-    y: Matrix
-    s: Matrix
-    place: IntVector
-    weight: Vector
-    first: IntVector
-    scale: Vector
-    differential: Vector
-    vals: Vector
-    plus: Vector
-    minus: Vector
-    yp_moved: Vector
-    rate: Vector
-    found: Vector
-    value: Vector
-    slope: Vector
-    nodes: Vector
-    kept: Vector
-    before: Matrix
-    rows: Matrix
-    old: IntVector
-    table: IntVector
-    error: Matrix
-    largest: Matrix
-
-
-TRACK_TYPE = Track.numba_type
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _size_of_move(tr, s, row):
-    """Return by how much of a unit a parameter is moved whose sensitivities are a row of ``s``."""
-    largest = 0.0
-    for i in range(tr.scale.shape[0]):
-        largest = max(largest, abs(s[row, i]) / tr.scale[i])
-    return min(MOST, MOVED / largest) if largest > 0.0 else MOST
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -178,6 +103,7 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
     lagrange_weights(t, nodes, k + 1, tr.value, tr.slope)
     slope = tr.slope
     gamma = slope[0]
+    tr.gamma = gamma
     functions.jacobian(t, y, yp, gamma, tr.vals, idata, rdata, work)
     growth = factor(plan, factors, tr.vals)
     if not growth <= tr.growth_limit:
@@ -205,7 +131,7 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
                 s[p, i] += w * s[(j + 1) * count + p, i]
         by = BY
         if tr.nonlinear_rates:
-            by = min(BY, _size_of_move(tr, s, p))
+            by = min(BY, size_of_move(tr, s, p))
         first, last = tr.first[p], tr.first[p + 1]
         for q in range(first, last):
             tr.kept[q] = rdata[tr.place[q]]
@@ -256,7 +182,7 @@ def _change_coordinates(functions, tr, t, rdata, work):
         for i in range(n):
             tr.rows[j * width, i] = tr.before[j, i]
         for p in range(count):
-            by = _size_of_move(tr, tr.s, j * count + p)
+            by = size_of_move(tr, tr.s, j * count + p)
             for i in range(n):
                 tr.rows[j * width + 1 + 2 * p, i] = tr.before[j, i] + by * tr.s[j * count + p, i]
                 tr.rows[j * width + 2 + 2 * p, i] = tr.before[j, i] - by * tr.s[j * count + p, i]
@@ -267,7 +193,7 @@ def _change_coordinates(functions, tr, t, rdata, work):
     functions.hook(t, tr.rows, past * width, tr.table, numbers, work)
     for j in range(past):
         for p in range(count):
-            by = _size_of_move(tr, tr.s, j * count + p)
+            by = size_of_move(tr, tr.s, j * count + p)
             for i in range(n):
                 moved = tr.rows[j * width + 1 + 2 * p, i] - tr.rows[j * width + 2 + 2 * p, i]
                 tr.rows[j * width + 1 + 2 * p, i] = moved / (2.0 * by)
@@ -340,6 +266,7 @@ def follow_run(
                 for i in range(n):
                     if tr.differential[i] == 0.0:
                         tr.s[count + p, i] = tr.s[p, i]
+        look_for_jumps(functions, tr, plan, factors, k, yp[m], idata, rdata, work)
         tr.n_past = min(past + 1, HISTORY)
         _write_outputs(tr, k, outputs, s_out, sp_out)
         if tr.has_hook and flags[m] & END_OF_STEP != 0:
@@ -441,7 +368,7 @@ def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction]) 
     Raises
     ------
     ModelError
-        If the equations for the sensitivities have no unique solution.
+        If the equations for the sensitivities have no unique solution; if these jump, which is not followed.
     """
     n, count = problem.n, len(directions)
     sol = result.sol
@@ -480,6 +407,11 @@ def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction]) 
             if reached < y.shape[0]:
                 plan = None
             at = reached
+    for p, direction in enumerate(directions):
+        # what does not change has its rounding beside it
+        least = BY * (tr.largest[p] / tr.scale).max() * tr.scale
+        if (tr.lost[p] > JUMP_COUNTS * np.maximum(tr.largest[p], least)).any():
+            raise ModelError(JUMPS.format(direction.name, tr.lost_at[p]))
     tested = np.asarray(problem.error_mask, dtype=float) / tr.scale
     most = (tr.largest * tested).max(axis=1, initial=0.0)
     error = (tr.error * tested).max(axis=1, initial=0.0) / np.where(most > 0.0, most, 1.0)
@@ -516,6 +448,7 @@ def _track(problem: DAEProblem, directions: list[Direction]) -> Track:
         has_hook=problem.hook is not None,
         nonlinear_rates=problem.nonlinear_rates,
         growth_limit=GROWTH_LIMIT,
+        gamma=0.0,
         times=np.zeros(HISTORY),
         y=np.zeros((HISTORY, n)),
         s=np.zeros((HISTORY * count, n)),
@@ -532,6 +465,9 @@ def _track(problem: DAEProblem, directions: list[Direction]) -> Track:
         table=np.zeros(len(problem.idata), dtype=np.int64),
         error=np.zeros((count, n)),
         largest=np.zeros((count, n)),
-        **{name: np.zeros(n) for name in ("plus", "minus", "yp_moved", "rate", "found")},
+        watched=np.asarray(problem.error_mask & problem.differential, dtype=float),
+        lost=np.zeros((count, n)),
+        lost_at=np.zeros(count),
+        **{name: np.zeros(n) for name in SCRATCH},
         **{name: np.zeros(HISTORY + 1) for name in ("value", "slope", "nodes")},
     )

@@ -46,8 +46,11 @@ HELD = 8
 """Equal samples in a row that are a value held, where the record otherwise changes from sample to sample."""
 FLAT, FLAT_TOPS = 3, 3
 """Equal samples in a row at the end of a range, and stretches of them, that are no chance."""
+SAME = 1e-9
+"""Part of a record's range within which samples are equal: a sixtieth of a converter's step at 24 bits."""
 FLAT_SHARE = 6.0
-"""How many times as many samples are at the highest value as a step below: of a sine in steps it is 2.4."""
+"""How many times as many samples are at the highest value as a step below, or at any other: of a sine in steps it is
+2.4. So seven samples tell of a range, where no other value recurs."""
 ISLAND = 3
 """Half the samples between two lost ones that are bridged with them: a bridge that has to lead through one wrong sample
 follows it."""
@@ -116,13 +119,6 @@ def repair_vibrometer(
             "over the range": np.zeros_like(dark) if bound is None else np.abs(column) >= AT_RANGE * bound,
             "held": _held(column),
         }
-        if bound is None and (top := flat_top(column)) is not None:
-            limit, count = top
-            unit = units_of(signal)[names.index(name)]
-            notes.append(
-                f"CLIPPED: {name} stands at {limit:.6g} {unit} in {count} samples, as where a range is exceeded; its "
-                f"levels are wrong. Give full_scale='{abs(limit):.6g} {unit}' to bridge them, or take a larger range."
-            )
         told = np.any(list(found.values()), axis=0)
         lost = _widened(told)
         found["spikes"] = np.zeros_like(dark)
@@ -143,6 +139,14 @@ def repair_vibrometer(
                 f"signal: {100 * share:.3g} % of {name!r} is lost, more than {100 * MOST_LOST:g} % can be bridged; "
                 "focus the laser, use reflecting tape or a larger range"
             )
+        if bound is None and (top := flat_top(column[~lost])) is not None:
+            limit, count = top
+            unit = units_of(signal)[names.index(name)]
+            notes.append(
+                f"CLIPPED: {name} stands at {limit:.6g} {unit} in {count} samples that are not bridged, as where a "
+                f"range is exceeded; its levels are wrong. Give full_scale='{abs(limit):.6g} {unit}' to bridge them, "
+                "or take a larger range."
+            )
         shares.append(share)
         columns.append(_bridged(column, lost))
         if lost.any():
@@ -162,21 +166,25 @@ def repair_vibrometer(
 def flat_top(column: np.ndarray) -> tuple[float, int] | None:
     """Return the highest or lowest value and its count, where a record stands at it as no vibration does, or None.
 
-    Several stretches of equal samples must be there, and far more samples than a step below: vibration cut to coarse
-    steps has stretches at its peaks, too, but nearly as many samples one step below.
+    Far more samples must be there than at any other value of the upper half: of a vibration that repeats itself each
+    value recurs. If there are several stretches of equal samples, far more than a step below do, too: vibration cut to
+    coarse steps has stretches at its peaks, but nearly as many samples one step below.
     """
+    whole = np.round(column / (SAME * max(float(np.ptp(column)), np.finfo(float).tiny)))
     for sign in (1.0, -1.0):
-        x = sign * column
+        x = sign * whole
         top = float(x.max())
         at = x == top
-        lower = x[~at]
-        longer = sum(b - a >= FLAT for a, b in _stretches(at))
-        if longer < FLAT_TOPS or not lower.size:
+        values, counts = np.unique(x[~at], return_counts=True)
+        if not values.size:
             continue
-        step = float(np.diff(np.unique(x)).min())
-        below = int(np.count_nonzero(lower >= top - 1.5 * step))
-        if np.count_nonzero(at) > FLAT_SHARE * below:
-            return sign * top, int(np.count_nonzero(at))
+        upper = counts[values > 0.5 * (top + float(np.median(x)))]
+        others = int(upper.max(initial=1))
+        if sum(b - a >= FLAT for a, b in _stretches(at)) >= FLAT_TOPS:
+            step = min(top - values[-1], float(np.diff(values).min(initial=np.inf)))
+            others = int(counts[values >= top - 1.5 * step].sum())
+        if np.count_nonzero(at) > FLAT_SHARE * others:
+            return float(column[at][0]), int(np.count_nonzero(at))
     return None
 
 

@@ -199,3 +199,81 @@ def test_a_parameter_without_effect_is_told():
     with pytest.warns(UserWarning, match=says("'idle'", "zero")):
         run = forward_sensitivities(lambda idle: oscillator(), {"idle": 1.0}, 0.05)
     assert not run.derivative("idle", "DX(place)").any()
+
+
+def pushed(law, **numbers):
+    """2 kg on 200 N/m, pushed by a force that is a text of the parameters, from rest."""
+    made = gm.Mechanism("pushed", gravity=(0, 0, 0))
+    body = made.body("body", mass=2.0, inertia=(1, 1, 1))
+    made.translational("slide", body, made.ground, at=(0, 0, 0), axis=(1, 0, 0))
+    push = f"{law.format(**{name: repr(value) for name, value in numbers.items()})}-200*DX(place)"
+    made.load("push", body.marker(name="place"), made.ground.marker(), rm=made.ground.marker(), fx=push)
+    return made
+
+
+JUMPING = {
+    "a time": ("IF(TIME-{when}: 0, 0, 7)", {"when": 0.5}, {}),
+    "a time at a breakpoint": ("IF(TIME-{when}: 0, 0, 7)", {"when": 0.5}, {"breakpoints": [0.5]}),
+    "a place": ("4+IF(DX(place)-{place}: 0, 0, 1)", {"place": 0.01}, {}),
+    "a small one at a place": ("4+IF(DX(place)-{place}: 0, 0, 0.001)", {"place": 0.02}, {}),
+    "a place that comes later": ("{size}+IF(DX(place)-0.01: 0, 0, 1)", {"size": 4.0}, {}),
+    "a speed": ("IF(VX(place)-{rate}: 1, 1, 2)", {"rate": 0.02}, {}),
+    "an impact": ("{size}-IMPACT(-DX(place), -VX(place), -0.01, 1E5, 1.5, 50, 0)", {"size": 4.0}, {}),
+}
+
+
+@pytest.mark.parametrize("law", JUMPING)
+def test_jumps_that_depend_on_the_parameter_are_refused(law):
+    text, values, options = JUMPING[law]
+    (name,) = values
+    with pytest.raises(ModelError, match=says(f"'{name}'", "jump", "STEP")):
+        forward_sensitivities(lambda **p: pushed(text, **p), values, 1.5, rate=100, **options)
+
+
+@pytest.mark.parametrize("options", [{}, {"breakpoints": [0.5]}], ids=["no breakpoint", "breakpoint"])
+def test_jumps_at_a_time_of_their_own_are_followed(options):
+    run = forward_sensitivities(
+        lambda size: pushed("IF(TIME-0.5: 0, 0, {size})", size=size), {"size": 7.0}, 1.5, rate=100, tol=1e-8, **options
+    )
+    t = run.solution.t
+    exact = np.where(t > 0.5, (1 - np.cos(10.0 * (t - 0.5))) / 200.0, 0.0)
+    assert np.abs(run.derivative("size", "DX(place)") - exact).max() < 2e-5 * exact.max()
+
+
+def test_a_step_in_place_of_a_jump_is_followed():
+    """By its time a push that comes over 20 ms moves the motion behind it as a whole: dx/dt0 = -x'."""
+    run = forward_sensitivities(
+        lambda when: pushed("STEP(TIME-{when}, -0.01, 0, 0.01, 7)", when=when), {"when": 0.5}, 1.5, rate=100, tol=1e-8
+    )
+    rate = run.solution.evaluate("VX(place)")
+    assert run.derivative("when", "DX(place)") == pytest.approx(-rate, abs=1e-4 * np.abs(rate).max())
+
+
+def test_kinks_that_depend_on_the_parameter_are_followed():
+    """A stop without damping at its rim: energy is conserved, by the place of the stop, too."""
+    text = "6-IMPACT(-DX(place), -VX(place), -{place}, 1E5, 1.5, 0, 1E-3)"
+    run = forward_sensitivities(lambda place: pushed(text, place=place), {"place": 0.04}, 1.0, rate=200, tol=1e-9)
+
+    def energy(s):
+        x, v = s.evaluate("DX(place)"), s.evaluate("VX(place)")
+        return v**2 + 100 * x**2 - 6 * x
+
+    x = run.solution.evaluate("DX(place)")
+    inside = x < 0.0399
+    assert x.max() > 0.04
+    assert run.derivative("place", energy)[inside] == pytest.approx(0.0, abs=2e-4)
+
+
+def jump_of_python(x, edge):
+    return 1.0 if x < edge else 0.0
+
+
+def test_jumps_inside_functions_of_python_are_seen():
+    def build(edge):
+        made = pushed("4+ONOFF(DX(place),{edge})", edge=edge)
+        made.function("onoff", jump_of_python)
+        return made
+
+    with pytest.raises(ModelError, match=says("'edge'", "jump")):
+        forward_sensitivities(build, {"edge": 0.02}, 1.0, rate=100)
+    assert forward_sensitivities(build, {"edge": 0.2}, 1.0, rate=100).solution.result.success

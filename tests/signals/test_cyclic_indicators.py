@@ -131,13 +131,19 @@ def test_zones_at_their_limits(velocity, group, support, zone):
     assert table["velocity"][0] == pytest.approx(1e-3 * velocity, rel=1e-3)
 
 
-def test_zones_of_slow_machines_follow_the_displacement_and_acceleration_is_integrated():
+def test_slow_machines_need_limits_of_the_displacement_which_then_decides():
     omega = 2 * np.pi * 5.0
     wave = 60e-6 * omega**2 * np.sqrt(2.0) * np.cos(omega * TIME)
-    table = vibration_zones(wave, "300 rpm", rate=RATE, units="m/s^2")
+    limits = ("10 um", "50 um", 100e-6)
+    table = vibration_zones(wave, "300 rpm", rate=RATE, units="m/s^2", displacement=limits)
     assert table["displacement"][0] == pytest.approx(60e-6, rel=0.02)
     assert (table["velocity_zone"][0], table["displacement_zone"][0], table["zone"][0]) == ("B", "C", "C")
     assert "long" in table["meaning"][0]
+    with pytest.raises(SignalError, match=says("displacement", "300 rpm", "zones A, B and C")):
+        vibration_zones(wave, "300 rpm", rate=RATE, units="m/s^2")
+    quick = vibration_zones(wave, "600 rpm", rate=RATE, units="m/s^2")
+    assert "displacement_zone" not in quick
+    assert quick["zone"][0] == quick["velocity_zone"][0]
 
 
 def test_what_zones_refuse():
@@ -147,3 +153,5 @@ def test_what_zones_refuse():
         vibration_zones(TIME, "100 rpm", rate=RATE, units="m/s")
     with pytest.raises(SignalError, match=says("units", "Pa")):
         vibration_zones(TIME, "1500 rpm", rate=RATE, units="Pa")
+    with pytest.raises(SignalError, match=says("displacement", "50 um", "increase")):
+        vibration_zones(TIME, "300 rpm", rate=RATE, units="m/s", displacement=("50 um", "20 um", "90 um"))

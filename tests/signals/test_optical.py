@@ -96,6 +96,34 @@ def test_a_range_that_is_exceeded_is_told(bits):
     assert not any("CLIPPED" in note for note in known.attrs.get("notes", ()))
 
 
+@pytest.mark.parametrize("share", [0.98, 0.95, 0.9])
+def test_a_range_that_single_samples_reach_is_told(share):
+    """Fast vibration is over its range for a sample or two at a time, so that hardly any stand next to each other."""
+    clean = add_noise(vibration(levels=(0.3, 0.6, 1.0)), seed=seed(5), rms=2e-4)
+    limit = share * float(clean.max())
+    clipped = make_signal({"laser": np.clip(clean.values[:, 0], -limit, limit)}, RATE, units="m/s")
+    told = [note for note in repair_vibrometer(clipped).attrs["notes"] if "CLIPPED" in note]
+    assert len(told) == 1
+    assert f"full_scale='{limit:.6g} m/s'" in told[0]
+
+
+def test_a_few_drop_outs_to_the_range_are_told_unless_they_are_bridged():
+    values = add_noise(vibration(), seed=seed(6), rms=1e-5).values[:, 0].copy()
+    for at in (3000, 9000, 15000, 21000):
+        values[at : at + 2] = 0.2
+    bad = make_signal({"laser": values}, RATE, units="m/s")
+    told = [note for note in repair_vibrometer(bad, spikes=None).attrs["notes"] if "CLIPPED" in note]
+    assert len(told) == 1
+    assert "full_scale='0.2 m/s'" in told[0]
+    assert not any("CLIPPED" in note for note in repair_vibrometer(bad).attrs["notes"])
+
+
+@pytest.mark.parametrize("per_period", [128, 32, 27.5862])
+def test_tones_that_repeat_their_samples_are_not_clipped(per_period):
+    tone = np.cos(2 * np.pi / per_period * np.arange(20_000))
+    assert "notes" not in repair_vibrometer(make_signal({"laser": tone}, RATE, units="m/s")).attrs
+
+
 def test_light_that_is_weak_tells_drop_outs_and_too_many_are_refused():
     clean = vibration(seconds=0.5)
     values, light = clean.values[:, 0].copy(), np.ones(clean.sizes["time"])

@@ -21,7 +21,8 @@ import numpy as np
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.results.solution import Solution
-from gearmbs.dae.tangents import MOST, MOVED, Direction, Followed, follow
+from gearmbs.dae.tangent_track import MOST, MOVED
+from gearmbs.dae.tangents import Direction, Followed, follow
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
@@ -138,13 +139,14 @@ def forward_sensitivities(
     Raises
     ------
     ModelError
-        If the run fails; if a parameter changes what the model is made of; if an option is of another kind of run.
+        If the run fails; if a parameter changes what the model is made of; if forces jump at a time that depends on it,
+        so that derivatives do; if an option is of another kind of run.
 
     Notes
     -----
     Of S parameters the cost beside the run is that of a Jacobian and a factorisation, and of S + 1 residuals and
-    S substitutions, for each step. Where forces jump with the state, or at a time that depends on a parameter, so do
-    derivatives, which is not followed; contact and friction here are continuous.
+    S substitutions, and five residuals more by which jumps are looked for, for each step. Contact and friction here are
+    continuous.
     """
     for option in WITHOUT:
         if option in options:

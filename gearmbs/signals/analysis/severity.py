@@ -1,12 +1,14 @@
 """Zones of vibration severity of industrial machines by ISO 20816-3, from the record of a bearing housing.
 
 The limits of the velocity, RMS over 10 to 1000 Hz, or from 2 Hz on below 600 rpm, are those of ISO 10816-3:2009, which
-ISO 20816-3:2022 replaces; public manuals of instruments and of controllers print them (docs/howto/bearings.md). For the
-displacement none was found that does.
+ISO 20816-3:2022 replaces; public manuals of instruments and of controllers print them (docs/howto/bearings.md). The
+standard also limits the displacement, which decides for slow machines. No public source prints those limits: whoever
+has the standard gives them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +18,7 @@ from gearmbs.signals.conversion import convert
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.given import given_speed
+from gearmbs.units import Quantity, to_si
 
 ZONES = "ABCD"
 MEANING = {
@@ -34,9 +37,6 @@ LIMITS: dict[tuple[int, str], tuple[float, float, float]] = {
 }
 """Upper ends of zones A, B and C, m/s RMS, by group (1: above 300 kW, or shafts 315 mm high and more; 2: 15 to 300 kW,
 or 160 to 315 mm) and support."""
-CORNER = {1: 12.5, 2: 10.0}
-"""Hz, by group: the limits of the displacement are those of the velocity at this frequency, to which those of the
-standard are round numbers."""
 QUANTITIES: tuple[Literal["velocity", "displacement"], ...] = ("velocity", "displacement")
 TOP = 1000.0
 """Hz."""
@@ -46,7 +46,12 @@ SLOW, SLOWEST = 600.0, 120.0
 
 @takes_data()
 def vibration_zones(
-    signal: Any, speed: Any, *, group: Literal[1, 2] = 2, support: Literal["rigid", "flexible"] = "rigid"
+    signal: Any,
+    speed: Any,
+    *,
+    group: Literal[1, 2] = 2,
+    support: Literal["rigid", "flexible"] = "rigid",
+    displacement: Sequence[Quantity] | None = None,
 ) -> pd.DataFrame:
     """Return the zone of ISO 20816-3 of each channel.
 
@@ -62,17 +67,21 @@ def vibration_zones(
     support : {"rigid", "flexible"}
         Rigid if the lowest natural frequency of machine and support in the direction measured is a quarter above the
         speed.
+    displacement : sequence of three floats or str, optional
+        Upper ends of zones A, B and C of the displacement, m RMS or text, as your copy of the standard has them.
+        Without them velocities alone are judged; below 600 rpm they are needed.
 
     Returns
     -------
     DataFrame
-        A row for each channel: ``velocity`` (m/s) and ``displacement`` (m), RMS over the band; their zones and the
-        worse of the two, ``zone``; ``meaning``.
+        A row for each channel: ``velocity`` (m/s) and ``displacement`` (m), RMS over the band; ``velocity_zone`` and,
+        with limits of it, ``displacement_zone``; the worse of the two, ``zone``; ``meaning``.
 
     Raises
     ------
     SignalError
-        If there are no such tables, the speed is below 120 rpm, or a unit is none of motion.
+        If there are no such tables, the speed is below 120 rpm, or below 600 rpm without limits of the displacement, or
+        a unit is none of motion.
 
     Examples
     --------
@@ -90,14 +99,30 @@ def vibration_zones(
     rpm = float(turning) * 30.0 / np.pi
     if rpm < SLOWEST:
         raise SignalError(f"speed: {rpm:g} rpm is below {SLOWEST:g} rpm, from which ISO 20816-3 applies")
-    velocities = np.array(LIMITS[group, support])
-    limits = dict(zip(QUANTITIES, (velocities, velocities / (2.0 * np.pi * CORNER[group])), strict=True))
+    if displacement is None and rpm < SLOW:
+        raise SignalError(
+            f"displacement: at {rpm:g} rpm, below {SLOW:g} rpm, it decides beside the velocity, and no public source "
+            "has its limits; give the upper ends of zones A, B and C as the standard has them, as "
+            "displacement=('... um', '... um', '... um')"
+        )
+    limits: dict[str, tuple[float, ...]] = {"velocity": LIMITS[group, support]}
+    if displacement is not None:
+        limits["displacement"] = _ends(displacement)
     band = (10.0 if rpm >= SLOW else 2.0, TOP)
     rows = []
     for c, name in enumerate(signal["channel"].values):
         one = signal.isel(channel=[c])
-        levels = {to: float(convert(one, to, band=band, edges="keep").std()) for to in QUANTITIES}
-        zones = [ZONES[int(np.searchsorted(limits[to], level))] for to, level in levels.items()]
+        levels: dict[str, float] = {to: float(convert(one, to, band=band, edges="keep").std()) for to in QUANTITIES}
+        zones = [ZONES[int(np.searchsorted(ends, levels[of]))] for of, ends in limits.items()]
         rows.append((str(name), *levels.values(), *zones, max(zones), MEANING[max(zones)]))
-    columns = ["channel", "velocity", "displacement", "velocity_zone", "displacement_zone", "zone", "meaning"]
+    columns = ["channel", *QUANTITIES, *(f"{of}_zone" for of in limits), "zone", "meaning"]
     return pd.DataFrame(rows, columns=columns)
+
+
+def _ends(displacement: Sequence[Quantity]) -> tuple[float, ...]:
+    """Return the upper ends of three zones in m."""
+    given = (displacement,) if isinstance(displacement, str) else tuple(displacement)
+    ends = tuple(to_si(end, "m", "displacement") for end in given)
+    if len(ends) != len(ZONES) - 1 or not all(a < b for a, b in zip((0.0, *ends), ends)):
+        raise SignalError(f"displacement: {displacement!r} are not the upper ends of zones A, B and C, which increase")
+    return ends

@@ -1,0 +1,222 @@
+"""Where the equations jump along a run, and by how much that moves its sensitivities.
+
+Where the rates jump by [y'] at a time t* that depends on the parameter, the sensitivities jump by -[y'] dt*/dp. This is
+not followed: it is measured, so that a derivative from which it is missing is refused. Nothing is known of the
+equations but their residual: along the polynomial of a step intervals are halved for as long as its fourth difference
+does not fade, which it does wherever the equations are continuous, with kinks, too. When the jump comes is then looked
+up beside the run, with unknowns and numbers moved along a sensitivity.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.dae.linalg.sparse_lu import solve
+from gearmbs.dae.problem import EPS
+from gearmbs.dae.result import lagrange_weights
+from gearmbs.dae.tangent_track import MOST
+from gearmbs.kernels.jit import njit
+
+SEEN = 1e-5
+"""Part of the largest rate of an unknown, so far, from which on a jump of its rate is looked for. Less counts for as
+little in the derivatives, unless they are by nothing else."""
+ROUNDED = 1e3
+"""Roundings of a typical unknown, times gamma, that a rate is not told from: residuals are sums of many terms."""
+APART = 8.0
+"""Roundings of a time between two that count as the same: an expression may jump at another sum than a breakpoint."""
+LOOKS = 4096
+"""Intervals of a step that are looked at: a smooth residual is through with a few, a jump in it with a hundred."""
+SMALLER, MOVES = 1e-2, 6
+"""Part of the move before, and number of moves, with which the time of a jump is looked up: it is to move by less than
+some steps, which are short at a jump. A difference of residuals at one has made sensitivities huge, so that these do
+not tell how far to move."""
+WIDENED = 4.0
+"""Ratio of one interval in which a moved jump is looked for to the one before."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _residual(functions, tr, k, t, yp, p, by, idata, rdata, work):
+    """Write the residual at a time to ``plus``, on the run moved along a parameter.
+
+    Parameters
+    ----------
+    functions, tr, k, yp, idata, rdata, work
+        As of `look_for_jumps`.
+    t : float
+    p : int
+        The parameter.
+    by : float
+        By how much of its scale; unknowns move along its sensitivities.
+    """
+    n, count = tr.scale.shape[0], tr.parameters
+    lagrange_weights(t, tr.times, k + 1, tr.value, tr.slope)
+    for i in range(n):
+        v = 0.0
+        for j in range(k + 1):
+            v += tr.value[j] * tr.y[j, i]
+        if by != 0.0:
+            for j in range(k + 1):
+                v += tr.value[j] * by * tr.s[j * count + p, i]
+        tr.between[i] = v
+    first, last = tr.first[p], tr.first[p + 1]
+    if by != 0.0:
+        for q in range(first, last):
+            tr.kept[q] = rdata[tr.place[q]]
+            rdata[tr.place[q]] += by * tr.weight[q]
+    functions.residual(t, tr.between, yp, tr.plus, idata, rdata, work)
+    if by != 0.0:
+        for q in range(first, last):
+            rdata[tr.place[q]] = tr.kept[q]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _correction(functions, tr, plan, factors, k, t, yp, p, by, out, idata, rdata, work):
+    """Write by how much the corrector would move the unknowns at a time to ``out``.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors, k, yp, idata, rdata, work
+        As of `look_for_jumps`.
+    t, p, by
+        As of `_residual`.
+    out : ndarray, shape (n,)
+    """
+    _residual(functions, tr, k, t, yp, p, by, idata, rdata, work)
+    solve(plan, factors, tr.plus, out)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _size(tr, i, moved):
+    """Return a change of what `_correction` finds of unknown i, as part of what is looked at."""
+    limit = SEEN * tr.most_rate[i] + ROUNDED * EPS * tr.gamma * tr.scale[i]
+    return tr.watched[i] * abs(tr.gamma * moved) / limit
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def look_for_jumps(functions, tr, plan, factors, k, yp, idata, rdata, work):
+    """Look for jumps in the step to the newest point, and note what each moves the sensitivities by.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors
+        As of `gearmbs.dae.tangents.follow_run`, with the newest point in the history.
+    k : int
+        Order of the polynomial.
+    yp : ndarray, shape (n,)
+        Rates at the newest point, with which the residual is looked at.
+    idata, rdata, work : ndarray
+        Tables and scratch of the problem.
+    """
+    n = tr.scale.shape[0]
+    difference, found = tr.last_seen, tr.first_seen
+    for i in range(n):
+        tr.most_rate[i] = max(tr.most_rate[i], abs(yp[i]))
+    # a jump right at the end belongs to the step behind it, one right at the start to this one
+    lows, highs = np.empty(LOOKS + 2), np.empty(LOOKS + 2)
+    lows[0] = tr.times[1] - APART * EPS * abs(tr.times[1])
+    highs[0] = tr.times[0] - APART * EPS * abs(tr.times[0])
+    waiting, looks = 1, 0
+    while waiting > 0 and looks < LOOKS:
+        waiting -= 1
+        looks += 1
+        low, high = lows[waiting], highs[waiting]
+        for i in range(n):
+            difference[i] = 0.0
+        for j in range(5):
+            _residual(functions, tr, k, low + 0.25 * j * (high - low), yp, 0, 0.0, idata, rdata, work)
+            weight = 6.0 if j == 2 else -4.0 if j % 2 else 1.0
+            for i in range(n):
+                difference[i] += weight * tr.plus[i]
+        solve(plan, factors, difference, found)
+        most = 0.0
+        for i in range(n):
+            most = max(most, _size(tr, i, found[i]))
+        if most <= 1.0:
+            continue
+        if high - low <= APART * EPS * abs(high):
+            _note(functions, tr, plan, factors, k, yp, low, high, idata, rdata, work)
+            continue
+        middle = low + 0.5 * (high - low)
+        lows[waiting], highs[waiting] = low, middle
+        lows[waiting + 1], highs[waiting + 1] = middle, high
+        waiting += 2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _note(functions, tr, plan, factors, k, yp, low, high, idata, rdata, work):
+    """Note what a jump moves the sensitivities by; leave the corrections before and behind it.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors, k, yp, idata, rdata, work
+        As of `look_for_jumps`.
+    low, high : float
+        Between which the equations jump.
+    """
+    before, after = tr.first_seen, tr.last_seen
+    n = tr.scale.shape[0]
+    _correction(functions, tr, plan, factors, k, low, yp, 0, 0.0, before, idata, rdata, work)
+    _correction(functions, tr, plan, factors, k, high, yp, 0, 0.0, after, idata, rdata, work)
+    told = 0
+    for i in range(n):
+        if _size(tr, i, after[i] - before[i]) > _size(tr, told, after[told] - before[told]):
+            told = i
+    for p in range(tr.parameters):
+        by = MOST
+        late = np.inf
+        for _ in range(MOVES):
+            by *= SMALLER
+            late = _moved(functions, tr, plan, factors, k, yp, low, high, told, p, by, idata, rdata, work)
+            late -= _moved(functions, tr, plan, factors, k, yp, low, high, told, p, -by, idata, rdata, work)
+            if np.isfinite(late):
+                break
+        if abs(late) <= 4.0 * APART * EPS * abs(high):
+            continue
+        for i in range(n):
+            moved = tr.watched[i] * abs(tr.gamma * (after[i] - before[i])) * abs(late) / (2.0 * by)
+            if moved > tr.lost[p, i]:
+                tr.lost[p, i] = moved
+                tr.lost_at[p] = high
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _moved(functions, tr, plan, factors, k, yp, low, high, told, p, by, idata, rdata, work):
+    """Return by how much later a jump comes with the run moved along a parameter.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors, k, yp, idata, rdata, work
+        As of `look_for_jumps`.
+    low, high : float
+        Between which the equations jump on the run itself.
+    told : int
+        Unknown by whose correction it is told on which side of the jump a time lies.
+    p, by
+        As of `_residual`.
+    """
+    before, after, found = tr.first_seen[told], tr.last_seen[told], tr.seen_between
+    width, most = high - low, WIDENED * (tr.times[0] - tr.times[1])
+    first, last = low, high
+    for _ in range(64):
+        _correction(functions, tr, plan, factors, k, first, yp, p, by, found, idata, rdata, work)
+        earlier = abs(found[told] - after) < abs(found[told] - before)
+        _correction(functions, tr, plan, factors, k, last, yp, p, by, found, idata, rdata, work)
+        later = abs(found[told] - after) > abs(found[told] - before)
+        if not earlier and not later:
+            break
+        width *= WIDENED
+        if width > most:
+            # it comes by more than steps later, or no longer, as where the run just reaches it
+            return np.inf if by > 0.0 else -np.inf
+        if earlier:
+            last, first = first, first - width
+        else:
+            first, last = last, last + width
+    while last - first > APART * EPS * abs(high):
+        middle = first + 0.5 * (last - first)
+        _correction(functions, tr, plan, factors, k, middle, yp, p, by, found, idata, rdata, work)
+        if abs(found[told] - after) < abs(found[told] - before):
+            last = middle
+        else:
+            first = middle
+    return 0.5 * ((first - low) + (last - high))
