@@ -99,6 +99,28 @@ def test_without_the_shafts_line_a_wrong_speed_acquits_nobody(share):
     assert combine_bearings([report]).fault is None
 
 
+@pytest.mark.parametrize("share", [-0.05, -0.03, 0.03, 0.05])
+def test_a_wrong_speed_acquits_no_cage(share):
+    cage = record(3.0 * pulses(LINES.ftf * SHAFT))
+    report = diagnose_bearing(cage, "6205", rpm(share), shafts=())
+    assert report.fault is None
+    (doubted,) = [finding for finding in report.findings if finding.grade == "shifted"]
+    assert doubted.part == "cage"
+    assert doubted.slip == pytest.approx(1.0 / (1.0 + share) - 1.0, abs=1e-3)
+    assert "CHECK THE SPEED" in report.verdict
+    # another shaft may turn as fast, where shafts are not known
+    assert "CHECK THE SPEED" not in diagnose_bearing(cage, "6205", rpm(share)).verdict
+
+
+def test_looseness_near_a_shifted_cage_is_none():
+    """All multiples of 2/5 of the turns, 2.6 % beside the cage of this bearing."""
+    lines = bearing_lines({"name": "loose", "FTF": 0.41, "BSF": 2.3, "BPFO": 3.69, "BPFI": 5.31})
+    step = record(3.0 * pulses(0.4 * SHAFT, jitter=0.0))
+    report = diagnose_bearing(step, lines, rpm(0.0), shafts=())
+    assert report.fault is None
+    assert not [finding for finding in report.findings if finding.grade == "shifted"]
+
+
 def test_a_sound_record_is_acquitted_within_the_tolerance_unless_its_speed_is_found():
     sound = diagnose_bearing(record(), "6205", rpm(0.0), shafts=())
     assert "this holds for speeds of 1731.3 to 1748.7 rpm" in sound.verdict

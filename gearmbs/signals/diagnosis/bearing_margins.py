@@ -26,6 +26,8 @@ import scipy.fft
 
 from gearmbs.signals.diagnosis.bearing_judgement import (
     CLEAR,
+    CLEAR_CHANCE,
+    PARENTS,
     SHIFTED,
     SIGNS,
     SPEED_SHARE,
@@ -144,7 +146,10 @@ def _doubted(judged: Judged) -> Judged:
 def _shifted(
     near: Weighed, told: float, tolerance: float, judge_at: Callable[[float], Iterator[Sequence[Judged]]]
 ) -> Verdicts:
-    """Return the verdicts, with the part whose lines are clear at a speed beyond the tolerance if none is named."""
+    """Return the verdicts, with the part whose lines are clear at a speed beyond the tolerance if none is named.
+
+    A cage, whose lines are never called clear, counts where they are no noise, after all other parts.
+    """
     if any(one.grade in (CLEAR, SIGNS, UNCERTAIN) for channel in near.verdicts for one in channel):
         return near.verdicts
     found = [
@@ -152,11 +157,12 @@ def _shifted(
         for shift in SHIFTS
         for c, channel in enumerate(judge_at(told * (1.0 + shift)))
         for p, one in enumerate(channel)
-        if one.grade == CLEAR and one.part != CAGE and not _whole_turns(one, told, tolerance)
+        if one.grade == CLEAR or (one.part == CAGE and one.grade == SIGNS and one.evidence.log_chance <= CLEAR_CHANCE)
+        if not _in_step(one, told, tolerance)
     ]
     if not found:
         return near.verdicts
-    one, c, p = min(found, key=lambda each: each[0].evidence.log_chance)
+    one, c, p = min(found, key=lambda each: (each[0].part == CAGE, each[0].evidence.log_chance))
     kinematic = one.lines.orders[one.part] * one.lines.ratio * told
     shown = replace(one, grade=SHIFTED, evidence=replace(one.evidence, kinematic=kinematic))
     channels = [list(channel) for channel in near.verdicts]
@@ -164,10 +170,15 @@ def _shifted(
     return tuple(map(tuple, channels))
 
 
-def _whole_turns(judged: Judged, told: float, tolerance: float) -> bool:
-    """Return whether lines are at whole multiples of a shaft's told turns, as those of blades are."""
+def _in_step(judged: Judged, told: float, tolerance: float) -> bool:
+    """Return whether lines are in step with a shaft's told turns.
+
+    Those of blades are at whole multiples; where a cage's would be, those of looseness are at multiples of a half to a
+    sixth.
+    """
     turns = judged.evidence.found / (told * judged.lines.ratio)
-    return abs(turns - round(turns)) <= tolerance * turns
+    parts = np.arange(1, PARENTS + 1) if judged.part == CAGE else np.ones(1)
+    return bool((np.abs(parts * turns - np.round(parts * turns)) <= tolerance * parts * turns).any())
 
 
 def answers_at(
