@@ -6,7 +6,6 @@ import numpy as np
 
 from gearmbs.dae.integrators import driver
 from gearmbs.dae.integrators import run_state as s
-from gearmbs.dae.integrators.corrector import rounding_level
 from gearmbs.dae.integrators.driver import Run
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.step import advance
@@ -31,13 +30,3 @@ def take_step(run: Run) -> int:
             run.records.drain()
         else:
             return code
-
-
-def moved_by_rounding(run: Run, unknowns: np.ndarray) -> float:
-    """Return how far rounding moves some unknowns in the corrector of the last step."""
-    st = run.state
-    weights = st.w_error.copy()
-    st.w_error[:] = unknowns
-    level = rounding_level(st, run.plan, run.factors)
-    st.w_error[:] = weights
-    return float(level)

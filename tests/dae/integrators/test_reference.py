@@ -6,13 +6,9 @@ import pytest
 from benchmarks.problems.chain import four_bar_chain
 from benchmarks.problems.reference import chain_problem, reference_problems
 from gearmbs.dae.integrators.bdf import HISTORY
-from gearmbs.dae.integrators.run_state import DONE, RUNNING
 from gearmbs.dae.integrators.wstiff import solve_wstiff
-from tests.dae.integrators.stepping import moved_by_rounding, started, take_step
 
 PROBLEMS = reference_problems()
-START_UP = 0.05
-"""Time after which steps have grown: shorter ones divide rounding by more, and what they leave is forgotten."""
 SINGULAR_POSITIONS = 2
 """That the chain passes within two seconds: all its links are in line near t = 0.72 and 1.24 s."""
 CASES = [(name, form) for name in PROBLEMS for form in ("I3", "SI2", "SI1")]
@@ -140,32 +136,33 @@ def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
         assert result.stats.noise_limited <= SINGULAR_POSITIONS * HISTORY
 
 
+def other_rounding(problem, number):
+    """Move the numbers of a problem by their last digit, up, down or not, none of them for the first."""
+    signs = np.random.default_rng(number).integers(-1, 2, problem.rdata.size)
+    problem.rdata *= 1.0 + min(number, 1) * np.finfo(float).eps * signs
+    return problem
+
+
 @pytest.mark.parametrize("loops", LOOPS)
 @pytest.mark.parametrize("tol", [1e-8, 1e-9, 1e-10, 1e-11])
 def test_chain_of_index_three_passes_at_the_level_of_rounding(loops, tol):
-    """Velocities are outside error control at index three: they take what rounding does to positions times gamma.
+    """The bound of the other forms, in the middle of five runs whose numbers differ by their last digit.
 
-    What rounding moves the velocities by is told by the solver's own estimate for the matrix of each step. The error
-    test knows positions alone. Where rounding moves those by more than their tolerance it lets the prediction stand,
-    so that the tolerance times gamma, the leading coefficient, is the most that a velocity takes over. An output holds
-    what some steps before it have left, too, and which correctors rounding keeps from converging is chance.
+    Velocities are outside error control at index three. A step that ends next to a singular position moves positions
+    by up to the tolerance over the constant of its error, and by that times gamma it kicks the velocities for good.
+    Whether one ends there is chance, and rounding draws: of fifteen runs at 1e-10 one is at 1.7 times the bound, so
+    that three of five are over it once in 300 times. Their middle is at 0.1 to 0.6 of it.
     """
     reference = chain_problem(loops, 2.0)
-    problem = reference.make("I3")
-    run = started(problem, reference.times, tol=tol)
-    st = run.state
-    velocities = (problem.differential & ~problem.error_mask).astype(float)
-    noise = 0.0
-    code = RUNNING
-    while code == RUNNING:
-        code = take_step(run)
-        if st.t > START_UP:
-            noise = max(noise, min(moved_by_rounding(run, velocities), st.gamma * tol))
-    assert code == DONE
-    assert reference.error(reference.times, st.y_out) < 400 * tol + 3 * max(5e-9, noise)
-    assert st.newton_rejections <= (2 if noise < tol else max(2, st.steps // 100))
+    runs = [
+        solve_wstiff(other_rounding(reference.make("I3"), number), reference.times, tol=tol)
+        for number in range(5 if loops < 100 else 3)
+    ]
+    assert all(run.success for run in runs)
+    assert np.median([reference.error(run.t, run.y) for run in runs]) < 400 * tol + 5e-9
+    assert np.median([run.stats.newton_rejections for run in runs]) <= SINGULAR_POSITIONS
     if tol >= 1e-8:
-        assert st.noise_limited == 0
+        assert np.median([run.stats.noise_limited for run in runs]) == 0
 
 
 @pytest.mark.slow
