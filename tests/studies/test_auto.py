@@ -57,8 +57,28 @@ def test_harmonics_are_those_of_a_long_precise_record_or_it_is_told_that_they_ar
     found, wanted = (one["gmf_rms"].sel(way="orders").values for one in (record, exact))
     levels = np.maximum(wanted, 0.01 * wanted.max(axis=0))
     if np.abs((found - wanted) / levels).max() > 5e-3:
-        # wheels that leave each other have several motions, and a tolerance of 1e-8, 1e-9 or 1e-10 decides which
-        assert "other motions may exist" in record.attrs["record_length"], case.name
+        # wheels that leave each other have several motions, and a tolerance of 1e-8, 1e-9 or 1e-10 decides which; what
+        # scatters by the tolerance has a mean that hangs on it
+        told = record.attrs["record_length"]
+        assert "other motions may exist" in told or "scatter" in told, case.name
+
+
+@pytest.mark.slow
+def test_harmonics_that_scatter_by_the_tolerance_are_told_and_a_tighter_one_settles_them():
+    """Number 184 of the random cases: the small second harmonic of a horizontal force is 0.4 % low at 9e-9."""
+    case = Case(
+        gears={"teeth": (20, 31)},
+        operation={"speed": 141.4296, "torque": 68.8414, **AUTO},
+        contact={"damping": 20733.7, "depth": 3.27891e-5},
+        fault={"backlash": 2.210636e-4, "teeth": {"kind": "wear", "wheel": "driven"}},
+    )
+    loose, tight = (
+        run_case(one, variables=["gmf_rms"]).attrs for one in (case, case.changed(solver={"tolerance": 1e-10}))
+    )
+    assert "scatter" in loose["record_length"]
+    assert f"{0.1 * case.tolerance:.1g}" in loose["record_length"]
+    assert tight["record_scatter"] < 0.5 * loose["record_scatter"]
+    assert "scatter" not in tight["record_length"]
 
 
 @pytest.mark.slow

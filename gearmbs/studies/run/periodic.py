@@ -42,6 +42,10 @@ HOLDS = 1e-3
 """Deviation up to which a motion is said to repeat itself: the noise of a mean over four mesh periods, and a fifth of
 what a harmonic may be off, 0.5 %, which it is at q^h = 0.8 of the module's text."""
 
+SCATTERS = 5e-3
+"""Part of its level by which a harmonic of single mesh periods may scatter about what repeats itself before it is told:
+what one may be off. Means settle all the same, on values that hang on what scatters: chaos, or the tolerance."""
+
 LEAST_LEVEL = 0.01
 """Levels below this part of the component's largest harmonic are judged as if they had it: they are differences of
 large numbers."""
@@ -102,7 +106,7 @@ class PeriodicRecorder:
         self._amplitudes = np.empty((0, HARMONICS, len(COMPONENTS)), dtype=complex)
         self._watched = False
         self.found: Found | None = None
-        self.deviation = math.nan
+        self.deviation = self.scatter = math.nan
 
     def take(self, part: Solution) -> None:
         """Take the next steps of a run."""
@@ -171,6 +175,7 @@ class PeriodicRecorder:
             levels = np.abs(c[n - span :].mean(axis=0))
             levels = np.maximum(levels, LEAST_LEVEL * levels.max(axis=0))
             shift, noise = np.abs((late - early).mean(axis=0)), (late - early).std(axis=0) / math.sqrt(2.0)
+            self.scatter = float((noise / levels).max())
             # of a turn the record is off by what its beginning is, as part of it
             weight = 1.0 if p == 1 else len(late) / span
             shift, noise = weight * shift, noise / math.sqrt(span)
@@ -273,6 +278,11 @@ class PeriodicRecorder:
                 f"; the flanks were apart in {100 * apart:.2g} % of the time behind the run-up: other motions may "
                 "exist beside this one, and how it begins may decide between them"
             )
+        if self.found is not None and self.scatter > SCATTERS:
+            said += (
+                f"; its harmonics scatter by {100 * self.scatter:.2g} % from mesh period to mesh period, and their "
+                f"means may hang on what makes them do so: compare a tolerance of {0.1 * self.case.tolerance:.1g}"
+            )
         return {
             "operation_settling": start - self._begin,
             "operation_duration": stop - start,
@@ -280,6 +290,7 @@ class PeriodicRecorder:
             "record_period": period,
             "record_mesh_periods": (stop - start) * self._gmf,
             "record_deviation": self.deviation,
+            "record_scatter": self.scatter,
             "record_apart": apart,
             "record_length": said,
         }
