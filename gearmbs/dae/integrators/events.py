@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.integrators.algebraic import note_moves, settle, settle_between
+from gearmbs.dae.integrators.corrector import GOLDEN_FRACTION
 from gearmbs.dae.integrators.run_state import copy, rows_from, times_from
 from gearmbs.kernels.jit import njit
 
@@ -26,6 +27,9 @@ STRAIGHT = 0.2
 """Part of its range over the step by which an event function may leave its chords where no more samples are taken: a
 parabola between two chords of a quarter of its arc leaves them by a sixteenth, a full wave by all."""
 
+TURNS = 40
+"""Tries for a value beyond zero where an event function turns within a step, by golden section: to 1e-8 of the step, at
+which a parabola is at its vertex to rounding."""
 RECORD = 0
 STOP = 1
 RESTART = 2
@@ -115,8 +119,9 @@ def _sample_time(st, i):
 def _sample(functions, st, part):
     """Sample the event functions over the last step into ``st.g_between``; return the samples from one to the next.
 
-    Functions of differential unknowns are as smooth as the error test has made these: the ends of the step tell. What
-    algebraic unknowns do between is unknown to it, so that samples are halved until the functions follow their chords.
+    Functions of differential unknowns are as smooth as the error test has made these: the ends of the step tell, and
+    what `_turn_beyond_zero` finds where they turn. What algebraic unknowns do between is unknown to it, so that samples
+    are halved until the functions follow their chords.
     """
     g = st.g_between
     for e in range(st.n_events):
@@ -146,6 +151,56 @@ def _sample(functions, st, part):
         if straight and stride <= COARSEST:
             break
     return stride
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _value_at(functions, st, part, which, at):
+    """Return event ``which`` on the polynomial of the last step, ``at`` a part of it; ``st.g_new`` is overwritten."""
+    interpolate(functions, st, part, st.t_old + at * (st.t_new - st.t_old), st.y_between, st.yp_between)
+    functions.events(
+        st.t_old + at * (st.t_new - st.t_old), st.y_between, st.yp_between, st.g_new, st.idata, st.rdata, st.work
+    )
+    return st.g_new[which]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _turn_beyond_zero(functions, st, part, which, first, last):
+    """Return the part of the last step at which an event that has one sign at both ends has the other; NaN for none.
+
+    Where it turns towards zero and back, both crossings may lie within. A function that bends one way lies above its
+    tangents: if these meet before zero it does not reach it.
+    """
+    if not (first > 0.0) == (last > 0.0) or first == 0.0 or last == 0.0:
+        return np.nan
+    sign = 1.0 if first > 0.0 else -1.0
+    near = 1.0 / SAMPLES
+    falls = sign * (_value_at(functions, st, part, which, near) - first) / near
+    rises = sign * (last - _value_at(functions, st, part, which, 1.0 - near)) / near
+    if not (falls < 0.0 and rises > 0.0):
+        return np.nan
+    meet = (sign * (last - first) - rises) / (falls - rises)
+    if sign * first + falls * meet > 0.0:
+        return np.nan
+    low, high = 0.0, 1.0
+    one, two = 1.0 - GOLDEN_FRACTION, GOLDEN_FRACTION
+    at_one, at_two = (
+        sign * _value_at(functions, st, part, which, one),
+        sign * _value_at(functions, st, part, which, two),
+    )
+    for _ in range(TURNS):
+        if at_one < 0.0:
+            return one
+        if at_two < 0.0:
+            return two
+        if at_one < at_two:
+            high, two, at_two = two, one, at_one
+            one = high - GOLDEN_FRACTION * (high - low)
+            at_one = sign * _value_at(functions, st, part, which, one)
+        else:
+            low, one, at_one = one, two, at_two
+            two = low + GOLDEN_FRACTION * (high - low)
+            at_two = sign * _value_at(functions, st, part, which, two)
+    return np.nan
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -181,20 +236,28 @@ def locate_events(functions, st, part):
     g = st.g_between
     for e in range(st.n_events):
         left = st.event_left[e]
-        for i in range(stride, SAMPLES + 1, stride):
-            before, after = g[i - stride, e], g[i, e]
-            rising = before < 0.0 and after >= 0.0
-            falling = before > 0.0 and after <= 0.0
-            if not ((rising and st.event_direction[e] >= 0) or (falling and st.event_direction[e] <= 0)):
-                continue
-            root = _root(functions, st, part, e, _sample_time(st, i - stride), before, _sample_time(st, i), after)
-            does = st.event_action[e]
-            acts = does == RESTART or (does == STOP and left <= 1)
-            left -= 1
-            if acts and (action == RECORD or root < cut):
-                cut = root
-                action = does
-            _store_crossing(st, first, root, e)
+        parts, turn = SAMPLES // stride, np.nan
+        if parts == 1:
+            turn = _turn_beyond_zero(functions, st, part, e, g[0, e], g[SAMPLES, e])
+            parts = 1 if np.isnan(turn) else 2
+        a, before = st.t_old, g[0, e]
+        for i in range(1, parts + 1):
+            if i < parts and stride == SAMPLES:
+                b, after = st.t_old + turn * (t - st.t_old), _value_at(functions, st, part, e, turn)
+            else:
+                b, after = _sample_time(st, min(i * stride, SAMPLES)), g[min(i * stride, SAMPLES), e]
+            rising = before < 0.0 and after >= 0.0 and st.event_direction[e] >= 0
+            falling = before > 0.0 and after <= 0.0 and st.event_direction[e] <= 0
+            if rising or falling:
+                root = _root(functions, st, part, e, a, before, b, after)
+                does = st.event_action[e]
+                acts = does == RESTART or (does == STOP and left <= 1)
+                left -= 1
+                if acts and (action == RECORD or root < cut):
+                    cut = root
+                    action = does
+                _store_crossing(st, first, root, e)
+            a, before = b, after
     while st.n_crossings > first and st.crossing_t[st.n_crossings - 1] > cut:
         st.n_crossings -= 1
     for p in range(first, st.n_crossings):

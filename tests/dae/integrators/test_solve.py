@@ -208,6 +208,30 @@ def test_directions_and_several_events():
     np.testing.assert_allclose(result.y_events[2][:, 1], 0.5, atol=1e-12)
 
 
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+@pytest.mark.parametrize("below", [1e-2, 1e-4, 1e-6, -1e-6])
+def test_events_that_come_and_go_within_a_step_are_found(method, below):
+    """A ball that rises above a level near its greatest height for less than a step; above its greatest it never is."""
+    top = 10.0**2 / (2 * 9.81)
+
+    def thrown(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = yp[1] + 9.81
+
+    def level(t, y, yp):
+        return y[0] - (top - below)
+
+    found = solve_dae(thrown, (0.0, 2.0), [0.0, 10.0], events=level, rtol=1e-9, atol=1e-11, method=method)
+    off = np.sqrt(2 * max(below, 0.0) / 9.81)
+    expected = 10.0 / 9.81 + np.array([-off, off] if below > 0.0 else [])
+    # the height may be off by its tolerance, times the growth of its error
+    np.testing.assert_allclose(found.t_events[0], expected, atol=1e-7 / (9.81 * off) if off else 0.0)
+    level.terminal = True
+    level.direction = -1
+    ended = solve_dae(thrown, (0.0, 2.0), [0.0, 10.0], events=level, rtol=1e-9, atol=1e-11, method=method)
+    assert ended.t[-1] == (pytest.approx(expected[1], abs=1e-7 / (9.81 * off)) if off else 2.0)
+
+
 @pytest.mark.parametrize(("below", "above"), [(1.0, 1.0), (1e9, 1.0), (1.0, 1e9)])
 def test_a_jump_is_found_to_rounding(below, above):
     """A function that jumps through zero has no root, and its values say nothing of where it jumps."""
