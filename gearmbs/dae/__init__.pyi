@@ -1,5 +1,6 @@
 from .integrators.options import Options as Options
 from .integrators.wstiff import resume as resume
+from .orbits import NoOrbit as NoOrbit
 from .problem import DAEProblem as DAEProblem
 from .result import DAEResult as DAEResult
 from .result import SolverStats as SolverStats

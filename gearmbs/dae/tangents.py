@@ -46,6 +46,8 @@ linear in both together this leaves 1e-8, and the rounding 1e-16/1e-8, of the te
 GROWTH, GROWING_ORDER = 1.4, 3
 """Ratio of a step to the one before it, and order, with which steps grow behind a restart: for ever at this ratio the
 formula of order three is stable up to 1.53, that of order four up to 1.28."""
+EVEN, EVEN_ORDER = 0.99, 4
+"""Part of the longest step allowed from which one was limited by that, and the order taken there."""
 SHORTER = 0.25
 """Ratio of a step of order one to the one before it from which a run has started afresh."""
 CHUNK = 2048
@@ -318,11 +320,12 @@ class Followed:
     error: np.ndarray
 
 
-def points_of(sol: DenseOutput) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def points_of(sol: DenseOutput, longest: float = np.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return times, orders and flags of the points at which a run is followed.
 
     These are the ends of its steps. Where it starts afresh, long steps behind short ones are divided, so that the
-    order can grow from one as it does at the start of a run.
+    order can grow from one as it does at the start of a run. Steps as long as ``longest`` allows are even and say
+    nothing of the order: a motion at rest has the first one. There it grows by itself.
     """
     nodes, step_orders = sol.stored()
     steps = np.flatnonzero(step_orders > 0)
@@ -330,30 +333,32 @@ def points_of(sol: DenseOutput) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     orders: list[int] = []
     flags: list[int] = []
     before, last, size, allowed, growing = 0, float(nodes[steps[0] - 1]), np.inf, 1, False
-    for step in steps:
-        end, order = float(nodes[step]), int(step_orders[step])
+    ends_of, orders_of = nodes[steps].tolist(), step_orders[steps].tolist()
+    for end, order in zip(ends_of, orders_of, strict=True):
         h = end - last
+        if h > EVEN * longest:
+            order = max(order, min(EVEN_ORDER, before + 1))
         afresh = order == 1 and (before != 1 or h < SHORTER * size)
         growing |= afresh
-        pieces = np.ones(1)
+        ends, last_piece = [end], h
         if not afresh and growing and h > GROWTH * size:
             number = int(np.ceil(np.log1p((GROWTH - 1.0) * h / (GROWTH * size)) / np.log(GROWTH)))
             pieces = GROWTH ** np.arange(number, dtype=float)
+            ends = [*(last + h * np.cumsum(pieces) / pieces.sum())[:-1].tolist(), end]
+            last_piece = h * float(pieces[-1] / pieces.sum())
         elif not afresh and allowed >= min(order, GROWING_ORDER):
             growing = False
-        ends = last + h * np.cumsum(pieces) / pieces.sum()
-        ends[-1] = end
         allowed = 0 if afresh else allowed
         for q, t in enumerate(ends):
             allowed = min(allowed + 1, GROWING_ORDER if growing else MAX_ORDER)
-            times.append(float(t))
+            times.append(t)
             orders.append(allowed if growing else min(allowed, order))
             flags.append((AFRESH if afresh else 0) | (END_OF_STEP if q + 1 == len(ends) else 0))
-        size, before, last = h * float(pieces[-1] / pieces.sum()), order, end
+        size, before, last = last_piece, order, end
     return np.array(times), np.array(orders, dtype=np.int64), np.array(flags, dtype=np.int64)
 
 
-def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction]) -> Followed:
+def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction], longest: float = np.inf) -> Followed:
     """Return the sensitivities of a run at its outputs.
 
     Parameters
@@ -364,6 +369,8 @@ def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction]) 
         With ``sol``: the run has to be known between its outputs (``dense_output``).
     directions : list of Direction
         The parameters.
+    longest : float
+        Longest step that the run was allowed, s.
 
     Raises
     ------
@@ -373,7 +380,7 @@ def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction]) 
     n, count = problem.n, len(directions)
     sol = result.sol
     assert sol is not None
-    times, orders, flags = points_of(sol)
+    times, orders, flags = points_of(sol, longest)
     run = sol.polynomials()
     # where the run starts afresh the equations may have jumped already
     before_jump = np.append(flags[1:] & AFRESH != 0, False)

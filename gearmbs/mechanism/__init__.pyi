@@ -34,6 +34,8 @@ from .solve.analyses import kinematic as kinematic
 from .solve.analyses import linear_modes as linear_modes
 from .solve.analyses import quasi_static as quasi_static
 from .solve.analyses import static_equilibrium as static_equilibrium
+from .solve.orbits import SteadyMotion as SteadyMotion
+from .solve.orbits import steady_motion as steady_motion
 from .solve.plants import linearize as linearize
 from .solve.sensitivities import Sensitivities as Sensitivities
 from .solve.sensitivities import forward_sensitivities as forward_sensitivities

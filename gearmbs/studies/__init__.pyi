@@ -42,6 +42,8 @@ from .run.simulation import SimulationInterrupted as SimulationInterrupted
 from .run.simulation import case_mechanism as case_mechanism
 from .run.simulation import run_case as run_case
 from .run.simulation import simulate_case as simulate_case
+from .run.steady import SteadyCase as SteadyCase
+from .run.steady import steady as steady
 from .run.sweep import Sweep as Sweep
 from .run.sweep import sweep as sweep
 from .train_views import train_campbell as train_campbell

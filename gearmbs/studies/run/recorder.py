@@ -73,6 +73,8 @@ class _Turned:
         self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
         self._lag = pair.rotation * pair.wheels[1].base_radius
         self._last: list[np.ndarray] = [np.empty(0), np.empty(0)]
+        self._pitch = pair.driver.base_pitch
+        self._whole: float | None = None
 
     def error(self, part: Solution) -> np.ndarray:
         """Return the transmission error of the next part of a solution, m."""
@@ -83,7 +85,11 @@ class _Turned:
             angles = np.unwrap(np.concatenate([before, np.arctan2(across, along)]))[before.size :]
             self._last[wheel] = angles[-1:]
             turned.append(angles)
-        return self._lag * (turned[0] * self._ratio + turned[1])
+        error = self._lag * (turned[0] * self._ratio + turned[1])
+        if self._whole is None:
+            # what starts with the wheels turned is counted from the nearest tooth
+            self._whole = self._pitch * float(np.round(error[0] / self._pitch))
+        return error - self._whole
 
 
 def _taken(part: Solution, turned: _Turned) -> np.ndarray:

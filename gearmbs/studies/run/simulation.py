@@ -119,7 +119,7 @@ def simulate_case(
         Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
         without aliases; see its ``status``.
     """
-    _load_kernels(case.solver.integrator, case.lump)
+    load_kernels(case.solver.integrator, case.lump)
     mechanism = case_mechanism(case) if mechanism is None else mechanism
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.longest + edge(case)
@@ -237,7 +237,7 @@ def run_case(
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
-    _load_kernels(case.solver.integrator, case.lump)
+    load_kernels(case.solver.integrator, case.lump)
     periodic = PeriodicRecorder(case, mechanism is None) if case.is_auto else None
     recorder = Recorder(case) if periodic is None else periodic.recorder
     options: dict[str, Any] = {"every_step": True, "consumer": recorder.take, "watch": WATCHED}
@@ -253,7 +253,7 @@ def run_case(
             measured, even = recorder.measured(), recorder.is_even
             dataset = _evaluated(case, solution, measured, recorder.slipped, even=even, variables=variables)
         else:
-            dataset = _evaluated_period(case, solution, periodic, variables)
+            dataset = evaluated_period(case, solution, periodic, variables)
     except SimulationFailed as failure:
         known = _partial(case, solution, recorder, mechanism)
         raise SimulationFailed(str(failure), solution, case, known) from None
@@ -273,7 +273,7 @@ def _misplaced(name: str, value: Any) -> str:
 
 
 @cache
-def _load_kernels(integrator: str, lump: bool) -> None:
+def load_kernels(integrator: str, lump: bool) -> None:
     """Import the kernels of a run before the first is called, so that all that are missing are compiled at once."""
     with uncollected():
         contact_kernels()
@@ -351,7 +351,7 @@ def _evaluated(
     return dataset
 
 
-def _evaluated_period(
+def evaluated_period(
     case: Case, solution: Solution, periodic: PeriodicRecorder, variables: Collection[str] | None
 ) -> xr.Dataset:
     """Return the record of a motion that repeats itself; its acceleration lasts for some turns of the driver."""

@@ -1,0 +1,252 @@
+"""The steady motion of a case, a drivetrain or a mechanism: one period, found without waiting for it.
+
+A case starts in the static equilibrium of its teeth at full speed, which leaves a few mesh periods until its motion is
+near an orbit; see `gearmbs.dae.orbits` and docs/theory/orbits.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.dae.orbits import NoOrbit, attracting_orbit
+from gearmbs.dae.problem import DAEProblem, ModelError
+from gearmbs.dae.results.solution import Solution
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, SpeedDrive
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.solve.orbits import TIGHTER, Posed, SteadyMotion, steady_motion
+from gearmbs.studies.case.case import Case, CaseError
+from gearmbs.studies.case.limits import check_record, geometric_period
+from gearmbs.studies.run.periodic import Found, PeriodicRecorder
+from gearmbs.studies.run.record import check_variables
+from gearmbs.studies.run.simulation import case_mechanism, evaluated_period, load_kernels
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FURTHEST = 0.5
+"""Part of a pitch by which the driven wheel is turned at most to find where its teeth carry the load."""
+LOOKS = 400
+"""Places there at which the moment is looked at: ten within the tenth of a millimetre of a usual backlash."""
+CLOSED = 1e-5
+"""How nearly the motion of a case closes, as part of its size: forces of teeth, stiff as they are, follow relative
+motions of that part of their own amplitude to 1e-4."""
+AROUND = 2
+"""Mesh periods ahead of a record that its interpolation and its seams need."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SteadyCase(SteadyMotion):
+    """The steady motion of a case.
+
+    Attributes
+    ----------
+    record : Dataset
+        As `run_case` returns it of a motion that repeats itself; with ``orbit_multiplier``, the size of the largest
+        multiplier, in its attributes.
+    """
+
+    record: xr.Dataset
+
+
+def steady(what: Case | Mechanism | Drivetrain, period: Any = None, **settings: Any) -> SteadyMotion:
+    """Find the motion that repeats itself after a period.
+
+    Parameters
+    ----------
+    what : Case, Mechanism or Drivetrain
+        A case at constant speed: its period is that of its mesh, with faulty teeth that of the faulty wheels. A
+        drivetrain whose drives prescribe its speed: by default the time after which all its teeth stand as before.
+    period : float or str, optional
+        Of a mechanism, needed: s.
+    **settings
+        Of mechanisms and drivetrains: see `gearmbs.mechanism.solve.orbits.steady_motion`. Of a case: ``variables`` as
+        of `run_case`, and ``most``, the mesh periods that may be integrated.
+
+    Returns
+    -------
+    SteadyMotion
+        Of a case with its ``record``.
+
+    Raises
+    ------
+    NoOrbit
+        If there is no such motion; it tells why. `run_case` integrates the motion that there is.
+
+    Examples
+    --------
+    >>> motion = steady(Case(operation={"speed": "1000 rpm", "torque": "100 N m"}))
+    >>> motion.stable, f"{1e3 * motion.period:.3f} ms"
+    (True, '2.069 ms')
+    >>> float(motion.record["gmf_rms"].sel(component="y", method="orders")[0].round(3)) > 0.0
+    True
+    """
+    if isinstance(what, Case):
+        if period is not None:
+            raise CaseError("steady: the period of a case follows from its wheels; leave period away")
+        return steady_case(what, **settings)
+    if isinstance(what, Drivetrain):
+        return steady_train(what, period, **settings)
+    if not isinstance(what, Mechanism):
+        raise ModelError(f"steady: {what!r} is a {type(what).__name__}; give a Case, a Mechanism or a Drivetrain")
+    if period is None:
+        raise ModelError("steady: give the period of the mechanism, s; that of a mesh is 1 over its frequency")
+    return steady_motion(what, period, **settings)
+
+
+def steady_case(case: Case, *, variables: Collection[str] | None = None, most: int = 200) -> SteadyCase:
+    """Find the steady motion of a case; see `steady`.
+
+    Parameters
+    ----------
+    case : Case
+        Its ``duration`` has no part in it. Bodies that turn about fixed axes are integrated by their angles alone.
+    variables : collection of str, optional
+        Of the record, as of `run_case`.
+    most : int
+        Mesh periods that may be integrated beside those of the first orbit tried.
+
+    Raises
+    ------
+    CaseError
+        For a speed or torque that is no constant.
+    NoOrbit
+        See `steady`.
+    """
+    operation = case.operation
+    if operation.speed_curve is not None or not np.isscalar(operation.torque):
+        raise CaseError("steady: speed and torque have to be constant; run_case follows curves")
+    case = case.changed(operation={"duration": "auto"})
+    check_record(case)
+    check_variables(variables)
+    load_kernels(case.solver.integrator, True)
+    meshes = geometric_period(case)
+    period = meshes / case.mesh_frequency
+    tol = case.tolerance if case.solver.tolerance else TIGHTER * case.tolerance
+    rate_scale = operation.top_speed * case.gears.teeth[0]
+    mechanism = case_mechanism(case)
+    posed = Posed.of(mechanism, 0.0, None, True, case.solver.formulation, rate_scale, tol)
+    problem, advance = _at_speed(case, posed.problem, meshes)
+    settle = 2 if meshes == 1 else 0
+    orbit = attracting_orbit(
+        problem, period, advance, tol=tol, settle=settle, most=max(3, math.ceil(most / meshes)) + settle,
+        closed=CLOSED, method=case.solver.integrator,
+    )  # fmt: skip
+    solution = posed.solution(orbit)
+    found = round(orbit.period * case.mesh_frequency)
+    dataset = _recorded(case, solution, found, advance * (found // meshes), orbit.error, variables)
+    dataset.attrs["orbit_multiplier"] = abs(orbit.largest)
+    return SteadyCase(solution, orbit, posed.state(orbit), dataset)
+
+
+def steady_train(train: Drivetrain, period: Any = None, **settings: Any) -> SteadyMotion:
+    """Find the steady motion of a drivetrain; see `steady`.
+
+    Parameters
+    ----------
+    train : Drivetrain
+        Its drives prescribe constant speeds.
+    period : float or str, optional
+        s; default the time after which all meshes have made whole cycles, with faulty teeth all shafts whole turns.
+    **settings
+        As of `gearmbs.mechanism.solve.orbits.steady_motion`; ``t_start`` is by default the end of the run-up.
+
+    Raises
+    ------
+    DrivetrainError
+        If no drive prescribes a constant speed: the period of what a motor drives is not known.
+    ModelError
+        Where elastic bearings let shafts turn about axes that move: it repeats itself after whole turns alone.
+    """
+    for drive in train.drives:
+        if not isinstance(drive, SpeedDrive) or drive.curve is not None or drive.function is not None:
+            raise DrivetrainError(
+                f"{drive.label}: does not prescribe a constant speed: the motion has a period of its own; take a "
+                'drive of kind "speed", or run_train'
+            )
+    if period is None:
+        period = mesh_period(train)
+    return steady_motion(train.build(), period, **{"t_start": train.run_up, **settings})
+
+
+def mesh_period(train: Drivetrain) -> float:
+    """Return the time after which all meshes of a drivetrain have made whole cycles, s.
+
+    With faults of single teeth it is that after which all shafts have made whole turns.
+    """
+    frequencies = [abs(train.kinematics.mesh_frequency(mesh.name)) for mesh in train.meshes]
+    turning = [f for f in frequencies if f > 0.0]
+    if not turning:
+        raise DrivetrainError(f"drivetrain '{train.name}': no mesh turns; give the period")
+    if any(mesh.settings.get("faults") for mesh in train.meshes):
+        return train.kinematics.common_period()
+    shares = [Fraction(f / turning[0]).limit_denominator(10**7) for f in turning]
+    return math.lcm(*(share.denominator for share in shares)) / turning[0]
+
+
+def _at_speed(case: Case, problem: DAEProblem, meshes: int) -> tuple[DAEProblem, np.ndarray]:
+    """Return the equations with the driven wheel at speed, its teeth in equilibrium with the load, and its advance."""
+    pair, start = case.pair(), case.operation.run_up
+    z2 = case.gears.teeth[1]
+    speed = -pair.rotation * math.tau * case.mesh_frequency / z2
+    omega, phi = (
+        problem.names.index(next(n for n in problem.names if n.startswith(head))) for head in ("omega", "phi")
+    )
+    y, rates, out, work = problem.y0.copy(), np.zeros(problem.n), np.zeros(problem.n), np.zeros(problem.work_size)
+    y[omega] = speed
+
+    def moment(angle: float) -> float:
+        y[phi] = angle
+        problem.residual(start, y, rates, out, problem.idata, problem.rdata, work)
+        return float(out[omega])
+
+    # during the run-up, which rises evenly, the driver turns half as far as at speed
+    middle = 0.5 * speed * start
+    y[phi] = middle + _balanced(lambda angle: moment(middle + angle), FURTHEST * math.tau / z2)
+    rates[phi] = speed
+    advance = np.zeros(problem.n)
+    advance[phi] = math.copysign(math.tau * meshes / z2, speed)
+    return replace(problem, t0=start, y0=y, yp0=rates), advance
+
+
+def _balanced(moment: Any, most: float) -> float:
+    """Return the nearest angle to zero, up to ``most``, at which a moment vanishes."""
+    from scipy.optimize import brentq
+
+    angles = np.linspace(0.0, most, LOOKS // 2 + 1)
+    last = {1.0: moment(0.0), -1.0: moment(0.0)}
+    if last[1.0] == 0.0:
+        return 0.0
+    for before, angle in pairwise(angles):
+        for side in last:
+            value = moment(side * angle)
+            if value * last[side] <= 0.0:
+                return float(brentq(moment, side * before, side * angle))
+            last[side] = value
+    raise NoOrbit("the teeth do not carry the load at any angle within half a pitch; run_case tells what happens")
+
+
+def _recorded(
+    case: Case, solution: Solution, meshes: int, advance: np.ndarray, error: float, variables: Collection[str] | None
+) -> xr.Dataset:
+    """Return the record of a period: what lies ahead of it and behind it are repetitions."""
+    recorder = PeriodicRecorder(case)
+    t, y = solution.t, solution.result.y
+    length = meshes / case.mesh_frequency
+    # teeth stand as before after whole periods alone
+    ahead = t >= t[-1] - AROUND * length / meshes if meshes > AROUND else t >= t[0]
+    behind = t <= t[0] + length / meshes
+    times = np.concatenate([t[ahead][:-1], t[:-1] + length, t[behind] + 2.0 * length])
+    states = np.concatenate([y[ahead][:-1], y[:-1] + advance, y[behind] + 2.0 * advance])
+    for part in solution.over(times, states, solution.result.epochs).parts():
+        recorder.take(part)
+    recorder.found, recorder.deviation = Found(meshes, meshes), error
+    dataset = evaluated_period(case, solution, recorder, variables)
+    dataset.attrs |= recorder.attributes()
+    return dataset
