@@ -11,14 +11,10 @@ import math
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.evaluate import STATE, TABLES, backward, forward, selected
 from gearmbs.dae.equations.expressions.integrals import external, integral
-from gearmbs.dae.equations.expressions.measure_hessians import leaf_gradient, leaf_hessian, leaf_jacobians
-from gearmbs.dae.equations.expressions.measures import LEAF_WORK
+from gearmbs.dae.equations.expressions.measure_hessians import leaf_gradient, leaf_hessian
 from gearmbs.dae.equations.expressions.scalar import binary, unary
 from gearmbs.dae.equations.expressions.spline_value import spline_value
 from gearmbs.kernels.jit import njit
-
-JACOBIAN_AT = LEAF_WORK + 6
-"""Where a leaf's Jacobian blocks stand in its scratch."""
 
 
 @njit(
@@ -143,8 +139,7 @@ def eval_second(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, h
     for k in range(count):
         code = ints[at]
         if code == op.DISPLACEMENT or code == op.COSINE:
-            leaf_jacobians(ints, at, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns)
-            leaf_gradient(ints, at, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns, rows, k)
+            leaf_gradient(ints, at, kin, marker_body, marker_frame, leaf, rows, k)
         elif code <= op.LAST_LEAF:
             for q in range(columns):
                 rows[k, q] = 0.0
@@ -162,7 +157,7 @@ def eval_second(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, h
         if weight != 0.0:
             code = ints[at]
             if code == op.DISPLACEMENT or code == op.COSINE:
-                leaf_hessian(ints, at, weight, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns, rows, k, h)
+                leaf_hessian(ints, at, weight, kin, marker_body, marker_frame, leaf, h)
             elif code > op.LAST_LEAF:
                 _curvature(ints, at, k, weight, work, rows, h)
         at += op.WIDTH

@@ -10,10 +10,10 @@ import numpy as np
 
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.integrals import integral_table, time_value
+from gearmbs.dae.equations.expressions.measure_hessians import SECOND_WORK
 from gearmbs.dae.equations.expressions.measures import LEAF_WORK
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError
 from gearmbs.dae.equations.expressions.scalar import binary_python, unary_python
-from gearmbs.dae.equations.expressions.second import JACOBIAN_AT
 from gearmbs.dae.equations.expressions.splines import SplineData, spline_table
 
 _LEAF_LEVEL = {
@@ -104,7 +104,7 @@ class Tape:
         external = int(self.ints[op.HEAD_EXTERNAL])
         if self.second_order:
             c = self.second_size
-            size = max(size, 7 * n + n * c + JACOBIAN_AT + 6 * c)
+            size = max(size, 7 * n + n * c + SECOND_WORK)
         return size + external + (n if self.integrates else 0)
 
     @property
