@@ -83,7 +83,15 @@ def prepare_leaf(ints, at, kin, marker_body, marker_frame, w):
     error_model="numpy",
 )
 def leaf_gradient(ints, at, kin, marker_body, marker_frame, w, rows, row):
-    """Write the gradient of a leaf in (R, theta) to ``rows[row]``; other parameters as of `prepare_leaf`."""
+    """Write the gradient of a leaf in (R, theta) to a row.
+
+    Parameters
+    ----------
+    ints, at, kin, marker_body, marker_frame, w
+        As of `prepare_leaf`.
+    rows, row : ndarray, int
+        Gradients of the leaves, and the row to write.
+    """
     own = vector_at(w, SLOPES, OWN)
     arm_i, arm_j, x, e, one, two, three = prepare_leaf(ints, at, kin, marker_body, marker_frame, w)
     count = OWN
@@ -109,7 +117,16 @@ def leaf_gradient(ints, at, kin, marker_body, marker_frame, w, rows, row):
     error_model="numpy",
 )
 def leaf_hessian(ints, at, weight, kin, marker_body, marker_frame, w, hess):
-    """Add ``weight`` times the Hessian of a leaf over R and theta to ``hess``; parameters as of `prepare_leaf`."""
+    """Add a multiple of the Hessian of a leaf over R and theta.
+
+    Parameters
+    ----------
+    ints, at, kin, marker_body, marker_frame, w
+        As of `prepare_leaf`.
+    weight : float
+    hess : ndarray
+        Hessian over R and theta of the bodies of the tape, and time.
+    """
     own = matrix_at(w, SLOPES, OWN, OWN)
     own[:] = 0.0
     arm_i, arm_j, x, e, one, two, three = prepare_leaf(ints, at, kin, marker_body, marker_frame, w)
