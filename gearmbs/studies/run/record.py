@@ -7,7 +7,7 @@ import json
 import platform
 from collections.abc import Collection
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -120,16 +120,23 @@ def evaluate(
     return dataset
 
 
+class _EvenForces(NamedTuple):
+    """Forces at the output rate, N, plain arrays: where they are samples already, no copy is made of them."""
+
+    t: np.ndarray
+    values: np.ndarray
+    channels: list[str]
+
+
 def _even_forces(
     case: Case, known: Measured, start: float, stop: float, wanted: set[str], *, even: bool
-) -> xr.DataArray | None:
+) -> _EvenForces | None:
     """Return the forces that are needed at the output rate, with the edges that filters use up; None if none are."""
     wheels = [1] if "force_1" in wanted else []
     wheels += [2] if wanted & {"force_2", "acceleration", *LEVELS} else []
     if not wheels:
         return None
-    rate, ahead = case.output_rate, edge(case)
-    labels: dict[str, Any] = {"units": "N", "speed": case.operation.top_speed, "teeth": case.gears.teeth}
+    ahead = edge(case)
     names = [f"{wheel}{axis}" for wheel in wheels for axis in "xyz"]
     first, last = 3 * (wheels[0] - 1), 3 * wheels[-1]
     if wanted & {"acceleration", *LEVELS}:
@@ -137,22 +144,23 @@ def _even_forces(
         last += 1
     values = known.forces[:, first:last]
     if even:
-        return make_signal(values, rate, channels=names, t0=float(known.t[0]), **labels)
-    return even_signal(known.t, values, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels)
+        return _EvenForces(known.t, values, names)
+    signal = even_signal(known.t, values, case.output_rate, start=start - ahead, stop=stop + ahead)
+    return _EvenForces(signal["time"].values, signal.values, names)
 
 
 def _series(
-    case: Case, known: Measured, forces: xr.DataArray | None, span: tuple[float, float], wanted: set[str], *, even: bool
+    case: Case, known: Measured, forces: _EvenForces | None, span: tuple[float, float], wanted: set[str], *, even: bool
 ) -> xr.Dataset:
     """Return the variables over time that are wanted."""
     rate = case.output_rate
-    t = _even_times(case, known, *span, even=even) if forces is None else forces["time"].values
+    t = _even_times(case, known, *span, even=even) if forces is None else forces.t
     inside = slice(*np.searchsorted(t, [at - 0.5 / rate for at in span]))
-    t = t[inside].copy()
+    t = t[inside]
     values: dict[str, np.ndarray] = {}
     for name in FORCES:
         if name in wanted and forces is not None:
-            first = list(forces["channel"].values).index(f"{name[-1]}x")
+            first = forces.channels.index(f"{name[-1]}x")
             values[name] = forces.values[inside, first : first + 3]
     if even:
         told = {"transmission_error": known.error, **known.contact}
@@ -199,19 +207,21 @@ def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
     return xr.Dataset(data, coords=coords)
 
 
-def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -> xr.DataArray:
+def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) -> xr.DataArray:
     """Return the components of the force on the driven gear over its mass, at the signal rate."""
     pair, rate = case.pair(), case.signal_rate
     angle, mass = pair.working_pressure_angle, pair.wheels[1].mass
-    values, t = component_values(forces.values[:, -4:-1], angle, sense=pair.rotation), forces["time"].values
-    values[:, -1] = forces.values[:, -1]
+    force, t = forces.values[:, -4:], forces.t
     if rate < case.output_rate:
         ratio = round(case.output_rate / rate)
-        values, first = apply_zero_phase(values, decimation_taps(ratio, case.output_rate), "trim", step=ratio)
-        t = t[first] + np.arange(len(values)) / rate
+        force, first = apply_zero_phase(force, decimation_taps(ratio, case.output_rate), "trim", step=ratio)
+        t = t[first] + np.arange(len(force)) / rate
     first, last = np.searchsorted(t, [at - 0.5 / rate for at in (start, stop)])
+    force = force[first:last]
+    values = component_values(force[:, :-1], angle, sense=pair.rotation)
+    values[:, -1] = force[:, -1]
     return make_signal(
-        values[first:last] / mass,
+        values / mass,
         rate,
         units="m/s^2",
         channels=COMPONENTS,

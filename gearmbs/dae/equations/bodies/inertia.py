@@ -5,6 +5,7 @@ What the present state of a body is summed from stands in lanes, neighbouring mo
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,16 +21,15 @@ from gearmbs.kernels.lanes import LANES, lanes_at, put_lanes
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
-STIFF, TURNED, SPUN, HEAVY = 1, 2, 4, 8
-"""What two modes have in common: entries of p_f by q_f, p_f by v_f, v_f by q_f, and v_f by v_f."""
-
 APART = 9
 """Behind J0 in the head of the table: 1 if M, K and D are diagonal."""
 LISTED = 10
 """How many lanes are listed."""
 GATHERED = 11
 """1 if these lanes are of modes that have much in common instead of neighbours."""
-HEAD = 12
+PAIRED = 12
+"""How many entries there are between two modes, or a mode and itself: of p_f by q_f, p_f by v_f, v_f by q_f, v_f by v_f."""
+HEAD = 16
 """Numbers before the integrals."""
 
 SYMMETRIC = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -102,15 +102,20 @@ class ModalInertia:
         turned = np.moveaxis(self.c1, (0, 1, 2), (2, 0, 1))
         parts = (self.mass, self.stiffness, self.damping)
         apart = all(np.array_equal(part, np.diag(np.diag(part))) for part in parts)
-        pairs = STIFF * (self.stiffness.astype(bool) | self.j2.any(axis=(2, 3)))
-        pairs += TURNED * (self.damping.astype(bool) | self.c1.any(axis=2)) + SPUN * self.c1.any(axis=2).T
-        pairs += HEAVY * self.mass.astype(bool)
+        turning = self.c1.any(axis=2)
+        entries = (
+            self.stiffness.astype(bool) | self.j2.any(axis=(2, 3)), self.damping.astype(bool) | turning, turning.T,
+            self.mass.astype(bool),
+        )  # fmt: skip
+        # mode l, then mode k of each: of one l after the other, whose integrals stand in a row
+        pairs = [np.nonzero(between.T) for between in entries]
         order, lists = in_lanes(np.concatenate([second, turned], axis=1))
         head = np.zeros(HEAD)
         head[:APART] = np.ravel(inertia)
         head[APART], head[LISTED], head[GATHERED] = apart, len(lists[1]), len(order) > 0
+        head[PAIRED:] = [len(modes) for modes, _ in pairs]
         diagonals = [padded(np.diag(part)) for part in parts]
-        pieces: tuple = (head, padded(first), second, turned, *parts, pairs, *diagonals, *lists, order)
+        pieces: tuple = (head, padded(first), second, turned, *parts, *diagonals, *lists, order, *itertools.chain(*pairs))
         return np.concatenate([np.ravel(piece) for piece in pieces])
 
 
@@ -136,8 +141,6 @@ def integrals(modal, at, n):
     turned : ndarray, shape (n, 3 n)
         C1_kl, a row for each l.
     mass, stiffness, damping : ndarray, shape (n, n)
-    pairs : ndarray, shape (n, n)
-        What modes have in common, a sum of `STIFF` and the others.
     """
     second = at + HEAD + 9 * stride(n)
     turned = second + 9 * n * n
@@ -148,7 +151,6 @@ def integrals(modal, at, n):
         matrix_at(modal, m, n, n),
         matrix_at(modal, m + n * n, n, n),
         matrix_at(modal, m + 2 * n * n, n, n),
-        matrix_at(modal, m + 3 * n * n, n, n),
     )
 
 
@@ -173,7 +175,7 @@ def moving(modal, at, n):
     """
     wide = stride(n)
     head = vector_at(modal, at, HEAD)
-    counts = at + HEAD + 9 * wide + 16 * n * n + 3 * wide
+    counts = at + HEAD + 9 * wide + 15 * n * n + 3 * wide
     modes = counts + PRESENT * (wide // LANES)
     listed = int(head[LISTED])
     return (
@@ -190,7 +192,7 @@ def moving(modal, at, n):
 def diagonals(modal, at, n):
     """Return the diagonals of M, K and D, in lanes, as views."""
     wide = stride(n)
-    first = at + HEAD + 9 * wide + 16 * n * n
+    first = at + HEAD + 9 * wide + 15 * n * n
     return vector_at(modal, first, wide), vector_at(modal, first + wide, wide), vector_at(modal, first + 2 * wide, wide)
 
 
@@ -335,7 +337,7 @@ def row_product(matrix, apart, k, y, i):
 def set_modal_momenta(y, at, modal, partial, kin_row):
     """Write p_f = dT/dv_f to y."""
     n = at[T.AT_MODES]
-    _, _, mass, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
+    _, _, mass, _, _ = integrals(modal, at[T.AT_MODAL], n)
     apart = has_diagonals(modal, at)
     _, h, _ = present(partial, at[T.AT_PARTIAL], n)
     wx, wy, wz = spin_in_body(kin_row)
@@ -358,7 +360,7 @@ def modal_residual(y, yp, at, modal, partial, kin_row, out):
         The body's row of the kinematics table; the residual.
     """
     n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    _, _, mass, stiffness, damping, _ = integrals(modal, at[T.AT_MODAL], n)
+    _, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
     apart = has_diagonals(modal, at)
     spin = spin_in_body(kin_row)
@@ -446,7 +448,7 @@ def modal_acceleration_terms(y, at, modal, partial, kin_row, mass_out, coupling_
         -sum_k v_k (dJ/dq_k w + sum_l C1_kl v_l), global components.
     """
     n, vf, qf = at[T.AT_MODES], at[T.AT_VF], at[T.AT_QF]
-    second, _, mass, stiffness, damping, _ = integrals(modal, at[T.AT_MODAL], n)
+    second, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
     apart = has_diagonals(modal, at)
     s = np.zeros(12)
@@ -520,43 +522,59 @@ def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, s, slot, vals, 
             k = put(mode, slot, vals, k, pf + i, th + c, -along_rate)
             k = put(mode, slot, vals, k, vf + i, e + c, -about)
             k = put(mode, slot, vals, k, vf + i, th + c, -about_rate)
-        k = pair_entries(mode, i, at, modal, s, slot, vals, k)
-    return k
+    return pair_entries(mode, at, modal, s, slot, vals, k)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def pair_entries(mode, i, at, modal, s, slot, vals, k):
-    """Hand over the entries of mode i with all modes; return the number of the next entry.
+def listed_pairs(modal, at, n, kind):
+    """Return the entries of a kind, see `PAIRED`, between two modes: mode l and mode k of each."""
+    head, lanes = vector_at(modal, at, HEAD), stride(n) // LANES
+    first = at + HEAD + 12 * LANES * lanes + 15 * n * n + PRESENT * lanes + (1 + LANES) * int(head[LISTED])
+    first += n if head[GATHERED] > 0.0 else 0
+    for before in range(kind):
+        first += 2 * int(head[PAIRED + before])
+    count = int(head[PAIRED + kind])
+    return vector_at(modal, first, count), vector_at(modal, first + count, count)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def pair_entries(mode, at, modal, s, slot, vals, k):
+    """Hand over the entries between modes, kind by kind and without a look at those that vanish; return as `put` does.
 
     Parameters
     ----------
     mode, slot, vals, k
         As of `gearmbs.dae.equations.unknowns.put`.
-    i : int
-        Mode.
     at, modal : ndarray
         The body's places, the table of all integrals.
     s : ndarray
         Angular velocity in body components in ``s[0:3]``.
     """
     n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    second, turned, mass, stiffness, damping, pairs = integrals(modal, at[T.AT_MODAL], n)
+    place = at[T.AT_MODAL]
+    second, turned, mass, stiffness, damping = integrals(modal, place, n)
     x, y, z = s[0], s[1], s[2]
-    for l in range(n):
-        common = int(pairs[i, l])
-        if common == 0:
-            continue
-        row, other = second[l], turned[l]
-        if common & STIFF:
-            centrifugal = 0.5 * (row[i] * x * x + row[3 * n + i] * y * y + row[5 * n + i] * z * z)
-            centrifugal += row[n + i] * x * y + row[2 * n + i] * x * z + row[4 * n + i] * y * z
-            k = put(mode, slot, vals, k, pf + i, qf + l, stiffness[i, l] - centrifugal)
-        if common & TURNED:
-            gyro = x * other[i] + y * other[n + i] + z * other[2 * n + i]
-            k = put(mode, slot, vals, k, pf + i, vf + l, damping[i, l] - gyro)
-        if common & SPUN:
-            mixed = x * row[6 * n + i] + y * row[7 * n + i] + z * row[8 * n + i]
-            k = put(mode, slot, vals, k, vf + i, qf + l, -mixed)
-        if common & HEAVY:
-            k = put(mode, slot, vals, k, vf + i, vf + l, -mass[i, l])
+    apart = has_diagonals(modal, at)
+    by, of = listed_pairs(modal, place, n, 0)
+    for e in range(by.size):
+        l, i = int(by[e]), int(of[e])
+        centrifugal = 0.5 * (second[l, i] * x * x + second[l, 3 * n + i] * y * y + second[l, 5 * n + i] * z * z)
+        centrifugal += second[l, n + i] * x * y + second[l, 2 * n + i] * x * z + second[l, 4 * n + i] * y * z
+        own = stiffness[i, l] if i == l or not apart else 0.0
+        k = put(mode, slot, vals, k, pf + i, qf + l, own - centrifugal)
+    by, of = listed_pairs(modal, place, n, 1)
+    for e in range(by.size):
+        l, i = int(by[e]), int(of[e])
+        gyro = x * turned[l, i] + y * turned[l, n + i] + z * turned[l, 2 * n + i]
+        own = damping[i, l] if i == l or not apart else 0.0
+        k = put(mode, slot, vals, k, pf + i, vf + l, own - gyro)
+    by, of = listed_pairs(modal, place, n, 2)
+    for e in range(by.size):
+        l, i = int(by[e]), int(of[e])
+        mixed = x * second[l, 6 * n + i] + y * second[l, 7 * n + i] + z * second[l, 8 * n + i]
+        k = put(mode, slot, vals, k, vf + i, qf + l, -mixed)
+    by, of = listed_pairs(modal, place, n, 3)
+    for e in range(by.size):
+        l, i = int(by[e]), int(of[e])
+        k = put(mode, slot, vals, k, vf + i, vf + l, -mass[i, l])
     return k
