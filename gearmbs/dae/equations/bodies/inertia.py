@@ -28,7 +28,7 @@ LISTED = 10
 GATHERED = 11
 """1 if these lanes are of modes that have much in common instead of neighbours."""
 PAIRED = 12
-"""How many entries there are between two modes, or a mode and itself: of p_f by q_f, p_f by v_f, v_f by q_f, v_f by v_f."""
+"""How many entries two modes, or a mode and itself, have: of p_f by q_f, p_f by v_f, v_f by q_f, and v_f by v_f."""
 HEAD = 16
 """Numbers before the integrals."""
 
@@ -115,7 +115,17 @@ class ModalInertia:
         head[APART], head[LISTED], head[GATHERED] = apart, len(lists[1]), len(order) > 0
         head[PAIRED:] = [len(modes) for modes, _ in pairs]
         diagonals = [padded(np.diag(part)) for part in parts]
-        pieces: tuple = (head, padded(first), second, turned, *parts, *diagonals, *lists, order, *itertools.chain(*pairs))
+        pieces: tuple = (
+            head,
+            padded(first),
+            second,
+            turned,
+            *parts,
+            *diagonals,
+            *lists,
+            order,
+            *itertools.chain(*pairs),
+        )
         return np.concatenate([np.ravel(piece) for piece in pieces])
 
 
