@@ -33,17 +33,22 @@ MOST_LOST = 0.2
 SPIKE = 10.0
 """Robust standard deviations of the prediction's error from which a sample is a spike: of noise one in 1e23 is. Shocks
 of bearings and of broken teeth ring, so that only their first samples come near."""
+SUSPECT = 0.3
+"""Robust standard deviations of the record itself by which a spike must surprise, too: in records without noise all
+that is not a tone does."""
 CLEAR_OF_VIBRATION = 3.0
-"""Robust standard deviations of the record itself by which a spike must surprise, too."""
-LARGE = 5.0
-"""Robust standard deviations of the record from which a sample that one side does not predict is a spike: vibration of
-gears has peaks of two to three."""
+"""Robust standard deviations of the record by which a spike must be off the bridge: peaks of vibration are two or
+three."""
+ABRUPT = 0.3
+"""Share of a spike's largest deviation that there is at its end: a shock rings down."""
 RING = 2
 """Samples to either side of a lost one that are bridged with it: filters behind the demodulator smear it."""
 PASSES = 6
 """Searches for spikes, each in the record with those before bridged."""
 HELD = 8
 """Equal samples in a row that are a value held, where the record otherwise changes from sample to sample."""
+HELD_SURPRISES = 2
+"""Equal neighbours among samples that neither side predicts, which are no chance."""
 FLAT, FLAT_TOPS = 3, 3
 """Equal samples in a row at the end of a range, and stretches of them, that are no chance."""
 SAME = 1e-9
@@ -121,13 +126,12 @@ def repair_vibrometer(
         }
         told = np.any(list(found.values()), axis=0)
         lost = _widened(told)
+        known = _widened(lost)
         found["spikes"] = np.zeros_like(dark)
         for _ in range(PASSES):
             if spikes is None:
                 break
-            # those beside what is lost are told from one side: from the other a bridge leads up to them
-            both, either = _spikes(_bridged(column, lost), spikes)
-            more = (both | (either & _widened(_widened(lost)))) & ~lost
+            more = _spikes(_bridged(column, lost), lost, known, spikes) & ~lost
             if not more.any():
                 break
             found["spikes"] |= more
@@ -232,22 +236,36 @@ def _prediction(column: np.ndarray) -> np.ndarray:
     return np.concatenate(([1.0], -scipy.linalg.solve_toeplitz(correlation[:-1], correlation[1:])))
 
 
-def _spikes(column: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return samples that are spikes, and those whose prediction fails from one side at least."""
+def _spikes(column: np.ndarray, lost: np.ndarray, told: np.ndarray, bound: float) -> np.ndarray:
+    """Return samples that are spikes: predicted from neither side, and far from where a bridge over them leads.
+
+    Those beside what is lost are told from one side: from the other a bridge leads up to them. A step of the
+    vibration itself, the onset of a shock, surprises one side only; a kink surprises both, but a bridge comes near
+    it. Values held for less than `HELD` samples are taken for spikes if they surprise.
+    """
     taps = _prediction(np.clip(column, *np.percentile(column, [0.1, 99.9])))
     x = column - column.mean()
     errors = []
     for forth in (True, False):
         error = np.abs(ss.lfilter(taps, [1.0], x if forth else x[::-1]))
-        error[: taps.size] = 0.0
+        error[: taps.size] = np.nan
         errors.append(error if forth else error[::-1])
-    # a step of the vibration itself surprises one side only, and in records without noise all that is not a tone does
-    both = np.minimum(*errors)
+    both, beside = np.fmin(*errors), _widened(_widened(lost))
     own = 1.4826 * float(np.median(np.abs(x - np.median(x))))
-    least = max(bound * 1.4826 * float(np.median(both)), CLEAR_OF_VIBRATION * own)
-    either = np.maximum(*errors) > least
-    # within a burst the samples before and behind are wrong as well: there it is the size that tells
-    return (both > least) | (either & (np.abs(x) > LARGE * own)), either
+    least = max(bound * 1.4826 * float(np.median(both)), SUSPECT * own)
+    suspect = (both > least) | ((np.fmax(*errors) > least) & beside)
+    wide = _widened(suspect) | lost
+    if wide.mean() > MOST_LOST:
+        # vibration that stands still between its bursts is predicted too well there
+        return both > CLEAR_OF_VIBRATION * own
+    off, same = np.abs(column - _bridged(column, wide)), np.diff(column, prepend=np.nan) == 0.0
+    for first, last in _stretches(wide):
+        part, held = off[first:last], np.count_nonzero(same[first:last]) >= HELD_SURPRISES
+        end = part[part > own][-RING - 1 :].max(initial=0.0)
+        rings = end < ABRUPT * part.max() and last < x.size and not told[first:last].any()
+        if not held and (part.max() < CLEAR_OF_VIBRATION * own or rings):
+            suspect[first:last] = False
+    return suspect
 
 
 def _bridged(column: np.ndarray, lost: np.ndarray) -> np.ndarray:

@@ -57,9 +57,9 @@ def test_drop_outs_are_bridged_and_counted(case):
     lost = np.zeros(clean.sizes["time"], dtype=bool)
     lost[bad.attrs["lost_truly"]] = True
     off = (fixed.values - clean.values)[:, 0]
-    # values held for a few samples stay: they are no farther off than the vibration moves meanwhile
-    assert np.sqrt(np.mean(off[lost] ** 2)) < 0.6 * clean.values.std()
-    assert np.sqrt(np.mean(off[~lost] ** 2)) < 0.02 * clean.values.std()
+    # the largest of 30 draws are 0.14 and 0.016
+    assert np.sqrt(np.mean(off[lost] ** 2)) < 0.3 * clean.values.std()
+    assert np.sqrt(np.mean(off[~lost] ** 2)) < 0.03 * clean.values.std()
     before, after = (float(abs(s.values.std() / clean.values.std() - 1.0)) for s in (bad, fixed))
     assert after < 0.01 < before
     assert "bridged by linear prediction" in fixed.attrs["notes"][-1]
@@ -75,7 +75,8 @@ def test_sound_records_and_shocks_are_left_alone():
         shocks[at : at + 400] += 0.08 * np.exp(-t / 2e-3) * np.sin(math.tau * 2500.0 * t)
     record = make_signal({"laser": shocks}, RATE, units="m/s")
     assert np.array_equal(repair_vibrometer(record, spikes=None).values, record.values)
-    assert repair_vibrometer(record).attrs["lost"][0] < 0.02
+    # what rings down is no spike
+    assert np.array_equal(repair_vibrometer(record).values, record.values)
 
 
 @pytest.mark.parametrize("bits", [8, 12, 24])
