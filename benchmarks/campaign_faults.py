@@ -442,8 +442,11 @@ def read(path: Path) -> list[Any]:
 
 def flips(folder: Path, count: int, seed: int) -> tuple[dict[str, int], list[str]]:
     """Flip single bits of all kinds of files, one at a time; return how often by kind, and what was read wrongly."""
-    subject = FunctionSubject(recorded, dict.fromkeys(("x1", "x2", "x3"), 0.0), signals={"wave": (50, 10.0)})
-    factors = [Factor(name, -np.pi, np.pi) for name in ("x1", "x2", "x3")]
+    names = ("x1", "x2", "x3")
+    subject = FunctionSubject(
+        "benchmarks.campaign_faults:recorded", dict.fromkeys(names, 0.0), signals={"wave": (50, 10.0)}
+    )
+    factors = [Factor(name, -np.pi, np.pi) for name in names]
     plan = make_plan(subject, factors, "sobol", n=12, seed=1, keep=["numbers", "record", "signal:wave"], unit=4)
     one = Campaign(folder / "flips", plan)
     one.run(workers=0)

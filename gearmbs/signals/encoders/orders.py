@@ -31,10 +31,11 @@ FEWEST_TURNS = 4
 """Turns of the slower shaft within the smooth angle: a window of as many parts orders that lie one apart."""
 BRIDGINGS = 3
 """Times that missing pulses are bridged: each leaves the part of the error that one pulse has in the known lines."""
-APART = 1.99
-"""Lines of the Hann window's spectrum from which two orders do not see each other."""
-HANN_NOISE = 1.5
-"""Variance of a line with the Hann window by that without any, for noise."""
+APART = 0.99
+"""Distance of two orders, by the reciprocal of the window's turns, from which they do not see each other."""
+FLANK = 4.0
+"""Turns of the slower shaft in which the window rises and falls, if the record has twice as many: what is half an order
+beside a line and no line itself is let through to 1/15 of what it would be by flanks of no length."""
 WHOLE = 1e-9
 """Difference from a whole number up to which an order is one: of ratios written as decimals."""
 
@@ -48,6 +49,52 @@ class Gearing(NamedTuple):
     def on_second(self, order: Fraction) -> Fraction:
         """Return an order of the first shaft as one of the second."""
         return order * self.ratio
+
+
+class Window(NamedTuple):
+    """Whole periods of the common angle, whose beginning fades in as what follows them fades out.
+
+    Copies of it a window apart add to one, so that lines of the periods do not see each other; what is none is damped
+    by the flanks. With flanks as long as the window it is Hann's, of twice the turns.
+
+    Attributes
+    ----------
+    begin : float
+        rad.
+    turns, flank : float
+        Turns from the middle of one flank to that of the other, and of each flank.
+    """
+
+    begin: float
+    turns: float
+    flank: float
+
+    @classmethod
+    def of(cls, begin: float, end: float, periods: Sequence[float]) -> Window:
+        """Return the window of a stretch (rad): whole ones of the first of some periods (turns) that fits."""
+        whole = (end - begin) / TURN
+        shortest = periods[-1]
+        flank = min(FLANK * shortest, 0.5 * whole)
+        period = next((p for p in periods if whole - flank >= p), shortest)
+        turns = max(1.0, (whole - flank) // period) * period
+        return cls(begin, turns, min(whole - turns, turns))
+
+    @property
+    def length(self) -> float:
+        """Turns from its first point to its last."""
+        return self.turns + self.flank
+
+    @property
+    def noise(self) -> float:
+        """Variance of a line of noise, by that of as many turns without flanks."""
+        return 1.0 - 0.25 * self.flank / self.turns
+
+    def weights(self, phi: np.ndarray, spacing: np.ndarray) -> np.ndarray:
+        """Return weights of points, normalised so that the sum with a line's exponential is its amplitude."""
+        turned = (phi - self.begin) / TURN
+        inside = np.minimum(turned, self.length - turned) / self.flank
+        weights = spacing * (0.5 - 0.5 * np.cos(math.pi * np.clip(inside, 0.0, 1.0)))
+        return 2.0 / weights.sum() * weights
 
 
 class Course(NamedTuple):
@@ -114,12 +161,6 @@ class Deviations:
     numbers: np.ndarray
     there: np.ndarray
 
-    def window(self, begin: float, turns: float) -> np.ndarray:
-        """Return the weights of the pulses, normalised so that the sum with a line's exponential is its amplitude."""
-        part = (self.phi - begin) / (TURN * turns)
-        weights = self.spacing * np.where((part >= 0.0) & (part < 1.0), 1.0 - np.cos(TURN * part), 0.0)
-        return 2.0 / weights.sum() * weights
-
 
 def deviations(
     train: PulseTrain,
@@ -127,13 +168,14 @@ def deviations(
     begin: float,
     end: float,
     scale: float,
-    known: Sequence[float] = (),
     errors: np.ndarray | None = None,
+    known: Sequence[float] = (),
+    window: Window | None = None,
 ) -> Deviations:
     """Return how far a shaft is ahead of the common angle at its pulses, whose marks have errors (rad) or none.
 
     Pulses that are missing are bridged: by a straight line through what is left when the lines at the `known` orders of
-    the common angle are taken out, which a line of pulses two marks apart would not follow.
+    the common angle are taken out, as a window shows them, which a line of pulses two marks apart would not follow.
     """
     numbers, times, there = train.every()
     inside = (times >= course.begin) & (times <= course.end)
@@ -150,13 +192,14 @@ def deviations(
         return found
     holes, values = ~there, found.values.copy()
     values[holes] = np.interp(phi[holes], phi[there], values[there])
-    weights = found.window(begin, (end - begin) / TURN)
-    for _ in range(BRIDGINGS if known else 0):
-        model = np.zeros_like(phi)
-        for order in known:
-            rotating = np.exp(1j * order * phi)
-            model += np.real(((weights * values) @ rotating.conj()) * rotating)
-        values[holes] = model[holes] + np.interp(phi[holes], phi[there], (values - model)[there])
+    if window is not None:
+        weights = window.weights(phi, spacing)
+        for _ in range(BRIDGINGS):
+            model = np.zeros_like(phi)
+            for order in known:
+                rotating = np.exp(1j * order * phi)
+                model += np.real(((weights * values) @ rotating.conj()) * rotating)
+            values[holes] = model[holes] + np.interp(phi[holes], phi[there], (values - model)[there])
     return replace(found, values=values)
 
 
@@ -171,8 +214,7 @@ def lines(
     found: Sequence[Deviations],
     orders: Sequence[Fraction],
     steps: Sequence[Fraction],
-    begin: float,
-    turns: float,
+    window: Window,
     signs: Sequence[float],
     mesh: Fraction | None = None,
 ) -> dict[Fraction, Line]:
@@ -186,8 +228,7 @@ def lines(
     steps : sequence of Fraction
         Orders of which these are multiples, such as 1 and omega_2/omega_1 of the two shafts: one after the other each
         takes its multiples, and scatter is that from one of its turns to the next.
-    begin, turns : float
-        Window of the common angle, rad and turns.
+    window : Window
     signs : sequence of float
         Factors of the encoders.
     mesh : Fraction, optional
@@ -198,7 +239,7 @@ def lines(
         step = next(step for step in steps if (order / step).denominator == 1)
         wanted[step][int(order / step)] = order
     # uneven marks leak a part of each line into all others: the lines of what is left make up for it
-    apart = float(min(np.diff([float(o) for o in sorted(orders)]), default=1.0)) * turns > APART
+    apart = float(min(np.diff([float(o) for o in sorted(orders)]), default=1.0)) * window.turns > APART
     stages = [wanted, wanted] if apart else [wanted]
     if mesh is not None:
         large = {mesh: {int(order / mesh): order for order in orders if (order / mesh).denominator == 1}}
@@ -206,7 +247,7 @@ def lines(
     values = dict.fromkeys(orders, 0.0j)
     variances = dict.fromkeys(orders, 0.0)
     for one, sign in zip(found, signs):
-        weights = one.window(begin, turns)
+        weights = window.weights(one.phi, one.spacing)
         # what is left beside all lines is noise: those of one shaft would scatter over turns of the other
         left = one.values.copy()
         for stage in stages:
@@ -218,14 +259,15 @@ def lines(
                     left -= np.real(value * rotating.conj())
         for step, places in wanted.items():
             length = TURN / float(step)
-            whole = math.floor(turns * float(step) + WHOLE)
-            edges = np.searchsorted(one.phi, begin + length * np.arange(whole + 1))
+            whole = math.floor(window.length * float(step) + WHOLE)
+            edges = np.searchsorted(one.phi, window.begin + length * np.arange(whole + 1))
             if whole < 2 or np.any(np.diff(edges) < 1):
                 continue
             plain = (2.0 / length) * one.spacing * left
+            share = 0.5 * window.noise / (window.turns * float(step))
             for order, rotating in _rotating(one.phi, step, places):
                 by_turn = np.add.reduceat((plain * rotating)[: edges[-1]], edges[:-1])
-                variances[order] += HANN_NOISE * 0.5 * float(np.var(by_turn, ddof=1)) / whole
+                variances[order] += share * float(np.var(by_turn, ddof=1))
     return {order: Line(values[order], variances[order]) for order in orders}
 
 

@@ -16,9 +16,9 @@ from gearmbs.signals.encoders.marks import encoder_marks, share_found
 from gearmbs.signals.encoders.orders import (
     FEWEST_TURNS,
     Course,
-    Deviations,
     Gearing,
     Line,
+    Window,
     deviations,
     folded,
     lines,
@@ -262,36 +262,28 @@ SURELY = 3.0
 """Standard errors by which a share must be below it: of a disc whose share is 1 fewer than 1 in 800 are."""
 
 
-def _window(gearing: Gearing, begin: float, end: float) -> float:
-    """Return the turns of the first shaft that are evaluated: whole ones of both if they fit, else of the slower."""
-    turns = (end - begin) / TURN
-    hunting = gearing.ratio.numerator
-    if turns >= hunting:
-        return float(hunting * math.floor(turns / hunting))
-    slower = max(float(gearing.ratio), 1.0)
-    return slower * math.floor(turns / slower)
-
-
 def _lines_of(
     run: CoupledRun, gearing: Gearing, orders: Sequence[Order], errors: Mapping[str, np.ndarray | None]
 ) -> _Measured:
     """Evaluate a run at all orders."""
     course = smooth_angle(run.driver)
     begin, end = _common(course, run.driven)
-    turns = _window(gearing, begin, end)
-    slower = turns / max(float(gearing.ratio), 1.0)
+    turn = max(float(gearing.ratio), 1.0)
+    slower = (end - begin) / (TURN * turn)
     if slower < FEWEST_TURNS:
         raise SignalError(
             f"runs: the records of {run.driver.name!r} and {run.driven.name!r} have {max(slower, 0.0):.3g} turns of "
             f"the slower shaft in common beside two that the smooth angle takes; {FEWEST_TURNS} are needed"
         )
-    end = begin + TURN * turns
+    # the turns after which the wheels meet again, if there are as many
+    window = Window.of(begin, end, (float(gearing.ratio.numerator), turn))
+    end = begin + TURN * window.length
     known = [float(o.order) for o in orders if o.harmonic]
     scale = float(gearing.ratio)
-    first = deviations(run.driver, course, begin, end, 1.0, known, errors["driver"])
-    second = deviations(run.driven, course, begin, end, scale, known, errors["driven"])
+    first = deviations(run.driver, course, begin, end, 1.0, errors["driver"], known, window)
+    second = deviations(run.driven, course, begin, end, scale, errors["driven"], known, window)
     steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
-    values = lines((first, second), [o.order for o in orders], steps, begin, turns, (1.0, -1.0), gearing.mesh)
+    values = lines((first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh)
     mesh = [o.order for o in orders if o.harmonic]
     return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)))
 
@@ -308,14 +300,15 @@ def _free_lines(train: PulseTrain, name: str, orders: Sequence[int], errors: np.
     """Return the lines of a shaft that runs free, at whole orders: what is left of its marks with the sign turned."""
     course = smooth_angle(train)
     begin, end = float(course.angle(course.begin)), float(course.angle(course.end))
-    turns = math.floor((end - begin) / TURN)
+    turns = (end - begin) / TURN
     if turns < FEWEST_TURNS:
         raise SignalError(
-            f"free: {train.name!r} of the {name} has {turns} turns beside two that the smooth angle takes; "
+            f"free: {train.name!r} of the {name} has {turns:.3g} turns beside two that the smooth angle takes; "
             f"{FEWEST_TURNS} are needed, record longer"
         )
-    found: Deviations = deviations(train, course, begin, begin + TURN * turns, 1.0, errors=errors)
-    return lines((found,), [Fraction(k) for k in orders], (Fraction(1),), begin, float(turns), (1.0,))
+    window = Window.of(begin, end, (1.0,))
+    found = deviations(train, course, begin, begin + TURN * window.length, 1.0, errors)
+    return lines((found,), [Fraction(k) for k in orders], (Fraction(1),), window, (1.0,))
 
 
 def _shifts(measured: Sequence[_Measured], gearing: Gearing) -> tuple[list[tuple[float, float]], list[str]]:

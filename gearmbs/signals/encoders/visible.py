@@ -118,4 +118,4 @@ DARK = 7
 """A mesh harmonic is refused where one of up to so many times its number is folded onto it, and remarked on where one
 beyond is: amplitudes that fall as the number's square are then 2 % of it."""
 SHADOW = 2.0
-"""Width of a line with the Hann window, by the reciprocal of the turns: nearer orders are not parted."""
+"""Width of a line, at most, by the reciprocal of the turns: nearer orders are not parted."""

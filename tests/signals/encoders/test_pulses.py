@@ -220,6 +220,16 @@ def test_the_command_reads_what_virtual_encoders_write(tmp_path):
     assert abs(table["amplitude"][0] / 5e-6 - 1.0) < 0.02
     assert table["calibrated"].all()
     assert (tmp_path / "transmission_error.png").exists()
+    # harmonics 4 and 5 are beyond half of 200 lines, on orders of their own; 6 and 7 fall below the mesh order
+    out = CliRunner().invoke(app, [*words, *alone, "--tables", str(tmp_path), "--harmonics", "7"])
+    assert out.exit_code == 0
+    fine = pd.read_csv(tmp_path / "mesh_harmonics.csv")
+    assert fine["harmonic"].tolist() == [1, 2, 3, 4, 5]
+    assert fine["amplitude"][0] == pytest.approx(table["amplitude"][0], rel=1e-3)
+    assert (fine["low"][3:] == 0.0).all()
+    assert "Mesh harmonics 6, 7: the lines fold them" in out.output
+    assert "--harmonics" in CliRunner().invoke(app, [*words, "--harmonics", "many"]).output
+    assert "harmonics: must be a whole number" in CliRunner().invoke(app, [*words, "--harmonics", "0"]).output
     ratio = [*words[:2], "--ratio", "1", "--mesh-order", "29", "--base-radius", "40 mm"]
     assert "Mesh harmonic 1" in CliRunner().invoke(app, ratio).output
     out = CliRunner().invoke(app, [*words, "--columns", "a,b"])

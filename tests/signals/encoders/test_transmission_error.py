@@ -106,6 +106,29 @@ def test_uneven_marks_leak_nothing_from_line_to_line(lines, lacking):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("teeth", [(29, 29), (21, 34)])
+def test_what_counting_leaves_is_the_cramer_rao_bound(teeth):
+    """Nothing unbiased could leave less than the information in all pulses; the window costs a tenth of it."""
+    turns, seconds, speed = 120.0, 4.0, 100.0
+    amplitudes, ratio = np.array([1e-6, 1e-7]), teeth[1] / teeth[0]
+    angles = coupled(
+        lambda turned: sum(a * np.cos(math.tau * (k + 1) * teeth[0] * turned) for k, a in enumerate(amplitudes)),
+        teeth, 0.04, turns=turns, speed=speed, rate=20e3,
+    )  # fmt: skip
+    discs = Discs(seed=seed(9))
+    mesh = transmission_error_from_pulses(
+        discs.run(angles), teeth, base_radius=0.04, free=discs.free(seconds=seconds)
+    ).harmonics()[:2]
+    # of L pulses a turn with independent errors; the clock cuts evenly
+    free, error = speed * seconds / math.tau, math.hypot(50e-9, 50e-9 / math.sqrt(12.0))
+    bound = 0.04 * speed * error * math.sqrt(2 / 1024 * (1 / turns + ratio / turns + 1 / free + ratio**2 / free))
+    known = (mesh["high"] - mesh["low"]) / 2 / stats.norm.ppf(0.975)
+    assert np.all((known > 0.97 * bound) & (known < 1.1 * bound))
+    # 4 standard deviations: once in 3000
+    assert np.all(np.abs(mesh["amplitude"] - amplitudes) < 4 * known)
+
+
+@pytest.mark.slow
 def test_sixty_lines_show_one_harmonic_and_refuse_the_rest_by_name():
     error, radius = paper_error()
     discs = Discs(60)
