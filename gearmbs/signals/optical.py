@@ -192,6 +192,14 @@ def flat_top(column: np.ndarray) -> tuple[float, int] | None:
     return None
 
 
+def _known_unit(unit: str) -> bool:
+    """Return whether a unit is one of motion or force."""
+    try:
+        return bool(unit_dimension(unit)[0])
+    except SignalError:
+        return False
+
+
 def _in_unit(bound: Quantity, unit: str) -> float:
     """Return a bound in a channel's unit."""
     if not isinstance(bound, str):
@@ -369,6 +377,10 @@ def point_track(
     length = to_si(scale, "length", "scale")
     if not 0.0 < length < math.inf:
         raise SignalError(f"scale: must be the positive length of a pixel in m, got {scale!r}")
+    if (unit := next(filter(_known_unit, units_of(signal)), None)) is not None:
+        raise SignalError(
+            f"units: the track is in {unit}, not in pixels; leave point_track (--pixel) out, or set its unit to 'pixel'"
+        )
     values = length * (signal.values - signal.values.mean(axis=0))
     if direction is None:
         return like(signal, values, units="m")

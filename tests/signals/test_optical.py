@@ -171,6 +171,8 @@ def test_a_camera_sees_displacement(rate):
     two = make_signal({"x": pixels.values[:, 0], "y": 0.5 * pixels.values[:, 0]}, rate, units="pixel")
     along = point_track(two, 20e-6, direction=(0, 2))
     assert np.allclose(along.values, 0.5 * track.values)
+    with pytest.raises(SignalError, match=says("units", "m", "pixel")):
+        point_track(true, "20 um")
     with pytest.raises(SignalError, match=says("scale", "0")):
         point_track(pixels, 0)
     with pytest.raises(SignalError, match=says("direction", "2")):

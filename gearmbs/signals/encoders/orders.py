@@ -161,6 +161,12 @@ class Deviations:
     numbers: np.ndarray
     there: np.ndarray
 
+    @property
+    def drift(self) -> float:
+        """By how much the shaft comes ahead from the first pulse to the last, rad: twice that of the halves' means."""
+        half = self.values.size // 2
+        return 2.0 * float(self.values[half:].mean() - self.values[:half].mean())
+
 
 def deviations(
     train: PulseTrain,

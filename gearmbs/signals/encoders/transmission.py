@@ -35,6 +35,8 @@ LEVEL_LINES = 32
 """Orders beside one, at most, by whose median the level of the marks is told."""
 SLIPPED = 0.05
 """Pitches by which wheels and discs of two runs may stand otherwise than told: 1/20 is 18 degrees of the mesh."""
+LARGEST_RADIUS = 10.0
+"""m: girth gears of mills are about as large; a radius in mm without its unit is beyond."""
 LARGEST_TERM = 2000
 """Largest denominator that a ratio given as a decimal number is taken for."""
 
@@ -134,8 +136,11 @@ def transmission_error_from_pulses(
         raise SignalError(f"probability: must lie between 0 and 1, got {probability!r}")
     gearing = _gearing(teeth, ratio, mesh_order)
     radius = to_si(base_radius, "length", "base_radius")
-    if not 0.0 < radius < math.inf:
-        raise SignalError(f"base_radius: must be positive, got {base_radius!r}")
+    if not 0.0 < radius < LARGEST_RADIUS:
+        raise SignalError(
+            f"base_radius: must be positive and below {LARGEST_RADIUS:g} m, got {base_radius!r}; a number is in m, a "
+            'length in mm is written "41.76 mm"'
+        )
     trains = (runs[0].driver, runs[0].driven)
     freed = {name: _listed((free or {}).get(name)) for name in ("driver", "driven")}
     stray = set(free or {}) - set(freed)
@@ -282,10 +287,22 @@ def _lines_of(
     scale = float(gearing.ratio)
     first = deviations(run.driver, course, begin, end, 1.0, errors["driver"], known, window)
     second = deviations(run.driven, course, begin, end, scale, errors["driven"], known, window)
+    _check_clocks(run, first.drift - second.drift, float(gearing.mesh), window.length)
     steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
     values = lines((first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh)
     mesh = [o.order for o in orders if o.harmonic]
     return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)))
+
+
+def _check_clocks(run: CoupledRun, drift: float, mesh: float, turns: float) -> None:
+    """Refuse shafts that move apart (rad of the first) by more than wheels in mesh can, their backlash included."""
+    pitches = drift * mesh / TURN
+    if abs(pitches) > SLIPPED:
+        raise SignalError(
+            f"runs: {run.driven.name!r} moves {pitches:.3g} pitches of teeth against {run.driver.name!r}, which no "
+            f"wheels in mesh do: {1e6 * drift / (TURN * turns):.3g} ppm, as of two clocks, or lost pulses; record both "
+            "with one counter, and see the notes of the trains"
+        )
 
 
 def _common(course: Course, driven: PulseTrain) -> tuple[float, float]:

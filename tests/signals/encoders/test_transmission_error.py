@@ -1,5 +1,6 @@
 """Transmission error from the pulses of two encoders: against the exact one of the bench, with and without marks."""
 
+import dataclasses
 import math
 from fractions import Fraction
 
@@ -263,6 +264,13 @@ def test_records_that_do_not_fit_are_refused():
         transmission_error_from_pulses(run, **known)
     with pytest.raises(SignalError, match=says("base_radius", "0")):
         transmission_error_from_pulses(run, TEETH, base_radius=0)
+    with pytest.raises(SignalError, match=says("base_radius", "41.76", "mm")):
+        transmission_error_from_pulses(run, TEETH, base_radius=41.76)
+    late = dataclasses.replace(run.driven, times=run.driven.times * (1 + 1e-3))
+    with pytest.raises(SignalError, match=says("driven", "ppm", "one counter")):
+        transmission_error_from_pulses(CoupledRun(run.driver, late), TEETH, **known)
+    near = dataclasses.replace(run.driven, times=run.driven.times * (1 + 1e-5))
+    assert len(transmission_error_from_pulses(CoupledRun(run.driver, near), TEETH, **known).harmonics()) == 3
     with pytest.raises(SignalError, match=says("mark_error", "-1")):
         transmission_error_from_pulses(run, TEETH, mark_error=-1, **known)
     with pytest.raises(SignalError, match=says("probability", "2")):
