@@ -23,6 +23,7 @@ from gearmbs.campaigns.datasets import (
     from_recordings_to_recordings,
     from_simulation_to_recordings,
     identify_noise,
+    identify_path,
     leak_and_no_leak,
     macro_auroc,
     one_state_a_group,
@@ -37,7 +38,7 @@ from gearmbs.campaigns.datasets import (
 )
 from gearmbs.campaigns.datasets.baseline import NAMES
 from gearmbs.campaigns.datasets.layers import STOP
-from gearmbs.signals import make_signal
+from gearmbs.signals import ModalPath, Mode, accelerometer, make_signal
 from tests.campaigns.models import Ringing
 from tests.says import says
 
@@ -157,6 +158,33 @@ def test_noise_of_a_recording_comes_back():
     assert ratio == pytest.approx(10.0, rel=0.15)
     again = SensorLayers(noises=(found,)).noisy(np.zeros(COUNT), 2.0, 0, 0)
     assert np.std(again) == pytest.approx(2.0 * found.level, rel=0.05)
+
+
+def test_the_path_of_a_recording_comes_back():
+    """Resonances that random vibration shows beside lines of gears, and a data set's sensors behind them."""
+    true = ModalPath((Mode(820.0, 0.03, 1.0), Mode(2100.0, 0.02, -2.0), Mode(3900.0, 0.02, 1.5)))
+    generator = np.random.default_rng(1)
+    force = make_signal(generator.standard_normal((1 << 16, 1)), RATE, units="N")
+    heard = accelerometer(force, true, settle="keep").values[:, 0]
+    t = np.arange(heard.size) / RATE
+    heard = heard + np.std(heard) * np.sin(2 * np.pi * 640.0 * t)
+    (path,) = identify_path(make_signal(heard[:, None], RATE, units="m/s^2"), modes=3)
+    found = sorted(path.modes, key=lambda mode: mode.frequency)
+    for one, mode in zip(found, true.modes, strict=True):
+        assert one.frequency == pytest.approx(mode.frequency, rel=0.02)
+        assert one.damping == pytest.approx(mode.damping, rel=0.4)
+    # one gain apart, the peaks are as high
+    peaks = np.array([m.frequency for m in true.modes])
+    level = 20 * np.log10(np.abs(path.accelerance(peaks)) / np.abs(true.accelerance(peaks)))
+    assert np.ptp(level) < 3.0
+    layers = SensorLayers(paths=(path,), seed=1)
+    assert layers.path(3, 1) is path
+    before, after = layers.margins(DURATION, RATE)
+    assert before > SensorLayers().margins(DURATION, RATE)[0]
+    clean = generator.standard_normal(before + COUNT + after)
+    assert layers.heard(clean, RATE, DURATION, 0, 0).shape == (COUNT,)
+    with pytest.raises(CampaignError, match=says("recording", "sensor", "repeats")):
+        identify_path(make_signal({"sensor": np.zeros(1 << 13)}, RATE, units="m/s^2"))
 
 
 def test_no_specimen_is_in_two_splits():

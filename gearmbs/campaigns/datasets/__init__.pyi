@@ -19,6 +19,7 @@ from .make import measured as measured
 from .make import read_data_set as read_data_set
 from .make import write_data_set as write_data_set
 from .recordings import identify_noise as identify_noise
+from .recordings import identify_path as identify_path
 from .splits import one_state_a_group as one_state_a_group
 from .splits import random_split as random_split
 from .splits import shared_groups as shared_groups

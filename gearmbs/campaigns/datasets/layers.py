@@ -76,6 +76,8 @@ class SensorLayers:
     modes : int
         Modes of a transfer path with random frequencies, dampings and weights; 0 where the simulated housing is the
         path.
+    paths : tuple of ModalPath
+        Instead of modes: paths identified from recordings (`identify_path`), of which each sensor gets one.
     lowest, highest : float
         Range of their frequencies, Hz, drawn evenly in the logarithm.
     damping : tuple of float
@@ -95,6 +97,7 @@ class SensorLayers:
     """
 
     modes: int = 0
+    paths: tuple[ModalPath, ...] = ()
     lowest: float = 400.0
     highest: float = 5500.0
     damping: tuple[float, float] = (0.02, 0.08)
@@ -112,6 +115,8 @@ class SensorLayers:
         """
         u = np.random.default_rng([self.seed, 1, specimen]).random((self.modes, 2))
         generator = np.random.default_rng([self.seed, 3, specimen, sensor])
+        if self.paths:
+            return self.paths[int(generator.integers(len(self.paths)))]
         modes = []
         for k in range(self.modes):
             frequency = self.lowest * (self.highest / self.lowest) ** ((k + u[k, 0]) / self.modes)
@@ -122,9 +127,9 @@ class SensorLayers:
 
     def _settling(self, rate: float) -> int:
         """Return the samples in which the slowest path that may be drawn forgets its start."""
-        if not self.modes:
-            return 0
-        return math.ceil(ModalPath((Mode(self.lowest, self.damping[0], 1.0),)).settling * rate)
+        slowest = ModalPath((Mode(self.lowest, self.damping[0], 1.0),))
+        known = self.paths or ((slowest,) if self.modes else ())
+        return math.ceil(max((path.settling for path in known), default=0.0) * rate)
 
     def _lost(self, samples: float) -> int:
         """Return the samples that drift, interpolation and filter take from either end of a record of so many."""
@@ -136,7 +141,7 @@ class SensorLayers:
         """Return the samples that have to be simulated before and after a record of a duration, s."""
         lost = self._lost(duration * rate)
         # the path's response to the end of what is known must not reach the record either
-        return lost + self._settling(rate), lost + (MARGIN if self.modes else 0)
+        return lost + self._settling(rate), lost + (MARGIN if self.modes or self.paths else 0)
 
     def longest(self, samples: int, rate: float) -> float:
         """Return the longest record, s, that a simulation of so many samples has the margins of.
@@ -185,7 +190,7 @@ class SensorLayers:
         # the machine drifts alike for all its sensors
         positions = before + self.times(rate, duration, record, (-before + MARGIN, count + after - MARGIN)) * rate
         x = interpolate(x - x.mean(), np.clip(positions, 0.0, x.size - 1.0))
-        if self.modes:
+        if self.modes or self.paths:
             path = self.path(specimen, sensor)
             scale = math.sqrt(float(np.mean(np.abs(path.accelerance(np.linspace(0.0, 0.5 * rate, 2049))) ** 2)))
             force = make_signal(x[:, None], rate, units="N", channels=["sensor"])
