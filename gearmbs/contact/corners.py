@@ -22,7 +22,7 @@ from gearmbs.contact.sections import (
     turned,
     unmark_unsettled,
 )
-from gearmbs.contact.support import (
+from gearmbs.contact.support.profiles import (
     corner_curvatures,
     corner_slopes,
     involute_curvatures,

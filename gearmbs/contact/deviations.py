@@ -10,7 +10,7 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.records import integers_of, kernel, reals_of
-from gearmbs.contact.support import edge_bends, edge_of, tilt_of
+from gearmbs.contact.support.profiles import edge_bends, edge_of, tilt_of
 
 SHORTEST = 0.01  # length of roll over base radius where the lookup ends towards the base circle
 

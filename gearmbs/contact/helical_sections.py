@@ -20,7 +20,7 @@ from gearmbs.contact.sections import (
     turned,
     unmark_unsettled,
 )
-from gearmbs.contact.support import (
+from gearmbs.contact.support.profiles import (
     HelicalCurvatures,
     HelicalSlopes,
     edge_curvatures,

@@ -11,7 +11,7 @@ import numpy as np
 from gearmbs.contact import layout as L
 from gearmbs.contact.records import inlined, kernel
 from gearmbs.contact.sections import LARGEST_TURN, NEAR_BASE
-from gearmbs.contact.support import (
+from gearmbs.contact.support.profiles import (
     corner_curvatures,
     corner_slopes,
     edge_curvatures,

@@ -9,7 +9,7 @@ from gearmbs.contact.helical_sections import helical_flanks, helical_normals
 from gearmbs.contact.places import level, level_flanks
 from gearmbs.contact.records import kernel, strip_at
 from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
-from gearmbs.contact.support import GENTLE
+from gearmbs.contact.support.profiles import GENTLE
 
 STEEPEST = 3.0  # how much steeper the corner gap may grow than that bound
 BENDING = 4.0  # bound of the gap's bending along the face of an internal pair, as a multiple of the tilt squared

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearmbs.contact.records import inlined, kernel, summing
-from gearmbs.contact.support import involute_curvatures, involute_slopes, normal_turn, tilt_of
+from gearmbs.contact.support.profiles import involute_curvatures, involute_slopes, normal_turn, tilt_of
 
 NEWTON_STEPS = 20
 NEWTON_END = 1e-6  # a further step would change alpha by about the square of it

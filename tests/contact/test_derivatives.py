@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearmbs.contact import support as sup
+from gearmbs.contact.support import profiles as sup
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import (
     BrokenTooth,

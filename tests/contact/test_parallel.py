@@ -1,5 +1,7 @@
 """The lean form of wheels on fixed parallel axes against the general one: wrench, derivatives, diagnostics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,9 @@ PAIRS = {
     "jammed": GearPair.paper(backlash="5 um", centre_distance_error="-20 um"),
     "Hunt-Crossley, smooth friction": GearPair.paper(
         backlash="0.1 mm", contact=ContactLaw.hunt_crossley(), friction=FlankFriction(kind="smooth")
+    ),
+    "Kuwabara and Kono": GearPair.paper(
+        contact=replace(ContactLaw.hunt_crossley(), kind="kuwabara-kono", damping=1e-4), backlash="0.1 mm"
     ),
     "no friction": GearPair.paper(friction=FlankFriction.none(), backlash="0.1 mm"),
 }

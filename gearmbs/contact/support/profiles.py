@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearmbs.contact.records import inlined
+from gearmbs.contact.support import derived as D
 
 GENTLE = 0.02
 """Turns of the normal below this are taken from a series."""
@@ -76,6 +77,12 @@ def tilt_of(side):
 
 
 @inlined
+def tilt_numbers(tilt):
+    """Return what kernels made from definitions take of a tilt."""
+    return tilt.w, tilt.i_w, tilt.i_1w, tilt.m, tilt.m_w, tilt.m_ww
+
+
+@inlined
 def normal_turn(A, B, tilt):
     """Turn of the normal seen from the wheel's own plane: the angle E added to alpha."""
     arg = A * B / (tilt.w * (1.0 + tilt.w) + A * A)
@@ -91,57 +98,15 @@ def involute_slopes(A, B, kap, s, rb, tilt):
 
     For two meshing involutes together ``s`` and ``rb`` are sums over the wheels.
     """
-    w, i_w, i_w3 = tilt.w, tilt.i_w, tilt.i_w3
-    i_k = 1.0 / kap
-    k = kap * i_w
-    k_A = kap * A * i_w3
-    k_B = A * A * B * i_k * i_w3
-    E_A = B * i_w * tilt.i_1w
-    E_B = A * (w + B * B) * i_w * tilt.i_1w * i_k * i_k
-    return Slopes(
-        k * s,
-        A * B * s * i_w * i_k + rb * i_k,
-        k_A * s + k * rb * E_A,
-        k_B * s + k * rb * E_B,
-        k * rb,
-    )
+    h, alpha, by_A, by_B, spin = D.involute_slopes(A, B, kap, s, rb, *tilt_numbers(tilt))
+    return Slopes(h, alpha, by_A, by_B, spin)
 
 
 @inlined
 def involute_curvatures(A, B, kap, s, rb, tilt):
     """Second derivatives of the support of an involute; arguments as in `involute_slopes`."""
-    w, i_w, i_w3, i_w5, one = tilt.w, tilt.i_w, tilt.i_w3, tilt.i_w5, tilt.i_1w
-    i_k = 1.0 / kap
-    i_k3 = i_k * i_k * i_k
-    k = kap * i_w
-    k_A = kap * A * i_w3
-    k_B = A * A * B * i_k * i_w3
-    E_A = B * i_w * one
-    top = w + B * B
-    i_bottom = i_w * one * i_k * i_k
-    E_B = A * top * i_bottom
-    ab = A * B * i_w * i_k
-    ab_B = A * (w * w * kap * kap + B * B * kap * kap + B * B * w * w) * i_w3 * i_k3
-    w2 = (1.0 + 2.0 * w) * i_w3 * one * one
-    E_AA = A * B * w2
-    E_AB = i_w * one + B * B * w2
-    bottom_B = -(1.0 + 2.0 * w) * B * i_w * kap * kap - 2.0 * w * (1.0 + w) * B
-    E_BB = A * (2.0 * B - B * i_w - top * bottom_B * i_bottom) * i_bottom
-    k_AA = kap * (w * w + 3.0 * A * A) * i_w5
-    k_AB = A * (3.0 * kap * B * i_w5 - B * i_k * i_w3)
-    k_BB = A * A * (i_k * i_w3 + B * B * i_k3 * i_w3 + 3.0 * B * B * i_k * i_w5)
-    return Curvatures(
-        s * (B * B * w * w - A * A * kap * kap) * i_w * i_k3,
-        s * B * kap * i_w3 + ab * rb * E_A,
-        s * ab_B + ab * rb * E_B + rb * B * i_k3,
-        ab * rb,
-        s * k_AA + rb * (2.0 * k_A * E_A + k * E_AA),
-        s * k_AB + rb * (k_A * E_B + k_B * E_A + k * E_AB),
-        s * k_BB + rb * (2.0 * k_B * E_B + k * E_BB),
-        k_A * rb,
-        k_B * rb,
-        0.0,
-    )
+    aa, aA, aB, aF, AA, AB, AF, BB, BF, FF = D.involute_curvatures(A, B, kap, s, rb, *tilt_numbers(tilt))
+    return Curvatures(aa, aA, aB, aF, AA, AB, BB, AF, BF, FF)
 
 
 @inlined
@@ -158,18 +123,9 @@ def corner_slopes(A, B, kap, sn, cs, r, rt, tilt):
         Radius of the corner's line and of its rounding.
     tilt : Tilt
     """
-    i_w, i_w3, m = tilt.i_w, tilt.i_w3, tilt.m
-    i_k = 1.0 / kap
-    m_A = -tilt.m_w * A * i_w
-    m_B = -tilt.m_w * B * i_w
     V = A * sn + B * cs
-    return Slopes(
-        r * (sn + m * A * V) + rt * kap * i_w,
-        r * (cs + m * B * V) + rt * A * B * i_w * i_k,
-        r * (m * (A * sn + V) + m_A * A * V) + rt * kap * A * i_w3,
-        r * (m * A * cs + m_B * A * V) + rt * A * A * B * i_k * i_w3,
-        r * (cs + m * A * (A * cs - B * sn)),
-    )
+    h, alpha, by_A, by_B, spin = D.corner_slopes(A, B, kap, sn, cs, V, r, rt, *tilt_numbers(tilt))
+    return Slopes(h, alpha, by_A, by_B, spin)
 
 
 @inlined
@@ -181,32 +137,11 @@ def corner_curvatures(A, B, kap, sn, cs, r, rt, tilt):
     A, B, kap, sn, cs, r, rt, tilt
         As in `corner_slopes`.
     """
-    w, i_w, i_w3, i_w5, m, m_w, m_ww = tilt.w, tilt.i_w, tilt.i_w3, tilt.i_w5, tilt.m, tilt.m_w, tilt.m_ww
-    i_k = 1.0 / kap
-    i_k3 = i_k * i_k * i_k
-    m_A = -m_w * A * i_w
-    m_B = -m_w * B * i_w
-    m_AA = m_ww * A * A * i_w * i_w - m_w * (i_w + A * A * i_w3)
-    m_AB = m_ww * A * B * i_w * i_w - m_w * A * B * i_w3
-    m_BB = m_ww * B * B * i_w * i_w - m_w * (i_w + B * B * i_w3)
     V = A * sn + B * cs
-    Ve = A * cs - B * sn
-    X = A * sn + V
-    ab_B = A * (w * w * kap * kap + B * B * kap * kap + B * B * w * w) * i_w3 * i_k3
-    k_AB = A * (3.0 * kap * B * i_w5 - B * i_k * i_w3)
-    k_BB = A * A * (i_k * i_w3 + B * B * i_k3 * i_w3 + 3.0 * B * B * i_k * i_w5)
-    return Curvatures(
-        -r * (sn + m * A * V) + rt * (B * B * w * w - A * A * kap * kap) * i_w * i_k3,
-        r * B * (m_A * V + m * sn) + rt * B * kap * i_w3,
-        r * (m_B * B * V + m * V + m * B * cs) + rt * ab_B,
-        r * (m * B * Ve - sn),
-        r * (2.0 * m * sn + 2.0 * m_A * X + m_AA * A * V) + rt * kap * (w * w + 3.0 * A * A) * i_w5,
-        r * (m_B * X + m * cs + m_AB * A * V + m_A * A * cs) + rt * k_AB,
-        r * (2.0 * m_B * A * cs + m_BB * A * V) + rt * k_BB,
-        r * (m * (A * cs + Ve) + m_A * A * Ve),
-        r * (m_B * A * Ve - m * A * sn),
-        -r * (sn + m * A * V),
-    )
+    aa, aA, aB, aF, AA, AB, AF, BB, BF, FF = D.corner_curvatures(
+        A, B, kap, sn, cs, V, r, rt, *tilt_numbers(tilt)
+    )  # fmt: skip
+    return Curvatures(aa, aA, aB, aF, AA, AB, BB, AF, BF, FF)
 
 
 # Support functions of helical wheels in a section across two tilted wheels, with all second derivatives.
@@ -349,82 +284,28 @@ def helicoid_slopes(screw, s, Z, rb, t, sa, ca, tilt):
     tilt : Tilt
     """
     A, B, kap2, c, K, R, U, V, inverse = screw
-    w, i_w = tilt.w, tilt.i_w
-    i_K = 1.0 / K
-    K_B = -c * R
-    by_A = rb * B * i_w * tilt.i_1w
-    by_B = rb * (A * (w + B * B) * i_w * tilt.i_1w - t * i_K) / kap2
-    h = (U * s + V * Z) * inverse
-    h_A = ((-A * K * i_w - t) * s + U * by_A + c * (w - A * A * i_w) * Z + 2.0 * c * A * h) * inverse
-    h_B = (
-        (-B * K * i_w + w * K_B) * s + U * by_B + (-c * A * B * i_w - t * K_B) * Z + 2.0 * c * B * h
-    ) * inverse  # fmt: skip
-    return HelicalSlopes(
-        h,
-        (V * s + c * U * Z) * R * inverse + rb * i_K,
-        h_A * sa + h_B * ca,
-        h_A * ca - h_B * sa,
-        U * rb * inverse,
-        V * inverse,
+    h, alpha, h_A, h_B, spin, place = D.helicoid_slopes(
+        A, B, np.sqrt(kap2), c, K, R, U, V, inverse, s, Z, rb, t, *tilt_numbers(tilt)
     )
+    return HelicalSlopes(h, alpha, h_A * sa + h_B * ca, h_A * ca - h_B * sa, spin, place)
 
 
 @inlined
 def helicoid_curvatures(screw, s, Z, rb, t, sa, ca, tilt):
     """Second derivatives of the support of an involute helicoid; arguments as in `helicoid_slopes`."""
     A, B, kap2, c, K, R, U, V, inverse = screw
-    w, i_w, i_w3, one = tilt.w, tilt.i_w, tilt.i_w3, tilt.i_1w
-    i_K = 1.0 / K
-    i_K3 = i_K * i_K * i_K
-    i_kap2 = 1.0 / kap2
-    K_B = -c * R
-    K_BB = -c * i_K3
-    w_AA, w_AB, w_BB = -(i_w + A * A * i_w3), -A * B * i_w3, -(i_w + B * B * i_w3)
-    # the angle of s by the tilt: E less the arcsine
-    top, i_bottom = w + B * B, i_w * one * i_kap2
-    w2 = (1.0 + 2.0 * w) * i_w3 * one * one
-    bottom_B = -(1.0 + 2.0 * w) * B * i_w * kap2 - 2.0 * w * (1.0 + w) * B
-    s_A = rb * B * i_w * one
-    s_B = rb * (A * top * i_bottom - t * i_K * i_kap2)
-    s_AA = rb * A * B * w2
-    s_AB = rb * (i_w * one + B * B * w2)
-    s_BB = rb * (
-        A * (2.0 * B - B * i_w - top * bottom_B * i_bottom) * i_bottom
-        + t * (kap2 * K_B - 2.0 * B * K) * i_kap2 * i_kap2 * i_K * i_K
+    aa, aA, aB, aF, aZ, AA, AB, AF, AZ, BB, BF, BZ, _, _, _ = D.helicoid_curvatures(
+        A, B, np.sqrt(kap2), c, K, R, U, V, inverse, s, Z, rb, t, *tilt_numbers(tilt)
     )
-    U_A, U_B = -A * K * i_w - t, -B * K * i_w + w * K_B
-    V_A, V_B = c * (w - A * A * i_w), -c * A * B * i_w - t * K_B
-    O_A, O_B = -2.0 * c * A, -2.0 * c * B
-    h = (U * s + V * Z) * inverse
-    h_A = (U_A * s + U * s_A + V_A * Z - h * O_A) * inverse
-    h_B = (U_B * s + U * s_B + V_B * Z - h * O_B) * inverse
-    h_AA = (
-        K * w_AA * s + 2.0 * U_A * s_A + U * s_AA + c * (A * w_AA - 2.0 * A * i_w) * Z - 2.0 * h_A * O_A + 2.0 * c * h
-    ) * inverse
-    h_AB = (
-        (K * w_AB - A * i_w * K_B) * s + U_A * s_B + U_B * s_A + U * s_AB + c * (A * w_AB - B * i_w) * Z
-        - h_A * O_B - h_B * O_A
-    ) * inverse  # fmt: skip
-    h_BB = (
-        (K * w_BB - 2.0 * B * i_w * K_B + w * K_BB) * s + 2.0 * U_B * s_B + U * s_BB + (c * A * w_BB - t * K_BB) * Z
-        - 2.0 * h_B * O_B + 2.0 * c * h
-    ) * inverse  # fmt: skip
-    W = V * s + c * U * Z
-    turning = W * R * inverse
-    alpha_A = ((V_A * s + V * s_A + c * U_A * Z) * R - turning * O_A) * inverse
-    alpha_B = ((V_B * s + V * s_B + c * U_B * Z) * R + W * i_K3 - turning * O_B) * inverse - rb * K_B * i_K * i_K
-    h_F, h_Z = U * rb * inverse, V * inverse
-    AF, BF = (U_A * rb - h_F * O_A) * inverse, (U_B * rb - h_F * O_B) * inverse
-    AZ, BZ = (V_A - h_Z * O_A) * inverse, (V_B - h_Z * O_B) * inverse
     return HelicalCurvatures(
-        c * R * R * h - A * i_K3 * W * inverse + V * R * rb / (U * K) - c * A * B * rb * i_K3,
-        alpha_A * sa + alpha_B * ca,
-        alpha_A * ca - alpha_B * sa,
-        V * R * rb * inverse,
-        c * U * R * inverse,
-        h_AA * sa * sa + 2.0 * h_AB * sa * ca + h_BB * ca * ca,
-        (h_AA - h_BB) * sa * ca + h_AB * (ca * ca - sa * sa),
-        h_AA * ca * ca - 2.0 * h_AB * sa * ca + h_BB * sa * sa,
+        aa,
+        aA * sa + aB * ca,
+        aA * ca - aB * sa,
+        aF,
+        aZ,
+        AA * sa * sa + 2.0 * AB * sa * ca + BB * ca * ca,
+        (AA - BB) * sa * ca + AB * (ca * ca - sa * sa),
+        AA * ca * ca - 2.0 * AB * sa * ca + BB * sa * sa,
         AF * sa + BF * ca,
         AF * ca - BF * sa,
         AZ * sa + BZ * ca,
