@@ -175,7 +175,10 @@ def _object(m: Deckmaker, item: Item) -> str | None:
 
 
 def _from_first(m: Deckmaker, item: Item) -> bool:
-    return m.values.word(item, "from_first", "yes") in ("yes", "on", "true")
+    word = m.values.word(item, "from_first")
+    if not word:
+        raise ViewError("from_first is missing, by which the sign goes; give yes or no")
+    return word in ("yes", "on", "true")
 
 
 def _seen(m: Deckmaker, item: Item, found: Item) -> list[int]:

@@ -89,7 +89,8 @@ force create direct force_vector force_vector_name = .m.VF i_marker_name = .m.B.
 data_element create variable variable_name = .m.V function = "AKISPL(time, 0, .m.S, 0) + .m.ME"
 data_element create spline spline_name = .m.S x = 0, 1, 2, 3 y = 0, 1, 4, 9 linear_extrapolate = no
 data_element create array ic_array array_name = .m.AR size = 2 numbers = 1, 2
-measure create object measure_name = .m.ME object = .m.J1 characteristic = ax_ay_az_projection_angles  &
+measure create object measure_name = .m.ME object = .m.J1 from_first = yes  &
+   characteristic = ax_ay_az_projection_angles  &
    component = z_component
 variable create variable_name = .m.K real_value = (3.5(newton/mm))
 output_control create request request_name = .m.R f2 = "DX(.m.A.M1)" f3 = "" f4 = ""

@@ -241,7 +241,7 @@ MEASURE = (
         ("HINGE", "ax_ay_az_projection_angles", "from_first = yes", "RTOD * AZ({1}, {0})"),
         ("HINGE", "ax_ay_az_projection_angles", "from_first = no", "RTOD * AZ({0}, {1})"),
         ("HINGE", "angular_velocity", "from_first = no coordinate_rframe = .swing.ROD.cm", "RTOD * WZ({0}, {1}, {2})"),
-        ("HINGE", "translational_velocity", "motion_rframe = .swing.ground.PIVOT", "VZ({1}, {0})"),
+        ("HINGE", "translational_velocity", "from_first = yes motion_rframe = .swing.ground.PIVOT", "VZ({1}, {0})"),
         ("HINGE", "element_torque", "from_first = yes", "JOINT({3}, 0, 8, 0)"),
         ("HINGE", "element_torque", "from_first = no", "JOINT({3}, 1, 8, 0)"),
         ("ROD", "cm_velocity", "from_first = yes", "VZ({2})"),
@@ -256,9 +256,17 @@ def test_measures_of_objects_are_those_of_exported_decks(of, characteristic, how
     assert by_name(view, st.Variable, "SEEN").function == expected.format(*ids)
 
 
-def test_velocities_seen_from_a_frame_that_moves_are_remarked():
-    deck = parse_view(PENDULUM + MEASURE.format("HINGE", "angular_velocity", "motion_rframe = .swing.ROD.cm")).deck
-    assert any("SEEN" in str(d) and "left out" in str(d) for d in deck.diagnostics)
+@pytest.mark.parametrize(
+    ("how", "why"),
+    [("from_first = yes motion_rframe = .swing.ROD.cm", "not computed"), ("", "from_first is missing")],
+    ids=["seen from a frame that moves", "without a sign"],
+)
+def test_measures_whose_meaning_no_public_model_shows_are_left_out(how, why):
+    text = PENDULUM + MEASURE.format("HINGE", "angular_velocity", how)
+    deck = parse_view(text).deck
+    assert any("SEEN" in str(d) and why in str(d) and "left out" in str(d) for d in deck.diagnostics)
+    assert not deck.unsupported
+    assert parse_view(text + TORQUE.format("-.swing.SEEN")).deck.unsupported
 
 
 def test_inactive_objects_are_not_there():
