@@ -25,6 +25,7 @@ import gearmbs
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.session import check_script
+from gearmbs.kernels.cache import folders
 
 from . import (
     test_accelerations,
@@ -79,6 +80,7 @@ def _audit(event: str, arguments: tuple) -> None:
     if not _watching or event not in TOUCHING or isinstance(arguments[0], int):
         return
     own = [sys.prefix, sys.base_prefix, Path(gearmbs.__file__).parent, "/proc", "/dev/null"]
+    own += folders("gearmbs")
     own += [os.environ["NUMBA_CACHE_DIR"]] if "NUMBA_CACHE_DIR" in os.environ else []
     if event == "open" and "w" not in str(arguments[1]):
         own.append(Path.cwd())
