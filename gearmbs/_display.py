@@ -30,7 +30,7 @@ PLOTS = {
     "MeasuredTransmissionError": "gearmbs.view:measured_error_plot",
     "PaperStudy": "gearmbs.studies.show:study_plot",
 }
-"""What draws an object, by the name of its class."""
+"""Functions that draw objects, by the name of their class."""
 
 REPORTS = ("AnalysisReport", "VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport")
 TABLES = {
@@ -43,7 +43,7 @@ TABLES = {
         "gearmbs.view.pages:report_body",
     ),
 }
-"""What makes a table of an object for notebooks, where its class does not do so itself."""
+"""Functions that make tables of objects for notebooks, for classes that do not do so themselves."""
 
 
 class Written:

@@ -279,7 +279,7 @@ TURN = 2.0 * math.pi
 RPM = 30.0 / math.pi
 """Revolutions per minute in a rad/s."""
 PLACES = {"speed": "angular speed", "angle": "angle", "time": "time"}
-"""What a table of torques may be over."""
+"""Abscissas that a table of torques may have, with their dimensions."""
 
 FAR = 0.4
 """Part of the range of a table's torques by which a curve may leave it: that through three points of a cosine, one at

@@ -180,4 +180,4 @@ WRITERS: dict[str, Callable[[Seen], Written]] = {
     "kloss": _kloss, "circuit": _circuit, "controller": _controller, "pump": _pump, "resistance": _resistance,
     "table": _table, "clutch": _clutch,
 }  # fmt: skip
-"""What writes each law."""
+"""Writers of the texts of laws, by law."""

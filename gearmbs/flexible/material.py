@@ -81,7 +81,7 @@ STEEL = ElasticMaterial()
 
 
 Damping = float | str | Sequence[float] | Sequence[tuple[float, float]]
-"""What `damping_ratios` takes."""
+"""Types that `damping_ratios` takes."""
 
 ADAMS = ((100.0, 0.01), (1000.0, 0.1), (np.inf, 1.0))
 """Bands that ADAMS assumes where nothing is given: 1 % below 100 Hz, 10 % below 1000 Hz, critical above."""

@@ -26,7 +26,7 @@ from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.progress import waiting
 
 SAME = 1e-12
-"""How far two places that move alike may differ, in m and in what a unit of a mode moves and turns them."""
+"""Largest difference of two places that move alike, in m and in what a unit of a mode moves and turns them."""
 VERSION = b"\x00\x00\x01\x3c"
 HEADER = 0xA14
 """Bytes before the number of nodes."""

@@ -21,7 +21,7 @@ from gearmbs.mechanism.parts.modal import COUPLING, ShapedMarker
 
 
 REACH = 1e-4
-"""How far a marker may be from a node, as a share of the body's size."""
+"""Largest distance of a marker from a node, as a share of the body's size."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ ORDERS: tuple[Literal["little", "big"], ...] = ("little", "big")
 FIRST_RECORDS = {"OP4": (24, 48), "op2": (4, 8)}
 """Sizes in bytes that the first record of a binary file may have, by words of 4 and 8 bytes."""
 PRINTED = bytes(range(32, 127)) + b"\t\r\n"
-"""What a text file consists of."""
+"""Bytes that a text file consists of."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -181,7 +181,7 @@ ANALYSES = {
 """Approach code, tenths of the first word of an identification (DMAP guide)."""
 OTHER_EIGENVALUES = (("CLAMA", "complex modes"), ("BLAMA", "buckling"))
 ORTHOGONAL = 1e-3
-"""How far modes may be from orthogonal in the mass matrix, whose numbers have 4 bytes."""
+"""Largest deviation of modes from orthogonality in the mass matrix, whose numbers have 4 bytes."""
 LUMPED = 2.0
 """Factor between the first generalised mass and that of lumped masses, where elements have consistent ones."""
 SAME_MASS = 1e-3

@@ -125,7 +125,7 @@ class StressModes:
 AROUND = 16
 """Places round about a shaft where its stress is known."""
 SAME = 1e-6
-"""How far a shape may be from a combination of others, as a share of it."""
+"""Largest deviation of a shape from a combination of others, as a share of it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ MOST_ROWS = 200
 
 MOTIONS = ("rotation", "translation")
 STILL = 1e-8
-"""Motion of a body, as a part of the largest, that is none."""
+"""Motion of a body, as a part of the largest, that counts as rest."""
 
 MOVED = 1e-7
 """Way (m) or turn (rad) by which a body has moved: locked ones stray within the tolerance of constraints, 1e-10."""

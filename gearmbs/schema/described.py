@@ -143,13 +143,13 @@ class Described(Written):
     """
 
     error: ClassVar[type[ValueError]] = ValueError
-    """What is raised of wrong values."""
+    """Class of the error that wrong values raise."""
     section: ClassVar[str] = ""
     """What messages call it; default its class."""
 
     @property
     def place(self) -> str:
-        """What messages put in front of a field's name."""
+        """Prefix of a field's name in messages."""
         return f"{self.section or type(self).__name__}."
 
     def __post_init__(self) -> None:

@@ -40,7 +40,7 @@ STANDING = 1e-7
 """Magnitude of a pole, of the fastest one, up to which it is an integrator: the error of a double pole is the root of
 rounding, 1.5e-8 of the fastest."""
 SHOWN = 1e-9
-"""What an output shows of an integrator, of the sizes of its row and column: rounding is 1e-13 of them."""
+"""Least entry by which an output sees an integrator, relative to its row and column: rounding is 1e-13 of them."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ ENDS = (
     "The solution seems to end there, as at a fold, where two branches meet; end the run before, or see whether the "
     "equation is the one that is meant."
 )
-"""What to make of equations without a solution on the branch that was followed."""
+"""Advice on equations without a solution on the branch that was followed."""
 
 ADVICE = {
     Status.NOT_FINITE: (

@@ -58,7 +58,7 @@ MOST_DOUBTFUL = 2000
 CHUNK = 200
 """Doubtful rows that are looked at together."""
 SELECTIONS = 3
-"""How often other rows are removed when those removed at first turn out to be violated."""
+"""Most choices of redundant rows that are tried where those removed first turn out to be violated."""
 
 LONGEST_STEP = 0.5
 """rad, far from the quarter turn at which the nearest solution is another one."""

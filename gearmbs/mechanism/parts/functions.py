@@ -13,7 +13,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.quantities import any_quantity, expression_text, quantity
 
 RATES = ("angular speed", "speed", "rad/s^2", "acceleration", "dimensionless")
-"""What the rate of a ramp may be."""
+"""Dimensions that the rate of a ramp may have."""
 
 ROUNDING = 0.02
 """Share of a line that its corners take: no acceleration of an angle jumps, and a speed leaves the line by 0.6 %."""

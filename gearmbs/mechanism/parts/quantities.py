@@ -61,7 +61,7 @@ def has_quantity(value: Any) -> bool:
 VALUES = (
     "angle", "length", "angular speed", "speed", "rad/s^2", "acceleration", "torque", "force", "dimensionless",
 )  # fmt: skip
-"""What a function of time may give; tried in turn where nothing tells."""
+"""Dimensions of the values of functions of time, tried in turn where nothing else says which."""
 
 
 def quantity(value: Any, unit: str, field: str, factor: float = 1.0) -> float:

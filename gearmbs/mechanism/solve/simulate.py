@@ -138,7 +138,7 @@ ADVICE = {
     ),
     Status.SOLVER_FAILURE: ("Loosen tol, let motions and torques start more smoothly, or take the WSTIFF integrator."),
 }
-"""What the modeller of a mechanism can try against a failing integration."""
+"""Advice for the modeller of a mechanism whose integration fails."""
 
 
 def simulate(
