@@ -146,7 +146,8 @@ def _even_forces(
     if even:
         return _EvenForces(known.t, values, names)
     signal = even_signal(known.t, values, case.output_rate, start=start - ahead, stop=stop + ahead)
-    return _EvenForces(signal["time"].values, signal.values, names)
+    # those of an index are not to be written to, as kernels want them
+    return _EvenForces(signal["time"].values.copy(), signal.values, names)
 
 
 def _series(
