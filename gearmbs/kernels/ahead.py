@@ -16,8 +16,6 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from threading import Condition, Thread
 from typing import TYPE_CHECKING, Any
@@ -84,6 +82,9 @@ def compile_all(
 
 def _compile_in_turn(wanted: list[Any], report: Report) -> None:
     """Compile entries one after the other, for numba's cache, in processes that end before they grow large."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
     from gearmbs.kernels.calls import address
 
     start = time.perf_counter()
