@@ -246,6 +246,15 @@ def test_a_state_holds_what_controllers_remember(tmp_path):
         sim.state()
 
 
+def test_a_controller_does_not_go_on_itself():
+    sim = gm.Simulator(two_discs(), 1.0)
+    sim.control("load", lambda t, s: 1.0 if t < 0.25 else s.advance(t + 0.1), 0.1)
+    sim.advance(0.25)
+    with pytest.raises(ModelError, match=says("advance", "controller", "return")):
+        sim.advance(0.4)
+    assert sim.t == pytest.approx(0.3)
+
+
 def driven(level):
     """A disc that a motion drives, and another on a shaft."""
     m = two_discs()

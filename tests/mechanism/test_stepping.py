@@ -395,6 +395,25 @@ def test_wrong_calls_say_what_to_do():
         sim.get("com_positon", "top")
     with pytest.raises(KeyError, match=says("'wheel'", "top")):
         sim.get("com_position", "wheel")
+    for asked, told in (
+        (("kinetic_energy", "top"), ("'kinetic_energy'", "no name", "'top'")),
+        (("com_position",), ("'com_position'", "body", "none")),
+        (("com_position", "top", "z"), ("'com_position'", "body", "'top', 'z'")),
+        (("output",), ("'output'", "name", "none")),
+    ):
+        with pytest.raises(ModelError, match=says(*told)):
+            sim.get(*asked)
+    with pytest.raises(ModelError, match=says("expression", "3", "text")):
+        sim.get("evaluate", 3)
+    assert sim.get("kinetic_energy") > 0.0
+    for name in ("t", "t_end"):
+        with pytest.raises(ModelError, match=says(name, "0.1", "another one")):
+            setattr(sim, name, 0.1)
+    for other in (None, "state.npz"):
+        with pytest.raises(ModelError, match=says("restore", repr(other), "State.load")):
+            sim.restore(other)
+    with pytest.raises(ModelError, match=says("'top'", "Mechanism")):
+        gm.Simulator("top", 1.0)
     with pytest.raises(ModelError, match="records=True"):
         sim.solution()
     with pytest.raises(ModelError, match=says("IDA", "WSTIFF")):

@@ -362,6 +362,8 @@ def parse(text: str) -> Node:
     ExpressionError
         With the column and what was expected there.
     """
+    if not isinstance(text, str):
+        raise ExpressionError(f"the expression is {text!r}; give it as text")
     if not text.strip():
         raise ExpressionError("the expression is empty; give at least a number")
     return _Parser(text).whole()

@@ -331,12 +331,17 @@ def with_brief_changes(system: System, start: float, end: float, options: Mappin
     return {"breakpoints": [*options.get("breakpoints", ()), *found]} if found else {}
 
 
+def check_state(label: str, state: Any) -> None:
+    """Raise a ModelError if something is no State."""
+    if not hasattr(state, "yp"):
+        raise ModelError(f"{label}: {state!r} is no State; read a file with gearmbs.State.load")
+
+
 def start_time(t_start: float, initial: State | None) -> float:
     """Return the time at which a run starts, that of its initial state if it has one."""
     if initial is None:
         return t_start
-    if not hasattr(initial, "yp"):
-        raise ModelError(f"initial: {initial!r} is no State; read a file with gearmbs.State.load")
+    check_state("initial", initial)
     if t_start not in (0.0, initial.t):
         raise ModelError(f"initial: it is a state at t = {initial.t:g} s, t_start is {t_start:g} s; leave t_start away")
     return initial.t

@@ -31,6 +31,7 @@ from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.mechanism.solve.simulate import (
     ADVICE,
     StopAt,
+    check_state,
     checked,
     just_inside,
     prepared,
@@ -105,6 +106,8 @@ class Simulator(Told):
     -0.0471
     """
 
+    settled = ("t", "t_end", "numbers")
+
     def __init__(
         self,
         mechanism: Mechanism,
@@ -122,6 +125,8 @@ class Simulator(Told):
         advice: Mapping[Status, str] | None = None,
         **options: Any,
     ) -> None:
+        if not isinstance(mechanism, Mechanism):
+            raise ModelError(f"mechanism is {mechanism!r}; give a Mechanism")
         t_start = start_time(quantity(t_start, "time", "t_start"), initial)
         self.t_end = quantity(t_end, "time", "t_end")
         if not (np.isfinite(self.t_end) and self.t_end > t_start):
@@ -147,6 +152,7 @@ class Simulator(Told):
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []
+        self._sampling = False
         if stops:
             first = int(self._base.idata[T.H_Z])
             self._watched = partial(with_stops, names=mechanism.state_names, first=first, stops=stops)
@@ -388,9 +394,15 @@ class Simulator(Told):
 
     def _sample(self, t: float) -> float:
         """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""
+        if self._sampling:
+            raise ModelError("advance: a controller cannot go on itself; let it return the value for its input")
         for control in self._controls:
             if control.next <= self.t:
-                self.set(control.name, control.function(self.t, self))
+                self._sampling = True
+                try:
+                    self.set(control.name, control.function(self.t, self))
+                finally:
+                    self._sampling = False
                 control.count += 1
         return min([t, *(control.next for control in self._controls)])
 
@@ -469,6 +481,7 @@ class Simulator(Told):
         ModelError
             If the state is one of another model, or lies outside the span of this simulator.
         """
+        check_state("restore", state)
         if not self._t_start <= state.t < self.t_end:
             remedy = "pass it as initial=" if state.t < self._t_start else "make it with a later t_end"
             raise ModelError(

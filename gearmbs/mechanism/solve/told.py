@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from inspect import Signature, signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,15 +91,23 @@ class Told(OwnAttributes):
         Raises
         ------
         ModelError
-            For a quantity that is not there.
+            For a quantity that is not there, and for more names than it takes, or fewer.
         KeyError
             For a name that is not there; the message lists those that are.
         """
+        try:
+            return self._got(what, *names)
+        except TypeError:
+            measured = what == "transmission_error"
+            _check_names(what, getattr(self._mechanism.measures(self._now()) if measured else self._now(), what), names)
+            raise
+
+    def _got(self, what: str, *names: Any) -> Any:
         if what == "input":
             return self._settings.value(self.t, *names)
         if what == "output":
             made = self._mechanism.measures(self._now()).named_output(*names)
-            return made.of(self.get(*made.asked))
+            return made.of(self._got(*made.asked))
         if what not in AT_AN_INSTANT + COUNTED:
             known = [*AT_AN_INSTANT, *COUNTED, "input", "output"]
             hint = did_you_mean(what, known)
@@ -110,6 +119,8 @@ class Told(OwnAttributes):
         if what == "transmission_error":
             return _last(self._mechanism.measures(self._now()).transmission_error(*names))
         found = getattr(self._now(), what)
+        if names and not callable(found):
+            _check_names(what, found, names)
         return _last(found(*names) if callable(found) else found)
 
     def _now(self) -> Solution:
@@ -170,6 +181,16 @@ class Told(OwnAttributes):
         solution.initial = self._origin
         solution.inside = self._row.inside
         return solution
+
+
+def _check_names(what: str, found: Any, names: tuple[Any, ...]) -> None:
+    """Raise a ModelError if what a quantity was found to be takes more or fewer names."""
+    takes = signature(found) if callable(found) else Signature()
+    try:
+        takes.bind(*names)
+    except TypeError:
+        known, given = ", ".join(takes.parameters), ", ".join(map(repr, names))
+        raise ModelError(f"get: {what!r} takes {known or 'no name'}; got {given or 'none'}") from None
 
 
 def _last(value: Any) -> Any:
