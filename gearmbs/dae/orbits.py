@@ -27,10 +27,11 @@ import numpy as np
 import scipy.linalg
 
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.methods import INTEGRATORS
+from gearmbs.dae.methods import INTEGRATORS, those_that
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult
 from gearmbs.dae.tangents import Direction, follow
+from gearmbs.wording import any_of
 
 INDEPENDENT = 1e-8
 """Singular value, of the largest, from which directions count: rounding leaves 1e-12 of the coefficients of a scaled
@@ -236,6 +237,8 @@ FOLLOWED = 8
 """Periods that a motion is followed on where Newton's method does not lead nearer."""
 FARTHEST = 5.0
 """Newton steps beyond so many sizes of the motion lead to where the equations are others."""
+STAYS = 1e-3
+"""How far above 1 a multiplier may be of what stays as it is: a wheel that touches nothing, or moves evenly."""
 LEAST_STEPS = 64
 """Steps of a period at least: a motion that hardly moves needs few, disturbances of it need as many as of any."""
 REACHED = 0.1
@@ -322,9 +325,9 @@ def attracting_orbit(
         if not (first.real < -1.0 and first.imag == 0.0) or doubling == DOUBLINGS:
             break
         search.double()
+    does = f"grow by a factor of {abs(first):.4g} in each period" if abs(first) > 1.0 + STAYS else "do not die out"
     raise search.none(
-        f"the orbit of period {search.period:.6g} s is unstable: disturbances grow by a factor of {abs(first):.4g} in "
-        "each period, and the motion is another one"
+        f"the orbit of period {search.period:.6g} s is not stable: disturbances {does}, and the motion is another one"
     )
 
 
@@ -341,6 +344,11 @@ class _Search:
         most: int,
         closed: float,
     ) -> None:
+        if not INTEGRATORS[method].can("dense_output"):
+            able = any_of(those_that("dense_output"))
+            raise ModelError(
+                f"integrator: {method!r} does not keep its steps, which orbits are closed by; choose {able}"
+            )
         self.problem, self.period, self.tol, self.most, self.closed = problem, period, tol, most, closed
         self.advance = np.asarray(advance, dtype=float)
         self.options = Options.gather(

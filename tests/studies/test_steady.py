@@ -94,6 +94,19 @@ def test_a_case_along_a_curve_has_no_steady_motion(operation):
         gm.steady(Case(operation=operation | {"duration": "1 s"}))
 
 
+def test_an_integrator_that_does_not_keep_its_steps_is_named_and_others_are_not():
+    case = Case(operation={"speed": "1000 rpm"}, solver={"integrator": "IDA"})
+    with pytest.raises(CaseError, match=says("steady", "IDA", "WSTIFF")):
+        gm.steady(case)
+    other = case.changed(solver={"integrator": "GSTIFF", "formulation": "I3"})
+    assert gm.steady(other, variables=["gmf_rms"]).stable
+
+
+def test_a_wheel_without_load_has_no_motion_that_it_goes_to():
+    with pytest.raises(NoOrbit, match=says("orbit", "disturbances", "die")):
+        gm.steady(Case(operation={"speed": "1000 rpm", "torque": "0.001 N m"}), variables=["gmf_rms"])
+
+
 def test_what_cannot_be_meant_is_named():
     with pytest.raises(CaseError, match=says("steady", "period", "case", "wheels")):
         gm.steady(Case(), 0.01)

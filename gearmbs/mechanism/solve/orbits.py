@@ -300,7 +300,7 @@ def steady_motion(
     ModelError
         If the equations do not repeat themselves after the period, or a run fails.
     """
-    period = quantity(period, "time", "period")
+    period, integrator = quantity(period, "time", "period"), integrator.upper()
     if not (np.isfinite(period) and period > 0.0):
         raise ModelError(f"period = {period} s; it must be positive")
     start = start_time(quantity(t_start, "time", "t_start"), initial)
