@@ -8,8 +8,8 @@
     report = gm.analyse(gm.read_signal("gearbox.csv", rate=12800.0), teeth=29)
 
 Studies
-    `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `steady`, `sweep`,
-    `record_signal`, `run_train`, `run_bench`, `run_gearbox`, `run_resonance`, `gear_rig`
+    `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `steady`, `steady_branch`,
+    `sweep`, `record_signal`, `run_train`, `run_bench`, `run_gearbox`, `run_resonance`, `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`, `IdealMesh`, `planetary`,
     `planetary_mechanism`, `diagnose_planetary`

@@ -83,6 +83,7 @@ from .studies import run_paper as run_paper
 from .studies import run_resonance as run_resonance
 from .studies import run_train as run_train
 from .studies import steady as steady
+from .studies import steady_branch as steady_branch
 from .studies import sweep as sweep
 from .units import to_si as to_si
 from .view import average_plot as average_plot

@@ -287,7 +287,7 @@ def find_orbit(
     ModelError
         If a run fails, or the coordinates at the end of a period are others than at its start.
     """
-    search = _Search(problem, float(period), advance, tol, method, most, closed)
+    search = Search(problem, float(period), advance, tol, method, most, closed)
     search.follow(settle)
     return search.found()
 
@@ -314,7 +314,7 @@ def attracting_orbit(
     NoOrbit
         If there is none within ``most`` periods: orbits that are found are unstable, or the motion does not go there.
     """
-    search = _Search(problem, float(period), advance, tol, method, most, closed)
+    search = Search(problem, float(period), advance, tol, method, most, closed)
     search.follow(settle)
     for doubling in range(DOUBLINGS + 1):
         orbit = search.found()
@@ -331,7 +331,7 @@ def attracting_orbit(
     )
 
 
-class _Search:
+class Search:
     """Where the search for an orbit stands."""
 
     def __init__(
@@ -346,9 +346,7 @@ class _Search:
     ) -> None:
         if not INTEGRATORS[method].can("dense_output"):
             able = any_of(those_that("dense_output"))
-            raise ModelError(
-                f"integrator: {method!r} does not keep its steps, which orbits are closed by; choose {able}"
-            )
+            raise ModelError(f"integrator: {method!r} has no stored steps, by which orbits are closed; choose {able}")
         self.problem, self.period, self.tol, self.most, self.closed = problem, period, tol, most, closed
         self.advance = np.asarray(advance, dtype=float)
         self.options = Options.gather(

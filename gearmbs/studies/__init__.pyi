@@ -31,6 +31,8 @@ from .presets.resonance import resonance_rig as resonance_rig
 from .presets.resonance import run_resonance as run_resonance
 from .presets.resonance import separation_load as separation_load
 from .presets.resonance import sweep_resonance as sweep_resonance
+from .run.branch import SteadyBranch as SteadyBranch
+from .run.branch import steady_branch as steady_branch
 from .run.parallel import run_cases as run_cases
 from .run.rig import bearing_rig as bearing_rig
 from .run.rig import flexible_rig as flexible_rig

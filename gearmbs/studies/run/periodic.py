@@ -92,13 +92,15 @@ class PeriodicRecorder:
     known_period : bool
         Whether the wheels alone decide the period, as they do not where bearings have defects: else the record has its
         longest length.
+    begin : float, optional
+        Time from which its mesh periods are counted, s; default the end of the run-up.
     """
 
-    def __init__(self, case: Case, known_period: bool = True) -> None:
+    def __init__(self, case: Case, known_period: bool = True, begin: float | None = None) -> None:
         self.case = case
         operation = case.operation
         self.period = geometric_period(case) if known_period else 0
-        self._gmf, self._begin = case.mesh_frequency, operation.run_up
+        self._gmf, self._begin = case.mesh_frequency, operation.run_up if begin is None else begin
         self._longest = int((operation.settling + operation.longest) * self._gmf)
         self.recorder = Recorder(case, self._begin - (MARGIN + 1) / case.output_rate)
         pair = case.pair()

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.dae.continuation import AtValue
 from gearmbs.dae.methods import INTEGRATORS, those_that
 from gearmbs.dae.orbits import NoOrbit, attracting_orbit
 from gearmbs.dae.problem import DAEProblem, ModelError
@@ -122,33 +123,36 @@ def steady_case(case: Case, *, variables: Collection[str] | None = None, most: i
     NoOrbit
         See `steady`.
     """
+    check_variables(variables)
+    case, posed, at, tol = posed_case(case)
+    meshes = geometric_period(case)
+    settle = 2 if meshes == 1 else 0
+    orbit = attracting_orbit(
+        at.problem, at.period, at.advance, tol=tol, settle=settle, most=max(3, math.ceil(most / meshes)) + settle,
+        closed=CLOSED, method=case.solver.integrator,
+    )  # fmt: skip
+    solution = posed.solution(orbit)
+    found = round(orbit.period * case.mesh_frequency)
+    dataset = _recorded(case, solution, found, at.advance * (found // meshes), orbit.error, variables)
+    dataset.attrs["orbit_multiplier"] = abs(orbit.largest)
+    return SteadyCase(solution, orbit, posed.state(orbit), dataset)
+
+
+def posed_case(case: Case) -> tuple[Case, Posed, AtValue, float]:
+    """Return a case at "auto", its equations as assembled and at speed, and the tolerance of its orbit."""
     operation = case.operation
     if operation.speed_curve is not None or not np.isscalar(operation.torque):
         raise CaseError("steady: speed and torque have to be constant; run_case follows curves")
     if not INTEGRATORS[case.solver.integrator].can("dense_output"):
         able = any_of(those_that("dense_output"))
-        raise CaseError(f"steady: solver.integrator = {case.solver.integrator!r} does not keep its steps; take {able}")
+        raise CaseError(f"steady: solver.integrator = {case.solver.integrator!r} has no stored steps; take {able}")
     case = case.changed(operation={"duration": "auto"})
     check_record(case)
-    check_variables(variables)
     load_kernels(case.solver.integrator, True)
-    meshes = geometric_period(case)
-    period = meshes / case.mesh_frequency
     tol = case.tolerance if case.solver.tolerance else TIGHTER * case.tolerance
     rate_scale = operation.top_speed * case.gears.teeth[0]
-    mechanism = case_mechanism(case)
-    posed = Posed.of(mechanism, 0.0, None, True, "SI2", rate_scale, tol)
-    problem, advance = _at_speed(case, posed.problem, meshes)
-    settle = 2 if meshes == 1 else 0
-    orbit = attracting_orbit(
-        problem, period, advance, tol=tol, settle=settle, most=max(3, math.ceil(most / meshes)) + settle,
-        closed=CLOSED, method=case.solver.integrator,
-    )  # fmt: skip
-    solution = posed.solution(orbit)
-    found = round(orbit.period * case.mesh_frequency)
-    dataset = _recorded(case, solution, found, advance * (found // meshes), orbit.error, variables)
-    dataset.attrs["orbit_multiplier"] = abs(orbit.largest)
-    return SteadyCase(solution, orbit, posed.state(orbit), dataset)
+    posed = Posed.of(case_mechanism(case), 0.0, None, True, "SI2", rate_scale, tol)
+    return case, posed, at_speed(case, posed.problem, geometric_period(case)), tol
 
 
 def steady_train(train: Drivetrain, period: Any = None, **settings: Any) -> SteadyMotion:
@@ -196,11 +200,18 @@ def mesh_period(train: Drivetrain) -> float:
     return math.lcm(*(share.denominator for share in shares)) / turning[0]
 
 
-def _at_speed(case: Case, problem: DAEProblem, meshes: int) -> tuple[DAEProblem, np.ndarray]:
-    """Return the equations with the driven wheel at speed, its teeth in equilibrium with the load, and its advance."""
-    pair, start = case.pair(), case.operation.run_up
+def at_speed(case: Case, problem: DAEProblem, meshes: int) -> AtValue:
+    """Return the equations with the driven wheel at speed and its teeth in equilibrium with the load.
+
+    Angle and speed are counted from those of a driven wheel that follows without play and deflection.
+    """
+    pair, run_up = case.pair(), case.operation.run_up
     z2 = case.gears.teeth[1]
     speed = -pair.rotation * math.tau * case.mesh_frequency / z2
+    # during the run-up, which rises evenly, the driver turns half as far as at speed; the orbit starts with the first
+    # tooth at the same place, whatever the speed
+    meshed = 0.5 * run_up * case.mesh_frequency
+    start = run_up + (math.ceil(meshed / meshes) * meshes - meshed) / case.mesh_frequency
     omega, phi = (
         problem.names.index(next(n for n in problem.names if n.startswith(head))) for head in ("omega", "phi")
     )
@@ -212,13 +223,14 @@ def _at_speed(case: Case, problem: DAEProblem, meshes: int) -> tuple[DAEProblem,
         problem.residual(start, y, rates, out, problem.idata, problem.rdata, work)
         return float(out[omega])
 
-    # during the run-up, which rises evenly, the driver turns half as far as at speed
-    middle = 0.5 * speed * start
+    middle = speed * (start - 0.5 * run_up)
     y[phi] = middle + _balanced(lambda angle: moment(middle + angle), FURTHEST * math.tau / z2)
     rates[phi] = speed
-    advance = np.zeros(problem.n)
+    advance, origin = np.zeros(problem.n), np.zeros(problem.n)
     advance[phi] = math.copysign(math.tau * meshes / z2, speed)
-    return replace(problem, t0=start, y0=y, yp0=rates), advance
+    origin[omega], origin[phi] = speed, middle
+    posed = replace(problem, t0=start, y0=y, yp0=rates)
+    return AtValue(posed, meshes / case.mesh_frequency, advance, origin)
 
 
 def _balanced(moment: Any, most: float) -> float:
@@ -242,7 +254,7 @@ def _recorded(
     case: Case, solution: Solution, meshes: int, advance: np.ndarray, error: float, variables: Collection[str] | None
 ) -> xr.Dataset:
     """Return the record of a period: what lies ahead of it and behind it are repetitions."""
-    recorder = PeriodicRecorder(case)
+    recorder = PeriodicRecorder(case, begin=float(solution.t[0]))
     t, y = solution.t, solution.result.y
     length = meshes / case.mesh_frequency
     # teeth stand as before after whole periods alone

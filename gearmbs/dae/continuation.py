@@ -1,0 +1,247 @@
+"""Branches of periodic orbits: from one to the next along a parameter, through turning points.
+
+With x the independent unknowns and p the parameter, orbits are the curve P(x, p) = x. It is followed by its arc length:
+z = (x, p) in units of its own sizes, a step ds along the tangent t of the curve, and back onto it by Newton's method
+in the hyperplane across t (Keller's pseudo-arclength),
+
+    [ M - 1   dP/dp ] [ dx ]     [ P - x                ]
+    [   t_x     t_p ] [ dp ] = - [ t . (z - z_0) - ds   ].
+
+So p may turn back, where one orbit of three that exist at a time, the unstable one, passes into another. M is the
+monodromy matrix (`gearmbs.dae.orbits`); dP/dp is a difference of two runs, in which x stays.
+
+References
+----------
+.. [1] H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems", in: P. Rabinowitz (ed.),
+       Applications of Bifurcation Theory, Academic Press 1977, 359-384.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from gearmbs.dae.orbits import CLOSED, Orbit, Search
+from gearmbs.dae.problem import DAEProblem
+
+BY = 1e-5
+"""Part of the parameter by which it is moved for dP/dp: of an orbit that doubles within a hundredth of it, differences
+are off by 1e-6, and by what the tolerance leaves over 1e-5."""
+CORRECTIONS = 6
+"""Newton steps that a point may take; a shorter step along the curve takes fewer."""
+EASY = 3
+"""Newton steps up to which the next step along the curve is longer."""
+LONGER, SHORTER = 1.5, 0.5
+"""Factors of the next step along the curve behind an easy one, and behind one that did not come back to it."""
+GROWN = 2.0
+"""Growth of a defect from one Newton step to the next from which a shorter step along the curve is taken."""
+ASTRAY = 2.0
+"""Distance from the last point, in steps, beyond which Newton's method has gone to another part of the curve."""
+ON_CURVE = 1e-5
+"""Correction, as part of the first orbit's size and of the span, below which a point is on the curve."""
+SECANTS = 3
+"""Secants by which a turning point is found: the parameter is as good as the square of what is left along the curve."""
+SEARCHED = 200
+"""Periods in which the first orbit is looked for."""
+SMALLEST = 1e-4
+"""Step along the curve, of the span of the parameter, below which it is not followed."""
+
+
+@dataclass(frozen=True)
+class AtValue:
+    """The equations at a value of the parameter.
+
+    Attributes
+    ----------
+    problem : DAEProblem
+        Where an orbit is looked for from.
+    period : float
+        s.
+    advance, origin : ndarray, shape (n,)
+        What unknowns advance by in a period, and what they are counted from.
+    """
+
+    problem: DAEProblem
+    period: float
+    advance: np.ndarray
+    origin: np.ndarray
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Orbits along a curve.
+
+    Attributes
+    ----------
+    values : ndarray, shape (m,)
+        Of the parameter.
+    orbits : list of Orbit
+    turns : ndarray, shape (k,)
+        Values at which the parameter turns back: orbits there are among the others.
+    """
+
+    values: np.ndarray
+    orbits: list[Orbit]
+    turns: np.ndarray
+
+    @property
+    def stable(self) -> np.ndarray:
+        """Whether each orbit is stable, shape (m,)."""
+        return np.array([orbit.stable for orbit in self.orbits])
+
+
+def follow_branch(
+    posed: Callable[[float], AtValue],
+    start: float,
+    stop: float,
+    *,
+    tol: float,
+    step: float = 0.02,
+    largest: float = 0.05,
+    most: int = 400,
+    method: str = "WSTIFF",
+    first: Orbit | None = None,
+) -> Branch:
+    """Follow the orbits of a problem from one value of a parameter until another is passed, or the first again.
+
+    Parameters
+    ----------
+    posed : callable
+        Makes an `AtValue` of a value.
+    start, stop : float
+        Values; the curve is left where it leaves their span.
+    tol : float
+        Of the runs.
+    step, largest : float
+        First and largest step along the curve, as part of the span and of the orbit's size.
+    most : int
+        Points.
+    method : str
+        Integrator.
+    first : Orbit, optional
+        The orbit at ``start``; default the one that its motion leads to.
+
+    Raises
+    ------
+    NoOrbit
+        If there is none at the start.
+    """
+    curve = _Curve(posed, start, stop, tol, method)
+    z = curve.begin(first)
+    tangent = curve.tangent(z, curve.orbits[-1], np.append(np.zeros(len(z) - 1), np.sign(stop - start)))
+    low, high = sorted((start, stop))
+    ds, turns = step, []
+    while len(curve.values) < most:
+        found = curve.corrected(z, tangent, ds)
+        if found is None:
+            ds *= SHORTER
+            if ds < SMALLEST:
+                break
+            continue
+        new, orbit, steps = found
+        following = curve.tangent(new, orbit, tangent)
+        if tangent[-1] * following[-1] < 0.0:
+            turns.append(curve.turn(z, tangent, ds, following[-1]))
+        curve.take(float(new[-1] * curve.span), orbit)
+        z, tangent = new, following
+        if not low <= curve.values[-1] <= high:
+            break
+        if steps <= EASY:
+            ds = min(LONGER * ds, largest)
+    return Branch(np.array(curve.values), curve.orbits, np.array(turns))
+
+
+class _Curve:
+    """Where the curve is followed: its points so far, and the units of z."""
+
+    def __init__(self, posed: Callable[[float], AtValue], start: float, stop: float, tol: float, method: str) -> None:
+        self.posed = lru_cache(8)(posed)
+        self.start, self.span, self.tol, self.method = start, abs(stop - start), tol, method
+        self.values: list[float] = []
+        self.orbits: list[Orbit] = []
+
+    def search(self, p: float) -> tuple[Search, AtValue]:
+        """Return a search for orbits at a value."""
+        at = self.posed(p)
+        return Search(at.problem, at.period, at.advance, self.tol, self.method, SEARCHED, CLOSED), at
+
+    def begin(self, first: Orbit | None) -> np.ndarray:
+        """Take the first orbit; return z of it."""
+        search, at = self.search(self.start)
+        if first is None:
+            search.follow(2)
+            first = search.found()
+        self.places, self.basis = first.directions.places, first.directions.basis
+        # x in units of the orbit's own size
+        weights = np.abs(search.weights).max(axis=0)
+        self.unit = first.size / np.where(weights > 0.0, weights, 1.0)
+        self.take(self.start, first)
+        x = (first.problem.y0 - at.origin)[self.places] / self.unit
+        return np.append(x, self.start / self.span)
+
+    def take(self, value: float, orbit: Orbit) -> None:
+        """Add a point."""
+        self.values.append(value)
+        self.orbits.append(orbit)
+
+    def tried(self, z: np.ndarray, matrix: np.ndarray | None) -> tuple[Orbit, np.ndarray]:
+        """Return the motion over a period from z, and by what it misses itself, in units of x."""
+        search, at = self.search(float(z[-1] * self.span))
+        last = self.orbits[-1].problem
+        # all other unknowns move with the origin, and with x
+        y = last.y0 + at.origin - self.posed(self.values[-1]).origin
+        y = y + self.basis @ (at.origin[self.places] + z[:-1] * self.unit - y[self.places])
+        orbit = search.tried(replace(at.problem, y0=y, yp0=last.yp0), matrix)
+        return orbit, search.missing(orbit) / self.unit
+
+    def jacobian(self, z: np.ndarray, orbit: Orbit) -> np.ndarray:
+        """Return d(P - x)/dz at a motion from z, shape (m, m + 1)."""
+        m = len(z) - 1
+        by = BY * max(1.0, abs(z[-1]))
+        ends = [self.tried(z + sign * by * np.eye(m + 1)[-1], orbit.near)[1] for sign in (1.0, -1.0)]
+        own = orbit.near * self.unit[None, :] / self.unit[:, None]
+        return np.column_stack([own - np.eye(m), (ends[0] - ends[1]) / (2.0 * by)])
+
+    def tangent(self, z: np.ndarray, orbit: Orbit, along: np.ndarray) -> np.ndarray:
+        """Return the tangent at a point, in the sense of another direction."""
+        matrix = np.vstack([self.jacobian(z, orbit), along])
+        tangent = np.linalg.solve(matrix, np.append(np.zeros(len(z) - 1), 1.0))
+        return tangent / np.linalg.norm(tangent)
+
+    def turn(self, last: np.ndarray, tangent: np.ndarray, ds: float, end: float) -> float:
+        """Return the value at which the parameter turns back between a point and one a step on; add the orbit there.
+
+        The parameter's part of the tangent, of which ``end`` is that a step on, vanishes there: by secants.
+        """
+        low, high = (0.0, float(tangent[-1])), (ds, end)
+        value = self.values[-1]
+        for _ in range(SECANTS):
+            at = low[0] + (high[0] - low[0]) * low[1] / (low[1] - high[1])
+            found = self.corrected(last, tangent, at)
+            if found is None:
+                return value
+            z, orbit, _ = found
+            value, part = float(z[-1] * self.span), float(self.tangent(z, orbit, tangent)[-1])
+            low, high = ((at, part), high) if part * low[1] > 0.0 else (low, (at, part))
+        self.take(value, orbit)
+        return value
+
+    def corrected(self, last: np.ndarray, tangent: np.ndarray, ds: float) -> tuple[np.ndarray, Orbit, int] | None:
+        """Return z and orbit of the next point, and how many corrections it took; None if there are too many."""
+        z, before = last + ds * tangent, np.inf
+        for count in range(1, CORRECTIONS + 1):
+            orbit, missing = self.tried(z, None)
+            matrix = np.vstack([self.jacobian(z, orbit), tangent])
+            step = np.linalg.solve(matrix, -np.append(missing, tangent @ (z - last) - ds))
+            if np.linalg.norm(z - last) > ASTRAY * abs(ds):
+                return None
+            if np.abs(step).max() < ON_CURVE:
+                return z, orbit, count
+            z, size = z + step, float(np.abs(missing).max())
+            if size > GROWN * before:
+                return None
+            before = size
+        return None
