@@ -26,16 +26,6 @@ SAME_MARK = 0.5
 """Share of the turns in which a mark must be missing to be one that the disc lacks, which numbers the others."""
 OVERFLOW = 0.5
 """Share of the span of times by which each fall is more than disorder: a counter falls by nearly all of it."""
-LOCAL = 33
-"""Pulses whose mean is the local step, from which a mark's error is told."""
-MARKS_STAND_OUT = 100.0
-"""Times the median line that one line may count for."""
-FEWEST_MARKS = 24
-"""Marks below which a pattern is none: of few ones mesh and speed recur as well."""
-NEAR, MULTIPLIED = 0.05, (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Which other counts are tried, by the lines: 500 of 512, 1000 of 1024, and as counters multiply."""
-RECURS = 0.5
-"""Share of the pattern that is alike: of 20 turns with marks well above jitter it is 0.8."""
 INDEX_REACH = 1.0
 """Pitches within which a pulse must follow an index pulse to be that of mark 0."""
 
@@ -152,47 +142,11 @@ def pulse_train(
         raise SignalError(f"faults: {' '.join(words)} Mend them with faults='mend', or take them with faults='keep'")
     kept, counted = mended_count(at.size, found)
     train = PulseTrain(at[kept], counted.astype(np.int64), int(lines), name=name)
-    if faults != "keep" and (recurs := _recurrence(train)) is not None:
-        raise SignalError(
-            f"lines: the marks of {name!r} recur every {recurs} pulses, not every {train.lines}; give lines={recurs} "
-            "(counters have up to four pulses a line), or faults='keep' if the count is right all the same"
-        )
     train, words = _referenced(train, None if index is None else np.asarray(index, dtype=float), words)
     if tooth_at_zero is not None:
         number, step = tooth_at_zero
         train = replace(train, tooth_at_zero=(float(number), math.copysign(1.0, step)))
     return replace(train, notes=words)
-
-
-def _recurrence(train: PulseTrain) -> int | None:
-    """Return after how many pulses the pattern of the marks recurs, if that is surely another count than told.
-
-    Errors of marks that are alike in each turn are lines at all multiples of it; speed, teeth and vibration are few of
-    the lines, so that none may count for more than a hundred times the median one.
-    """
-    _, times, _ = train.every()
-    steps = np.diff(times)
-    width = min(LOCAL, steps.size)
-    local = np.convolve(steps, np.ones(width), "same") / np.convolve(np.ones(steps.size), np.ones(width), "same")
-    power = np.abs(np.fft.rfft(steps / local - 1.0, 2 * steps.size)) ** 2
-    alike = np.fft.irfft(np.minimum(power, MARKS_STAND_OUT * np.median(power)))
-    if alike[0] == 0.0:
-        return None
-    alike = alike[: steps.size // 2] / alike[0]
-    near = round(NEAR * train.lines)
-    # other counts of the same disc, and what a counter that multiplies makes of them
-    tried = [
-        k
-        for part in MULTIPLIED
-        for k in range(round(part * (train.lines - near)), round(part * (train.lines + near)) + 1)
-    ]
-    tried = [k for k in tried if FEWEST_MARKS <= k < alike.size]
-    if not tried:
-        return None
-    best = max(tried, key=lambda k: alike[k])
-    # nothing else recurs so, neither the count told nor those beside the one found
-    others = [k for k in tried if k == train.lines or (k % best and best % k)]
-    return best if alike[best] > RECURS and alike[others].max(initial=0.0) < 0.5 * alike[best] else None
 
 
 def _referenced(train: PulseTrain, index: np.ndarray | None, words: list[str]) -> tuple[PulseTrain, list[str]]:

@@ -248,18 +248,6 @@ def test_angles_of_records_with_speeds_are_their_integrals():
         shaft_angles(record, "ring")
 
 
-@pytest.mark.parametrize(("lines", "told"), [(512, 256), (512, 500), (360, 361)])
-def test_another_count_of_lines_is_told_by_the_marks(lines, told):
-    """A counter that multiplies, a round number for the true one, one off."""
-    times = encoder(steady(), lines, marks=mark_errors(lines, 0.01, seed(8)), jitter="50 ns").times
-    assert pulse_train(times, lines).lines == lines
-    with pytest.raises(SignalError, match=says("lines", str(lines), str(told))):
-        pulse_train(times, told)
-    assert pulse_train(times, told, faults="keep").lines == told
-    # without errors of marks nothing tells
-    assert pulse_train(encoder(steady(), lines).times, told).lines == told
-
-
 def test_what_is_no_train_is_refused():
     times = np.arange(300) / 100.0
     with pytest.raises(SignalError, match=says("lines", "2.5")):
