@@ -417,3 +417,17 @@ def test_late_kernels_that_cannot_be_compiled(package):
     answer, _ = package.call("[callers.hopeful(-1.0), *[callers.tried(callers.hopeful, 1.0) for _ in range(2)]]")
     expected = "RuntimeError: smallpackage.callers:impossible could not be compiled; what went wrong was printed"
     assert answer == [-1.0, expected, expected]
+
+
+def test_symbols_have_the_same_names_in_all_processes():
+    """A part is looked for by the name that its callers have on disk, whatever the process that has compiled it."""
+    from numba.core.cpu_options import FastMathOptions
+
+    from gearmbs.kernels.jit import _Flags
+
+    flags = _Flags()
+    flags.fastmath = FastMathOptions({"reassoc", "contract", "arcp", "nsz"})
+    assert "arcp', 'contract', 'nsz', 'reassoc" in flags.summary()
+    plain = _Flags()
+    plain.fastmath = FastMathOptions(True)
+    assert flags.get_mangle_string() != plain.get_mangle_string()

@@ -28,6 +28,7 @@ from numba import types
 from numba.core import bytecode, compiler, config, errors, ir, sigutils, typing
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.cpu_options import FastMathOptions
 from numba.core.ir_utils import get_definition, guard
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NopythonTypeInference
@@ -279,6 +280,14 @@ class _Flags(compiler.Flags):
 
     def __eq__(self, other: object) -> bool:
         return (isinstance(other, _Flags) and self._values == other._values) or super().__eq__(other)
+
+    def summary(self) -> str:
+        """Return what symbols are named by, alike in all processes: flags of fastmath are a set, in no order."""
+        args = [
+            f"{key}=FastMathOptions({sorted(value.flags)})" if isinstance(value, FastMathOptions) else f"{key}={value}"
+            for key, value in self._summary_args()
+        ]
+        return f"{type(self).__name__}({', '.join(args)})"
 
 
 _HASH_OF_FLAGS = hash(compiler.Flags())
