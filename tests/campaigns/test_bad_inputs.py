@@ -129,6 +129,17 @@ def test_functions_of_more_than_numbers(tmp_path):
     assert FunctionSubject(ishigami, PLACES).function == "tests.campaigns.models:ishigami"
 
 
+def test_functions_of_which_nothing_is_kept_are_named():
+    """Arrays and texts alone, without a signal that describes them; beside a number they may be left out."""
+    subject = FunctionSubject(nested, {"x": 1.0})
+    with pytest.raises(CampaignError, match=says("y", "3", "signal:")):
+        subject.reduce({}, {"y": np.zeros(3), "t": "text"}, ["numbers"])
+    with pytest.raises(CampaignError, match=says("nested", "empty")):
+        subject.reduce({}, {}, ["numbers"])
+    assert subject.reduce({}, {"y": np.zeros(3), "n": 1.0}, ["numbers"]).numbers == {"n": 1.0}
+    assert subject.reduce({}, {"y": np.zeros(3)}, ["record"]).numbers == {}
+
+
 def unruly(x: float) -> dict:
     """Go wrong in a way of its own for each x, or return names that are taken."""
     if x == 1:

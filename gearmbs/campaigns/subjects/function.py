@@ -151,6 +151,12 @@ class FunctionSubject(Subject):
                 if name not in items:
                     raise CampaignError(f"{self.function} returned no {name!r}, which is to be kept as a signal")
                 kept.signals[name] = np.atleast_2d(np.asarray(items[name], dtype=float))
+        if not (kept.numbers or kept.signals or "record" in keep):
+            told = ", ".join(f"{k} is {_described(v)}" for k, v in items.items()) or "it is empty"
+            raise CampaignError(
+                f"{self.function} returned nothing that is kept: {told}; return numbers, or describe arrays with "
+                "FunctionSubject(signals={name: (n, rate)}) and keep 'signal:name'"
+            )
         return kept
 
     def signals(self, keep: Sequence[str], things: Sequence[Any]) -> list[SignalSpec]:
@@ -166,6 +172,12 @@ class FunctionSubject(Subject):
                 samples, rate = self.signal_sizes[name]
                 specs.append(SignalSpec(name, (name,), samples, rate, "1"))
         return specs
+
+
+def _described(value: Any) -> str:
+    """Return what a result is, in words."""
+    values = getattr(value, "values", value)
+    return f"an array of {np.size(values)}" if np.ndim(values) else f"a {type(values).__name__}"
 
 
 def _name_of(function: str | Callable[..., Any]) -> str:
