@@ -15,6 +15,7 @@ from gearmbs.campaigns.datasets import (
     GEARBOXES,
     Noise,
     SensorLayers,
+    against_reference,
     artefact_leaks,
     classifier,
     data_set_plan,
@@ -183,8 +184,21 @@ def test_the_path_of_a_recording_comes_back():
     assert before > SensorLayers().margins(DURATION, RATE)[0]
     clean = generator.standard_normal(before + COUNT + after)
     assert layers.heard(clean, RATE, DURATION, 0, 0).shape == (COUNT,)
-    with pytest.raises(CampaignError, match=says("recording", "sensor", "repeats")):
+    with pytest.raises(CampaignError, match=says("recording", "sensor", "still")):
         identify_path(make_signal({"sensor": np.zeros(1 << 13)}, RATE, units="m/s^2"))
+
+
+def test_a_reference_takes_out_what_a_sensor_makes_of_every_state():
+    generator = np.random.default_rng(2)
+    sensor, faulty = np.repeat(["a", "b"], 40), np.tile(np.repeat([False, True], 20), 2)
+    reference = np.tile(np.arange(20) < 10, 4) & ~faulty
+    own = np.where(sensor == "a", 5.0, -5.0)[:, None] * np.array([1.0, 2.0])
+    x = own + faulty[:, None] * np.array([1.0, 0.0]) + 0.01 * generator.standard_normal((80, 2))
+    found = against_reference(x, sensor, reference)
+    np.testing.assert_allclose(found[faulty].mean(axis=0), [1.0, 0.0], atol=0.02)
+    np.testing.assert_allclose(found[~faulty & ~reference], 0.0, atol=0.06)
+    with pytest.raises(CampaignError, match=says("reference", "b", "healthy")):
+        against_reference(x, sensor, reference & (sensor == "a"))
 
 
 def test_no_specimen_is_in_two_splits():

@@ -1,5 +1,6 @@
 from .artefacts import artefact_leaks as artefact_leaks
 from .baseline import Score as Score
+from .baseline import against_reference as against_reference
 from .baseline import classifier as classifier
 from .baseline import feature_table as feature_table
 from .baseline import features as features

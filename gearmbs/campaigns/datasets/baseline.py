@@ -34,6 +34,8 @@ NAMES = (
     "tilt",
 )
 """Names of the features, none of which changes with the gain of the sensor."""
+ORDERS = tuple(k for k, name in enumerate(NAMES) if name.startswith(("mesh", "sidebands")))
+"""Places of the features by mesh order, which know the shaft's angle and little of the structure."""
 
 
 def features(x: np.ndarray, rate: float, shaft: float, teeth: int) -> np.ndarray:
@@ -149,6 +151,34 @@ def feature_table(rows: pd.DataFrame, *, window: float = 0.25) -> tuple[np.ndarr
                 owner.append(k)
     labels = rows.iloc[owner]
     return np.array(found), *(labels[name].to_numpy() for name in ("state", "specimen", "severity"))
+
+
+def against_reference(x: np.ndarray, owners: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Return features less the mean of those of a reference, each sensor's and operating point's own.
+
+    What a structure and its sensors make of every state is so taken out. Rows of the reference are at zero on average
+    and must not be trained or tested on; leave them out.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n, k)
+    owners : ndarray, shape (n,)
+        Of which sensor at which operating point each row is.
+    reference : ndarray of bool, shape (n,)
+        Rows that are known to be healthy.
+
+    Raises
+    ------
+    CampaignError
+        If an owner has no row of reference.
+    """
+    found = np.asarray(x, dtype=float).copy()
+    for name in np.unique(owners):
+        mine = np.asarray(owners) == name
+        if not np.any(mine & reference):
+            raise CampaignError(f"reference: {name} has no row that is known to be healthy; give one, or leave it out")
+        found[mine] -= found[mine & reference].mean(axis=0)
+    return found
 
 
 TREES = 200

@@ -81,13 +81,14 @@ def identify_path(signal: xr.DataArray, modes: int = 6) -> tuple[ModalPath, ...]
     ----------
     .. [1] J. Makhoul, Linear prediction: a tutorial review, Proc. IEEE 63, 1975.
     """
+    still = [str(name) for name, x in zip(signal["channel"].values, signal.values.T) if not np.std(x) > 0.0]
+    if still:
+        raise CampaignError(f"recording: {', '.join(still)} stands still; give one of a machine that runs")
     _, random = discrete_random(signal)
     rate, found = rate_of(signal), []
-    for c, name in enumerate(signal["channel"].values):
+    for c in range(signal.sizes["channel"]):
         x = random.values[:, c] - random.values[:, c].mean()
         likeness = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * x.size)) ** 2)[: MEMORY + 1]
-        if not likeness[0] > 0.0:
-            raise CampaignError(f"recording: {name} holds nothing but what repeats; give one of a machine that runs")
         taps = np.r_[1.0, -solve_toeplitz(likeness[:-1], likeness[1:])]
         roots = np.roots(taps).astype(complex)
         # of 1/A the parts that belong to the poles, by their peaks
