@@ -129,7 +129,7 @@ def test_a_stiff_rim_is_a_rigid_ring():
     stiff = ElasticRim(waves=3, youngs_modulus=2.1e15, damping_ratio=1.0)
     forces = []
     for rim in (None, stiff):
-        found = mechanism(rim).simulate(0.01, rate=2000, tol=1e-7)
+        found = mechanism(rim).simulate(0.01, rate=2000, tol=1e-8)
         told = found.diagnostics("planet 1-ring")["normal_force"] if rim is None else (
             found.diagnostics("ring meshes")["normal_force_1"]
         )  # fmt: skip
