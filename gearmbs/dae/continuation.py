@@ -21,15 +21,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
-from gearmbs.dae.orbits import CLOSED, Orbit, Search
+from gearmbs.dae.orbits import CLOSED, IN_TOLERANCES, Orbit, Search
 from gearmbs.dae.problem import DAEProblem
 
-BY = 1e-5
-"""Part of the parameter by which it is moved for dP/dp: of an orbit that doubles within a hundredth of it, differences
-are off by 1e-6, and by what the tolerance leaves over 1e-5."""
+BY = 1e-3
+"""Part of the parameter's span by which it is moved for dP/dp: of an orbit that doubles within a hundredth of the span,
+differences are off by 1 %, which Newton's method bears."""
+NOISE = 0.02
+"""Part of dP/dp that the runs' tolerance may leave of it: a tighter one is taken where orbits are that small."""
+LEAST_TOLERANCE = 1e-12
+"""Tolerance below which rounding would be larger."""
 CORRECTIONS = 6
 """Newton steps that a point may take; a shorter step along the curve takes fewer."""
 EASY = 3
@@ -40,10 +45,11 @@ GROWN = 2.0
 """Growth of a defect from one Newton step to the next from which a shorter step along the curve is taken."""
 ASTRAY = 2.0
 """Distance from the last point, in steps, beyond which Newton's method has gone to another part of the curve."""
-ON_CURVE = 1e-5
-"""Correction, as part of the first orbit's size and of the span, below which a point is on the curve."""
-SECANTS = 3
-"""Secants by which a turning point is found: the parameter is as good as the square of what is left along the curve."""
+ON_CURVE = 3e-4
+"""Correction, as part of the first orbit's size and of the span, below which a point is on the curve: runs of light
+oscillations leave 1e-4."""
+VERTICES = 2
+"""How often a turning point is looked for by a parabola anew."""
 SEARCHED = 200
 """Periods in which the first orbit is looked for."""
 SMALLEST = 1e-4
@@ -80,12 +86,15 @@ class Branch:
         Of the parameter.
     orbits : list of Orbit
     turns : ndarray, shape (k,)
-        Values at which the parameter turns back: orbits there are among the others.
+        Values at which the parameter turns back: orbits next to them are among the others.
+    why : str
+        Why the curve ends: "left the span", "lost" where no step along it was short enough, or the number of points.
     """
 
     values: np.ndarray
     orbits: list[Orbit]
     turns: np.ndarray
+    why: str
 
     @property
     def stable(self) -> np.ndarray:
@@ -130,28 +139,32 @@ def follow_branch(
         If there is none at the start.
     """
     curve = _Curve(posed, start, stop, tol, method)
-    z = curve.begin(first)
-    tangent = curve.tangent(z, curve.orbits[-1], np.append(np.zeros(len(z) - 1), np.sign(stop - start)))
+    points = [curve.begin(first)]
+    tangent = np.append(np.zeros(len(points[0]) - 1), np.sign(stop - start))
     low, high = sorted((start, stop))
-    ds, turns = step, []
-    while len(curve.values) < most:
-        found = curve.corrected(z, tangent, ds)
+    ds, turns, why = step, [], f"{most} points"
+    while len(points) < most:
+        found = curve.corrected(points[-1], tangent, ds)
         if found is None:
             ds *= SHORTER
             if ds < SMALLEST:
+                why = "lost"
                 break
             continue
-        new, orbit, steps = found
-        following = curve.tangent(new, orbit, tangent)
-        if tangent[-1] * following[-1] < 0.0:
-            turns.append(curve.turn(z, tangent, ds, following[-1]))
-        curve.take(float(new[-1] * curve.span), orbit)
-        z, tangent = new, following
+        z, orbit, steps = found
+        curve.take(float(z[-1] * curve.span), orbit)
+        points.append(z)
+        if len(points) > 2 and (z[-1] - points[-2][-1]) * (points[-2][-1] - points[-3][-1]) < 0.0:
+            turns.append(curve.turn(points))
+        tangent = (points[-1] - points[-2]) / np.linalg.norm(points[-1] - points[-2])
         if not low <= curve.values[-1] <= high:
+            why = "left the span"
+            curve.end_at(low if curve.values[-1] < low else high, points)
             break
         if steps <= EASY:
-            ds = min(LONGER * ds, largest)
-    return Branch(np.array(curve.values), curve.orbits, np.array(turns))
+            # where orbits have grown the curve is as much longer
+            ds = min(LONGER * ds, largest * max(1.0, orbit.size / curve.orbits[0].size))
+    return Branch(np.array(curve.values), curve.orbits, np.array(turns), why)
 
 
 class _Curve:
@@ -174,6 +187,12 @@ class _Curve:
         if first is None:
             search.follow(2)
             first = search.found()
+            allowed = NOISE * BY * first.size / IN_TOLERANCES
+            if allowed < self.tol:
+                self.tol = max(allowed, LEAST_TOLERANCE)
+                search, at = self.search(self.start)
+                search.problem = first.problem
+                first = search.found()
         self.places, self.basis = first.directions.places, first.directions.basis
         # x in units of the orbit's own size
         weights = np.abs(search.weights).max(axis=0)
@@ -200,43 +219,54 @@ class _Curve:
     def jacobian(self, z: np.ndarray, orbit: Orbit) -> np.ndarray:
         """Return d(P - x)/dz at a motion from z, shape (m, m + 1)."""
         m = len(z) - 1
-        by = BY * max(1.0, abs(z[-1]))
+        by = BY
         ends = [self.tried(z + sign * by * np.eye(m + 1)[-1], orbit.near)[1] for sign in (1.0, -1.0)]
         own = orbit.near * self.unit[None, :] / self.unit[:, None]
         return np.column_stack([own - np.eye(m), (ends[0] - ends[1]) / (2.0 * by)])
 
-    def tangent(self, z: np.ndarray, orbit: Orbit, along: np.ndarray) -> np.ndarray:
-        """Return the tangent at a point, in the sense of another direction."""
-        matrix = np.vstack([self.jacobian(z, orbit), along])
-        tangent = np.linalg.solve(matrix, np.append(np.zeros(len(z) - 1), 1.0))
-        return tangent / np.linalg.norm(tangent)
+    def turn(self, points: list[np.ndarray]) -> float:
+        """Return the value at which the parameter turns back at the last but one of some points; add the orbit there.
 
-    def turn(self, last: np.ndarray, tangent: np.ndarray, ds: float, end: float) -> float:
-        """Return the value at which the parameter turns back between a point and one a step on; add the orbit there.
-
-        The parameter's part of the tangent, of which ``end`` is that a step on, vanishes there: by secants.
+        It is the vertex of a parabola through three points, of which that at the vertex itself becomes the middle one.
         """
-        low, high = (0.0, float(tangent[-1])), (ds, end)
-        value = self.values[-1]
-        for _ in range(SECANTS):
-            at = low[0] + (high[0] - low[0]) * low[1] / (low[1] - high[1])
-            found = self.corrected(last, tangent, at)
+        three, value = points[-3:], self.values[-2]
+        for refined in range(VERTICES + 1):
+            s = np.cumsum([0.0, *(np.linalg.norm(b - a) for a, b in pairwise(three))])
+            c = np.polyfit(s - s[1], [z[-1] for z in three], 2)
+            ahead = -c[1] / (2.0 * c[0])
+            value = float((c[2] + 0.5 * c[1] * ahead) * self.span)
+            along = three[2] - three[0]
+            found = self.corrected(three[1], along / np.linalg.norm(along), ahead) if refined < VERTICES else None
             if found is None:
-                return value
+                break
             z, orbit, _ = found
-            value, part = float(z[-1] * self.span), float(self.tangent(z, orbit, tangent)[-1])
-            low, high = ((at, part), high) if part * low[1] > 0.0 else (low, (at, part))
-        self.take(value, orbit)
+            three = [three[0], z, three[1]] if ahead < 0.0 else [three[1], z, three[2]]
+        if refined:
+            at = len(self.values) - 1 if np.dot(z - points[-2], points[-1] - points[-3]) > 0.0 else len(self.values) - 2
+            self.values.insert(at, float(z[-1] * self.span))
+            self.orbits.insert(at, orbit)
         return value
 
-    def corrected(self, last: np.ndarray, tangent: np.ndarray, ds: float) -> tuple[np.ndarray, Orbit, int] | None:
+    def end_at(self, value: float, points: list[np.ndarray]) -> None:
+        """Put the last point, which is beyond the span, onto its end."""
+        share = (value / self.span - points[-2][-1]) / (points[-1][-1] - points[-2][-1])
+        guess = points[-2] + share * (points[-1] - points[-2])
+        along = np.append(np.zeros(len(guess) - 1), np.sign(points[-1][-1] - points[-2][-1]))
+        ds = abs(value / self.span - points[-2][-1])
+        found = self.corrected(points[-2], along, ds, guess)
+        if found is not None:
+            self.values[-1], self.orbits[-1] = value, found[1]
+
+    def corrected(
+        self, last: np.ndarray, tangent: np.ndarray, ds: float, guess: np.ndarray | None = None
+    ) -> tuple[np.ndarray, Orbit, int] | None:
         """Return z and orbit of the next point, and how many corrections it took; None if there are too many."""
-        z, before = last + ds * tangent, np.inf
+        z, before = last + ds * tangent if guess is None else guess, np.inf
         for count in range(1, CORRECTIONS + 1):
             orbit, missing = self.tried(z, None)
             matrix = np.vstack([self.jacobian(z, orbit), tangent])
             step = np.linalg.solve(matrix, -np.append(missing, tangent @ (z - last) - ds))
-            if np.linalg.norm(z - last) > ASTRAY * abs(ds):
+            if guess is None and np.linalg.norm(z - last) > ASTRAY * abs(ds) + ON_CURVE:
                 return None
             if np.abs(step).max() < ON_CURVE:
                 return z, orbit, count

@@ -189,6 +189,9 @@ class EvenSamples:
         t, columns, even = self._t, self._columns, self._even
         begin = max(self._first - self._next, 0)
         rows = slice(self._next + begin - self._first, min(last, self._last) + 1 - self._first)
+        if rows.stop <= rows.start:
+            # all of it lies in the margin behind the span
+            return
         n = last - self._next + 1
         smooth, linear, held = (columns.shape[1] - int(k) for k in self._sharp)
         # the filter has a gain of one: what does not change, as forces along spur wheels' shafts, comes out as it is
@@ -202,8 +205,6 @@ class EvenSamples:
             for channel, source in zip(changing, fine.T, strict=True):
                 products(np.ascontiguousarray(source), self._weights, self._factor, room)
                 even[rows, channel] = room[begin : begin + rows.stop - rows.start]
-        if rows.stop <= rows.start:
-            return
         at = self.t[rows]
         if linear > smooth:
             even[rows, smooth:linear] = monotone_cubic(t, columns[:, smooth:linear], np.clip(at, t[0], t[-1]))

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from gearmbs.signals import SignalError, even_signal
-from gearmbs.signals.resampling import EvenSamples, monotone_cubic
+from gearmbs.signals.resampling import BLOCK, MARGIN, EvenSamples, monotone_cubic
 from tests.says import says
 
 RATE = 51200.0
@@ -102,3 +102,14 @@ def test_the_cubic_is_pchip(n):
     expected = PchipInterpolator(x, y, axis=0)(at)
     np.testing.assert_allclose(monotone_cubic(x, y, at), expected, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(monotone_cubic(x, y[:, 1], at), expected[:, 1], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("extra", [-1, 0, 1, 63, 64, 65])
+def test_spans_that_end_about_the_end_of_a_block(extra):
+    """What lies behind the span is made in blocks, too, of which the last may hold nothing else."""
+    rate, count = 1000.0, 2 * BLOCK - MARGIN + extra
+    t = np.arange(4 * (count + 4 * MARGIN)) / (4 * rate)
+    start, stop = 2 * MARGIN / rate, (2 * MARGIN + count - 1) / rate
+    found = even_signal(t, np.sin(40.0 * t), rate, start=start, stop=stop).values[:, 0]
+    assert found.size == count
+    assert np.abs(found - np.sin(40.0 * (start + np.arange(count) / rate))).max() < 1e-4

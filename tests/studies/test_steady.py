@@ -71,6 +71,16 @@ def test_the_record_of_a_steady_motion_is_that_of_a_record_that_repeats_itself()
     assert motion.record.attrs["orbit_multiplier"] < 1.0
 
 
+@pytest.mark.parametrize("rpm", [650, 700, 1200, 1375, 1600])
+def test_whole_records_are_made_at_any_speed(rpm):
+    case = Case(operation={"speed": f"{rpm} rpm", "torque": "100 N m"})
+    record = gm.steady(case).record
+    exact = run_case(case.changed(operation={"duration": "auto"}))
+    assert record["acceleration"].std("signal_time").values == pytest.approx(
+        exact["acceleration"].std("signal_time").values, rel=1e-2
+    )
+
+
 def test_a_case_and_its_mechanism_have_one_orbit():
     case = Case(operation={"speed": "1000 rpm", "run_up": "10 ms"})
     one = gm.steady(case, variables=["gmf_rms"])

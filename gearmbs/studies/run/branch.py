@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -99,7 +100,7 @@ def steady_branch(
     tol : float, optional
         Of the runs; default that of `steady`.
     step, largest : float
-        First and largest step along the curve, as part of the span of values and of the size of the first motion.
+        First and largest step along the curve, as parts of the span of values and of the size of the motion: 0 to 1.
     most : int
         Motions.
 
@@ -126,6 +127,10 @@ def steady_branch(
     if not (np.isfinite([first, last]).all() and first != last):
         raise ModelError(f"steady_branch: start is {start!r}, stop {stop!r}; give two different numbers")
 
+    for name, share in (("step", step), ("largest", largest)):
+        if not 0.0 < share <= 1.0:
+            raise ModelError(f"steady_branch: {name} is {share!r}; it is a part of the span of values: give 0 to 1")
+
     @lru_cache(4)
     def made(value: float) -> tuple[Posed, AtValue, float]:
         found = build(value)
@@ -143,6 +148,12 @@ def steady_branch(
 
     used = made(first)[2] if tol is None else tol
     branch = follow_branch(lambda value: made(value)[1], first, last, tol=used, step=step, largest=largest, most=most)
+    if branch.why != "left the span":
+        warnings.warn(
+            f"steady_branch: the curve ends at {branch.values[-1]:.6g}, not beyond {first:g} or {last:g}: "
+            + (f"{branch.why}; raise most" if branch.why != "lost" else "no step along it was short enough"),
+            stacklevel=2,
+        )
     motions = []
     for value, orbit in zip(branch.values, branch.orbits, strict=True):
         posed = made(float(value))[0]

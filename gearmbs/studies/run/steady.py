@@ -254,7 +254,8 @@ def _recorded(
     case: Case, solution: Solution, meshes: int, advance: np.ndarray, error: float, variables: Collection[str] | None
 ) -> xr.Dataset:
     """Return the record of a period: what lies ahead of it and behind it are repetitions."""
-    recorder = PeriodicRecorder(case, begin=float(solution.t[0]))
+    # it begins and ends between steps: times of copies of one step differ in their last digits
+    recorder = PeriodicRecorder(case, begin=float(solution.t[:2].mean()))
     t, y = solution.t, solution.result.y
     length = meshes / case.mesh_frequency
     # teeth stand as before after whole periods alone
