@@ -459,3 +459,44 @@ def test_a_four_bar_linkage_of_parallel_cranks():
     turned = 1.0 / (whole * s**2 + mass * GRAVITY * r)
     # about y a positive turn swings what hangs to negative x
     assert plant.transfer(s)[:, 0] == pytest.approx([turned, -r * s**2 * turned], rel=1e-9)
+
+
+def turning(stiffness=100.0, drag=0.5):
+    """Two discs on a shaft that turns freely, the first of which is braked."""
+    m = gm.Mechanism("turning")
+    a, b = (m.body(name, 1.0, (inertia,) * 3) for name, inertia in (("a", 2.0), ("b", 1.0)))
+    first, second = (m.revolute(f"pin_{body.name}", body, m.ground, axis=(0, 0, 1)) for body in (a, b))
+    m.torsion_spring("shaft", first.i, second.i, stiffness=stiffness, damping=0.5)
+    m.torque("drive", a, m.input("load", "N m"))
+    m.parameter("drag", "N m s/rad", drag)
+    m.axis_torque("brake", first.i, first.j, f"-drag*WZ({first.i.name},{first.j.name})")
+    return m
+
+
+def test_the_response_at_rest_leaves_out_an_angle_that_no_output_shows():
+    plant = turning().linearize(["load"], [("joint_rate", "pin_b"), ("joint_angle", "pin_b")])
+    f = np.array([0.0, 1e-6])
+    answer = plant.frequency_response(f)[:, :, 0]
+    # a torque of 1 N m turns against the brake at 1 / drag, and the angle without end
+    assert answer[0, 0] == pytest.approx(2.0, rel=1e-9)
+    assert answer[1, 0] == pytest.approx(2.0, rel=1e-3)
+    assert np.isinf(answer[0, 1])
+    assert plant.transfer(0.0)[0, 0] == pytest.approx(2.0, rel=1e-9)
+
+
+def test_a_plant_at_the_run_of_another_mechanism_has_its_own_numbers():
+    sim = gm.Simulator(turning(400.0, 3.0), 1.0)
+    for t in (0.1, 0.2):
+        sim.advance(t)
+    outputs = [("joint_rate", "pin_b")]
+    own = turning().linearize(["load"], outputs)
+    for at in (sim.solution(), sim.state()):
+        found = turning().linearize(["load"], outputs, at=at)
+        np.testing.assert_allclose(np.sort_complex(found.poles), np.sort_complex(own.poles), atol=1e-6)
+    # what the run itself has changed is taken over
+    sim.set("shaft.stiffness", 900.0)
+    sim.advance(0.3)
+    stiffer = turning(900.0).linearize(["load"], outputs)
+    for at in (sim.solution(), sim.state()):
+        found = turning().linearize(["load"], outputs, at=at)
+        np.testing.assert_allclose(np.sort_complex(found.poles), np.sort_complex(stiffer.poles), atol=1e-6)

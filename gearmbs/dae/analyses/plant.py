@@ -132,6 +132,9 @@ class LinearPlant:
     def transfer(self, s: complex) -> np.ndarray:
         """Return C (s - A)^-1 B + D, shape (outputs, inputs); s is by the plant's unit of time."""
         n = len(self.A)
+        if s == 0.0:
+            # a shaft that turns freely is an integrator, seen or not: what rounding leaves of it is no number
+            return self.dc_gain.astype(complex)
         return self.C @ np.linalg.solve(s * np.eye(n) - self.A, self.B.astype(complex)) + self.D
 
     def frequency_response(self, f: np.ndarray) -> np.ndarray:
@@ -156,6 +159,9 @@ class LinearPlant:
         reduced, turned = hessenberg(self.A, calc_q=True)
         left, right = self.C @ turned, turned.T @ self.B.astype(complex)
         for row, s in zip(out, points, strict=True):
+            if s == 0.0:
+                row[:] = self.dc_gain
+                continue
             try:
                 row += left @ np.linalg.solve(s * np.eye(len(reduced)) - reduced, right)
             except np.linalg.LinAlgError:

@@ -132,7 +132,9 @@ def _of_solution(system: System, problem: Any, members: Any, state: State) -> Po
     now = row.over(np.array([state.t]), state.y[None, :], [(0, idata)])
     places = int(idata[T.H_Z]) + np.arange(len(system.state_names))
     states = dict(zip(system.state_names, state.y[places].tolist(), strict=True))
-    numbers = _numbers(problem.numbers, rdata)
+    # what was not changed on the way is the mechanism's own, which may be another one than that of the run
+    changed = {name: one for name, one in problem.numbers.items() if np.isin(one.cells(), state.reals[0]).any()}
+    numbers = _numbers(changed, rdata)
     point = Point(state.t, now._configuration(0), states, numbers=numbers, state=state)
     return point if members is not None else replace(point, system=system, idata=idata, rdata=rdata)
 
