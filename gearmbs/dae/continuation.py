@@ -43,13 +43,15 @@ LONGER, SHORTER = 1.5, 0.5
 """Factors of the next step along the curve behind an easy one, and behind one that did not come back to it."""
 GROWN = 2.0
 """Growth of a defect from one Newton step to the next from which a shorter step along the curve is taken."""
+FINE = 0.02
+"""Step along the curve with which turning points are passed: a parabola through three points then has them to 1e-3."""
+PASSED = 1.5
+"""Step, of that, up to which a turning point counts as passed in short ones."""
 ASTRAY = 2.0
 """Distance from the last point, in steps, beyond which Newton's method has gone to another part of the curve."""
 ON_CURVE = 3e-4
 """Correction, as part of the first orbit's size and of the span, below which a point is on the curve: runs of light
 oscillations leave 1e-4."""
-VERTICES = 2
-"""How often a turning point is looked for by a parabola anew."""
 SEARCHED = 200
 """Periods in which the first orbit is looked for."""
 SMALLEST = 1e-4
@@ -142,7 +144,7 @@ def follow_branch(
     points = [curve.begin(first)]
     tangent = np.append(np.zeros(len(points[0]) - 1), np.sign(stop - start))
     low, high = sorted((start, stop))
-    ds, turns, why = step, [], f"{most} points"
+    ds, limit, turns, why = step, largest, [], f"{most} points"
     while len(points) < most:
         found = curve.corrected(points[-1], tangent, ds)
         if found is None:
@@ -155,7 +157,17 @@ def follow_branch(
         curve.take(float(z[-1] * curve.span), orbit)
         points.append(z)
         if len(points) > 2 and (z[-1] - points[-2][-1]) * (points[-2][-1] - points[-3][-1]) < 0.0:
+            steps_there = [float(np.linalg.norm(b - a)) for a, b in pairwise(points[-3:])]
+            if max(steps_there) > PASSED * FINE and len(points) > 3:
+                # a turning point is passed in short steps, from ahead of it
+                for _ in range(2):
+                    curve.drop()
+                    points.pop()
+                tangent = (points[-1] - points[-2]) / np.linalg.norm(points[-1] - points[-2])
+                ds = limit = FINE
+                continue
             turns.append(curve.turn(points))
+            limit = largest
         tangent = (points[-1] - points[-2]) / np.linalg.norm(points[-1] - points[-2])
         if not low <= curve.values[-1] <= high:
             why = "left the span"
@@ -163,7 +175,8 @@ def follow_branch(
             break
         if steps <= EASY:
             # where orbits have grown the curve is as much longer
-            ds = min(LONGER * ds, largest * max(1.0, orbit.size / curve.orbits[0].size))
+            grown = max(1.0, orbit.size / curve.orbits[0].size) if limit == largest else 1.0
+            ds = min(LONGER * ds, limit * grown)
     return Branch(np.array(curve.values), curve.orbits, np.array(turns), why)
 
 
@@ -206,6 +219,11 @@ class _Curve:
         self.values.append(value)
         self.orbits.append(orbit)
 
+    def drop(self) -> None:
+        """Forget the last point."""
+        self.values.pop()
+        self.orbits.pop()
+
     def tried(self, z: np.ndarray, matrix: np.ndarray | None) -> tuple[Orbit, np.ndarray]:
         """Return the motion over a period from z, and by what it misses itself, in units of x."""
         search, at = self.search(float(z[-1] * self.span))
@@ -225,27 +243,10 @@ class _Curve:
         return np.column_stack([own - np.eye(m), (ends[0] - ends[1]) / (2.0 * by)])
 
     def turn(self, points: list[np.ndarray]) -> float:
-        """Return the value at which the parameter turns back at the last but one of some points; add the orbit there.
-
-        It is the vertex of a parabola through three points, of which that at the vertex itself becomes the middle one.
-        """
-        three, value = points[-3:], self.values[-2]
-        for refined in range(VERTICES + 1):
-            s = np.cumsum([0.0, *(np.linalg.norm(b - a) for a, b in pairwise(three))])
-            c = np.polyfit(s - s[1], [z[-1] for z in three], 2)
-            ahead = -c[1] / (2.0 * c[0])
-            value = float((c[2] + 0.5 * c[1] * ahead) * self.span)
-            along = three[2] - three[0]
-            found = self.corrected(three[1], along / np.linalg.norm(along), ahead) if refined < VERTICES else None
-            if found is None:
-                break
-            z, orbit, _ = found
-            three = [three[0], z, three[1]] if ahead < 0.0 else [three[1], z, three[2]]
-        if refined:
-            at = len(self.values) - 1 if np.dot(z - points[-2], points[-1] - points[-3]) > 0.0 else len(self.values) - 2
-            self.values.insert(at, float(z[-1] * self.span))
-            self.orbits.insert(at, orbit)
-        return value
+        """Return the value at which the parameter turns back: the vertex of a parabola through the last points."""
+        s = np.cumsum([0.0, *(np.linalg.norm(b - a) for a, b in pairwise(points[-3:]))])
+        c = np.polyfit(s - s[1], [z[-1] for z in points[-3:]], 2)
+        return float((c[2] - c[1] ** 2 / (4.0 * c[0])) * self.span)
 
     def end_at(self, value: float, points: list[np.ndarray]) -> None:
         """Put the last point, which is beyond the span, onto its end."""
@@ -262,16 +263,15 @@ class _Curve:
     ) -> tuple[np.ndarray, Orbit, int] | None:
         """Return z and orbit of the next point, and how many corrections it took; None if there are too many."""
         z, before = last + ds * tangent if guess is None else guess, np.inf
+        farthest = ASTRAY * (abs(ds) if guess is None else float(np.linalg.norm(guess - last))) + ON_CURVE
         for count in range(1, CORRECTIONS + 1):
             orbit, missing = self.tried(z, None)
             matrix = np.vstack([self.jacobian(z, orbit), tangent])
             step = np.linalg.solve(matrix, -np.append(missing, tangent @ (z - last) - ds))
-            if guess is None and np.linalg.norm(z - last) > ASTRAY * abs(ds) + ON_CURVE:
-                return None
             if np.abs(step).max() < ON_CURVE:
                 return z, orbit, count
             z, size = z + step, float(np.abs(missing).max())
-            if size > GROWN * before:
+            if size > GROWN * before or np.linalg.norm(z - last) > farthest:
                 return None
             before = size
         return None

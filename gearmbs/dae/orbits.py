@@ -90,36 +90,48 @@ def directions_at(problem: DAEProblem) -> Directions:
     return Directions(places, np.where(tested[:, None], basis, 0.0))
 
 
-def check_repeats(problem: DAEProblem, period: float, advance: np.ndarray) -> None:
-    """Refuse equations that are others after a period.
+def check_repeats(
+    problem: DAEProblem, period: float, advance: np.ndarray, along: DAEResult | None = None, periods: int = 1
+) -> None:
+    """Refuse equations that are others after a period, or some.
 
     Parameters
     ----------
     problem, period, advance
         As of `find_orbit`.
+    along : DAEResult, optional
+        A run over the period: it is looked at some instants of it, and else at its start.
+    periods : int
+        Over how many periods: parts of what turns that differ are seen once their turn has come.
 
     Raises
     ------
     ModelError
         That names the equation that changes most.
     """
-    found = []
-    for t, y in ((problem.t0, problem.y0), (problem.t0 + period, problem.y0 + advance)):
-        out = np.zeros(problem.n)
-        problem.residual(
-            t, y, problem.yp0, out, problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
-        )
-        found.append(out)
-    # each equation beside what unknowns of their typical magnitude do in it
-    terms = np.abs(_dense(problem, 0.0)) @ np.asarray(problem.scale, dtype=float) + np.abs(found[0])
-    change = np.abs(found[1] - found[0]) / np.where(terms > 0.0, terms, 1.0)
-    worst = int(np.argmax(change))
-    if change[worst] > ALIKE:
-        raise ModelError(
-            f"period = {period:.9g} s: the equation of {problem.names[worst]} is another one after it, by "
-            f"{change[worst]:.1e} of its terms; give the period of all motions and loads, after which "
-            "all that turns stands as before, counted from a time behind all run-ups (t_start)"
-        )
+    rows = np.zeros(1, dtype=np.int64)
+    t, y, yp = np.array([problem.t0]), problem.y0[None, :], problem.yp0[None, :]
+    if along is not None and along.yp.size:
+        rows = np.unique(np.linspace(0, along.t.size - 1, INSTANTS + 2).astype(np.int64)[1:-1])
+        t, y, yp = along.t, along.y, along.yp
+    tables, work = (problem.idata.copy(), problem.rdata.copy()), np.zeros(problem.work_size)
+    terms = np.abs(_dense(problem, 0.0)) @ np.asarray(problem.scale, dtype=float)
+    out, later = np.zeros(problem.n), np.zeros(problem.n)
+    for row in rows:
+        problem.residual(t[row], y[row], yp[row], out, *tables, work)
+        # each equation beside what unknowns of their typical magnitude do in it
+        size = terms + np.abs(out)
+        for k in range(1, periods + 1):
+            problem.residual(t[row] + k * period, y[row] + k * advance, yp[row], later, *tables, work)
+            change = np.abs(later - out) / np.where(size > 0.0, size, 1.0)
+            worst = int(np.argmax(change))
+            if change[worst] > ALIKE * k:
+                after = "it" if k == 1 else f"{k} of it"
+                raise ModelError(
+                    f"period = {period:.9g} s: the equation of {problem.names[worst]} is another one after {after}, by "
+                    f"{change[worst]:.1e} of its terms; give the period of all motions and loads, after which "
+                    "all that turns stands as before, counted from a time behind all run-ups (t_start)"
+                )
 
 
 def _dense(problem: DAEProblem, cj: float) -> np.ndarray:
@@ -187,18 +199,15 @@ class Orbit:
         """How the independent unknowns at the end change with those at the start, shape (m, m)."""
         return monodromy_of(self.problem, self.result, self.directions)
 
-    @property
+    @cached_property
     def multipliers(self) -> np.ndarray:
         """Floquet multipliers, the eigenvalues of the monodromy matrix, the largest first, shape (m,), complex."""
         return _by_size(self.monodromy)
 
     @property
     def largest(self) -> complex:
-        """The largest multiplier, where it is far from 1 only as well as it is known already."""
-        found = _by_size(self.near)
-        if found.size and abs(found[0]) > SURE and "monodromy" not in self.__dict__:
-            found = self.multipliers
-        return complex(found[0]) if found.size else 0.0
+        """The largest multiplier, 0 where there is none."""
+        return complex(self.multipliers[0]) if self.multipliers.size else 0.0
 
     @property
     def stable(self) -> bool:
@@ -213,7 +222,11 @@ def monodromy_of(problem: DAEProblem, result: DAEResult, directions: Directions)
     starts = [Direction(problem.names[i], column, *none) for i, column in columns]
     end = replace(result, t=result.t[-1:], y=result.y[-1:], yp=result.yp[-1:])
     longest = float(result.t[-1] - result.t[0]) / LEAST_STEPS
-    return np.ascontiguousarray(follow(problem, end, starts, longest).s[:, -1, directions.places].T)
+    try:
+        followed = follow(problem, end, starts, longest)
+    except ModelError as error:
+        raise NoOrbit(f"how disturbances go on is not known: {error}") from None
+    return np.ascontiguousarray(followed.s[:, -1, directions.places].T)
 
 
 def _by_size(matrix: np.ndarray) -> np.ndarray:
@@ -221,8 +234,6 @@ def _by_size(matrix: np.ndarray) -> np.ndarray:
     return found[np.argsort(-np.abs(found), kind="stable")]
 
 
-SURE = 0.8
-"""Multiplier up to which an orbit is stable by the monodromy matrix of a motion near it."""
 FAST = 0.1
 """What is left of a defect at most after a step with the matrix of another motion; else it is made anew."""
 CLOSED = 1e-7
@@ -239,6 +250,8 @@ FARTHEST = 5.0
 """Newton steps beyond so many sizes of the motion lead to where the equations are others."""
 STAYS = 1e-3
 """How far above 1 a multiplier may be of what stays as it is: a wheel that touches nothing, or moves evenly."""
+INSTANTS = 16
+"""Instants of a period at which equations are compared with those of later ones."""
 LEAST_STEPS = 64
 """Steps of a period at least: a motion that hardly moves needs few, disturbances of it need as many as of any."""
 REACHED = 0.1

@@ -36,7 +36,7 @@ def fold(start):
 
 @pytest.mark.slow
 def test_a_duffing_oscillator_turns_back_where_an_independent_shooting_has_its_folds():
-    branch = gm.steady_branch(duffing, 1.2, 2.0, tol=1e-8, step=0.1, largest=0.2)
+    branch = gm.steady_branch(duffing, 1.0, 2.5, tol=1e-8, step=0.1, largest=0.3)
     assert len(branch.turns) == 2
     # three motions between the turning points, the middle one of which is unstable
     at = [k for k in range(1, len(branch.values)) if (branch.values[k - 1] - 1.6) * (branch.values[k] - 1.6) <= 0.0]

@@ -123,6 +123,30 @@ def test_a_chaotic_motion_has_no_orbit_that_it_goes_to():
     assert str(error.value)
 
 
+def test_what_differs_between_the_ends_of_a_period_is_seen():
+    # a half period of cos 2t and of sin t, and |sin t| in place of sin t: alike at the ends
+    for force in ("COS(2*TIME)+0.05*SIN(TIME)-VX(I,J)-4*DX(I,J)", "SIN(TIME)-VX(I,J)-4*DX(I,J)"):
+        with pytest.raises(ModelError, match=says("period", "equation", "loads")):
+            steady_motion(oscillator(force), np.pi, attracting=False)
+        assert steady_motion(oscillator(force), TAU).stable
+
+
+def test_stability_is_that_of_the_orbit_and_not_of_motions_near_it():
+    # a second mass whose stiffness follows the first: Mathieu's equation, unstable by a parametric resonance
+    m = oscillator("COS(TIME)-VX(I,J)-4*DX(I,J)")
+    other = m.body("other", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    m.translational("slide 2", other, m.ground, at=(0, 0, 0), axis=(1, 0, 0))
+    i, j = other.marker(name="K"), m.ground.marker(name="L")
+    # x = a cos(t + phase), a = 1 / sqrt(10)
+    m.load("force 2", i, j, fx="-0.02*VX(K,L)-(0.25+1.5*DX(I,J))*DX(K,L)")
+    motion = steady_motion(m, TAU, attracting=False, tol=1e-8)
+    assert not motion.stable
+    assert not motion.stable
+    assert abs(motion.multipliers[0]) > 1.05
+    with pytest.raises(NoOrbit):
+        steady_motion(m, TAU, most=30, tol=1e-8)
+
+
 def test_a_period_that_is_none_of_the_loads_is_refused_and_its_multiple_is_not():
     m = oscillator("COS(2*TIME)-0.5*VX(I,J)-9*DX(I,J)")
     with pytest.raises(ModelError, match=says("period", "3 s", "equation", "loads")):

@@ -35,6 +35,8 @@ FULL = 2.0 * np.pi
 TIGHTER = 0.1
 """Part of the usual tolerance at which an orbit is looked for: of one period no errors average out, as those of the
 many that a simulation takes do."""
+LATER = 8
+"""Periods over which loads and motions are compared at least."""
 SAMPLES = 4096
 """Samples of a period from which harmonics are taken: eight of the shortest contacts, a five-hundredth of it."""
 
@@ -312,4 +314,7 @@ def steady_motion(
     check_repeats(posed.problem, period, advance)
     search = attracting_orbit if attracting else find_orbit
     orbit = search(posed.problem, period, advance, tol=tol, settle=settle, most=most, method=integrator)
+    # each tooth of any wheel comes into mesh once
+    teeth = max((max(one.periods) for one in mechanism.elements.values() if hasattr(one, "periods")), default=0)
+    check_repeats(orbit.problem, period, advance, orbit.result, max(teeth, LATER))
     return SteadyMotion(posed.solution(orbit), orbit, posed.state(orbit))
