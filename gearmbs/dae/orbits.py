@@ -174,6 +174,8 @@ class Orbit:
     directions : Directions
     near : ndarray, shape (m, m)
         The monodromy matrix of a motion near it, by which it was found.
+    own : bool
+        Whether that is its own.
     error : float
         By how much the start is off at most, as part of the orbit's own size: Newton's next correction.
     defect : float
@@ -189,6 +191,7 @@ class Orbit:
     result: DAEResult
     directions: Directions
     near: np.ndarray
+    own: bool
     error: float
     defect: float
     size: float
@@ -197,7 +200,7 @@ class Orbit:
     @cached_property
     def monodromy(self) -> np.ndarray:
         """How the independent unknowns at the end change with those at the start, shape (m, m)."""
-        return monodromy_of(self.problem, self.result, self.directions)
+        return self.near if self.own else monodromy_of(self.problem, self.result, self.directions)
 
     @cached_property
     def multipliers(self) -> np.ndarray:
@@ -334,7 +337,7 @@ def attracting_orbit(
         first = orbit.largest
         if abs(first) < 1.0:
             search.approach(orbit)
-            return replace(orbit, periods=search.periods)
+            return replace(orbit, near=orbit.monodromy, own=True, periods=search.periods)
         if not (first.real < -1.0 and first.imag == 0.0) or doubling == DOUBLINGS:
             break
         search.double()
@@ -461,24 +464,25 @@ class Search:
             else:
                 return None
             if found.defect > FAST * orbit.defect:
-                found = self.with_matrix(found, found.monodromy)
+                found = self.with_matrix(found, found.monodromy, True)
             orbit = found
 
     def tried(self, problem: DAEProblem, matrix: np.ndarray | None) -> Orbit:
         """Return a motion over a period as an orbit, with a matrix that is known or its own."""
         result = self.integrate(problem)
         start = replace(problem, y0=result.y[0].copy(), yp0=result.yp[0].copy())
+        own = matrix is None
         if matrix is None:
             matrix = monodromy_of(start, result, self.directions)
         gone = (result.t - result.t[0])[:, None] / self.period * self.advance[self.tested]
         apart = (result.y[:, self.tested] - gone) * self.weight
         size = 0.5 * float(np.ptp(apart, axis=0).max(initial=0.0)) + np.finfo(float).tiny
-        orbit = Orbit(start, self.period, result, self.directions, matrix, 0.0, 0.0, size, self.periods)
-        return self.with_matrix(replace(orbit, defect=self.size_of(self.missing(orbit))), matrix)
+        orbit = Orbit(start, self.period, result, self.directions, matrix, own, 0.0, 0.0, size, self.periods)
+        return self.with_matrix(replace(orbit, defect=self.size_of(self.missing(orbit))), matrix, own)
 
-    def with_matrix(self, orbit: Orbit, matrix: np.ndarray) -> Orbit:
-        """Return a motion with another matrix, and what is left to correct by it."""
-        orbit = replace(orbit, near=matrix)
+    def with_matrix(self, orbit: Orbit, matrix: np.ndarray, own: bool) -> Orbit:
+        """Return a motion with another matrix, its own or not, and what is left to correct by it."""
+        orbit = replace(orbit, near=matrix, own=own)
         return replace(orbit, error=self.size_of(self.step(orbit)) / orbit.size)
 
     def size_of(self, change: np.ndarray) -> float:

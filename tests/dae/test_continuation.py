@@ -71,6 +71,14 @@ def test_motions_of_a_branch_are_those_of_single_searches():
     assert branch.figure(branch.levels(force)).axes
 
 
+def test_a_branch_of_equations_that_only_look_alike_at_the_ends_is_refused():
+    def half(size):
+        return oscillator(f"COS(2*TIME)+{size!r}*SIN(TIME)-VX(I,J)-4*DX(I,J)"), np.pi
+
+    with pytest.raises(ModelError, match=says("period", "equation", "loads")):
+        gm.steady_branch(half, 0.05, 0.06, step=0.5, largest=1.0)
+
+
 def test_a_branch_needs_two_values_and_something_that_moves():
     with pytest.raises(ModelError, match=says("start", "stop", "different")):
         gm.steady_branch(duffing, 1.0, 1.0)

@@ -241,6 +241,13 @@ class Posed:
         return State.of(self.assembled, problem.t0, problem.y0, problem.yp0, (problem.idata, problem.rdata))
 
 
+def check_along(mechanism: Mechanism, orbit: Orbit, period: float, advance: np.ndarray) -> None:
+    """Refuse an orbit along which the equations of a mechanism are others after some periods."""
+    # each tooth of any wheel comes into mesh once
+    teeth = max((max(one.periods) for one in mechanism.elements.values() if hasattr(one, "periods")), default=0)
+    check_repeats(orbit.problem, period, advance, orbit.result, max(teeth, LATER))
+
+
 def _nearest(choices: list[float], value: float) -> float:
     return min(choices, key=lambda choice: abs(choice - value))
 
@@ -314,7 +321,5 @@ def steady_motion(
     check_repeats(posed.problem, period, advance)
     search = attracting_orbit if attracting else find_orbit
     orbit = search(posed.problem, period, advance, tol=tol, settle=settle, most=most, method=integrator)
-    # each tooth of any wheel comes into mesh once
-    teeth = max((max(one.periods) for one in mechanism.elements.values() if hasattr(one, "periods")), default=0)
-    check_repeats(orbit.problem, period, advance, orbit.result, max(teeth, LATER))
+    check_along(mechanism, orbit, period, advance)
     return SteadyMotion(posed.solution(orbit), orbit, posed.state(orbit))

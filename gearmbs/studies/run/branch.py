@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -17,7 +17,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
-from gearmbs.mechanism.solve.orbits import TIGHTER, Posed, SteadyMotion
+from gearmbs.mechanism.solve.orbits import TIGHTER, Posed, SteadyMotion, check_along
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.run.steady import posed_case
 
@@ -157,5 +157,8 @@ def steady_branch(
     motions = []
     for value, orbit in zip(branch.values, branch.orbits, strict=True):
         posed = made(float(value))[0]
-        motions.append(SteadyMotion(posed.solution(orbit), replace(orbit), posed.state(orbit)))
+        if not isinstance(found := build(float(value)), Case):
+            at = made(float(value))[1]
+            check_along(found[0], orbit, at.period, at.advance)
+        motions.append(SteadyMotion(posed.solution(orbit), orbit, posed.state(orbit)))
     return SteadyBranch(branch.values, motions, branch)
