@@ -304,6 +304,10 @@ def dataset(
     noise_from: Annotated[
         list[Path] | None, typer.Option(help="Recording whose random part becomes the sensors' noise; repeat.")
     ] = None,
+    path_from: Annotated[
+        list[Path] | None,
+        typer.Option(help="Recording whose resonances become the path from the housing to the sensors; repeat."),
+    ] = None,
     rate: Annotated[str | None, typer.Option(help="Sampling rate of the recordings, where they do not say.")] = None,
     bearing_defects: Annotated[
         bool, typer.Option("--bearing-defects", help="Spalls of rolling bearings as sources beside the teeth.")
@@ -316,15 +320,28 @@ def dataset(
 ) -> None:
     """Make a labelled data set of gear faults: simulate, put sensors on, split by specimen, write card and metadata."""
     with guarded():
-        from gearmbs.campaigns import Campaign, dask_client
-        from gearmbs.campaigns.datasets import GEARBOXES, SensorLayers, data_set_plan, identify_noise, write_data_set
+        from gearmbs.campaigns import Campaign, CampaignError, dask_client
+        from gearmbs.campaigns.datasets import (
+            GEARBOXES,
+            SensorLayers,
+            data_set_plan,
+            identify_noise,
+            identify_path,
+            split_by_group,
+            write_data_set,
+        )
+        from gearmbs.schema.described import chosen
         from gearmbs.signals.files.simulated import read_any
         from gearmbs.units import to_si
 
-        boxes = gearbox or list(GEARBOXES)
+        boxes = [chosen(GEARBOXES, name, "", CampaignError, "gearbox") for name in dict.fromkeys(gearbox or GEARBOXES)]
         given = _given_rate(rate)
-        noises = [noise for file in noise_from or () for noise in identify_noise(read_any(file, **given))]
-        layers = SensorLayers(noises=tuple(noises), seed=seed)
+        # splits that cannot be made are told before hours of simulation
+        split_by_group(range(specimens))
+        at = boxes[0].rate
+        noises = [noise for file in noise_from or () for noise in identify_noise(read_any(file, **given), at)]
+        paths = [path for file in path_from or () for path in identify_path(read_any(file, **given))]
+        layers = SensorLayers(noises=tuple(noises), paths=tuple(paths), seed=seed)
         seconds = to_si(duration, "time", "--duration")
         campaigns = []
         for box in boxes:
@@ -337,7 +354,7 @@ def dataset(
                 bearing_defects=bearing_defects,
                 seed=seed,
             )
-            campaigns.append(Campaign(out.with_name(f"{out.name}-{box.replace(' ', '-')}.campaign"), plan))
+            campaigns.append(Campaign(out.with_name(f"{out.name}-{box.name.replace(' ', '-')}.campaign"), plan))
         for campaign in campaigns:
             if dask is not None:
                 with dask_client(dask, workers) as client:
@@ -347,6 +364,29 @@ def dataset(
             typer.echo(f"{campaign.path.name}: {status}")
         for path in write_data_set(campaigns, out, layers=layers, seed=seed, url=url, published=published):
             typer.echo(f"wrote {path}")
+
+
+@app.command("path")
+def identified_path(
+    recording: Annotated[Path, typer.Argument(help="Recording of a machine that runs, of one state.")],
+    modes: Annotated[int, typer.Option(help="Of each channel, the strongest.")] = 6,
+    rate: Annotated[str | None, typer.Option(help="Sampling rate of the recording, where it does not say.")] = None,
+) -> None:
+    """Print the resonances of a recording's sensors, which dataset --path-from puts between housing and sensors."""
+    with guarded():
+        import math
+
+        from gearmbs.campaigns.datasets import identify_path
+        from gearmbs.signals.files.simulated import read_any
+
+        signal = read_any(recording, **_given_rate(rate))
+        typer.echo("| channel | frequency, Hz | damping ratio | peak, dB |\n|---|---|---|---|")
+        for name, path in zip(signal["channel"].values, identify_path(signal, modes), strict=True):
+            # over the highest, since no recording knows the gain
+            lowest = min(mode.damping * mode.mass for mode in path.modes)
+            for mode in sorted(path.modes, key=lambda mode: mode.frequency):
+                level = 20.0 * math.log10(lowest / (mode.damping * mode.mass))
+                typer.echo(f"| {name} | {mode.frequency:.1f} | {mode.damping:.4f} | {level:.1f} |")
 
 
 @app.command()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+import scipy.signal as ss
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
@@ -53,3 +55,20 @@ def test_errors_are_one_line(tmp_path):
     assert "no campaign here" in call("status", tmp_path, code=1)
     (tmp_path / "p.toml").write_text(PLAN.replace("x1 = 0.0, ", ""))
     assert "no such parameter" in call("plan", tmp_path / "p.toml", code=1)
+
+
+def test_the_path_of_a_recording(tmp_path):
+    x, y = np.random.default_rng(0).standard_normal((2, 1 << 14))
+    heard = ss.lfilter([1.0], [1.0, -1.2, 0.97], x) + ss.lfilter([1.0], [1.0, 0.8, 0.97], y)
+    np.savetxt(tmp_path / "r.csv", heard, header="a1", comments="")
+    *_, low, high = call("path", tmp_path / "r.csv", "--rate", 12800, "--modes", 2).splitlines()
+    frequencies = [float(line.split("|")[2]) for line in (low, high)]
+    assert frequencies == pytest.approx([1865.0, 4053.0], rel=0.02)
+    np.savetxt(tmp_path / "w.csv", x, header="a1", comments="")
+    assert "no resonance" in call("path", tmp_path / "w.csv", "--rate", 12800, code=1)
+
+
+def test_data_sets_that_cannot_be_split_are_refused_before_they_are_simulated(tmp_path):
+    told = call("dataset", tmp_path / "d", "--signals", 96, "--specimens", 2, code=1)
+    assert "2 groups are too few" in told
+    assert not list(tmp_path.iterdir())

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.signal as ss
 
 from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, Specimens, make_plan
 from gearmbs.campaigns.codes import code_counts
@@ -184,8 +185,39 @@ def test_the_path_of_a_recording_comes_back():
     assert before > SensorLayers().margins(DURATION, RATE)[0]
     clean = generator.standard_normal(before + COUNT + after)
     assert layers.heard(clean, RATE, DURATION, 0, 0).shape == (COUNT,)
+
+
+@pytest.mark.parametrize("identify", [identify_noise, identify_path])
+def test_recordings_that_tell_nothing_are_refused(identify):
+    x = np.random.default_rng(0).standard_normal(1 << 13)
     with pytest.raises(CampaignError, match=says("recording", "sensor", "still")):
-        identify_path(make_signal({"sensor": np.zeros(1 << 13)}, RATE, units="m/s^2"))
+        identify({"sensor": np.full(1 << 13, 0.1)}, rate=RATE)
+    with pytest.raises(CampaignError, match=says("recording", "4000", "4096")):
+        identify(x[:4000], rate=RATE)
+    identify(ss.lfilter([1.0], [1.0, -1.2, 0.9], x), rate=RATE)
+
+
+def test_a_path_has_modes_that_stand_out():
+    x = np.random.default_rng(0).standard_normal(1 << 15)
+    with pytest.raises(CampaignError, match=says("resonance", "ch1", "structure")):
+        identify_path(x, rate=RATE)
+    (path,) = identify_path(ss.lfilter([1.0], [1.0, -1.2, 0.9], x), modes=5, rate=RATE)
+    (mode,) = path.modes
+    assert mode.frequency == pytest.approx(RATE / (2.0 * np.pi) * np.arccos(0.6 / np.sqrt(0.9)), rel=0.01)
+    with pytest.raises(CampaignError, match=says("modes", "whole")):
+        identify_path(x, modes=0, rate=RATE)
+
+
+def test_noise_of_a_faster_recording_has_the_frequencies_it_had():
+    """A band up to 3 kHz heard at 51.2 kHz reaches 3 of 6.4 kHz at the data set's rate, not 0.4 of them."""
+    x = np.random.default_rng(0).standard_normal(1 << 16)
+    x = ss.sosfiltfilt(ss.butter(8, 3000.0, fs=4 * RATE, output="sos"), x)
+    (found,) = identify_noise(x, data_rate=RATE, rate=4 * RATE)
+    density = np.interp(np.array([1000.0, 2700.0, 3500.0]) / RATE, found.frequency, found.density)
+    assert density[1] == pytest.approx(density[0], rel=0.2)
+    assert density[2] < 0.1 * density[0]
+    with pytest.raises(CampaignError, match=says("recording", "12800", "faster")):
+        identify_noise(x, data_rate="12.8 kHz", rate=6400.0)
 
 
 def test_a_reference_takes_out_what_a_sensor_makes_of_every_state():

@@ -109,6 +109,7 @@ def write_card(
     from gearmbs.files import write_whole
 
     bearings = "" if any(name.startswith("source.") for name in _columns(files)) else "no bearing fault, "
+    path = "a transfer path, " if layers["modes"] or layers["paths"] else ""
     lines = ["---", "license: cc0-1.0", "task_categories:", "- time-series-classification", "tags:", "- vibration"]
     lines += ["- gears", "- simulation", *front_matter(files, int(facts["signals"]))]
     lines += [
@@ -129,8 +130,8 @@ def write_card(
         f"Gearboxes were simulated by gearmbs {gearmbs.__version__}, a multibody solver with contact of involute "
         "flanks; `plan-*.json` hold the plans, from which the same code makes the same bits again. Clean signals "
         "are accelerations of a housing that bends, with the modes of its specimen, at seats of bearings. "
-        "Between them and the measured ones are layers of their own, drift of the speed, noise and converter, none of "
-        "which knows the state; records are cut out of longer ones, so that filters leave no edges:",
+        f"Between them and the measured ones are layers of their own, drift of the speed, {path}noise and converter, "
+        "none of which knows the state; records are cut out of longer ones, so that filters leave no edges:",
         "",
         "```json",
         json.dumps(dict(layers), indent=1),

@@ -94,6 +94,11 @@ class Gearbox:
         return found[0]
 
     @property
+    def rate(self) -> float:
+        """Sampling rate of its records, Hz."""
+        return float(to_si(self.tables.get("run", {}).get("rate", 12800.0), "frequency"))
+
+    @property
     def rolling(self) -> list[str]:
         """Names of the rolling bearings, which may have defects."""
         return [name for name, table in self.tables.get("bearings", {}).items() if table.get("kind") == "rolling"]
@@ -233,7 +238,7 @@ def data_set_plan(
             f"sensors, too few for {specimens} specimens; ask for {each * specimens} signals or fewer specimens"
         )
     tables = {**box.tables, "run": dict(box.tables.get("run", {}))}
-    rate = float(to_si(tables["run"].get("rate", 12800.0), "frequency"))
+    rate = box.rate
     before, after = layers.margins(duration, rate)
     tables["run"] |= {"rate": rate, "duration": duration + (before + after) / rate}
     sources = box.sources() if bearing_defects else []
