@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import roll_of_flanks
 from gearmbs.contact.kernel import relative_twist, slopes_of_sums, wheel_frame, wrench_of_sums
 from gearmbs.contact.law_kinds import LAW_IMPACT
@@ -71,10 +72,10 @@ def side_spring(options, wheels, own, scratch, diagnostics, sign, want):
     if not open_side(wheels, side):
         return
     facing_teeth(options, wheels, side)
-    middle_section(options, wheels, side, strip, want)
+    f_1, f_2 = side.start_1 - wheels.wheel_1.half_angle, side.start_2 - wheels.wheel_2.half_angle
+    to_pitch_point(options, wheels, side, strip, want)
     gap_rates(side, strip, 1, want)
     cosine, linear = own[COSINE], own[BACKLASH] == 0.0
-    f_1, f_2 = side.start_1 - wheels.wheel_1.half_angle, side.start_2 - wheels.wheel_2.half_angle
     roll_of_flanks(side, wheels, lookup, 0, f_1, f_2, 0.0)
     pitch, n = wheels.pitch, int(own[PLACES])
     # the drive flanks' table holds for both sides, each in its own sense
@@ -122,6 +123,63 @@ def side_spring(options, wheels, own, scratch, diagnostics, sign, want):
             for m in range(6):
                 other = strip.grad[m, 0] + error_u * per * lookup.grad[m]
                 sums.q_x[m, i] -= cosine * cosine * by_rate * other * moved
+
+
+@kernel
+def by_turns(hess, j, turn_1, turn_2):
+    """Derivative of the gap's gradient by turns of both wheels at once."""
+    return hess[min(j, L.F1), max(j, L.F1), 0] * turn_1 + hess[min(j, L.F2), max(j, L.F2), 0] * turn_2
+
+
+@kernel
+def to_pitch_point(options, wheels, side, strip, want):
+    """Fill the gap at mid-face, of helical flanks that touch each other in the pitch point.
+
+    The gap of parallel axes is that of all teeth; tilted axes, or the moment of a force along a leaning normal, tell
+    them apart. The pair is ``i`` pitches past the facing one, ``r_1 (F_1 + i t_1 + alpha) = r_1 tan alpha``, a real
+    number that follows the pose x: with y = x + i(x) e and e = (t_1, -t_2) along the turns of the wheels,
+    ``dg/dx = dG/dy + (dG/dy . e) di/dx``, so that the spring keeps its energy.
+
+    Parameters
+    ----------
+    options, wheels, side, strip : record
+    want : int
+        Nonzero for second derivatives.
+    """
+    helical = side.twist_1 != 0.0
+    a, sum_of_bases, length, alpha = side.x[L.A], side.base_sum, side.length, side.alpha_0
+    per = side.base_1 / wheels.pitch
+    slope = length / sum_of_bases  # tan alpha
+    turn_1, turn_2 = 2.0 * np.pi / options.teeth[0], -side.turn_2
+    if helical:
+        i = per * (slope - alpha - side.start_1)
+        side.start_1 += i * turn_1
+        side.start_2 += i * turn_2
+    middle_section(options, wheels, side, strip, want)
+    if not helical:
+        return
+    # di/dF_1, di/da, d2i/da2, of cos alpha = (r_1 + r_2)/a
+    alpha_a = sum_of_bases / (a * length)
+    alpha_aa = -sum_of_bases * (length + a * a / length) / (a * length) ** 2
+    i_f, i_a = -per, per * slope * slope * alpha_a
+    i_aa = per * slope * (2.0 * (1.0 + slope * slope) * alpha_a * alpha_a + slope * alpha_aa)
+    grad, hess = strip.grad, strip.hess
+    along = grad[L.F1, 0] * turn_1 + grad[L.F2, 0] * turn_2
+    grad[L.F1, 0] += along * i_f
+    grad[L.A, 0] += along * i_a
+    if want == 0:
+        return
+    turned = (
+        by_turns(hess, 0, turn_1, turn_2), by_turns(hess, 1, turn_1, turn_2), by_turns(hess, 2, turn_1, turn_2),
+        by_turns(hess, 3, turn_1, turn_2), by_turns(hess, 4, turn_1, turn_2), by_turns(hess, 5, turn_1, turn_2),
+    )  # fmt: skip
+    both = turned[L.F1] * turn_1 + turned[L.F2] * turn_2
+    for j in range(6):
+        i_j = i_f if j == L.F1 else i_a if j == L.A else 0.0
+        for k in range(j, 6):
+            i_k = i_f if k == L.F1 else i_a if k == L.A else 0.0
+            hess[j, k, 0] += turned[j] * i_k + turned[k] * i_j + both * i_j * i_k
+    hess[L.A, L.A, 0] += along * i_aa
 
 
 @kernel
