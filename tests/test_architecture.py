@@ -40,7 +40,7 @@ MAY_KNOW = {
     "gears": {"contact", "mechanism", "dae"},
     "bearings": {"mechanism"},
     "flexible": {"mechanism"},
-    "drivetrain": {"bearings", "gears", "mechanism"},
+    "drivetrain": {"bearings", "flexible", "gears", "mechanism"},
     "signals": set(),
     "view": {"contact", "flexible", "gears", "mechanism", "signals", "dae.results"},
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
@@ -86,8 +86,8 @@ EXCEPTIONS = {
 CIRCLES = {
     ("kernels.ahead", "kernels.calls", "kernels.jit"):
         "a kernel that is not there is compiled when it is called",
-    ("drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.placement", "drivetrain.plants",
-     "drivetrain.torsional"):
+    ("drivetrain.bodies", "drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.on_shafts",
+     "drivetrain.placement", "drivetrain.plants", "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
     ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.plant_names",

@@ -9,7 +9,8 @@ import pytest
 import gearmbs as gm
 from gearmbs.bearings import Bearing, BearingError
 from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, SpeedDrive
-from gearmbs.drivetrain.parts import Shaft, Wheel
+from gearmbs.drivetrain.parts import Wheel
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.flexible import Support
 from gearmbs.gears import ContactLaw, GearPair, GearSpec, OperatingPoint
 from gearmbs.gears.faults import RootCrack

@@ -22,6 +22,9 @@ from .drivetrain import Description as Description
 from .drivetrain import Drivetrain as Drivetrain
 from .drivetrain import RunSettings as RunSettings
 from .drivetrain import read_description as read_description
+from .housing import Housing as Housing
+from .housing import HousingMode as HousingMode
+from .housing import Mount as Mount
 from .kinematics import KinematicTable as KinematicTable
 from .loads import LOADS as LOADS
 from .loads import Brake as Brake
@@ -36,15 +39,12 @@ from .part import DrivetrainError as DrivetrainError
 from .parts import SENSORS as SENSORS
 from .parts import Accelerometer as Accelerometer
 from .parts import GearMesh as GearMesh
-from .parts import Housing as Housing
-from .parts import HousingMode as HousingMode
 from .parts import Laser as Laser
-from .parts import Mount as Mount
 from .parts import Sensor as Sensor
-from .parts import Shaft as Shaft
 from .parts import SpeedSensor as SpeedSensor
 from .parts import TorqueSensor as TorqueSensor
 from .parts import Wheel as Wheel
+from .shaft import Shaft as Shaft
 from .torque_element import ShaftTorque as ShaftTorque
 from .torsional import TorsionalModel as TorsionalModel
 from .torsional import TorsionalSpring as TorsionalSpring

@@ -11,11 +11,13 @@ import numpy as np
 
 from gearmbs.drivetrain.connections import Bearing, Coupling
 from gearmbs.drivetrain.drives import Drive
+from gearmbs.drivetrain.housing import Housing
 from gearmbs.drivetrain.kinematics import walk
 from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
-from gearmbs.drivetrain.parts import Accelerometer, Housing, Laser, Sensor, Shaft, SpeedSensor, TorqueSensor, Wheel
+from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.mechanism.mechanism import Mechanism
@@ -94,7 +96,9 @@ def _names(train: Drivetrain) -> None:
                 "an accelerometer cannot be on; give a housing",
             )
     for housing in train.housings:
-        for mode in housing.modes:
+        for name in housing.seats.keys() - {mount.name for mount in housing.mounts}:
+            train.part(name, Bearing, f"{housing.label}: seats")
+        for mode in housing.modes if housing.model is None else ():
             for place in mode.shape:
                 train.part(place, Bearing, mode.label)
 
@@ -304,6 +308,24 @@ class _Builder:
         train, layout = self.train, self.layout
         seat = layout.seats[shaft.name]
         self._warn_of_solid_wheels(shaft)
+        spin = train.start_share * train.speeds[shaft.name]
+        where = {
+            "position": seat.origin,
+            "orientation": seat.axes @ turn_z(layout.angles[shaft.name]),
+            "angular_velocity": spin * seat.axes[:, 2],
+        }
+        if shaft.modes is None:
+            body = self._rigid_shaft(shaft, where)
+        else:
+            body = train.modal_models[shaft.name].add_to(self.m, shaft.name, damping=shaft.damping, **where)
+        for wheel in train.wheels:
+            if wheel.shaft == shaft.name:
+                turned = turn_z(layout.wheels[wheel.name])
+                self.wheels[wheel.name] = body.marker((0.0, 0.0, train.station(wheel)), turned, name=wheel.name)
+
+    def _rigid_shaft(self, shaft: Shaft, where: dict[str, Any]) -> Body:
+        """Return the body of a rigid shaft with its wheels."""
+        train = self.train
         mass, centre, polar, across = shaft.body()
         pieces = [(mass, centre, np.diag([across, across, polar]))]
         for wheel in train.wheels:
@@ -312,15 +334,7 @@ class _Builder:
         total = sum(p[0] for p in pieces)
         middle = sum(p[0] * p[1] for p in pieces) / total
         inertia = sum(p[2] + p[0] * (p[1] - middle) ** 2 * np.diag([1.0, 1.0, 0.0]) for p in pieces)
-        spin = train.start_share * train.speeds[shaft.name]
-        body = self.m.body(
-            shaft.name, total, inertia, com=(0.0, 0.0, middle), position=seat.origin,
-            orientation=seat.axes @ turn_z(layout.angles[shaft.name]), angular_velocity=spin * seat.axes[:, 2],
-        )  # fmt: skip
-        for wheel in train.wheels:
-            if wheel.shaft == shaft.name:
-                turned = turn_z(layout.wheels[wheel.name])
-                self.wheels[wheel.name] = body.marker((0.0, 0.0, train.station(wheel)), turned, name=wheel.name)
+        return self.m.body(shaft.name, total, inertia, com=(0.0, 0.0, middle), **where)
 
     def _warn_of_solid_wheels(self, shaft: Shaft, stacklevel: int = 5) -> None:
         """Warn where wheels and the shaft through them hold much of the same material."""
@@ -352,9 +366,16 @@ class _Builder:
 
     def housing(self, housing: Housing) -> None:
         """Add a housing on its mounts, with its modes."""
-        if housing.modes:
+        if housing.model is not None:
+            model = self.train.modal_models[housing.name]
+            body: Body = model.add_to(
+                self.m, housing.name, damping=housing.damping, position=housing.at, orientation=housing.turned
+            )
+        elif housing.modes:
             body = self._modal_housing(housing)
         else:
+            assert housing.mass is not None
+            assert housing.inertia is not None
             body = self.m.body(housing.name, housing.mass, housing.inertia, position=housing.at)
         if not housing.mounts:
             self.m.fixed(f"{housing.name} fixed", body, self.m.ground, at=housing.at)
@@ -380,6 +401,8 @@ class _Builder:
                         moved[k] = mode.shape.get(name, (0.0, 0.0, 0.0))
             return moved, np.zeros((len(modes), 3))
 
+        assert housing.mass is not None
+        assert housing.inertia is not None
         return self.m.modal_body(housing.name, housing.mass, housing.inertia, modes, shapes, position=housing.at)
 
     def bearing(self, bearing: Bearing) -> None:

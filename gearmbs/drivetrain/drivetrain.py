@@ -57,9 +57,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.drivetrain.connections import BEARINGS, COUPLINGS, Bearing, Coupling
 from gearmbs.drivetrain.drives import DRIVES, Drive, SpeedDrive
+from gearmbs.drivetrain.housing import Housing, HousingMode, Mount
 from gearmbs.drivetrain.loads import LOADS, Load
+from gearmbs.drivetrain.on_shafts import unfolded, with_parts_of_shafts
 from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, parts_html, require
-from gearmbs.drivetrain.parts import SENSORS, GearMesh, Housing, HousingMode, Mount, Sensor, Shaft, Wheel
+from gearmbs.drivetrain.parts import SENSORS, GearMesh, Sensor, Wheel
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
 from gearmbs.schema.described import Described, check_keys, chosen, line, make, read_toml
@@ -71,6 +74,7 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.kinematics import KinematicTable, PowerFlow
     from gearmbs.drivetrain.placement import Layout
     from gearmbs.drivetrain.torsional import MeshDynamics, TorsionalModel, TorsionalSpring
+    from gearmbs.flexible import ModalModel
     from gearmbs.gears.spec import GearSpec
     from gearmbs.mechanism.mechanism import Mechanism
     from gearmbs.mechanism.solve.plants import LinearPlant
@@ -148,6 +152,8 @@ class Drivetrain:
     parts: Mapping[str, Part] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        for group, found in unfolded(self).items():
+            object.__setattr__(self, group, found)
         known: dict[str, Part] = {}
         for group, kind in KINDS.items():
             object.__setattr__(self, group, tuple(getattr(self, group)))
@@ -247,6 +253,20 @@ class Drivetrain:
             driver, driven = self.wheels_of(mesh)
             sense = self.power.rotation(mesh.name)
             out[mesh.name] = mesh.make(driver.gear, driven.gear, sense, self.power.on_driven(mesh.name))
+        return out
+
+    @cached_property
+    def modal_models(self) -> dict[str, ModalModel]:
+        """Bodies with modes of the shafts and housings that deform, by name; see `gearmbs.drivetrain.bodies`."""
+        from gearmbs.drivetrain.bodies import modal_models
+
+        return modal_models(self)
+
+    def of_same_bodies(self, **changes: Any) -> Drivetrain:
+        """Return a drivetrain with other drives, loads or meshes, whose bodies that deform are not made again."""
+        out = replace(self, **changes)
+        if "modal_models" in self.__dict__:
+            out.__dict__["modal_models"] = self.modal_models
         return out
 
     @cached_property
@@ -471,27 +491,30 @@ def read_description(path: str | Path, fault: FaultReader | None = None) -> Desc
     """
     data = read_toml(path, DrivetrainError)
     data.setdefault("name", Path(path).stem)
-    return make_description(data, str(path), fault)
+    return make_description(data, str(path), fault, Path(path).parent)
 
 
 def make_description(
-    data: Mapping[str, Any], source: str = "drivetrain", fault: FaultReader | None = None
+    data: Mapping[str, Any], source: str = "drivetrain", fault: FaultReader | None = None, folder: Path | None = None
 ) -> Description:
-    """Return the drivetrain that nested tables describe; see `gearmbs.drivetrain.drivetrain` for their form."""
+    """Return the drivetrain that nested tables describe; see `gearmbs.drivetrain.drivetrain` for their form.
+
+    Files that they name are looked for in ``folder``, the present one if there is none.
+    """
     try:
-        return _made(data, fault)
+        return _made(data, fault, folder or Path())
     except ValueError as error:
         raise DrivetrainError(f"{source}: {error}") from None
 
 
-def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
+def _made(data: Mapping[str, Any], fault: FaultReader | None, folder: Path) -> Description:
     known = ("name", "gravity", "run_up", "running", "run", *KINDS)
     check_keys(data, known, "the file", DrivetrainError, shown=repr)
     parts: dict[str, Any] = {}
-    for group in KINDS:
-        tables = data.get(group, {})
+    groups = with_parts_of_shafts({group: data.get(group, {}) for group in KINDS})
+    for group, tables in groups.items():
         require(isinstance(tables, Mapping), f"{group}: write a table for each, such as [{group}.a]")
-        parts[group] = [_part(group, str(name), table, fault) for name, table in tables.items()]
+        parts[group] = [_part(group, str(name), table, fault, folder) for name, table in tables.items()]
     others: dict[str, Any] = {key: data[key] for key in ("name", "running") if key in data}
     running = data.get("running", False)
     require(isinstance(running, bool), f"running is {running!r}; give true or false")
@@ -510,7 +533,7 @@ def _measured(data: Mapping[str, Any], key: str, measure: Measure) -> Any:
         raise DrivetrainError(line(key, data[key], error)) from None
 
 
-def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
+def _part(group: str, name: str, table: Any, fault: FaultReader | None, folder: Path) -> Part:
     where = f"{group}.{name}"
     require(isinstance(table, Mapping), f"{where}: write a table, such as [{where}]")
     settings = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
@@ -519,7 +542,7 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
     if group == "meshes":
         return _mesh(where, name, settings, fault)
     if group == "housings":
-        return _housing(where, name, settings)
+        return _housing(where, name, settings, folder)
     if group == "shafts":
         return _of_kind(where, Shaft, name, settings)
     kinds, usual = BY_KIND[group]
@@ -566,9 +589,14 @@ def _mesh(where: str, name: str, settings: dict[str, Any], fault: FaultReader | 
     return _of_kind(where, GearMesh, name, {**own, "settings": settings})
 
 
-def _housing(where: str, name: str, settings: dict[str, Any]) -> Housing:
+def _housing(where: str, name: str, settings: dict[str, Any], folder: Path) -> Housing:
+    if isinstance(settings.get("model"), Mapping):
+        settings["model"] = _from_folder(where, settings["model"], folder)
     for key, kind in (("mounts", Mount), ("modes", HousingMode)):
         tables = settings.pop(key, {})
+        if key == "modes" and "model" in settings and not isinstance(tables, Mapping):
+            settings[key] = tables
+            continue
         require(isinstance(tables, Mapping), f"{where}.{key}: write a table for each, such as [{where}.{key}.a]")
         made = []
         for part, table in tables.items():
@@ -576,3 +604,15 @@ def _housing(where: str, name: str, settings: dict[str, Any]) -> Housing:
             made.append(_of_kind(f"{where}.{key}.{part}", kind, f"{name} {part}", fitted))
         settings[key] = tuple(made)
     return _of_kind(where, Housing, name, settings)
+
+
+def _from_folder(where: str, model: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the table of a finite-element model with the files that it names, by their full paths."""
+    table = dict(model)
+    files = table.get("files", [])
+    files = [files] if isinstance(files, str) else files
+    texts = isinstance(files, list) and all(isinstance(file, str) for file in files)
+    require(texts, f"{where}.model: files is {files!r}; give a list of texts")
+    if files:
+        table["files"] = [folder / file for file in files]
+    return table

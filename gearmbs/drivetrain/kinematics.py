@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.loads import RPM, Drag, Load, TableLoad
 from gearmbs.drivetrain.part import DrivetrainError, require
-from gearmbs.drivetrain.parts import GearMesh, Shaft
+from gearmbs.drivetrain.parts import GearMesh
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gearmbs.drivetrain.part import DrivetrainError, require
-from gearmbs.drivetrain.parts import GearMesh, Shaft
+from gearmbs.drivetrain.parts import GearMesh
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ import numpy as np
 from gearmbs.drivetrain.drives import Drive, SpeedDrive, TorqueDrive
 from gearmbs.drivetrain.loads import Load, TorqueLoad
 from gearmbs.drivetrain.part import DrivetrainError
-from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, Shaft, SpeedSensor, TorqueSensor
+from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.mechanism.parts.functions import constant
 from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.solve.analyses import static_equilibrium
@@ -41,7 +42,7 @@ def resting(train: Drivetrain) -> Drivetrain:
     ]  # fmt: skip
     # flanks that rest on each other would stick
     meshes = [replace(mesh, settings={**mesh.settings, "friction": False}) for mesh in train.meshes]
-    return replace(train, drives=drives, loads=loads, meshes=meshes, running=False)
+    return train.of_same_bodies(drives=drives, loads=loads, meshes=meshes, running=False)
 
 
 def _own_input(part: Drive | Load) -> Input | None:

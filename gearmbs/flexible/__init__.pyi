@@ -40,6 +40,7 @@ from .shaft import Shaft as Shaft
 from .shaft import ShaftSection as ShaftSection
 from .solid import block_mesh as block_mesh
 from .solid import box_housing as box_housing
+from .solid import box_model as box_model
 from .solid import nodes_where as nodes_where
 from .solid import planet_carrier as planet_carrier
 from .solid import ring_mesh as ring_mesh

@@ -334,12 +334,9 @@ def box_housing(
     FlexibleError
         If walls or bearings do not fit; if scikit-fem is not installed.
     """
-    x, y, z = quantities(size, "length", "box_housing: size")
-    t = quantity(wall, "length", "box_housing: wall")
+    x, y, z, t = _box(size, wall, "box_housing")
     reach = 0.5 * quantity(bearing, "length", "box_housing: bearing")
     axes = quantities(bearings, "length", "box_housing: bearings").reshape(-1, 2)
-    if not 0.0 < 2 * t < min(x, z) or not t < y:
-        raise FlexibleError(f"box_housing: walls of {t} m do not fit into {x} x {y} x {z} m")
     for u, v in axes:
         if not (t + reach <= u <= x - t - reach and t + reach <= v <= y - reach):
             raise FlexibleError(f"box_housing: a bearing of {2 * reach} m at ({u}, {v}) m is not inside the end walls")
@@ -351,6 +348,46 @@ def box_housing(
                 f"box_housing: bearings of {2 * reach} m at ({u}, {v}) m and ({other[0]}, {other[1]}) m overlap; they "
                 f"are {apart.min():.4g} m apart"
             )
+    model = box_model((x, y, z), t, divisions=divisions, material=material, name=name)
+    return reduce_model(model, _housing_seats(model, (x, z), t, axes, reach), modes=modes)
+
+
+def _box(size: npt.ArrayLike, wall: Quantity, label: str) -> tuple[float, float, float, float]:
+    """Return width, height, length and wall of a box, m, checked."""
+    x, y, z = (float(v) for v in quantities(size, "length", f"{label}: size"))
+    t = quantity(wall, "length", f"{label}: wall")
+    if not 0.0 < 2 * t < min(x, z) or not t < y:
+        raise FlexibleError(f"{label}: walls of {t} m do not fit into {x} x {y} x {z} m")
+    return x, y, z, t
+
+
+def box_model(
+    size: npt.ArrayLike,
+    wall: Quantity,
+    *,
+    divisions: tuple[int, int, int] = (6, 4, 4),
+    material: ElasticMaterial = STEEL,
+    name: str = "housing",
+) -> FiniteElementModel:
+    """Return the finite elements of a box, open on top (y), of which `box_housing` makes a body.
+
+    Parameters
+    ----------
+    size : array_like of 3 floats or str
+        Outer width (x), height (y) and length (z), m, from the origin.
+    wall : float or str
+        Thickness of all walls, m.
+    divisions : tuple of 3 ints
+        Elements between the walls.
+    material : ElasticMaterial
+    name : str
+
+    Raises
+    ------
+    FlexibleError
+        If the walls do not fit; if scikit-fem is not installed.
+    """
+    x, y, z, t = _box(size, wall, "box_model")
     places = [
         np.concatenate([[0.0], np.linspace(t, x - t, divisions[0] + 1), [x]]),
         np.concatenate([[0.0], np.linspace(t, y, divisions[1] + 1)]),
@@ -365,8 +402,7 @@ def box_housing(
         for k in range(counts[2] - 1)
         if i in (0, counts[0] - 2) or j == 0 or k in (0, counts[2] - 2)
     ]
-    model = solid_model(used_part(points, np.array(cells)), material, name=name)
-    return reduce_model(model, _housing_seats(model, (x, z), t, axes, reach), modes=modes)
+    return solid_model(used_part(points, np.array(cells)), material, name=name)
 
 
 def _housing_seats(

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.dae.results.solution import Solution
-from gearmbs.drivetrain import Accelerometer, Drivetrain, Laser, SpeedSensor, TorqueSensor
+from gearmbs.drivetrain import Accelerometer, Drivetrain, Housing, Laser, Shaft, SpeedSensor, TorqueSensor
 from gearmbs.drivetrain.kinematics import RPM
 from gearmbs.mechanism import Mechanism
 
@@ -47,6 +47,8 @@ class TrainColumns(NamedTuple):
         Angles about the shafts' axes, rad; within one turn until they are joined.
     speed : ndarray, shape (m, shafts)
         rad/s.
+    twisted : ndarray, shape (m, wheels)
+        Angles of wheels against their shafts that bend and twist, which turn on the mean; zero on rigid ones, rad.
     """
 
     t: np.ndarray
@@ -55,6 +57,7 @@ class TrainColumns(NamedTuple):
     sensors: np.ndarray
     turned: np.ndarray
     speed: np.ndarray
+    twisted: np.ndarray
 
 
 def counted_turns(t: np.ndarray, turned: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -129,15 +132,21 @@ class TrainRecorder:
             x = part.orientation(shaft.name)[:, :, 0] @ axes[:, :2]
             turned[:, k] = np.arctan2(x[:, 1], x[:, 0])
             speed[:, k] = part.angular_velocity(shaft.name) @ axes[:, 2]
+        twisted = np.zeros((m, len(train.wheels)))
+        for k, wheel in enumerate(train.wheels):
+            if train.part(wheel.shaft, Shaft).modes is not None:
+                twisted[:, k] = part.deflection(wheel.name)[1][:, 2]
         sensors = np.empty((m, len(train.sensors)))
         for k, sensor in enumerate(train.sensors):
             sensors[:, k] = self._sensed(sensor, part, speed)
-        return TrainColumns(part.t.copy(), contact, force, sensors, turned, speed)
+        return TrainColumns(part.t.copy(), contact, force, sensors, turned, speed, twisted)
 
     def _sensed(self, sensor: object, part: Solution, speed: np.ndarray) -> np.ndarray:
         train = self.train
         if isinstance(sensor, SpeedSensor):
             return speed[:, [s.name for s in train.shafts].index(sensor.shaft)]
+        if self._deforms(sensor):
+            return part.output(sensor.name)  # type: ignore[attr-defined]
         if isinstance(sensor, Laser):
             return self._laser(sensor, part)
         if isinstance(sensor, Accelerometer):
@@ -148,6 +157,15 @@ class TrainRecorder:
         source = train.parts[of]
         shaft = getattr(source, "shaft", None) or source.second  # type: ignore[attr-defined]
         return moment @ self._axes[shaft][:, 2]
+
+    def _deforms(self, sensor: object) -> bool:
+        """Return whether what a sensor looks at bends by shapes that its body knows."""
+        if isinstance(sensor, Laser):
+            return self.train.part(sensor.shaft, Shaft).modes is not None
+        if isinstance(sensor, Accelerometer):
+            bearing = next(b for b in self.train.bearings if b.name == sensor.bearing)
+            return self.train.part(self.train.carrier(bearing), Housing).model is not None
+        return False
 
     def _laser(self, sensor: Laser, part: Solution) -> np.ndarray:
         """Return (v + w x r) . d at a spot fixed in space: at rest on the axis or beside it."""

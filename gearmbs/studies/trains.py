@@ -192,21 +192,23 @@ def check_record(train: Drivetrain, run: RunSettings) -> None:
 def raw_record(train: Drivetrain, known: TrainColumns, solution: Solution) -> xr.Dataset:
     """Return what was computed at the integrator's own steps, for a run that failed."""
     out = _dataset(train, known.t, known.contact, known.bearing_force, known.sensors, known.speed,
-                   transmission_error(train, known.turned))  # fmt: skip
+                   transmission_error(train, known.turned, known.twisted))  # fmt: skip
     out.attrs = {**attributes(train, None, solution), "status": solution.status.name, "message": solution.message}
     return out
 
 
-def transmission_error(train: Drivetrain, turned: np.ndarray) -> np.ndarray:
+def transmission_error(train: Drivetrain, turned: np.ndarray, twisted: np.ndarray) -> np.ndarray:
     """Return the lag of the driven wheel along the line of action, from the touching start, shape (m, meshes), m."""
     names = [shaft.name for shaft in train.shafts]
+    wheels = [wheel.name for wheel in train.wheels]
     out = np.empty((turned.shape[0], len(train.meshes)))
     for k, mesh in enumerate(train.meshes):
         driver, driven = train.wheels_of(mesh)
         pair = train.pairs[mesh.name]
         ratio = pair.geometry.sign * driver.gear.teeth / driven.gear.teeth
         sense = pair.rotation * pair.geometry.driven.base_radius
-        lag = sense * (turned[:, names.index(driver.shaft)] * ratio + turned[:, names.index(driven.shaft)])
+        one, two = (turned[:, names.index(w.shaft)] + twisted[:, wheels.index(w.name)] for w in (driver, driven))
+        lag = sense * (one * ratio + two)
         start = sense * (train.layout.angles[driver.shaft] * ratio + train.layout.angles[driven.shaft])
         # full turns, counted from wherever the record begins, are no lag
         pitch = abs(pair.geometry.driver.base_pitch)
@@ -234,7 +236,7 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
             column = known.contact[:, k, c]
             contact[:, k, c] = column[latest] if name in COUNTED else np.interp(t, known.t, column)
         contact[:, k, 0] = values[:, k]
-    error = transmission_error(train, known.turned)
+    error = transmission_error(train, known.turned, known.twisted)
     error = _interpolated(known.t, error, t)
     speed = _interpolated(known.t, known.speed, t)
     bearing = values[:, meshes : meshes + 3 * bearings].reshape(t.size, bearings, 3)

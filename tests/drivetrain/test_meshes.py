@@ -357,8 +357,8 @@ def test_diameters_and_radii():
         Shaft(name="a", radius="15 mm", diameter="30 mm")
     with pytest.raises(DrivetrainError, match=says("sections", "give diameter")):
         Shaft(name="a", diameter="30 mm", sections=pairs)
-    with pytest.raises(DrivetrainError, match=says("'100 mm'", "'30 mm'", "without bore")):
-        Shaft(name="a", sections=[ShaftSection("100 mm", "30 mm", inner="10 mm")])
+    bored = Shaft(name="a", sections=[ShaftSection("100 mm", "30 mm", inner="10 mm")])
+    assert bored.body()[0] == pytest.approx(7850.0 * np.pi / 4 * (0.03**2 - 0.01**2) * 0.1)
     with pytest.raises(DrivetrainError, match="give length and diameter"):
         Shaft(name="a", sections=[{"length": 0.1, "width": 0.2}])
 

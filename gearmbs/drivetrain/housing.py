@@ -1,0 +1,233 @@
+"""Housings of a drivetrain: rigid, with modes by their numbers, or of finite elements; and what they stand on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+
+from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, require
+from gearmbs.drivetrain.shaft import ALL, DAMPING, damping_of
+from gearmbs.schema.described import chosen
+from gearmbs.schema.quantities import Measure
+from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    from gearmbs.flexible import ModalModel
+
+Mass = Annotated[Quantity, Measure("mass", above=0)]
+Three = tuple[Quantity, Quantity, Quantity]
+
+TURNED = 1e-6
+"""Largest entry of A A^T - 1 of axes: what six digits of a direction leave."""
+
+MODES = 20
+"""Vibration shapes of a finite-element housing where nothing is said, as of `gearmbs.flexible.reduce_model`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mount(Part):
+    """An elastic mount between a housing and the ground.
+
+    Parameters
+    ----------
+    at : sequence of 3 floats
+        Place in global components, m.
+    stiffness, damping : sequence of 3 floats
+        Along the global axes, N/m and N s/m.
+    radius : float or str, optional
+        Of the foot, m: the nodes of a finite-element housing so near to the place carry it.
+    """
+
+    title: ClassVar[str] = "mount"
+
+    at: Annotated[Three, Measure("length", several=3)]
+    stiffness: Annotated[Three, Measure("stiffness", 0, several=3)]
+    damping: Annotated[Three, Measure("damping", 0, several=3)] = (0.0, 0.0, 0.0)
+    radius: Annotated[Quantity, Measure("length", above=0)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class HousingMode(Part):
+    """A structural mode of a housing by its modal mass and stiffness, and how the bearing seats move in it.
+
+    Parameters
+    ----------
+    mass, stiffness : float or str
+        Modal mass (kg) and stiffness (N/m) for a displacement of one metre at shape 1.
+    damping_ratio : float
+        Of critical damping.
+    shape : mapping of str to 3 floats
+        Displacement of bearing seats and sensors, by name, in global components at the start; others stay.
+    """
+
+    title: ClassVar[str] = "mode"
+
+    mass: Mass
+    stiffness: Annotated[Quantity, Measure("stiffness", above=0)]
+    shape: Mapping[str, Any]
+    damping_ratio: float = 0.02
+
+    @property
+    def frequency(self) -> float:
+        """Natural frequency with the housing held, Hz."""
+        return math.sqrt(self.stiffness / self.mass) / (2.0 * math.pi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Housing(Part):
+    """A housing on mounts: rigid, with structural modes by their numbers, or a finite-element model.
+
+    A finite-element housing carries each bearing by its nodes within the bearing's outer ring, found by the place,
+    the outside diameter and the width of the bearing; each mount by those within its radius.
+
+    Parameters
+    ----------
+    mass : float or str, optional
+        kg; needed without ``model``.
+    inertia : sequence of 3 floats, optional
+        About the centre of mass in global axes, kg m^2; likewise.
+    at : sequence of 3 floats
+        Centre of mass in global components, m; with ``model`` the origin of its nodes' frame.
+    mounts : sequence of Mount
+        None: fixed to the ground, which a finite-element housing is not.
+    modes : sequence of HousingMode, or int or "all"
+        By their numbers; with ``model`` how many of its shapes between bearings and mounts are kept beside the static
+        ones (default 20), or of a body with modes how many of these (default all).
+    model : FiniteElementModel, ModalModel or mapping, optional
+        Of `gearmbs.flexible`; or a table with ``program``, one of `PROGRAMS`, ``files``, and the keywords of its
+        reader, as ``length = "mm"``.
+    axes : sequence of 3 by 3 floats, optional
+        Columns: the axes of the nodes' frame in global components; default: the same.
+    seats : mapping of str, optional
+        By bearing: outside diameter and width of what it sits in, m, instead of those of ``rolling``. By bearing or
+        mount: name of the seat, or number of the node, of a ``model`` with modes, else the one nearest to it.
+    faces : {"average", "rigid"}
+        How nodes follow their seat, see `gearmbs.flexible.Interface`.
+    damping : float, sequence or bands
+        Of the modes of a ``model``, see `gearmbs.flexible.damping_ratios`.
+
+    Raises
+    ------
+    DrivetrainError
+    """
+
+    title: ClassVar[str] = "housing"
+
+    mass: Mass = None
+    inertia: Annotated[Three | None, Measure("inertia", above=0, several=3)] = None
+    at: Annotated[Three, Measure("length", several=3)] = (0.0, 0.0, 0.0)
+    mounts: tuple[Mount, ...] = ()
+    modes: Any = ()
+    model: Any = None
+    axes: Any = None
+    seats: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
+    faces: str = "average"
+    damping: Any = DAMPING
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.model is None:
+            for name in ("mass", "inertia"):
+                require(getattr(self, name) is not None, f"{self.label}: {name} is missing; give it, or a model")
+            typed = isinstance(self.modes, tuple | list) and all(isinstance(mode, HousingMode) for mode in self.modes)
+            require(
+                typed, f"{self.label}: modes is {self.modes!r}; give HousingMode objects, or a model beside a number"
+            )
+            object.__setattr__(self, "modes", tuple(self.modes))
+            return
+        for name in ("mass", "inertia"):
+            require(getattr(self, name) is None, f"{self.label}: {name} follows from model; leave it out")
+        require(
+            bool(self.mounts),
+            f"{self.label}: mounts is empty; give the mounts on which a housing of finite elements stands",
+        )
+        counted = isinstance(self.modes, int) and not isinstance(self.modes, bool) and self.modes >= 1
+        require(
+            counted or self.modes in ((), ALL),
+            f"{self.label}: modes is {self.modes!r} beside model; give a whole number from 1 up, or '{ALL}'",
+        )
+        chosen(("average", "rigid"), self.faces, f"{self.label}: ", DrivetrainError, "faces")
+        with errors_named(f"{self.label}: damping"):
+            damping_of(self.damping)
+        self._check_axes()
+        with errors_named(f"{self.label}: model"):
+            object.__setattr__(self, "model", housing_source(self.model))
+
+    def _check_axes(self) -> None:
+        if self.axes is None:
+            return
+        given = np.asarray(self.axes, dtype=float)
+        right = (
+            given.shape == (3, 3) and np.abs(given @ given.T - np.eye(3)).max() < TURNED and np.linalg.det(given) > 0
+        )
+        require(bool(right), f"{self.label}: axes is {self.axes!r}; give 3 rows of a rotation matrix")
+        object.__setattr__(self, "axes", tuple(map(tuple, given.tolist())))
+
+    @property
+    def turned(self) -> np.ndarray:
+        """Axes of the body's frame in global components, as columns."""
+        return np.eye(3) if self.axes is None else np.array(self.axes)
+
+
+# Finite-element models and bodies with modes, from the files of other programs.
+
+
+def _neutral_file(path: Any, **options: Any) -> ModalModel:
+    from gearmbs.flexible import read_mnf
+
+    return read_mnf(path).modal_model(**options)
+
+
+def _modes_of_op2(path: Any, **options: Any) -> ModalModel:
+    from gearmbs.flexible import read_op2_modes
+
+    return read_op2_modes(path, **options).modal_model()
+
+
+def _reader(name: str) -> Callable[..., Any]:
+    def read(*files: Any, **options: Any) -> Any:
+        from gearmbs import flexible
+
+        return getattr(flexible, name)(*files, **options)
+
+    return read
+
+
+PROGRAMS: dict[str, Callable[..., Any]] = {
+    "abaqus": _reader("read_abaqus"),
+    "ansys": _reader("read_ansys"),
+    "box": _reader("box_model"),
+    "calculix": _reader("read_calculix"),
+    "mnf": _neutral_file,
+    "op2": _reader("read_op2"),
+    "op2 modes": _modes_of_op2,
+    "op4": _reader("read_op4"),
+}
+"""Readers of ``model`` by ``program``; "box" is a box by its walls, see `gearmbs.flexible.box_model`."""
+
+
+def housing_source(given: Any) -> Any:
+    """Return the finite-element model or the body with modes that was given, or that a table says how to read.
+
+    Raises
+    ------
+    DrivetrainError
+        For other objects, and unknown programs.
+    """
+    from gearmbs.flexible import FiniteElementModel, ModalModel
+
+    if isinstance(given, FiniteElementModel | ModalModel):
+        return given
+    require(
+        isinstance(given, Mapping),
+        f"{given!r} is no finite-element model; give one of gearmbs.flexible, or a table with program and files",
+    )
+    table = dict(given)
+    read = chosen(PROGRAMS, str(table.pop("program", "missing")), "", DrivetrainError, "program")
+    files = table.pop("files", ())
+    return read(*((files,) if isinstance(files, str | Path) else files), **table)
