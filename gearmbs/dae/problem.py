@@ -267,6 +267,9 @@ class DAEProblem:
         integrators that do not call it after each step.
     restart_rates : callable, optional
         ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
+    own_start : callable, optional
+        ``own_start(t, y, yp, idata, rdata)`` returns y and y' where these are of a like problem with other numbers:
+        what does not carry over, as momenta with another inertia, follows from what does.
     jacobian_residuals : int
         Calls of ``residual`` whose time one of ``jacobian`` takes, if they are many: differences, modal bodies.
     small_entries : bool
@@ -319,6 +322,7 @@ class DAEProblem:
     n_events: int = 0
     hook_interval: Callable[[float, np.ndarray, np.ndarray], float] | None = None
     restart_rates: Callable | None = None
+    own_start: Callable[..., tuple[np.ndarray, np.ndarray]] | None = None
     jacobian_residuals: int = 0
     small_entries: bool = False
     couplings: np.ndarray | None = None

@@ -149,8 +149,11 @@ class State:
             table[places] = values
         return found
 
-    def problem(self, problem: DAEProblem) -> DAEProblem:
+    def problem(self, problem: DAEProblem, history: History | None = None) -> DAEProblem:
         """Return a problem, as assembled at ``t_model``, that starts in this state.
+
+        Without a ``history`` that it goes on with its numbers may be others than those the state was made with. A body
+        of another inertia then has the velocity of the state, not its momentum.
 
         Raises
         ------
@@ -159,7 +162,10 @@ class State:
         """
         self.check(problem)
         idata, rdata = self.tables(problem)
-        return replace(problem, t0=self.t, y0=self.y.copy(), yp0=self.yp.copy(), idata=idata, rdata=rdata)
+        y, yp = self.y.copy(), self.yp.copy()
+        if history is None and problem.own_start is not None:
+            y, yp = problem.own_start(self.t, y, yp, idata, rdata)
+        return replace(problem, t0=self.t, y0=y, yp0=yp, idata=idata, rdata=rdata)
 
     def history_for(self, problem: DAEProblem, method: str) -> History | None:
         """Return the history if a run of a problem, as assembled at ``t_model``, may go on with it, else None.

@@ -306,9 +306,9 @@ def begin(run: Run) -> Failure | None:
     if failure is not None:
         return failure
     st.h = max(st.h, h)
-    if not run.options.check_start:
-        failure = _repair(run, h)
-    elif (failure := _check(run, h)) is not None and run.options.repairs > 0.0:
+    failure = _check(run, h) if run.options.check_start else _repair(run, h)
+    if run.options.check_start and run.options.repairs > 0.0:
+        # what passes the check may still be off by more than a step allows, which would shrink without end
         failure = _repair_within(run, h, run.options.repairs / run.options.tol, failure)
     return failure if failure is not None else _settle_first_step(run)
 
@@ -447,18 +447,25 @@ def _algebraic_note(run: Run) -> str:
     return messages.replaced_start(run.problem, np.flatnonzero(replaced))
 
 
-def _repair_within(run: Run, h: float, limit: float, refusal: Failure) -> Failure | None:
-    """Move the initial values onto the equations if none moves by more than a number of tolerances, else refuse."""
+def _repair_within(run: Run, h: float, limit: float, refusal: Failure | None) -> Failure | None:
+    """Move the initial values onto the equations if none moves by more than a number of tolerances, else refuse.
+
+    Without a refusal they are left as they were.
+    """
     st = run.state
-    start = st.y.copy()
+    start, note = st.y.copy(), run.start_note
+    places = (st.y, newest_point(st), st.record_y[0, : len(start)], *st.y_out[: st.next_output])
     if choose_first_pivots(run, h) is not None or not _correction(run) <= limit:
         return refusal
     failure = _repair(run, h)
-    if failure is not None or np.max(np.abs(st.y - start) * st.w_error) > limit:
-        return failure or refusal
+    back = ~run.problem.differential
     # multipliers over a vanishing step are impulses; those of the state are near, and the first step finds them
-    for row in (st.y, newest_point(st), st.record_y[0, : len(start)], *st.y_out[: st.next_output]):
-        row[~run.problem.differential] = start[~run.problem.differential]
+    if failure is not None or np.max(np.abs(st.y - start) * st.w_error) > limit:
+        if refusal is not None:
+            return failure or refusal
+        back[:], run.start_note = True, note
+    for row in places:
+        row[back] = start[back]
     return None
 
 

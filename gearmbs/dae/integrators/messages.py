@@ -58,6 +58,10 @@ ADVICE = {
         "The equations may have no solution beyond this time, or jump there; look at the unknown named, or end the run "
         "before."
     ),
+    Status.INCONSISTENT_START: (
+        "Make positions and velocities satisfy the constraints before the run, or pass check_start=False to let the "
+        "first step repair them."
+    ),
     Status.SOLVER_FAILURE: (
         "Try a looser tolerance, a smaller maximum step, a smoother start, or the WSTIFF integrator."
     ),
@@ -102,8 +106,8 @@ def inconsistent(problem: DAEProblem, t: float, worst: int, row: int, jump: floa
     """Explain initial values that do not satisfy the equations."""
     return (
         f"{Status.INCONSISTENT_START.sentence} At t = {t:.9g} {unknown_name(problem, worst)} would have to jump by "
-        f"about {jump:.3g} in the first instant; equation {row} is violated most. Make positions and velocities "
-        "satisfy the constraints before the run, or pass check_start=False to let the first step repair them."
+        f"about {jump:.3g} in the first instant; equation {row} is violated most. "
+        f"{advice(problem, Status.INCONSISTENT_START)}"
     )
 
 

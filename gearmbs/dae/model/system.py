@@ -208,6 +208,7 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
         hook=hook,
         hook_interval=_hook_interval(model, at),
         restart_rates=restart_rates,
+        own_start=own_start,
         jacobian_residuals=round(RESIDUALS_AN_ENTRY * len(indices) / at["n"]) if flexible else 0,
         small_entries=flexible,
         couplings=unknowns.between_modes(at, indptr, indices) if flexible else None,
@@ -327,6 +328,18 @@ def restart_rates(t, y, yp, idata, rdata) -> np.ndarray:
     yp = yp.copy()
     _momentum_rates(t, y, yp, idata, rdata, np.zeros(int(idata[T.H_WORK])))
     return yp
+
+
+def own_start(t, y, yp, idata, rdata) -> tuple[np.ndarray, np.ndarray]:
+    """Return y and y' of a model with other inertias: velocities are what bodies have, momenta follow, p = L_eps^T."""
+    y, yp = y.copy(), yp.copy()
+    p, e, r = (int(idata[k]) for k in (T.H_P, T.H_EPS, T.H_R))
+    out, work = np.zeros(y.size), np.zeros(int(idata[T.H_WORK]))
+    residual.residual(t, y, yp, out, idata, rdata, work)
+    y[p:e] -= out[e:r]
+    residual.residual(t, y, yp, out, idata, rdata, work)
+    yp[p:e] -= out[p:e]
+    return y, yp
 
 
 class System(BaseSystem):

@@ -136,6 +136,10 @@ ADVICE = {
         "The motion may have no continuation there, as where friction jams a joint; look at the forces just before, or "
         "end the run before."
     ),
+    Status.INCONSISTENT_START: (
+        "Joints, motions or centres of mass are elsewhere than in the model that the state is from: make them as there, "
+        "or start this mechanism without the state, from its own position and velocity."
+    ),
     Status.SOLVER_FAILURE: ("Loosen tol, let motions and torques start more smoothly, or take the WSTIFF integrator."),
 }
 """Advice for the modeller of a mechanism whose integration fails."""
@@ -267,7 +271,7 @@ def simulate(
         # events in what is left of the last step would be missed
         history = None if stops else initial.history_for(problem, name)
         options |= starting_options(name, history)
-        problem = initial.problem(problem)
+        problem = initial.problem(problem, history)
         # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there
         led = {name: number for name, number in problem.numbers.items() if number.slope(problem.rdata) != 0.0}
         for number in led.values():

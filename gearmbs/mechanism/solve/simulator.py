@@ -179,13 +179,14 @@ class Simulator(Told):
         self._tell_clock()
         problem, options = self._base, self._options
         if state is not None:
-            given = starting_options(options.method, state.history_for(problem, options.method))
-            problem, options = state.problem(problem), replace(options, **given)
+            history = state.history_for(problem, options.method)
+            problem = state.problem(problem, history)
+            options = replace(options, **starting_options(options.method, history))
         if self._stops:
             problem = self._watched(problem)
         self._problem, self._origin = problem, state
         with uncollected():
-            self._run = HeldRun(problem, self.t_end, replace(options, check_start=not repair))
+            self._run = HeldRun(problem, self.t_end, replace(options, check_start=options.check_start and not repair))
         nothing = np.empty((0, problem.n))
         cells = self._settings.cells
         held = (cells, np.empty((0, cells.size)))

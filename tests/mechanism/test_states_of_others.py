@@ -1,0 +1,75 @@
+"""States that go on in mechanisms with other numbers: bodies keep positions and velocities, whatever their inertia."""
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.mechanism import Mechanism, ModelError
+from tests.says import says
+
+TORQUE = 3.0
+
+
+def turning_disc(inertia, lump=False):
+    """A disc under a constant torque."""
+    m = Mechanism("disc")
+    disc = m.body("disc", mass=1.0, inertia=(inertia,) * 3, angular_velocity=(0, 0, 1.0))
+    m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    m.torque("drive", disc, TORQUE)
+    m.lump = lump
+    return m
+
+
+def pendulum(mass=1.0, inertia=0.02, place=0.5):
+    m = Mechanism("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", mass=mass, inertia=(inertia,) * 3, position=(place, 0, 0))
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    return m
+
+
+@pytest.mark.parametrize("lump", [False, True])
+@pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
+def test_another_inertia_has_the_same_speed(formulation, lump):
+    """Exactly, w = w0 + T t / J of each disc: started from the state, restored to it, and with check_start=False."""
+    sim = gm.Simulator(turning_disc(2.0, lump), 1.0, formulation=formulation)
+    sim.advance(0.5)
+    state = sim.state()
+    speed = 1.0 + 0.5 * TORQUE / 2.0
+    for inertia in (2.0, 5.0):
+        m, wanted = turning_disc(inertia, lump), speed + 0.3 * TORQUE / inertia
+        for options in ({}, {"check_start": False}):
+            run = m.simulate(0.8, initial=state, formulation=formulation, **options)
+            np.testing.assert_allclose(run.angular_velocity("disc")[[0, -1], 2], [speed, wanted], rtol=1e-5)
+            assert "moved" not in run.message
+        other = gm.Simulator(m, 1.0, formulation=formulation)
+        other.restore(state)
+        assert other.get("angular_velocity", "disc")[2] == pytest.approx(speed, rel=1e-6)
+        other.advance(0.8)
+        assert other.get("angular_velocity", "disc")[2] == pytest.approx(wanted, rel=1e-5)
+
+
+@pytest.mark.parametrize("other", [{"mass": 3.0}, {"inertia": 0.4}])
+def test_another_pendulum_goes_on_from_position_and_speed(other):
+    """As one that is built there: same energy, same angle later."""
+    state = pendulum().simulate(0.3).state_at(0.3)
+    run = pendulum(**other).simulate(0.6, initial=state, tol=1e-8)
+    start = pendulum().simulate(0.3)
+    built = pendulum(**other)
+    rod = built.bodies["rod"]
+    rod.position, rod.orientation = start.com_position("rod")[-1], start.orientation("rod")[-1]
+    rod.velocity, rod.angular_velocity = start.com_velocity("rod")[-1], start.angular_velocity("rod")[-1]
+    pin = built.joints["pin"]
+    pin.i.position = start.orientation("rod")[-1].T @ -start.com_position("rod")[-1]
+    wanted = built.simulate(0.3, tol=1e-8)
+    np.testing.assert_allclose(run.com_position("rod")[-1], wanted.com_position("rod")[-1], atol=1e-6)
+    assert run.kinetic_energy[0] == pytest.approx(wanted.kinetic_energy[0], rel=1e-6)
+
+
+def test_joints_elsewhere_are_refused_with_what_to_do():
+    state = pendulum().simulate(0.3).state_at(0.3)
+    told = says("state", "0.3", "centres", "make them as there")
+    assert pendulum(place=0.5 + 1e-6).simulate(0.4, initial=state).success
+    run = pendulum(place=0.6).simulate(0.4, initial=state)
+    assert not run.success and "check_start" not in run.message
+    with pytest.raises(ModelError, match=told):
+        gm.Simulator(pendulum(place=0.6), 1.0, initial=state).advance(0.4)
