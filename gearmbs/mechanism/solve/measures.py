@@ -154,8 +154,10 @@ class Measures:
         element, total = meshes[name], np.zeros(self.solution.t.size)
         *both, pitch = levers(element)
         for marker, lever in zip((element.i, element.j), both, strict=True):
-            first, now = marker.global_orientation(), self._axes(marker)
-            total += lever * np.arctan2(now[:, :, 0] @ first[:, 1], now[:, :, 0] @ first[:, 0])
+            first, now = marker.global_orientation(), self._axes(marker)[:, :, 0]
+            # term by term: a product of matrices rounds otherwise for one instant than for many
+            x, y = (now[:, 0] * first[0, c] + now[:, 1] * first[1, c] + now[:, 2] * first[2, c] for c in (0, 1))
+            total += lever * np.arctan2(y, x)
         return total - pitch * np.round(total / pitch)
 
     def output(self, name: str) -> Any:
