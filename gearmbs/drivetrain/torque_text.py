@@ -9,7 +9,7 @@ from typing import Any
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.parts.elements import AXIS_TORQUE, Load
-from gearmbs.mechanism.parts.functions import function_text
+from gearmbs.mechanism.parts.inputs import text_of
 
 LINEAR_SHARE = 0.8
 """Part of the largest torque up to which a controller's torque is what it asks for."""
@@ -58,7 +58,7 @@ def torque_text(element: Any, units: Units) -> tuple[Load, dict[str, tuple[str, 
         [float(v) for v in element.parameters],
         f'AZ("{i}", "{j}")',
         _scaled(f'WZ("{i}", "{j}", "{j}")', turn),
-        tuple(f"({function_text(function, units.time, 1.0)})" for function in element.times),
+        tuple(f"({text_of(function, units, 1.0)})" for function in element.times),
         f'DIF("{element.states[0].name}")' if element.states else "",
     )
     if element.law == "table" and seen.p[1] > 0.0:

@@ -377,7 +377,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
     for start in (gm.Simulator, Mechanism.simulate):
         with pytest.raises(ModelError, match=says("initial", "'s.npz'", "State.load")):
             start(slider_crank(), 1.0, initial="s.npz")
-    with pytest.raises(ModelError, match=says("state", "Joints", "make them as there")):
+    with pytest.raises(ModelError, match=says("0.2", "Joints", "centres", "make")):
         gm.Simulator(slider_crank(0.4), 1.0, initial=state).advance(0.3)
     solution = slider_crank().simulate(1.0, rate=10)
     with pytest.raises(ModelError, match=says("0.55", "output", "times")):

@@ -12,6 +12,7 @@ from gearmbs.adams.builders.constraints import CONSTRAINTS, CURVES
 from gearmbs.adams.builders.contacts import CONTACTS
 from gearmbs.adams.builders.flexible import DEFORMING, LINE_LOADS, ON_NODES
 from gearmbs.adams.builders.forces import FORCES
+from gearmbs.adams.builders.plants import name_plants
 from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.builders.scopes import IN_DYNAMICS, AdamsModel, BodyState, Present
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
@@ -156,6 +157,7 @@ def build_mechanism(
     model = build_model(made, allow_unsupported)
     if model.initial_motions:
         model = build_model(made, allow_unsupported, state=with_initial_motions(model))
+    name_plants(model)
     deck.diagnostics.extend(d for d in made.diagnostics if d not in deck.diagnostics)
     return model.mechanism
 

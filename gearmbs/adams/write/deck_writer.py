@@ -25,6 +25,7 @@ from gearmbs.adams.write.elements import (
     states_of,
 )
 from gearmbs.adams.write.gear_expressions import is_gear_contact
+from gearmbs.adams.write.plants import plant_in
 from gearmbs.adams.write.text import COMPONENTS_OF, WriterContext, listed, number, upper, wrapped
 from gearmbs.dae.equations.rotation import euler_from_matrix
 from gearmbs.dae.methods import FORMULATIONS, INTEGRATORS
@@ -48,6 +49,7 @@ from gearmbs.mechanism.language.syntax import (
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.parts.point_mass import PointMass
+from gearmbs.mechanism.solve.plants import markers_kept
 
 # What a written deck asks for: REQUESTs, the files of results, the integrator.
 
@@ -149,7 +151,10 @@ class DeckNames:
         self.kept = kept(mechanism)
         self.hidden = hidden(mechanism)
         self.numbers = {upper(k): made for k, made in {**mechanism.inputs, **mechanism.parameters}.items()}
-        self.variables = self._numbered({**mechanism.variables, **self.numbers})
+        self.plant = plant_in(mechanism)
+        others = {key: text for key, text in mechanism.variables.items() if key not in self.plant.aliases}
+        self.variables = self._numbered({**others, **self.numbers})
+        self.variables |= {upper(key): self.variables[upper(name)] for key, name in self.plant.aliases.items()}
         self.all_states = states_of(mechanism)
         self.states = self._numbered(self.all_states)
         self.splines = {upper(k): n for n, k in enumerate(mechanism.splines, 1)}
@@ -297,9 +302,10 @@ def write_deck(
     """
     if gears not in ("expressions", "solids"):
         raise ModelError(f"gears = {gears!r}; choose 'expressions' or 'solids'")
-    writer = DeckWriter(mechanism, path, gears)
-    writer.model(title)
-    request_statements(writer, requests or {}, output)
+    with markers_kept(mechanism):
+        writer = DeckWriter(mechanism, path, gears)
+        writer.model(title)
+        request_statements(writer, requests or {}, output)
     if output:
         writer.statement("OUTPUT/REQSAVE", [])
         writer.statement("RESULTS/XRF", [])

@@ -18,6 +18,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import specs_of
 from gearmbs.adams.write.contacts import contact_statements, gear_solid_statements
 from gearmbs.adams.write.gear_expressions import gear_statements, is_gear_contact
+from gearmbs.adams.write.plants import plant_statements
 from gearmbs.adams.write.text import COMPONENTS, COMPONENTS_OF, WriterContext, listed, number, upper
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.problem import ModelError
@@ -28,8 +29,7 @@ from gearmbs.mechanism.forces.springs import LineSpring
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import AXIS_FORCE, AXIS_TORQUE, LINE, ForceElement, Load, State
 from gearmbs.mechanism.parts.elements import COMPONENTS as COMPONENT_MODE
-from gearmbs.mechanism.parts.functions import function_text
-from gearmbs.mechanism.parts.inputs import unit_factor
+from gearmbs.mechanism.parts.inputs import text_of, unit_factor
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.parts.modal import ModalBody, ShapedMarker
 
@@ -52,10 +52,10 @@ def data_statements(w: WriterContext) -> None:
     """Write variables, states, arrays, plant inputs and outputs, and splines."""
     m = w.mechanism
     for key, text in m.variables.items():
-        if upper(key) in w.hidden:
+        if upper(key) in w.hidden or key in w.plant.aliases:
             continue
         n = w.variables[upper(key)]
-        w.statement(f"VARIABLE/{n}", [f"FUNCTION = {w.expression(text)}"], str(key))
+        w.statement(f"VARIABLE/{n}", [f"FUNCTION = {w.expression(text)}"], w.plant.names.get(key, str(key)))
     for made in w.numbers.values():
         value = made.start / unit_factor(w.units, made.unit)
         w.statement(f"VARIABLE/{w.variables[upper(made.name)]}", [f"FUNCTION = {number(value)}"], made.name)
@@ -69,9 +69,7 @@ def data_statements(w: WriterContext) -> None:
         w.statement(f"DIFF/{w.states[upper(key)]}", arguments, str(key))
     for key, values in m.arrays.items():
         w.statement(f"ARRAY/{w.arrays[upper(key)]}", ["IC", f"NUMBERS = {listed(values)}"], str(key))
-    for (kind, key), members in m.plants.items():
-        ids = ", ".join(str(w.variables[upper(member)]) for member in members)
-        w.statement(f"{kind.upper()}/{w.plants[kind, upper(key)]}", [f"VARIABLES = {ids}"], str(key))
+    plant_statements(w)
     for key, data in m.splines.items():
         arguments = [f"X = {listed(data.x)}"]
         if data.z:
@@ -340,9 +338,9 @@ def _motion(w: WriterContext, joint: Joint) -> list[str]:
     head = [f"JOINT = {_joint_id(w, joint.i, joint.j)}", "ROTATIONAL" if rotational else "TRANSLATIONAL"]
     given = joint.prescribed
     if given is None:
-        return [*head, f"FUNCTION = {w.expression(function_text(function, w.units.time, scale))}"]
+        return [*head, f"FUNCTION = {w.expression(text_of(function, w.units, scale))}"]
     rate, change = scale / w.units.time, scale / w.units.time ** (1 if given.level == "velocity" else 2)
-    text = w.expression(function_text(given.function, w.units.time, change))
+    text = w.expression(text_of(given.function, w.units, change))
     starts = [f"ICDISP = {number(given.start / scale)}"]
     if given.level == "acceleration":
         starts.append(f"ICVEL = {number(given.rate / rate)}")
@@ -376,7 +374,7 @@ def element_statements(w: WriterContext, name: str, element: Any) -> None:
     elif isinstance(made := as_expressions(element, w.units), Load):
         _load(w, name, made)
     elif isinstance(element, Torque):
-        text = w.expression(function_text(element.function, w.units.time, w.units.factor("torque")))
+        text = w.expression(text_of(element.function, w.units, w.units.factor("torque")))
         _gforce(w, name, element.i, element.j, element.axis, {"TZ": text})
     elif isinstance(element, SolidContact):
         contact_statements(w, name, element)

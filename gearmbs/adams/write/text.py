@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -72,6 +73,31 @@ COMPONENTS_OF = {"GFORCE": COMPONENTS, "VFORCE": COMPONENTS[:3], "VTORQUE": COMP
 """Components of loads, by the statement that has them."""
 
 
+@dataclass
+class Plant:
+    """What of a mechanism its deck has as a plant.
+
+    Attributes
+    ----------
+    aliases : dict of key to str
+        VARIABLEs that are an input under another name, as those that were read from a PINPUT: written once.
+    inputs : list of str
+        That are in no PINPUT yet.
+    outputs : dict of str to str
+        Expressions of outputs that are in no POUTPUT yet, by name.
+    left_out : dict of str to str
+        Outputs without an expression, and why.
+    names : dict of key to str
+        Outputs that VARIABLEs already are.
+    """
+
+    aliases: dict[Any, str] = field(default_factory=dict)
+    inputs: list[str] = field(default_factory=list)
+    outputs: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+    names: dict[Any, str] = field(default_factory=dict)
+
+
 class WriterContext(Protocol):
     """Ids of what a mechanism holds, and the statements written so far.
 
@@ -97,6 +123,8 @@ class WriterContext(Protocol):
         Inputs and parameters, for which variables stand, by name in capitals.
     gears : {"expressions", "solids"}
         How contacts of wheels are written.
+    plant : Plant
+        Inputs and outputs.
     """
 
     mechanism: Mechanism
@@ -113,6 +141,7 @@ class WriterContext(Protocol):
     states: dict[Any, int]
     splines: dict[Any, int]
     arrays: dict[Any, int]
+    plant: Plant
     plants: dict[tuple[str, Any], int]
     gears: str
 

@@ -13,7 +13,7 @@ from gearmbs.dae.equations.loads import time_functions as tf
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.language.syntax import DIMENSIONS as LANGUAGE
 from gearmbs.mechanism.language.syntax import Units, parse
-from gearmbs.mechanism.parts.functions import TimeFunction
+from gearmbs.mechanism.parts.functions import TimeFunction, function_text
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.units import DIMENSIONS, powers_of
 
@@ -219,9 +219,31 @@ def unit_factor(units: Units, unit: str) -> float:
     raise ModelError(f"unit {unit!r} has no counterpart in the mechanism's units; give one of a force, length or time")
 
 
+def text_of(function: TimeFunction, units: Units, value: float) -> str:
+    """Return a function of time as an expression, an input by its name.
+
+    Parameters
+    ----------
+    function : TimeFunction
+    units : Units
+        Of the mechanism, in which the text is.
+    value : float
+        SI value of the unit of the function's value in the text.
+
+    Raises
+    ------
+    ModelError
+        For a kind without such an expression.
+    """
+    if isinstance(function, Input) and function.order == 0:
+        factor = unit_factor(units, function.unit) / value
+        return f'"{function.name}"' if factor == 1.0 else f'{factor!r}*"{function.name}"'
+    return function_text(function, units.time, value)
+
+
 def _piece(coefficients: Sequence[float]) -> tuple[float, ...]:
     """Return the parameters of a single polynomial about time 0."""
     return (1.0, 0.0, *coefficients, *([0.0] * (COEFFICIENTS - len(coefficients))))
 
 
-__all__ = ["Input", "Output", "Parameter", "make_input", "make_output", "make_parameter"]
+__all__ = ["Input", "Output", "Parameter", "make_input", "make_output", "make_parameter", "text_of"]

@@ -105,7 +105,7 @@ def linearize(
     warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     names = PlantNames(mechanism)
     point = point_of(mechanism, at, t)
-    with _markers_kept(mechanism):
+    with markers_kept(mechanism):
         given = [one for item in inputs for one in names.inputs(item)]
         whole, told = _with_outputs(mechanism, names, outputs)
         instant = instant_at(whole, point)
@@ -285,7 +285,7 @@ class _Columns:
 
 
 @contextmanager
-def _markers_kept(mechanism: Mechanism) -> Iterator[None]:
+def markers_kept(mechanism: Mechanism) -> Iterator[None]:
     """Remove the markers that inputs and outputs have needed."""
     bodies = mechanism.ground, *mechanism.bodies.values()
     kept = [list(body.markers) for body in bodies]
