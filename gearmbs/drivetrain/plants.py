@@ -19,6 +19,7 @@ from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.solve.analyses import static_equilibrium
 from gearmbs.mechanism.solve.plant_names import Given, Told, own_marker
 from gearmbs.mechanism.solve.plants import linearize as linear_plant
+from gearmbs.mechanism.solve.points import point_of
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
@@ -90,8 +91,10 @@ def linearize(
         at, t = "initial", after if t is None else t
     else:
         m = train.build()
+    # before inputs and outputs add markers to the mechanism that a state is one of
+    point = point_of(m, at, t)
     named = [_input(train, m, item) for item in inputs]
-    return linear_plant(m, named, [_output(train, m, item) for item in outputs], at=at, t=t)
+    return linear_plant(m, named, [_output(train, m, item) for item in outputs], at=point)
 
 
 def _input(train: Drivetrain, m: Mechanism, item: Any) -> Any:

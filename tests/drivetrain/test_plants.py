@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
+import gearmbs as gm
 from gearmbs.drivetrain import (
     ControlledDrive,
     Drivetrain,
@@ -21,7 +22,7 @@ from gearmbs.drivetrain import (
 )
 from gearmbs.drivetrain.drives import Drive
 from gearmbs.gears import GearSpec
-from gearmbs.mechanism import make_input
+from gearmbs.mechanism import ModelError, make_input
 from gearmbs.studies import train_modes
 from tests.says import says
 
@@ -155,3 +156,22 @@ def test_a_speed_loop_designed_on_the_plant_behaves_so_in_a_simulation():
     assert np.transpose(found) == pytest.approx(expected, abs=1e-5)
     # a loop of 79 degrees of margin overshoots a little, by what its integral has gathered
     assert 5.3 < max(found[0]) < 5.8
+
+
+def test_states_of_its_simulators():
+    """As at the solution there, whatever sensors were asked; a sensor that was asked leaves the mechanism as it was."""
+    train = stage("speed")
+    m = train.build()
+    sim = gm.Simulator(m, 0.02)
+    sim.advance(0.01)
+    told = sim.get("output", "tacho")
+    state, asked = sim.state(), ([("torque", "out")], ["tacho", ("speed", "in")])
+    plants = [train.linearize(*asked, at=at) for at in (state, sim.solution())]
+    assert plants[0].point.outputs[0] == pytest.approx(told, rel=1e-9)
+    for one, two in zip(*plants, strict=True):
+        np.testing.assert_allclose(one, two, rtol=1e-9, atol=1e-9 * np.abs(two).max(initial=1e-300))
+    assert m.simulate(0.011, initial=state).output("tacho")[0] == pytest.approx(told, rel=1e-9)
+    gm.Simulator(m, 0.02).restore(state)
+    m.bodies["in"].marker(name="later")
+    with pytest.raises(ModelError, match=says("state", "markers", "take")):
+        m.linearize(*asked, at=state)

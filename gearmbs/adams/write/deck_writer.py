@@ -49,7 +49,7 @@ from gearmbs.mechanism.language.syntax import (
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.parts.point_mass import PointMass
-from gearmbs.mechanism.solve.plants import markers_kept
+from gearmbs.mechanism.solve.plant_names import markers_kept
 
 # What a written deck asks for: REQUESTs, the files of results, the integrator.
 

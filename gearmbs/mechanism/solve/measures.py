@@ -162,12 +162,15 @@ class Measures:
 
     def output(self, name: str) -> Any:
         """Return an output of the mechanism by its name over time."""
+        from gearmbs.mechanism.solve.plant_names import markers_kept
+
         made = self.named_output(name)
-        what, *names = made.asked
-        found = getattr(self if what == "transmission_error" else self.solution, what, None)
-        if found is None:
-            raise ModelError(f"output {name!r}: a solution tells of no {what!r}; see the methods of Solution")
-        return made.of(found(*names) if callable(found) else found)
+        with markers_kept(self.mechanism):
+            what, *names = made.asked
+            found = getattr(self if what == "transmission_error" else self.solution, what, None)
+            if found is None:
+                raise ModelError(f"output {name!r}: a solution tells of no {what!r}; see the methods of Solution")
+            return made.of(found(*names) if callable(found) else found)
 
     def named_output(self, name: str) -> Output:
         """Return what an output of the mechanism is by its name."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
-from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told
+from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told, markers_kept
 from gearmbs.mechanism.solve.points import instant_at, point_of
 from gearmbs.progress import waiting
 
@@ -282,18 +281,6 @@ class _Columns:
                 return np.concatenate([np.arange(force, force + f), np.arange(torque, torque + n)])
             force, torque = force + f, torque + n
         raise AssertionError(name)
-
-
-@contextmanager
-def markers_kept(mechanism: Mechanism) -> Iterator[None]:
-    """Remove the markers that inputs and outputs have needed."""
-    bodies = mechanism.ground, *mechanism.bodies.values()
-    kept = [list(body.markers) for body in bodies]
-    try:
-        yield
-    finally:
-        for body, markers in zip(bodies, kept, strict=True):
-            body.markers[:] = markers
 
 
 def _with_outputs(mechanism: Mechanism, names: PlantNames, outputs: Sequence[Any]) -> tuple[Mechanism, list[Told]]:

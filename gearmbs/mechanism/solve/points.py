@@ -68,7 +68,7 @@ def point_of(mechanism: Mechanism, at: Any, t: float | None) -> Point:
     Parameters
     ----------
     mechanism : Mechanism
-    at : {"initial", "equilibrium"}, StaticResult, State or Solution
+    at : {"initial", "equilibrium"}, StaticResult, State, Solution or Point
     t : float, optional
         Time of functions of time, s; of a Solution the output time, default its last.
 
@@ -77,6 +77,8 @@ def point_of(mechanism: Mechanism, at: Any, t: float | None) -> Point:
     ModelError
         For anything else, for a time that a State or an equilibrium has of its own, and for a state of another model.
     """
+    if isinstance(at, Point):
+        return at
     if isinstance(at, Solution):
         time = float(at.t[-1]) if t is None else float(t)
         state = at.state_at(time)
@@ -118,7 +120,9 @@ def _of_state(mechanism: Mechanism, state: State) -> Point:
                 try:
                     state.check(problem)
                 except ModelError as error:
-                    refusal = refusal or error
+                    # what differs from the model with as many unknowns says most
+                    if refusal is None or len(state.y) == problem.n:
+                        refusal = error
                     continue
                 return _of_solution(system, problem, members, state)
     assert refusal is not None

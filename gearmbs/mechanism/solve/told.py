@@ -14,6 +14,7 @@ from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
 from gearmbs.mechanism.parts.bodies import OwnAttributes
+from gearmbs.mechanism.solve.plant_names import markers_kept
 from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.wording import did_you_mean
 
@@ -107,7 +108,8 @@ class Told(OwnAttributes):
             return self._settings.value(self.t, *names)
         if what == "output":
             made = self._mechanism.measures(self._now()).named_output(*names)
-            return made.of(self._got(*made.asked))
+            with markers_kept(self._mechanism):
+                return made.of(self._got(*made.asked))
         if what not in AT_AN_INSTANT + COUNTED:
             known = [*AT_AN_INSTANT, *COUNTED, "input", "output"]
             hint = did_you_mean(what, known)
