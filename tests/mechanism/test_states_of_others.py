@@ -67,7 +67,7 @@ def test_another_pendulum_goes_on_from_position_and_speed(other):
 
 def test_joints_elsewhere_are_refused_with_what_to_do():
     state = pendulum().simulate(0.3).state_at(0.3)
-    told = says("eps_phi(rod)", "0.3", "Joints", "centres", "make")
+    told = says("0.3", "Joints", "centres", "make")
     assert pendulum(place=0.5 + 1e-6).simulate(0.4, initial=state).success
     run = pendulum(place=0.6).simulate(0.4, initial=state)
     assert not run.success
