@@ -31,7 +31,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gearmbs.bearings.catalogue import look_up
-from gearmbs.bearings.kinds import KINDS, BearingError, require
+from gearmbs.bearings.kinds import KINDS, LOOSEST, BearingError, require
 from gearmbs.bearings.laws_kernel import (
     BALL_EXPONENT,
     ROLLER_EXPONENT,
@@ -132,7 +132,7 @@ class Bearing(Described):
             f"{1e3 * pitch:.4g} mm, where {math.floor(math.pi / math.asin(d / pitch))} do",
         )
         angle = self.contact_angle
-        require(abs(self.clearance) < 0.2 * d, f"Bearing.clearance is {self.clearance:g} m; give it in '... um'")
+        require(abs(self.clearance) < LOOSEST * d, f"Bearing.clearance is {self.clearance:g} m; give it in '... um'")
         if self.rollers:
             require(
                 self.roller_length is not None,

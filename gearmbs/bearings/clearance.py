@@ -20,7 +20,7 @@ from gearmbs.dae.equations.loads.forces import (
     stored_energy,
 )
 from gearmbs.kernels.jit import njit
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting
+from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, ForceElement, Setting
 
 
 @dataclass(eq=False, repr=False)
@@ -40,10 +40,10 @@ class ClearanceForce(ForceElement):
     def compiled(self) -> Compiled:
 
         settings = {
-            "stiffness": Setting(STIFFNESS, f"N/m^{self.reals[EXPONENT]:g}"),
-            "damping": Setting(DAMPING, "N*s/m"),
+            "stiffness": Setting(STIFFNESS, f"N/m^{self.reals[EXPONENT]:g}", allowed=POSITIVE),
+            "damping": Setting(DAMPING, "N*s/m", allowed=NOT_NEGATIVE),
+            "clearance": Setting(CLEARANCE, "m", allowed=POSITIVE),
         }
-        settings["clearance"] = Setting(CLEARANCE, "m")
         return Compiled(clearance_bearing, reals=self.reals, scratch=WORK, settings=settings)
 
     def __repr__(self) -> str:

@@ -12,11 +12,11 @@ from gearmbs.bearings import layout as B
 from gearmbs.bearings.bearing import Bearing, equivalent_load, mean_load, rating_life
 from gearmbs.bearings.clearance import ClearanceForce
 from gearmbs.bearings.defects import INNER, OUTER, Defect, LooseFit, as_defects
-from gearmbs.bearings.kinds import BearingError, require
+from gearmbs.bearings.kinds import LOOSEST, BearingError, require
 from gearmbs.bearings.settings import BearingSettings, BearingTables, bearing_settings, pack, reals_by
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.mechanism.parts.bodies import Body
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting, State
+from gearmbs.mechanism.parts.elements import Allowed, Compiled, ForceElement, Setting, State
 from gearmbs.mechanism.parts.quantities import Vector, frame_along
 
 if TYPE_CHECKING:
@@ -226,7 +226,8 @@ def clearance_setting(settings: BearingSettings, tables: BearingTables) -> dict[
     places = first + column + B.PATH_COLUMNS * np.arange(int(tables.integers[B.PATHS]))
     found = [(int(at), slope, float(tables.reals[at]) - slope * bearing.clearance) for at in places]
     (at, factor, offset), *others = found
-    return {"clearance": Setting(at, "m", factor, offset, tuple(others))}
+    most = LOOSEST * bearing.element_diameter
+    return {"clearance": Setting(at, "m", factor, offset, tuple(others), Allowed(-most, most, above=True))}
 
 
 # A rolling bearing in a mechanism, its rings fixed or loose on their seats.

@@ -24,6 +24,9 @@ def require(condition: bool, message: str) -> None:
         raise BearingError(message)
 
 
+LOOSEST = 0.2
+"""Clearance, of the diameter of an element, that is no longer one: a number was given in another unit."""
+
 # Bearings are those of `bearing`, which knows this table.
 Bearing = Any
 

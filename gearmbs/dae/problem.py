@@ -78,6 +78,27 @@ class Place:
             table[self.at + 1 + k] = derivative / math.factorial(k)
 
 
+class Allowed(NamedTuple):
+    """Values that a number may have: from one to another, the first of which may be left out."""
+
+    least: float = -math.inf
+    most: float = math.inf
+    above: bool = False
+
+    def wrong(self, value: float) -> str:
+        """Return what a value that is not allowed must be, "" of others."""
+        if self.least < value <= self.most or (value == self.least and not self.above):
+            return ""
+        if self.most < math.inf:
+            return f"it must lie between {self.least:g} and {self.most:g}"
+        if self.least == 0.0:
+            return "it must be positive" if self.above else "it must not be negative"
+        return f"it must be {'above' if self.above else 'at least'} {self.least:g}"
+
+
+ANY, POSITIVE, NOT_NEGATIVE = Allowed(), Allowed(0.0, above=True), Allowed(0.0)
+
+
 @dataclass(frozen=True)
 class Number:
     """A number of a model that can be changed by its name.
@@ -101,6 +122,8 @@ class Number:
     prescribes: tuple[tuple[str, int], ...] = ()
     loads: bool = False
     """Whether equations change with it as with a load, and derivatives by the unknowns do not."""
+    allowed: Allowed = ANY
+    """What it may be set to: what the element that it is of could be made with."""
 
     def value(self, table: Table, t: float) -> float:
         """Return the value at a time."""
@@ -145,7 +168,7 @@ def cells_of(numbers: Mapping[str, Number]) -> np.ndarray:
     return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(n.cells() for n in numbers.values())]))
 
 
-__all__ = ["INPUT", "PARAMETER", "Number", "Place", "cells_of"]
+__all__ = ["ANY", "INPUT", "NOT_NEGATIVE", "PARAMETER", "POSITIVE", "Allowed", "Number", "Place", "cells_of"]
 
 
 EPS = 2.220446049250313e-16

@@ -16,7 +16,7 @@ from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagno
 from gearmbs.dae.problem import ModelError
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import law_factors, pack
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting, StartOverlap
+from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, ForceElement, Setting, StartOverlap
 from gearmbs.units import shown
 
 DEEP = 0.02
@@ -48,8 +48,8 @@ def law_settings(pair: Mesh) -> dict[str, Setting]:
     cosine = math.cos(geometry.wheels[0].base_helix_angle)
     stiff, damped = law_factors(pair.contact_model, geometry.narrower_face_width, cosine)
     return {
-        "stiffness": Setting(L.place(L.PAIR, "stiffness"), f"N/m^{law.exponent:g}", stiff),
-        "damping": Setting(L.place(L.PAIR, "damping"), LAW_KINDS[law.kind].damping_unit, damped),
+        "stiffness": Setting(L.place(L.PAIR, "stiffness"), f"N/m^{law.exponent:g}", stiff, allowed=POSITIVE),
+        "damping": Setting(L.place(L.PAIR, "damping"), LAW_KINDS[law.kind].damping_unit, damped, allowed=NOT_NEGATIVE),
     }
 
 

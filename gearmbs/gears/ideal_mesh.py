@@ -17,7 +17,7 @@ from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import convert_fields
 from gearmbs.gears.tables import pack
-from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting
+from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, ForceElement, Setting
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
@@ -243,8 +243,8 @@ class IdealMeshForce(ForceElement):
             np.concatenate([reals, own, stiffness, error]),
             scratch=scratch,
             settings={
-                "stiffness": Setting(reals.size, "N/m"),
-                "damping": Setting(reals.size + 1, "N*s/m"),
+                "stiffness": Setting(reals.size, "N/m", allowed=POSITIVE),
+                "damping": Setting(reals.size + 1, "N*s/m", allowed=NOT_NEGATIVE),
             },
         )
 

@@ -82,6 +82,8 @@ class _Compiler:
         self.row_names: list[str] = []
         self.force_names: list[str] = []
         self._scope: Scope | None = None
+        self._spelt: dict[str, str] = {}
+        """Names of inputs and parameters by what they are in capitals."""
         self.measures = False
         """Whether expressions are about a solution, which knows all inputs, and not part of the equations."""
 
@@ -155,18 +157,35 @@ class _Compiler:
     # --- inputs and parameters ----------------------------------------------------------------------
 
     def add_numbers(self) -> None:
-        for made in self.mechanism.inputs.values():
-            self.know(made)
-        for given in self.mechanism.parameters.values():
-            self.builder.add_number(given.name, given.unit, PARAMETER, given.start)
+        """Add inputs and parameters; refuse those whose names mean something else."""
+        m = self.mechanism
+        for what, taken in (("marker", self.marker_names), ("variable", m.variables), ("state", m.states)):
+            names = {_upper(name) for name in taken}
+            every: list[Input | Parameter] = [*m.inputs.values(), *m.parameters.values()]
+            for made in every:
+                if made.name.upper() in names:
+                    kind = INPUT if isinstance(made, Input) else PARAMETER
+                    raise ModelError(f"{kind} {made.name!r}: a {what} has the name, too; choose another")
+        for given in m.inputs.values():
+            self.know(given)
+        for constant in m.parameters.values():
+            self._spelt[constant.name.upper()] = constant.name
+            self.builder.add_number(constant.name, constant.unit, PARAMETER, constant.start)
 
     def know(self, made: Input) -> None:
         """Add an input, which may be one that was not made by the mechanism, to the named numbers."""
-        known = self.builder.numbers.get(made.name)
+        known = self.builder.numbers.get(self._spelt.setdefault(made.name.upper(), made.name))
         if known is None:
             self.builder.add_number(made.name, made.unit, INPUT, made.start)
-        elif known.kind != INPUT or known.unit != made.unit:
-            raise ModelError(f"input {made.name!r}: another {known.kind} in {known.unit} has this name; choose another")
+        elif known.kind != INPUT or known.unit != made.unit or known.name != made.name:
+            raise ModelError(
+                f"input {made.name!r}: another {known.kind} in {known.unit} is called {known.name!r}; choose another"
+            )
+        elif (start := float(self.builder.extra_r[known.places[0].at + 1])) != made.start:
+            raise ModelError(
+                f"input {made.name!r}: it starts at {made.start:g} {made.unit}, another one of this name at {start:g}; "
+                "use one and the same, or choose another name"
+            )
 
     # --- constraints --------------------------------------------------------------------------------
 
@@ -379,12 +398,23 @@ class _Compiler:
             first = row[T.FORCE_REXTRA]
             every = ((setting.at, setting.factor, setting.offset), *setting.others)
             places = [Place(first + at, factor=f, offset=c, table=T.H_R_EXTRA) for at, f, c in every]
-            self.builder.add_setting(f"{name}.{what}", setting.unit, places)
+            self.check_free(f"{name}.{what}", name)
+            self.builder.add_setting(f"{name}.{what}", setting.unit, places, allowed=setting.allowed)
         for what, number in made.given.items():
             kind, at = functions[len(functions) - len(made.times) + number]
             if kind in SETTLED:
                 place = Place(at + SETTLED[kind], table=T.H_R_FUNCTION)
+                self.check_free(f"{name}.{what}", name)
                 self.builder.add_setting(f"{name}.{what}", "N*m", [place], loads=True)
+
+    def check_free(self, number: str, element: str) -> None:
+        """Raise a ModelError if an input or a parameter has the name of a number of an element."""
+        spelt = self._spelt.get(number.upper())
+        if spelt is not None:
+            kind = self.builder.numbers[spelt].kind
+            raise ModelError(
+                f"{kind} {spelt!r}: '{element}' has a number of this name; choose another, or let the {kind} be it"
+            )
 
     def add_reaction(self, joint: jt.Joint) -> None:
         """Make the force and moment of a joint on its I marker's body unknowns."""

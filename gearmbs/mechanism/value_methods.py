@@ -28,6 +28,7 @@ class ValueMethods:
     splines: dict[Any, SplineData]
     arrays: dict[Any, tuple[float, ...]]
     functions: dict[str, UserFunction]
+    aliases: dict[str, str]
 
     def input(self, name: str, unit: str, value: float = 0.0) -> Input:
         """Add an input: a number with a name that is set from outside while a simulation goes on.
@@ -161,3 +162,5 @@ class ValueMethods:
         for title, table in {**tables, "output": self.outputs}.items():
             if name.upper() in map(str.upper, table):
                 raise ModelError(f"{what} {name!r}: one of its {title}s has the name; choose another")
+        if what != "output" and name in self.aliases:
+            raise ModelError(f"{what} {name!r}: {self.aliases[name]!r} goes by that name, too; choose another")

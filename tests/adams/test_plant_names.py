@@ -93,14 +93,14 @@ def test_a_deck_names_its_variables():
     """Those that are numbers can be set; what closes a loop already is told to be none."""
     deck = parse_deck(DECK)
     m = build_mechanism(deck)
-    assert (list(m.inputs), list(m.outputs)) == (["push"], ["VARIABLE/2"])
+    assert (list(m.inputs), list(m.outputs)) == (["push"], ["VARIABLE_2"])
     (remark,) = [d.message for d in deck.diagnostics]
     assert re.search(says("PINPUT/2", "VARIABLE/3", "number"), remark)
     sim = gm.Simulator(m, 3.0, tol=1e-9)
     sim.set("push", 6.0)
     sim.advance(1.5)
     # 2 v' = 6 - v
-    assert sim.get("output", "VARIABLE/2") == pytest.approx(6.0 * (1.5 - 2.0 * (1.0 - np.exp(-0.75))), rel=1e-6)
+    assert sim.get("output", "VARIABLE_2") == pytest.approx(6.0 * (1.5 - 2.0 * (1.0 - np.exp(-0.75))), rel=1e-6)
 
 
 def test_a_drivetrain_has_its_loads_and_sensors_in_the_deck():

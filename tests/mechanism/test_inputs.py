@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
-from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism import Mechanism, ModelError, make_input
 from tests.says import says
 
 
@@ -25,11 +25,13 @@ def test_an_input_is_a_torque_and_a_name_in_expressions():
     assert speed == pytest.approx(6.0 * (1.0 - np.exp(-0.5)), rel=1e-8)
 
 
+@pytest.mark.parametrize("made", [lambda m: m.input, lambda m: make_input])
 @pytest.mark.parametrize(("level", "order", "angle"), [("velocity", 1, 3.0), ("acceleration", 2, 1.5)])
-def test_an_input_is_the_rate_of_a_motion(level, order, angle):
+def test_an_input_is_the_rate_of_a_motion(level, order, angle, made):
     m, _, pin = disc()
     unit = "rad/s" if order == 1 else "rad/s^2"
-    m.rotation("motion", pin, m.input("rate", unit, 3.0), level=level)
+    m.rotation("motion", pin, made(m)("rate", unit, 3.0), level=level)
+    assert gm.Simulator(m, 1.0).get("input", "rate") == 3.0
     assert m.simulate(1.0).joint_angle("pin")[-1] == pytest.approx(angle, abs=1e-9)
     assert m.compile().problem().numbers["rate"].prescribes == (("motion: angle", order),)
 

@@ -29,7 +29,7 @@ def name_plants(model: AdamsModel) -> None:
     there = deck.of(st.Variable)
     for plant in deck.each(st.Plant):
         for variable in (there[n] for n in plant.variables if n in there):
-            name = (variable.name or variable.label()).replace('"', "").replace("'", "")
+            name = (variable.name or f"VARIABLE_{variable.id}").replace('"', "").replace("'", "")
             try:
                 if plant.keyword == "POUTPUT":
                     if name not in m.outputs:

@@ -46,10 +46,9 @@ from gearmbs.mechanism.language.syntax import (
     unrolled,
     with_children,
 )
-from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.bodies import Body, Marker, markers_kept
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.parts.point_mass import PointMass
-from gearmbs.mechanism.solve.plant_names import markers_kept
 
 # What a written deck asks for: REQUESTs, the files of results, the integrator.
 
@@ -302,7 +301,7 @@ def write_deck(
     """
     if gears not in ("expressions", "solids"):
         raise ModelError(f"gears = {gears!r}; choose 'expressions' or 'solids'")
-    with markers_kept(mechanism):
+    with markers_kept((mechanism.ground, *mechanism.bodies.values())):
         writer = DeckWriter(mechanism, path, gears)
         writer.model(title)
         request_statements(writer, requests or {}, output)

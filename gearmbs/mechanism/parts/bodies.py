@@ -7,7 +7,8 @@ has the value read as it is where the object is made.
 from __future__ import annotations
 
 from abc import ABCMeta
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -278,3 +279,14 @@ def make_body(
         "velocity": velocity, "angular_velocity": angular_velocity,
     }  # fmt: skip
     return Body(name, **{key: Body.reads[key](value, f"body '{name}': {key}") for key, value in given.items()})
+
+
+@contextmanager
+def markers_kept(bodies: Iterable[Body]) -> Iterator[None]:
+    """Remove the markers that inputs and outputs have needed: states fit a mechanism with the markers it had."""
+    kept = [(body, list(body.markers)) for body in bodies]
+    try:
+        yield
+    finally:
+        for body, markers in kept:
+            body.markers[:] = markers

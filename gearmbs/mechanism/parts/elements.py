@@ -10,6 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, Diagnostic
+from gearmbs.dae.problem import ANY
+from gearmbs.dae.problem import NOT_NEGATIVE as NOT_NEGATIVE
+from gearmbs.dae.problem import POSITIVE as POSITIVE
+from gearmbs.dae.problem import Allowed as Allowed
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.parts.bodies import Marker, OwnAttributes
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
@@ -27,6 +31,8 @@ class Setting(NamedTuple):
     offset: float = 0.0
     others: tuple[tuple[int, float, float], ...] = ()
     """Further places, factors and offsets."""
+    allowed: Allowed = ANY
+    """What the element could be made with."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,7 +14,7 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.loads import time_functions as tf
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.language.syntax import DIMENSIONS as LANGUAGE
-from gearmbs.mechanism.language.syntax import Units, parse
+from gearmbs.mechanism.language.syntax import Name, Units, parse
 from gearmbs.mechanism.parts.functions import TimeFunction, function_text
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.units import DIMENSIONS, powers_of
@@ -42,8 +44,8 @@ class Input(TimeFunction):
 
     @property
     def start(self) -> float:
-        """Value until it is set."""
-        return float(self.parameters[2 + self.order])
+        """Value until it is set; integrated n times it stands before t^n / n!."""
+        return float(self.parameters[2 + self.order]) * math.factorial(self.order)
 
     def integral(self, start: float, rate: float | None = None) -> Input:
         """Return start + int u, or with a rate start + rate t + int int u, from time 0."""
@@ -189,6 +191,21 @@ def checked_name(name: Any, what: str) -> None:
         raise ModelError(f"{what} {name!r}: give a name, a text without quotation marks")
     if name.upper() in RESERVED:
         raise ModelError(f"{what} {name!r}: the name means something else in expressions; choose another")
+    if name != name.strip() or not name.isprintable():
+        raise ModelError(f"{what} {name!r}: a blank at an end, or a line break, would not be seen; leave it out")
+    if what != "output" and _calculates(name):
+        plain = re.sub(r"\W+", "_", name).strip("_")
+        if not plain or _calculates(plain):
+            plain = f"u_{plain}"
+        raise ModelError(f"{what} {name!r}: expressions take that for a calculation; call it {plain!r}")
+
+
+def _calculates(name: str) -> bool:
+    """Whether a name, where it stands in an expression without quotation marks, is a number or a calculation."""
+    try:
+        return not isinstance(parse(name), Name)
+    except ExpressionError:
+        return False
 
 
 def checked_unit(unit: Any, field: str) -> str:

@@ -13,7 +13,7 @@ from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KI
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, known_turns, warn_of_doubtful_turns
-from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.bodies import Body, Marker, markers_kept
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle, kinds_with_displacement
@@ -162,10 +162,8 @@ class Measures:
 
     def output(self, name: str) -> Any:
         """Return an output of the mechanism by its name over time."""
-        from gearmbs.mechanism.solve.plant_names import markers_kept
-
         made = self.named_output(name)
-        with markers_kept(self.mechanism):
+        with markers_kept((self.mechanism.ground, *self.mechanism.bodies.values())):
             what, *names = made.asked
             found = getattr(self if what == "transmission_error" else self.solution, what, None)
             if found is None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -469,18 +468,6 @@ def own_marker(body: Body, name: str, make: Callable[..., Marker], *where: Any) 
     return next((one for one in body.markers if one.name == name), None) or make(*where, name=name)
 
 
-@contextmanager
-def markers_kept(mechanism: Mechanism) -> Iterator[None]:
-    """Remove the markers that inputs and outputs have needed: states fit a mechanism with the markers it had."""
-    bodies = mechanism.ground, *mechanism.bodies.values()
-    kept = [list(body.markers) for body in bodies]
-    try:
-        yield
-    finally:
-        for body, markers in zip(bodies, kept, strict=True):
-            body.markers[:] = markers
-
-
 def _at_level(given: Given) -> Given:
     name = given.name if given.level == 0 else f"{given.name} {LEVELS[given.level]}"
     return replace(given, name=name, unit=given.unit_of(given.level))
@@ -527,4 +514,4 @@ def _first_call(text: str, beginnings: Collection[str]) -> tuple[int, int, str] 
     return None
 
 
-__all__ = ["LEVELS", "Acceleration", "Given", "PlantNames", "Told", "markers_kept"]
+__all__ = ["LEVELS", "Acceleration", "Given", "PlantNames", "Told"]

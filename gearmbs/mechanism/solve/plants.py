@@ -17,10 +17,10 @@ from gearmbs.dae.analyses.turning import skew, turning
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import warn_of_stiff_seats
-from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.bodies import Marker, markers_kept
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
-from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told, markers_kept
+from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told
 from gearmbs.mechanism.solve.points import instant_at, point_of
 from gearmbs.progress import waiting
 
@@ -104,7 +104,7 @@ def linearize(
     warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     names = PlantNames(mechanism)
     point = point_of(mechanism, at, t)
-    with markers_kept(mechanism):
+    with markers_kept((mechanism.ground, *mechanism.bodies.values())):
         given = [one for item in inputs for one in names.inputs(item)]
         whole, told = _with_outputs(mechanism, names, outputs)
         instant = instant_at(whole, point)

@@ -100,6 +100,8 @@ class Settings:
         given = float(value if isinstance(value, float) else quantity(value, number.unit, f"set: {name!r}"))
         if not math.isfinite(given):
             raise ModelError(f"set: {name!r} = {given}; give a finite number")
+        if wrong := number.allowed.wrong(given):
+            raise ModelError(f"set: {name!r} = {given:g} {number.unit}; {wrong}")
         for row, order in number.prescribes if hold == 0 else ():
             if order == 0:
                 raise ModelError(

@@ -13,8 +13,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
-from gearmbs.mechanism.parts.bodies import OwnAttributes
-from gearmbs.mechanism.solve.plant_names import markers_kept
+from gearmbs.mechanism.parts.bodies import OwnAttributes, markers_kept
 from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.wording import did_you_mean
 
@@ -107,8 +106,9 @@ class Told(OwnAttributes):
         if what == "input":
             return self._settings.value(self.t, *names)
         if what == "output":
-            made = self._mechanism.measures(self._now()).named_output(*names)
-            with markers_kept(self._mechanism):
+            m = self._mechanism
+            made = m.measures(self._now()).named_output(*names)
+            with markers_kept((m.ground, *m.bodies.values())):
                 return made.of(self._got(*made.asked))
         if what not in AT_AN_INSTANT + COUNTED:
             known = [*AT_AN_INSTANT, *COUNTED, "input", "output"]
