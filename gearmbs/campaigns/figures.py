@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.campaigns.plans.conditions import satisfied
-from gearmbs.campaigns.results import ABOUT, factor_names, numeric_results, result_names
+from gearmbs.campaigns.plans.plan import ABOUT
+from gearmbs.campaigns.results import factor_names, numeric_results, result_names
 from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.schema.described import chosen
 

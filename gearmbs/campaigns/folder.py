@@ -105,6 +105,7 @@ class Folder:
         plan = Plan.from_dict(self.tree["plan"], self.extents[-1].points)
         self.plan: Plan = replace(plan, unit=self.tree["unit"])
         self.unit_size: int = self.tree["unit"]
+        self._plan = digest_of(self.tree["plan"])
         self.specs = [
             SignalSpec(s["name"], tuple(s["channels"]), s["samples"], s["rate"], s["units"])
             for s in self.tree["signals"]
@@ -156,9 +157,15 @@ class Folder:
             If it is damaged, or not there.
         """
         entry = read_ledger(self.ledger(unit))
-        if entry is None or entry["unit"] != unit:
-            raise self.damaged(unit, "its ledger is missing or another unit's")
+        mine = self.identity(unit)
+        if entry is None or entry["unit"] != unit or entry.get("plan", mine) != mine:
+            raise self.damaged(unit, "its ledger is missing, or that of another unit or campaign")
         return entry
+
+    def identity(self, unit: int) -> str:
+        """Return a digest of what was planned for a unit, which its ledger holds: the plan, and the table of cases."""
+        name, _ = self._planned(unit)
+        return digest_of([self._plan, self.tree["cases"].get(name)])
 
     def unit_table(self, unit: int, columns: Iterable[str] | None = None) -> pa.Table:
         """Return the table of a unit that is done, or those of some columns that it has.
@@ -206,9 +213,7 @@ class Folder:
         CampaignError
             If they are not those that were planned.
         """
-        extent = self._extent(unit)
-        block, place = divmod(unit - extent.first_unit, UNITS_A_FILE)
-        name = _block_name(self.extents.index(extent), block)
+        name, place = self._planned(unit)
         path = self.store / "cases" / name
         try:
             about = path.stat()
@@ -216,6 +221,12 @@ class Folder:
         except OSError as error:
             raise CampaignError(f"{path}: {error.strerror}; {REMEDY}") from None
         return table.slice(place * self.unit_size, self.unit_size).to_pylist()
+
+    def _planned(self, unit: int) -> tuple[str, int]:
+        """Return the file that holds the cases of a unit, and which of its units that is."""
+        extent = self._extent(unit)
+        block, place = divmod(unit - extent.first_unit, UNITS_A_FILE)
+        return _block_name(self.extents.index(extent), block), place
 
 
 @lru_cache(maxsize=2)
@@ -384,7 +395,8 @@ def _planned_here(path: Path) -> bool:
 def _taken_up(path: Path, plan: Plan) -> Folder:
     """Return the campaign that is there, if it is the plan's."""
     folder, wanted = Folder(path), json.loads(json.dumps(plan.as_dict()))
-    other = [name for name in wanted if folder.tree["plan"].get(name) != wanted[name]]
+    # by their digests: numbers that are none are not equal to themselves
+    other = [name for name in wanted if digest_of(folder.tree["plan"].get(name)) != digest_of(wanted[name])]
     if other:
         raise CampaignError(
             f"{path}: holds another campaign, with other {' and '.join(other)}; choose another folder, or take up "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import numpy as np
 
 from gearmbs.campaigns.folder import REMEDY, Folder
 from gearmbs.campaigns.plans.conditions import names_in, satisfied
+from gearmbs.campaigns.plans.plan import ABOUT
 from gearmbs.campaigns.settings import CampaignError, local, texts
 from gearmbs.campaigns.subjects.base import ABOUT_RECORD
 from gearmbs.files import whole_file, write_whole
@@ -21,9 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.campaigns.campaign import Campaign
-
-ABOUT = ("index", "unit", "point", "slot", "id", "status", "message", "advice")
-"""Columns of a table that are neither factors nor results."""
 
 
 def read_table(
@@ -268,7 +267,15 @@ def _parquet(campaign: Campaign, target: Path, split: np.ndarray | None, add: Ma
             with whole_file(path) as part:
                 pq.write_table(pa.table(columns), part, compression="zstd")
             written.append(path)
+    remove_former(target / "data", written)
     return written
+
+
+def remove_former(folder: Path, written: Sequence[Path]) -> None:
+    """Remove the rows of a former writing, whose files had other names: they would be read beside those of this one."""
+    for path in folder.glob("*.parquet"):
+        if path not in written and re.fullmatch(r"[a-z]+-\d{5}-of-\d{5}\.parquet", path.name):
+            path.unlink()
 
 
 def _split_by(campaign: Campaign, column: str, test: float) -> np.ndarray:

@@ -27,10 +27,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import gearmbs
 from gearmbs.campaigns.codes import OtherCode, admit, plan_modules
 from gearmbs.campaigns.folder import Folder, sealed
 from gearmbs.campaigns.limits import TimeLimitReached, later, limited
+from gearmbs.campaigns.plans.plan import TAKEN
 from gearmbs.campaigns.reuse import Reuse
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
@@ -135,6 +138,10 @@ class CaseRunner:
                 record = self.subject.run(thing, check, plan.keep)
                 kept = self.subject.reduce(thing, record, plan.keep)
             check_signals(self.folder.specs, kept.signals)
+            taken = _taken(self.folder, row)
+            for name in kept.numbers:
+                if name in taken and f"result.{name}" in kept.numbers:
+                    raise CampaignError(f"results: {name!r} is called 'result.{name}', as another one is; rename one")
         except TimeLimitReached as error:
             result.outcome = Outcome(TIME, str(error), "Raise time_limit or wall_limit, or narrow the ranges.")
         except MemoryError as error:
@@ -152,7 +159,12 @@ class CaseRunner:
                 self._write("failed", row, partial, result)
         else:
             if "record" in plan.keep:
-                self._write("records", row, record, result)
+                try:
+                    self._write("records", row, record, result)
+                except (TypeError, ValueError, AttributeError) as error:
+                    # a record that NetCDF does not take; what the disk does not take ends the run
+                    result.outcome = self.subject.explain(error)
+                    return
             result.outcome, result.kept = Outcome(), kept
 
     def _write(self, kind: str, row: dict[str, Any], record: Any, result: CaseResult) -> None:
@@ -359,10 +371,11 @@ def enter(
     files = {name: hashlib.sha256((folder.path / name).read_bytes()).hexdigest() for r in results for name in r.files}
     entry = {
         "unit": unit,
+        "plan": folder.identity(unit),
         "cases": len(rows),
         "failed": sum(r.outcome.status != DONE for r in results),
         "reused": sum(r.reused for r in results),
-        "not_numbers": sum(not all(map(math.isfinite, r.kept.numbers.values())) for r in results),
+        "not_numbers": sum(not _finite(r.kept) for r in results),
         "index": [rows[0]["index"], rows[-1]["index"] + 1],
         "status": {str(row["index"]): r.outcome.status for row, r in zip(rows, results) if r.outcome.status != DONE},
         "seconds": seconds,
@@ -375,6 +388,16 @@ def enter(
         **about,
     }
     write_whole(folder.ledger(unit), sealed(entry), durable=folder.path)
+
+
+def _taken(folder: Folder, row: dict[str, Any]) -> set[str]:
+    """Return the names whose place no number may take: those of factors, of what is known of cases, of signals."""
+    return {*row, *TAKEN, *(spec.name for spec in folder.specs)}
+
+
+def _finite(kept: Kept) -> bool:
+    """Whether all that is kept of a case is a number."""
+    return all(map(math.isfinite, kept.numbers.values())) and all(np.isfinite(x).all() for x in kept.signals.values())
 
 
 def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], reuse: Reuse | None) -> CaseResult:
@@ -407,9 +430,8 @@ def store(folder: Folder, unit: int, rows: list[dict[str, Any]], results: list[C
     for name in ("status", "message", "advice"):
         columns[name] = [getattr(r.outcome, name) for r in results]
     table = {name: pa.array(values) for name, values in columns.items()}
-    taken = set(table)
+    taken = _taken(folder, rows[0])
     for name in dict.fromkeys(key for r in results for key in r.kept.numbers):
-        # a result must not take the place of a factor or of the status
         column = f"result.{name}" if name in taken else name
         table[column] = pa.array([r.kept.numbers.get(name) for r in results], type=pa.float64())
     with whole_file(folder.table(unit), durable=folder.path) as part:

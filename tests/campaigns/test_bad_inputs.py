@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from gearmbs.campaigns import (
     Campaign,
@@ -69,6 +71,8 @@ def test_bad_plans(settings, words):
         ({"levels": 0}, "levels = 0; give a whole number, 1 or more"),
         ({"levels": 2.5}, "levels = 2.5; give a whole number"),
         ({"low": 2.5, "high": 7.0, "whole": True}, "2.5 to 7 is no range of whole numbers"),
+        ({"name": "index"}, "index is the name of another column"),
+        ({"name": "case"}, "case is the name of another column"),
     ],
 )
 def test_bad_factors(settings, words):
@@ -137,7 +141,9 @@ def test_functions_of_which_nothing_is_kept_are_named():
     with pytest.raises(CampaignError, match=says("nested", "empty")):
         subject.reduce({}, {}, ["numbers"])
     assert subject.reduce({}, {"y": np.zeros(3), "n": 1.0}, ["numbers"]).numbers == {"n": 1.0}
-    assert subject.reduce({}, {"y": np.zeros(3)}, ["record"]).numbers == {}
+    assert subject.reduce({}, xr.Dataset({"y": ("t", np.zeros(3))}), ["record"]).numbers == {}
+    with pytest.raises(CampaignError, match=says("nested", "dict", "Dataset")):
+        subject.reduce({}, {"y": np.zeros(3)}, ["record"])
 
 
 def unruly(x: float) -> dict:
@@ -151,6 +157,91 @@ def unruly(x: float) -> dict:
     if x == 4:
         return None
     return {"x": 5.0, "status": 7.0, "wave": np.ones(4)}
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((1, "x"), ("numbers", "texts", "one")),
+        ((True, 2.5), ("numbers", "truth", "one")),
+        ((1.0, float("nan")), ("nan", "number")),
+        ((1, 2**70), ("64", "bits")),
+        (([1, 2], [3, 4]), ("lists", "choose")),
+    ],
+)
+def test_values_that_one_column_does_not_hold(values, words):
+    """Texts beside numbers would make texts of them; in rows of a list as well."""
+    subject = FunctionSubject(nested, {"x": 1.0})
+    with pytest.raises(CampaignError, match=says(*words)):
+        make_plan(subject, [Factor("x", values=values)], "grid")
+    if not isinstance(values[0], list):
+        with pytest.raises(CampaignError, match=says(*words)):
+            make_plan(subject, design="list", options={"rows": [{"x": v} for v in values]})
+
+
+@pytest.mark.parametrize("values", [(1, 2), (1, 2.5), ("a", "b"), (True, False), (None, 2.5), (float("inf"), 1.0)])
+def test_values_that_one_column_holds(values):
+    subject = FunctionSubject(nested, {"x": 1.0})
+    plan = make_plan(subject, [Factor("x", values=values)], "grid")
+    assert plan.columns(plan.points())["x"].tolist() == list(values)
+
+
+def several(x: float, how: str) -> dict | xr.Dataset:
+    """Return results whose names or records are of some use, or of none."""
+    found = xr.Dataset({"index": x, "y": x, "wave": ("t", np.where(np.arange(4) == 2, np.nan, 1.0))})
+    if how == "clash":
+        found["result.index"] = 7.0
+    if how == "record":
+        found.attrs["about"] = {"a": 1}
+    return found
+
+
+def test_results_keep_their_names(tmp_path):
+    """Two that would have one name, and records that cannot be written, are the case's; the others are kept."""
+    subject = FunctionSubject(several, {"x": 0.0, "how": "good"}, signals={"wave": (4, 1.0), "y": (1, 1.0)})
+    rows = [{"x": float(k), "how": how} for k, how in enumerate(("good", "clash", "record"))]
+    keep = ["numbers", "signal:wave", "record"]
+    campaign = Campaign(tmp_path / "c", make_plan(subject, design="list", options={"rows": rows}, keep=keep))
+    status = campaign.run(workers=0)
+    assert (status.done, status.failed) == (3, 2)
+    # a signal with a hole is no number either
+    assert status.not_numbers == 1
+    messages = campaign.failed().message.tolist()
+    assert "result.index" in messages[0]
+    assert "TypeError" in messages[1]
+    assert campaign.table["result.index"][0] == 0.0
+    # a number and a signal of one name stand beside each other
+    again = Campaign(tmp_path / "d", make_plan(subject, [Factor("x", 1.0, 2.0)], n=2, keep=["numbers", "signal:y"]))
+    again.run(workers=0)
+    data = again.open()
+    np.testing.assert_allclose(data["result.y"], data["y"][:, 0, 0], rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "words"),
+    [("../w", (4, 1.0), "without /"), ("w", (4, 0.0), "positive"), ("w", (4.5, 1.0), "4.5"), ("w", 4, "samples")],
+)
+def test_sizes_of_signals(name, size, words):
+    with pytest.raises(CampaignError, match=re.escape(words)):
+        FunctionSubject(nested, {"x": 1.0}, signals={name: size})
+    assert FunctionSubject(nested, {"x": 1.0}, signals={"w 1.a": (4, "1 kHz")}).signal_sizes == {"w 1.a": (4, 1000.0)}
+
+
+def test_units_of_another_campaign_are_none_of_this_one(tmp_path):
+    """Ledger and table that were copied from a campaign with another seed agree with each other."""
+    mine, other = (small(tmp_path / name, seed=k) for k, name in enumerate(("a", "b")))
+    for one in (mine, other):
+        one.run(workers=0)
+    truth = mine.table
+    for path in (Path("units", "00001.json"), Path("table", "00001.parquet")):
+        shutil.copy(other.path / path, mine.path / path)
+    with pytest.raises(CampaignError, match=says("unit 1", "campaign")):
+        mine.table  # noqa: B018
+    with pytest.warns(CampaignWarning, match="unit 1"):
+        mine.run(workers=0)
+    assert mine.table.equals(truth)
+    # an extension is no other campaign
+    assert Campaign(mine.path).extend(48).table.equals(truth)
 
 
 @pytest.mark.slow
@@ -394,6 +485,16 @@ def test_a_grid_tells_what_decides(tmp_path):
     assert found.total[0] - found.first[0] == pytest.approx(found.total[2] - found.first[2], rel=1e-9)
     assert found.first.sum() + found.total[0] - found.first[0] == pytest.approx(1.0, rel=1e-12)
     assert "Parts of the grid's variance" in campaign.report(tmp_path / "r.html").read_text()
+
+
+def test_rows_of_a_former_export_are_gone(tmp_path):
+    """Other splits, or more files, have other names; whoever reads the folder would read both."""
+    campaign = small(tmp_path / "c", n=8)
+    campaign.run(workers=0)
+    campaign.export(tmp_path / "out", "hf", split_by="point")
+    (tmp_path / "out" / "data" / "mine.parquet").touch()
+    (written, _) = campaign.export(tmp_path / "out", "hf")
+    assert sorted((tmp_path / "out" / "data").iterdir()) == [tmp_path / "out" / "data" / "mine.parquet", written]
 
 
 def test_ranges_held_out(tmp_path):

@@ -104,10 +104,34 @@ def test_constraints_leave_points_out(tmp_path):
     assert [row["index"] for row in rows] == list(range(len(rows)))
 
 
-@pytest.mark.parametrize("text", ["x1 +", "x9 < 1", "x1 + 1", "__import__('os')", "x1.__class__ < 1"])
+@pytest.mark.parametrize(
+    "text",
+    ["x1 +", "x9 < 1", "x1 + 1", "__import__('os')", "x1.__class__ < 1", "x1 and x2", "x1 < 1 or x2", "not x1"],
+)
 def test_wrong_constraints_are_named(tmp_path, text):
     with pytest.raises(CampaignError, match=re.escape(f"constraint {text!r}: ")):
         small(tmp_path / "c", constraints=[text])
+
+
+def test_powers_of_whole_numbers_end(tmp_path):
+    """All digits of 9**9**9 would take hours."""
+    with np.errstate(over="ignore"):
+        campaign = small(tmp_path / "c", constraints=["x1 ** 2 < 9**9**9", "not x1 > 2", "2 ** -1 < 1"])
+    rows = [row for unit in range(campaign.folder.unit_count) for row in campaign.folder.cases(unit)]
+    assert 10 < len(rows) < 40
+    assert all(row["x1"] <= 2.0 for row in rows)
+
+
+def test_whole_numbers_on_a_logarithmic_range():
+    plan = make_plan(function(), [Factor("x1", 1, 1000, scale="log", whole=True)], n=1 << 14)
+    counts = np.bincount(table(plan)["x1"], minlength=1001)
+    assert counts.size == 1001
+    k = np.array([1, 2, 9, 30])
+    np.testing.assert_allclose(counts[k] / (1 << 14), np.log1p(1.0 / k) / np.log(1001.0), atol=2e-4)
+    # each number is at its own coordinate
+    (factor,) = plan.factors
+    u = np.array([[factor.coordinate(k, "1")] for k in range(1, 1001)])
+    assert factor.columns(u)["x1"].tolist() == list(range(1, 1001))
 
 
 def test_a_plan_in_a_file(tmp_path):

@@ -6,7 +6,7 @@ import math
 import shutil
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,8 +18,9 @@ from gearmbs.campaigns.datasets.card import write_card, write_croissant
 from gearmbs.campaigns.datasets.gearboxes import SOURCE
 from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.datasets.splits import shared_groups, split_by_group, withhold
-from gearmbs.campaigns.plans.factors import Choice
-from gearmbs.campaigns.results import ROWS_A_FILE
+from gearmbs.campaigns.folder import digest_of
+from gearmbs.campaigns.plans.factors import Choice, Specimens
+from gearmbs.campaigns.results import ROWS_A_FILE, remove_former
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.files import whole_file
 from gearmbs.signals.rotation.angular import interpolate
@@ -234,15 +235,20 @@ def write_data_set(
 
     out, layers = Path(out), layers or SensorLayers(seed=seed)
     given = [campaigns] if isinstance(campaigns, Campaign) else list(campaigns)
-    parts, individuals = [], 0
-    for number, campaign in enumerate(given):
-        part = measured(campaign, layers, number)
-        split = split_by_group(part.rows["specimen"].to_numpy(), test=test, validation=validation, seed=seed)
-        part.rows["split"] = withhold(split, part.rows["severity"].to_numpy(), *withheld)
-        part.rows["specimen"] += individuals
-        individuals = int(part.rows["specimen"].max()) + 1
-        parts.append(part)
-    rows = pd.concat([part.rows for part in parts], ignore_index=True)
+    parts = [measured(campaign, layers, number) for number, campaign in enumerate(given)]
+    # campaigns whose specimens are drawn alike have the same individuals, each of which is in one split
+    alike: dict[str, list[pd.DataFrame]] = {}
+    for campaign, part in zip(given, parts, strict=True):
+        alike.setdefault(_individuals(campaign), []).append(part.rows)
+    groups, individuals = [], 0
+    for tables in alike.values():
+        group = pd.concat(tables, ignore_index=True)
+        split = split_by_group(group["specimen"].to_numpy(), test=test, validation=validation, seed=seed)
+        group["split"] = withhold(split, group["severity"].to_numpy(), *withheld)
+        group["specimen"] += individuals
+        individuals = int(group["specimen"].max()) + 1
+        groups.append(group)
+    rows = pd.concat(groups, ignore_index=True)
     # the order of the cases is that of the states
     rows = rows.iloc[np.random.default_rng(seed).permutation(len(rows))].reset_index(drop=True)
     files = _parquet(rows, out)
@@ -280,6 +286,12 @@ def write_data_set(
     return [*files, *dict.fromkeys(paths)]
 
 
+def _individuals(campaign: Campaign) -> str:
+    """Return what the individuals of a campaign are drawn from, but for how many they are."""
+    drawn = [replace(factor, draws=1) for factor in campaign.plan.factors if isinstance(factor, Specimens)]
+    return digest_of([_source(campaign).name, campaign.plan.subject.kind, *(asdict(factor) for factor in drawn)])
+
+
 def _codes(campaign: Campaign) -> list[str]:
     """Return the codes that a campaign's results come from, each with its part of the units and its setting."""
     found, counts = [], code_counts(campaign.folder)
@@ -304,6 +316,7 @@ def _parquet(rows: pd.DataFrame, out: Path) -> list[Path]:
             with whole_file(path) as file:
                 pq.write_table(pa.Table.from_pandas(here, preserve_index=False), file, compression="zstd")
             written.append(path)
+    remove_former(out / "data", written)
     return written
 
 

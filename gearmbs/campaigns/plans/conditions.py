@@ -24,7 +24,8 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
+    # of whole numbers Python would write out all digits of 9**9**9
+    ast.Pow: lambda base, exponent: np.power(np.asarray(base, dtype=float), exponent),
     ast.USub: operator.neg,
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -141,6 +142,12 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
     def sub(part: ast.AST) -> Any:
         return _value(part, columns, text)
 
+    def truth(part: ast.AST) -> Any:
+        found = sub(part)
+        if np.asarray(found).dtype != bool:
+            raise CampaignError(f"constraint {text!r}: {ast.unparse(part)!r} is no comparison, as and, or, not take")
+        return found
+
     if isinstance(node, ast.Constant) and isinstance(node.value, (int, float, str)):
         return node.value
     if isinstance(node, (ast.Name, ast.Attribute)):
@@ -153,11 +160,11 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
         return OPERATORS[type(node.op)](sub(node.left), sub(node.right))
     if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](sub(node.operand))
+        return OPERATORS[type(node.op)](truth(node.operand) if isinstance(node.op, ast.Not) else sub(node.operand))
     if isinstance(node, ast.BoolOp):
-        result = sub(node.values[0])
+        result = truth(node.values[0])
         for part in node.values[1:]:
-            result = OPERATORS[type(node.op)](result, sub(part))
+            result = OPERATORS[type(node.op)](result, truth(part))
         return result
     if isinstance(node, ast.Compare):
         left, result = sub(node.left), True

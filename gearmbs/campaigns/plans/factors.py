@@ -37,7 +37,7 @@ class Factor:
     values : sequence, optional
         Takes the place of the range: these values, equally likely.
     whole : bool
-        Whole numbers, both ends included.
+        Whole numbers, both ends included; with ``scale="log"`` k comes in proportion to log((k + 1)/k).
     levels : int, optional
         How many values of the range a grid takes; default 2.
     name : str, optional
@@ -93,6 +93,12 @@ class Factor:
         unit = subject.unit_of(self.path)
         if self.values:
             values = tuple(number_in_si(v, unit, self.path) for v in self.values)
+            if any(isinstance(v, (list, dict)) for v in values):
+                raise CampaignError(
+                    f"factor {self.path!r}: values are numbers, texts, truth values or None; take lists and tables by "
+                    f"name, choose({self.path!r}, a=[...], b=[...])"
+                )
+            check_kinds(values, f"factor {self.path!r}: values")
             return Factor(self.path, values=values, whole=self.whole, name=self.name)
         low, high = (_real(v, unit, self.path) for v in (self.low, self.high))
         if not low < high:
@@ -111,7 +117,8 @@ class Factor:
             return {self.name: np.array(self.values)[place]}
         low, high = float(self.low), float(self.high)
         if self.whole:
-            return {self.name: np.minimum(np.floor(low + x * (high - low + 1)), high).astype(np.int64)}
+            drawn = low * ((high + 1.0) / low) ** x if self.scale == "log" else low + x * (high - low + 1.0)
+            return {self.name: np.minimum(np.floor(drawn), high).astype(np.int64)}
         if self.scale == "log":
             return {self.name: low * np.exp(x * math.log(high / low))}
         return {self.name: low + x * (high - low)}
@@ -370,6 +377,28 @@ def set_path(data: dict[str, Any], path: str, value: Any) -> None:
         data[section] = dict(data.get(section, {}))
         data = data[section]
     data[name] = value
+
+
+def check_kinds(values: Sequence[Any], where: str) -> None:
+    """Refuse values that do not fit in one column of a table as what they are.
+
+    Raises
+    ------
+    CampaignError
+        For texts beside numbers, which would become texts, for truth values beside either, for numbers that are none,
+        which stand for what is not given, and for whole ones beyond 64 bits.
+    """
+    kinds = {
+        "texts" if isinstance(v, str) else "truth values" if isinstance(v, bool) else "numbers"
+        for v in values
+        if v is not None
+    }
+    if len(kinds) > 1:
+        raise CampaignError(f"{where}: {' and '.join(sorted(kinds))} in one column; give values of one kind")
+    if "numbers" in kinds:
+        for v in values:
+            if v is not None and not (abs(v) < 2**63 if isinstance(v, int) else v == v):
+                raise CampaignError(f"{where}: {v!r} is no number, or a whole one beyond 64 bits")
 
 
 def _is_range(value: Any) -> bool:

@@ -19,6 +19,7 @@ from gearmbs.campaigns.plans.factors import (
     Columns,
     Factor,
     Specimens,
+    check_kinds,
     factor_from,
     factor_table,
     number_in_si,
@@ -30,6 +31,13 @@ from gearmbs.files import python_scalar
 from gearmbs.schema.described import chosen, read_toml
 
 FORMAT = 2
+
+ABOUT = ("index", "unit", "point", "slot", "id", "status", "message", "advice")
+"""Columns of a table that are neither factors nor results."""
+
+TAKEN = (*ABOUT, "case")
+"""Names that no column of a plan may have: those, and that of the dimension along which results are read."""
+
 ALL_CORNERS = 6
 """Up to so many coordinates every corner is checked; beyond, both ends of each and some corners."""
 
@@ -472,12 +480,20 @@ def _rows_in_si(plan: Plan) -> list[dict[str, Any]]:
             for row in found:
                 if isinstance(row.get(path), int) and not isinstance(row[path], bool):
                     row[path] = float(row[path])
+        if not any(isinstance(v, (list, tuple, dict)) for v in column):
+            check_kinds(column, f"rows: {path}")
     return found
 
 
 def _consistent(plan: Plan) -> None:
     """Refuse settings that contradict each other."""
     names = [name for f in plan.factors for name in f.columns(np.full((1, f.width), 0.5), *_variant(f))]
+    rows = plan.options["rows"] if plan.design == "list" else []
+    kept = [item.removeprefix("signal:") for item in plan.keep if item.startswith("signal:")]
+    taken = sorted({*names, *(name for row in rows for name in row)} & {*TAKEN, *kept})
+    if taken:
+        remedy = "rename the parameter" if rows else "give the factor another one, name='...'"
+        raise CampaignError(f"factors: {', '.join(taken)} is the name of another column or of a signal; {remedy}")
     doubled = {name for name in names if names.count(name) > 1}
     if doubled:
         raise CampaignError(

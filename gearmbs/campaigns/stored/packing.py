@@ -156,6 +156,7 @@ def _write_unit(folder: Folder, packed: Folder, unit: int) -> None:
     entry = parts[-1] | {name: sum(part[name] for part in parts) for name in SUMS}
     entry |= {
         "unit": unit,
+        "plan": packed.identity(unit),
         "index": [parts[0]["index"][0], parts[-1]["index"][1]],
         "status": {case: status for part in parts for case, status in part["status"].items()},
         "seconds": [seconds for part in parts for seconds in part["seconds"]],

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.campaigns.subjects.base import (
     Kept,
     SignalSpec,
@@ -17,6 +18,7 @@ from gearmbs.campaigns.subjects.base import (
     imported,
     kept_by_functions,
 )
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import DIMENSIONS, to_si
 
 
@@ -54,7 +56,7 @@ class FunctionSubject(Subject):
     ) -> None:
         self.function, self.version = _name_of(function), str(version)
         self.units = dict(units or {})
-        self.signal_sizes = {name: (int(size[0]), float(size[1])) for name, size in (signals or {}).items()}
+        self.signal_sizes = {name: _size(name, size) for name, size in (signals or {}).items()}
         self.parameters = {str(name): _tree(name, value) for name, value in (parameters or {}).items()}
         for path, unit in self.units.items():
             self._found(path)
@@ -137,11 +139,16 @@ class FunctionSubject(Subject):
                 f"{self.function} returned {record!r:.60}; return a dictionary of numbers and arrays, a Dataset or one "
                 "number"
             )
+        if "record" in keep and not hasattr(record, "data_vars"):
+            raise CampaignError(
+                f"{self.function} returned a {type(record).__name__}, of which no record is kept; return an "
+                "xarray.Dataset, or keep numbers and signals"
+            )
         kept = Kept(numbers=kept_by_functions(keep, record))
         items = {**record.attrs, **record.data_vars} if hasattr(record, "data_vars") else dict(record)
         if "numbers" in keep:
             kept.numbers |= {
-                k: float(v)
+                str(k): float(v)
                 for k, v in items.items()
                 if not isinstance(v, str) and np.ndim(getattr(v, "values", v)) == 0
             }
@@ -178,6 +185,25 @@ def _described(value: Any) -> str:
     """Return what a result is, in words."""
     values = getattr(value, "values", value)
     return f"an array of {np.size(values)}" if np.ndim(values) else f"a {type(values).__name__}"
+
+
+def _size(name: str, size: Sequence[float]) -> tuple[int, float]:
+    """Return samples and rate of a signal.
+
+    Raises
+    ------
+    CampaignError
+        If they are none, or the name is none of a folder, in which the signal is stored.
+    """
+    if not re.fullmatch(r"[^/\\.\0][^/\\\0]*", name):
+        raise CampaignError(f"signals: {name!r} is stored under its name; give one without / and \\ and a dot in front")
+    try:
+        samples, rate = size
+        return whole(samples, f"signals: {name}: samples", 1), float(Measure("frequency", above=0).as_given(rate))
+    except (TypeError, ValueError) as error:
+        raise CampaignError(
+            f"signals: {name} = {size!r}; give samples and rate in Hz, as (4096, 12800): {error}"
+        ) from None
 
 
 def _name_of(function: str | Callable[..., Any]) -> str:
