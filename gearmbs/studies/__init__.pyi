@@ -5,6 +5,10 @@ from .case.case import CaseError as CaseError
 from .case.case import CaseWarning as CaseWarning
 from .case.case import load_case as load_case
 from .case.case import make_case as make_case
+from .mode_names import mode_table as mode_table
+from .mode_names import named_modes as named_modes
+from .mode_names import ranked_crossings as ranked_crossings
+from .mode_names import train_modes as train_modes
 from .presets.bench import BenchSettings as BenchSettings
 from .presets.bench import BenchStudy as BenchStudy
 from .presets.bench import bench_choices as bench_choices
@@ -49,7 +53,6 @@ from .run.steady import steady as steady
 from .run.sweep import Sweep as Sweep
 from .run.sweep import sweep as sweep
 from .train_views import train_campbell as train_campbell
-from .train_views import train_modes as train_modes
 from .train_views import train_report as train_report
 from .train_views import train_scene as train_scene
 from .train_views import train_spectrum as train_spectrum

@@ -408,7 +408,7 @@ def campbell(
     record: Annotated[Path | None, typer.Option(help="Record of a run-up to lay beneath.")] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the figure.")] = Path("campbell"),
 ) -> None:
-    """Draw natural frequencies of a drivetrain over its speed, with what excites them; list the critical speeds."""
+    """Draw natural frequencies of a drivetrain over its speed, with what excites them; rank the critical speeds."""
     with guarded(), stage_bar(train.name) as move:
         check_kind(train, "drivetrain")
         if record is not None:
@@ -417,7 +417,7 @@ def campbell(
         import numpy as np
 
         from gearmbs.drivetrain.drivetrain import read_description
-        from gearmbs.signals import critical_speeds
+        from gearmbs.studies.mode_names import ranked_crossings
         from gearmbs.studies.train_views import train_campbell
         from gearmbs.units import to_si
         from gearmbs.view import campbell_plot
@@ -443,5 +443,5 @@ def campbell(
             measured = waterfall(read_any(record), maximum=top)
         move(0.8, "drawing")
         files = save_figures({"campbell": campbell_plot(diagram, measured=measured, maximum=top)}, out)
-        table = critical_speeds(diagram)
+        table = ranked_crossings(diagram)
     hand_over(table.to_string(index=False, float_format="{:.5g}".format), None, files)

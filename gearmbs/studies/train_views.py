@@ -10,13 +10,11 @@ import xarray as xr
 
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
 from gearmbs.drivetrain.kinematics import RPM
-from gearmbs.drivetrain.plants import loaded
-from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.gears.geometry import turn_z
-from gearmbs.mechanism import linear_modes
 from gearmbs.signals import spectrum
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import held_speed, holds_speed
+from gearmbs.studies.mode_names import train_modes, with_gains
 from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.train_record import STRAY
 from gearmbs.studies.trains import train_signal
@@ -24,7 +22,6 @@ from gearmbs.studies.trains import train_signal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gearmbs.dae.analyses.modes import Modes
     from gearmbs.view.mesh import Mesh
     from gearmbs.view.scene import Scene
 
@@ -245,38 +242,7 @@ def train_spectrum(
     return named_lines_plot(found, known, maximum=top, title=f"{train.name}: {name}")
 
 
-# Modes under load.
-
-
-def train_modes(train: Drivetrain) -> Modes:
-    """Return the modes of a whole drivetrain about its position of rest under the operating torques.
-
-    Tooth contacts have the stiffness of the pairs that touch there, and no friction. Shafts of prescribed speed are
-    held; other drives hold the train while it comes to rest, and then give way to the torque they held it with. Where a
-    corner of a tooth touches, the ratio of torques is another at the next angle: rigid rotation then has a frequency.
-
-    Parameters
-    ----------
-    train : Drivetrain
-
-    Returns
-    -------
-    Modes
-        See `gearmbs.mechanism.linear_modes`.
-
-    Raises
-    ------
-    ModelError
-        If no position of rest is found.
-
-    Warns
-    -----
-    UserWarning
-        Of meshes that are damped above critical: their modes do not oscillate.
-    """
-    warn_of_overdamped_meshes(train)
-    m, after = loaded(train)
-    return linear_modes(m, t=after)
+# Modes against speed.
 
 
 def mesh_orders(train: Drivetrain, harmonics: int = 2) -> dict[str, float]:
@@ -318,8 +284,9 @@ def train_campbell(
     Returns
     -------
     Dataset
-        See `gearmbs.signals.campbell`; its attribute ``operating_speed`` is that of the first drive, rad/s. Draw it by
-        `gearmbs.view.campbell_plot`.
+        See `gearmbs.signals.campbell`; its attribute ``operating_speed`` is that of the first drive, rad/s. Beside it
+        the ``mode_name`` of each mode and the ``critical_gain`` of each crossing: how far the excitation moves it, see
+        `gearmbs.studies.ranked_crossings`. Draw it by `gearmbs.view.campbell_plot`.
     """
     from gearmbs.signals import campbell
 
@@ -330,5 +297,6 @@ def train_campbell(
         for shaft in train.shafts
         if turns(shaft.name) > 0.0
     }
-    found = campbell(train_modes(train), turned, orders, maximum=maximum)
-    return found.assign_attrs(operating_speed=abs(train.drives[0].speed))
+    modes = train_modes(train)
+    found = campbell(modes, turned, orders, maximum=maximum)
+    return with_gains(train, found, modes).assign_attrs(operating_speed=abs(train.drives[0].speed))

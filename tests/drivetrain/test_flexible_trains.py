@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from gearmbs.drivetrain import (
     Accelerometer,
@@ -23,7 +24,7 @@ from gearmbs.drivetrain import (
 from gearmbs.drivetrain.drivetrain import read_description
 from gearmbs.flexible import Interface, block_mesh, mnf_of, nodes_where, reduce_model, solid_model, write_mnf
 from gearmbs.gears import GearSpec, IdealMesh
-from gearmbs.studies import run_train, train_modes
+from gearmbs.studies import mode_table, named_modes, ranked_crossings, run_train, train_campbell, train_modes
 from tests.drivetrain.assembled import Assembly, normal_at_pitch_point
 from tests.says import says
 
@@ -226,6 +227,55 @@ def test_energy_of_a_box_that_bends_is_closed():
     solution = train.build().simulate(0.004, rate=400000, tol=1e-8, rate_scale=train.rate_scale)
     balance = solution.energy_balance()
     assert abs(balance.attrs["relative_imbalance"]) < 1e-5
+
+
+@pytest.mark.slow
+def test_shares_of_energy_and_damping_are_those_of_the_matrices():
+    train = box("all", 4)
+    matrices = box_assembly(train)
+    free = np.setdiff1d(np.arange(len(matrices.k)), [matrices.row(0, 0.0) + 5])
+    squares, shapes = scipy.linalg.eigh(matrices.k[np.ix_(free, free)], matrices.m[np.ix_(free, free)])
+    named = named_modes(without_damping(train))
+    meshes, names = assembly_of(train, (0.03, 0.04, 0.04))
+    rows = add_meshes(meshes, train, names, (1, -1))
+    for name, row in zip(("stage 1", "stage 2"), rows):
+        expected = K_MESH * (row[free] @ shapes[:, :30]) ** 2 / squares[:30]
+        np.testing.assert_allclose(named.energy.sel(part=name).values[:30], expected, atol=1e-6)
+    np.testing.assert_allclose(named.energy.sum("part"), 1.0, atol=1e-6)
+    np.testing.assert_allclose(named.kinetic.sum("body"), 1.0, atol=1e-12)
+    # little damping, which leaves the shapes as they are
+    damped = named_modes(train.with_parts(*(replace(b, damping_time=0.01 * TIME) for b in train.bearings)))
+    resisting = 0.01 * matrices.c[np.ix_(free, free)]
+    expected = np.einsum("dk,de,ek->k", shapes, resisting, shapes) / (2.0 * np.sqrt(squares))
+    np.testing.assert_allclose(damped.damping.sum("part").values[:15], expected[:15], rtol=1e-3)
+    np.testing.assert_allclose(damped.damping_ratio.values[:15], expected[:15], rtol=1e-3)
+
+
+@pytest.mark.slow
+def test_modes_are_called_by_their_largest_part():
+    names = [str(name) for name in named_modes(box("all", 4)).name.values[:12]]
+    # across the axis of the lay shaft its bearings are softer than itself
+    assert "bending of shaft 'input'" in names
+    assert "bearing 'c'" in names
+    table = mode_table(named_modes(housed(time=0.0)))
+    assert table["name"].iloc[0] == "housing 'case' on its mounts"
+    kinds = ["mesh", "shaft", "bearing", "housing", "mount", "load", "other"]
+    assert list(table.columns[3:]) == kinds
+    np.testing.assert_allclose(table[kinds].sum(axis=1), 1.0, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_gains_of_crossings_are_the_deflections_that_matrices_have_there():
+    train = housed()
+    matrices, gear, _ = housed_assembly(train)
+    held = [matrices.row(0, 0.0) + 5]
+    ranked = ranked_crossings(train_campbell(train, ["0 rpm", "60000 rpm"], harmonics=1, maximum=12000.0))
+    assert list(ranked["gain"]) == sorted(ranked["gain"], reverse=True)
+    best = ranked.iloc[0]
+    assert best["order"] == "1 x stage"
+    assert best["gain"] > 2.0
+    found = gear @ matrices.response(K_MESH * gear, best["frequency_hz"], held)
+    assert abs(found) == pytest.approx(best["gain"], rel=0.1)
 
 
 TOML = """

@@ -21,7 +21,8 @@ def without_names(part):
     """Return a part as tables without its contact and the names of what it consists of."""
     table = described(part)
     table.get("settings", {}).pop("contact", None)
-    for piece in (*table.get("mounts", ()), *table.get("modes", ())):
+    # shafts have modes, too, by their number
+    for piece in (*table.get("mounts", ()), *(table.get("modes") or ())):
         del piece["name"]
     return table
 

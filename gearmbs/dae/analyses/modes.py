@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 from gearmbs.dae.analyses.eigenvalues import spectrum
+from gearmbs.dae.analyses.energies import ModeParts, mode_parts
 from gearmbs.dae.analyses.linearisation import Reduced, reduce, warn_of_varying
 
 RIGID, OSCILLATING, REAL, SLIDING = "rigid", "oscillating", "real", "damped rigid"
@@ -63,6 +64,8 @@ class Modes:
     shapes : ndarray of complex, shape (k, bodies, 6)
         Displacement of the centre of mass and rotation of each body, global components; the largest entry is 1.
     body_names : list of str
+    parts : ModeParts, optional
+        Where the energy of each is, and what damps it.
     """
 
     eigenvalues: np.ndarray
@@ -71,6 +74,7 @@ class Modes:
     kinds: list[str]
     shapes: np.ndarray
     body_names: list[str]
+    parts: ModeParts | None = None
 
     @property
     def stable(self) -> bool:
@@ -174,6 +178,7 @@ def linear_modes(place: System | Instant) -> Modes:
         kinds,
         _unit(instant.spatial(reduced.basis @ motions)),
         instant.system.body_names,
+        mode_parts(instant, reduced.basis @ motions, size),
     )
 
 

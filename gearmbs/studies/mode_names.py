@@ -1,0 +1,197 @@
+"""Modes of a drivetrain under load, named by the part that has most of their energy, and what excites them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from gearmbs.drivetrain import Drivetrain, Housing, Mount, Shaft
+from gearmbs.drivetrain.plants import loaded
+from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
+from gearmbs.mechanism import linear_modes
+
+if TYPE_CHECKING:
+    from gearmbs.dae.analyses.modes import Modes
+    from gearmbs.flexible import ModalModel
+
+KINDS = ("mesh", "shaft", "bearing", "coupling", "housing", "mount", "load", "other")
+"""What parts are, in the order of tables; drives count as loads."""
+
+MOTIONS = ("bending", "torsion", "stretching")
+"""How a shaft deforms in one of its modal coordinates."""
+
+RIGID = "rigid motion"
+
+
+def train_modes(train: Drivetrain) -> Modes:
+    """Return the modes of a whole drivetrain about its position of rest under the operating torques.
+
+    Tooth contacts have the stiffness of the pairs that touch there, and no friction. Shafts of prescribed speed are
+    held; other drives hold the train while it comes to rest, and then give way to the torque they held it with. Where a
+    corner of a tooth touches, the ratio of torques is another at the next angle: rigid rotation then has a frequency.
+
+    Parameters
+    ----------
+    train : Drivetrain
+
+    Returns
+    -------
+    Modes
+        See `gearmbs.mechanism.linear_modes`.
+
+    Raises
+    ------
+    ModelError
+        If no position of rest is found.
+
+    Warns
+    -----
+    UserWarning
+        Of meshes that are damped above critical: their modes do not oscillate.
+    """
+    warn_of_overdamped_meshes(train)
+    m, after = loaded(train)
+    return linear_modes(m, t=after)
+
+
+def part_kinds(train: Drivetrain) -> dict[str, str]:
+    """Return what each part of a drivetrain that can hold energy is, one of `KINDS`, by name."""
+    groups = {"mesh": train.meshes, "shaft": train.shafts, "bearing": train.bearings, "coupling": train.couplings,
+              "housing": train.housings, "load": (*train.drives, *train.loads)}  # fmt: skip
+    out = {part.name: kind for kind, parts in groups.items() for part in parts}
+    return out | {mount.name: "mount" for housing in train.housings for mount in housing.mounts}
+
+
+def named_modes(train: Drivetrain, modes: Modes | None = None) -> xr.Dataset:
+    """Return the modes of a drivetrain that oscillate, by name, with the shares of its parts.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    modes : Modes, optional
+        Of it; default: those under load, `gearmbs.studies.train_modes`.
+
+    Returns
+    -------
+    Dataset
+        Over ``mode``: ``frequency`` (Hz), ``damping_ratio``, ``name``, the largest part and what it does; over
+        ``mode`` and ``part``: ``energy``, the share of the potential energy, and ``damping``, the part of the damping
+        ratio that it gives; over ``mode`` and ``body``: ``kinetic``, the share of the kinetic energy. ``kind`` is what
+        a part is. Table it by `mode_table`.
+    """
+    if modes is None:
+        modes = train_modes(train)
+    chosen = modes.oscillating
+    parts = modes.parts
+    assert parts is not None
+    known = part_kinds(train)
+    kinds = [known.get(name, "other") for name in parts.names]
+    names = [_name(train, parts, kinds, row) for row in chosen]
+    return xr.Dataset(
+        {
+            "frequency": ("mode", modes.frequencies[chosen], {"units": "Hz"}),
+            "damping_ratio": ("mode", modes.damping_ratios[chosen], {"units": "1"}),
+            "name": ("mode", np.asarray(names, dtype=str)),
+            "energy": (("mode", "part"), parts.energy[chosen], {"units": "1"}),
+            "damping": (("mode", "part"), parts.damping[chosen], {"units": "1"}),
+            "kinetic": (("mode", "body"), parts.kinetic[chosen], {"units": "1"}),
+        },
+        coords={"mode": np.arange(1, chosen.size + 1), "part": parts.names, "kind": ("part", kinds),
+                "body": modes.body_names},
+    )  # fmt: skip
+
+
+def _name(train: Drivetrain, parts: Any, kinds: list[str], row: int) -> str:
+    """Return what a mode is called: its largest part, mounts of a housing taken together."""
+    shares: dict[tuple[str, str], float] = {}
+    for name, kind, share in zip(parts.names, kinds, parts.energy[row]):
+        owner = _housing_of(train, name) if kind == "mount" else name
+        shares[kind, owner] = shares.get((kind, owner), 0.0) + float(share)
+    if not shares or not max(shares.values()) > 0.0:
+        return RIGID
+    (kind, name), _ = max(shares.items(), key=lambda item: item[1])
+    if kind == "mount":
+        return f"housing '{name}' on its mounts"
+    if kind == "shaft":
+        return f"{_motion(train.modal_models[name], parts.strain[name][row])} of shaft '{name}'"
+    return f"{kind} '{name}'"
+
+
+def _housing_of(train: Drivetrain, mount: str) -> str:
+    owners: list[tuple[Housing, Mount]] = [(h, m) for h in train.housings for m in h.mounts]
+    return next(h.name for h, m in owners if m.name == mount)
+
+
+def _motion(model: ModalModel, strain: np.ndarray) -> str:
+    """Return how a shaft deforms most: round shafts bend, twist and stretch in modal coordinates of their own."""
+    assert model.turned is not None
+    reach = float(np.abs(model.positions[:, 2]).max())
+    sizes = np.column_stack([
+        np.abs(model.moved[:, :, :2]).max(axis=(1, 2)), reach * np.abs(model.turned[:, :, 2]).max(axis=1),
+        np.abs(model.moved[:, :, 2]).max(axis=1),
+    ])  # fmt: skip
+    sums = np.bincount(np.argmax(sizes, axis=1), strain, minlength=3)
+    return MOTIONS[int(np.argmax(sums))]
+
+
+def mode_table(named: xr.Dataset) -> pd.DataFrame:
+    """Return named modes as a table: frequency, damping ratio, name, and the share of each kind of part."""
+    kinds = np.asarray(named["kind"].values)
+    rows = {
+        "frequency_hz": named["frequency"].values,
+        "damping_ratio": named["damping_ratio"].values,
+        "name": named["name"].values,
+    }
+    energy = named["energy"].values
+    sums = {kind: energy[:, kinds == kind].sum(axis=1) for kind in KINDS if (kinds == kind).any()}
+    rest = 1.0 - energy.sum(axis=1)
+    sums["other"] = sums.get("other", 0.0) + rest
+    return pd.DataFrame({**rows, **sums}, index=named["mode"].values)
+
+
+def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Dataset:
+    """Return a Campbell diagram with the names of its modes and the gain of each crossing."""
+    named = named_modes(train, modes)
+    orders = dict(zip(diagram["order"].values.tolist(), diagram["order_name"].values.tolist()))
+    gains = []
+    for k, order in zip(diagram["critical_mode"].values, diagram["critical_order"].values):
+        one = named.sel(mode=int(k))
+        part = orders[float(order)].split(" x ", 1)[1]
+        share = one["kinetic"].sel(body=part) if isinstance(train.parts[part], Shaft) else one["energy"].sel(part=part)
+        ratio = float(one["damping_ratio"])
+        gains.append(float(share) / (2.0 * ratio) if ratio > 0.0 else np.inf)
+    names = [str(named["name"].sel(mode=int(k)).values) for k in diagram["mode"].values]
+    return diagram.assign(
+        critical_gain=("crossing", np.array(gains, dtype=float), {"units": "1"}),
+        mode_name=("mode", np.asarray(names, dtype=str)),
+    )
+
+
+def ranked_crossings(diagram: xr.Dataset) -> pd.DataFrame:
+    """Return the crossings of a drivetrain's Campbell diagram, those first that their excitation moves most.
+
+    The gain of a mesh is the amplitude of its deflection over that of the harmonic of the transmission error, at the
+    crossing and by this mode alone: the mesh's share of the energy over twice the damping ratio. Of a shaft, where
+    nothing meshes, it is its share of the kinetic energy over the same.
+
+    Parameters
+    ----------
+    diagram : Dataset
+        From `gearmbs.studies.train_campbell`.
+    """
+    orders = dict(zip(diagram["order"].values.tolist(), diagram["order_name"].values.tolist()))
+    names = dict(zip(diagram["mode"].values.tolist(), diagram["mode_name"].values.tolist()))
+    table = pd.DataFrame(
+        {
+            "speed_rpm": diagram["critical_speed"].values * 30.0 / np.pi,
+            "frequency_hz": diagram["critical_frequency"].values,
+            "order": [orders[float(k)] for k in diagram["critical_order"].values],
+            "mode": diagram["critical_mode"].values,
+            "name": [names[int(k)] for k in diagram["critical_mode"].values],
+            "gain": diagram["critical_gain"].values,
+        }
+    )
+    return table.sort_values("gain", ascending=False, kind="stable").reset_index(drop=True)
