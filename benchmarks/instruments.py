@@ -220,6 +220,17 @@ STATES: dict[str, dict[str, Any]] = {
 LOADS = {"low": 100.0, "high": 200.0}
 SHAFT = math.tau * 1000 / 60
 DROP_OUTS = {"per_second": 30, "longest": 0.7e-3, "full_scale": 0.2}
+PIXEL = 20e-6
+"""m."""
+
+
+AS_ACCELERATION: dict[str, dict[str, Any]] = {
+    "force": {},
+    "laser": {"quantity": "acceleration", "band": ("100 Hz", "5 kHz")},
+    "as it came": {"quantity": "acceleration", "band": ("100 Hz", "5 kHz")},
+    "camera": {"quantity": "acceleration", "band": ("100 Hz", "2.4 kHz")},
+}
+"""How records of each instrument are compared: the band ends below half the rate of the laser, and of the film."""
 
 
 def rig(torque: float, seconds: float = 1.26, **changes: Any) -> dict[str, xr.DataArray]:
@@ -255,6 +266,21 @@ def rig(torque: float, seconds: float = 1.26, **changes: Any) -> dict[str, xr.Da
     }
 
 
+def seen_by(run: dict[str, xr.DataArray], seed: int) -> dict[str, xr.DataArray]:
+    """Return what the force, a laser, bridged and as it came, and a camera show of a run of the rig."""
+    laser = signals.sample(run["velocity"], 12_800.0)
+    angle = xr.DataArray(SHAFT * laser["time"].values, dims=("time",))
+    laser = signals.speckle(laser, angle, rms=2e-4, seed=seed, recurring=0.9)
+    laser = signals.drop_outs(signals.add_noise(laser, seed=seed, rms=1e-5), seed=seed, **DROP_OUTS)
+    film = signals.camera(run["place"], 6000.0, scale=PIXEL, noise=0.02, seed=seed)
+    return {
+        "force": signals.sample(run["force"], 12_800.0),
+        "laser": signals.repair_vibrometer(laser, full_scale=DROP_OUTS["full_scale"]),
+        "as it came": laser,
+        "camera": signals.point_track(film, PIXEL),
+    }
+
+
 def optical() -> str:
     """Return the changes of mesh harmonics by the force, a laser and a camera, and where these say otherwise."""
     seen: dict[str, dict[str, dict[str, xr.DataArray]]] = {
@@ -262,21 +288,9 @@ def optical() -> str:
     }
     for number, (load, state) in enumerate((load, state) for load in LOADS for state in STATES):
         run = rig(LOADS[load], **STATES[state])
-        laser = signals.sample(run["velocity"], 12_800.0)
-        angle = xr.DataArray(SHAFT * laser["time"].values, dims=("time",))
-        laser = signals.speckle(laser, angle, rms=2e-4, seed=number, recurring=0.9)
-        laser = signals.drop_outs(signals.add_noise(laser, seed=number, rms=1e-5), seed=number, **DROP_OUTS)
-        film = signals.camera(run["place"], 6000.0, scale=20e-6, noise=0.02, seed=number)
-        for by, record in (
-            ("force", signals.sample(run["force"], 12_800.0)),
-            ("laser", signals.repair_vibrometer(laser, full_scale=0.2)),
-            ("as it came", laser),
-            ("camera", signals.point_track(film, "20 um")),
-        ):
+        for by, record in seen_by(run, number).items():
             seen[by][load][state] = record
-    wide, narrow = ({"quantity": "acceleration", "band": band} for band in (("100 Hz", "5 kHz"), ("100 Hz", "2.4 kHz")))
-    told = {"force": {}, "laser": wide, "as it came": wide, "camera": narrow}
-    found = {by: signals.compare(records, **told[by]) for by, records in seen.items()}
+    found = {by: signals.compare(records, **AS_ACCELERATION[by]) for by, records in seen.items()}
     rows = []
     for load in LOADS:
         for state in list(STATES)[1:]:

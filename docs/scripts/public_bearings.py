@@ -1,9 +1,10 @@
-"""What the diagnosis of bearings finds in public recordings: the tables of docs/howto/bearings.md.
+"""What the diagnosis of bearings finds in public recordings: the tables of docs/howto/bearing_records.md.
 
-``python docs/scripts/public_bearings.py --cwru FOLDER --mfpt FOLDER --gears FOLDER`` judges the recordings in these
-folders, those that are given, and stores what it found; the page shows what is stored. The recordings are
+``python docs/scripts/public_bearings.py --cwru FOLDER --other-end FOLDER --mfpt FOLDER --gears FOLDER`` judges the
+recordings in these folders, those that are given, and stores what it found; the page shows what is stored. They are
 
-* of Case Western Reserve University, one ``RPM_FAULT_DIAMETER_END.npz`` for each with the channels DE, FE and BA;
+* of Case Western Reserve University, one ``RPM_FAULT_DIAMETER_END.npz`` for each with the channels DE, FE and BA; with
+  ``--other-end`` the bearing at the end that was not hurt is judged;
 * of the Machinery Failure Prevention Technology society, as MATLAB files with the structure ``bearing``;
 * of a gearbox rig of SpectraQuest, tables of four channels at 12.8 kHz and 30 turns a second.
 
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,7 +54,7 @@ class Recording(NamedTuple):
 
 
 def cwru(folder: Path) -> Iterator[Recording]:
-    """Yield the recordings at 12 kHz, and pieces of those without a fault, 48 kHz."""
+    """Yield the recordings at 12 and 48 kHz, and pieces of those without a fault."""
     for path in sorted(folder.rglob("*.npz")):
         speed, fault, *size = path.stem.split("_")
         channels = {name: G * values[:, 0] for name, values in np.load(path).items()}
@@ -64,12 +66,34 @@ def cwru(folder: Path) -> Iterator[Recording]:
                         "CWRU without a fault", f"{path.stem} {name} {k + 1}", piece, [piece], 48000.0,
                         int(speed) / 60, BEARINGS[name], None,
                     )  # fmt: skip
-        elif size[1] in ("DE12", "FE") and (end := size[1][:2]) in channels:
-            name = {"DE": "drive end", "FE": "fan end"}[end]
+        elif (end := size[1][:2]) in channels:
+            name, rate = {"DE": "drive end", "FE": "fan end"}[end], 48000.0 if size[1] == "DE48" else 12000.0
+            group = f"CWRU {name}{' at 48 kHz' if rate == 48000.0 else ''}, {kind}"
             yield Recording(
-                f"CWRU {name}, {kind}", path.stem, channels[end], list(channels.values()), 12000.0,
+                group, path.stem, channels[end], list(channels.values()), rate,
                 int(speed) / 60, BEARINGS[end], PARTS[place],
             )  # fmt: skip
+
+
+def other_end(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield what is named of the bearing at the end of the motor that was not hurt, at the true speed."""
+    from gearmbs.signals import diagnose_bearing, make_signal
+
+    group = "CWRU, bearing at the end that was not hurt"
+    for path in sorted(folder.rglob("*.npz")):
+        speed, _, *size = path.stem.split("_")
+        channels = {name: G * values[:, 0] for name, values in np.load(path).items()}
+        end = {"DE12": "FE", "FE": "DE"}.get(size[1] if size else "")
+        if end not in channels:
+            continue
+        one = Recording(
+            group, f"{path.stem} {end}", channels[end], list(channels.values()), 12000.0, int(speed) / 60,
+            BEARINGS[end], None,
+        )  # fmt: skip
+        turns = true_speed(one)
+        signal = make_signal(one.values, one.rate, units="m/s^2")
+        fault = diagnose_bearing(signal, one.bearing, math.tau * turns, shafts=()).fault
+        yield {"group": group, "record": one.name, "part": None, "rpm": round(60 * turns, 1), "+0.0": fault}
 
 
 def mfpt(folder: Path) -> Iterator[Recording]:
@@ -184,13 +208,14 @@ def main() -> None:
     """Judge the recordings in the folders given and store the outcome."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     sets = {"cwru": cwru, "mfpt": mfpt}
-    for name in (*sets, "gears"):
+    alone = {"gears": gears, "other-end": other_end}
+    for name in (*sets, *alone):
         parser.add_argument(f"--{name}", type=Path)
     asked = vars(parser.parse_args())
     rows = []
     for name, folder in asked.items():
         if folder is not None:
-            new = gears(folder) if name == "gears" else map(judged, sets[name](folder))
+            new = map(judged, sets[name](folder)) if name in sets else alone[name.replace("_", "-")](folder)
             for row in new:
                 print(row, flush=True)
                 rows.append(row)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -272,12 +273,19 @@ def analyse(
         signal, own_speed = measured(signal, channel or (), helpers, told)
         shaft["speed_channel"] = speed_channel if own_speed is None else own_speed
         if planetary is not None or (teeth is None and "planetary" in signal.attrs):
+            if bearing or train is not None:
+                raise ValueError(
+                    "--bearing: bearings are not looked for beside a planetary set; leave --planetary out and give the "
+                    "speed of the bearings' shaft with --speed"
+                )
             done = _of_set(signal, shaft, planetary, planets, member)
         else:
-            done = _of_record(signal, shaft, wheel, harmonics, lambda f, s: move(0.3 + 0.7 * f, s))
-        if not done.of_set and (bearing or train is not None):
-            asked = bearings_asked(bearing or [], shaft_texts, train)
-            done = _with_bearings(done, asked if tolerance is None else asked | {"tolerance": tolerance}, band)
+            record = partial(_of_record, signal, wheel=wheel, harmonics=harmonics)
+            done = record(shaft, progress=lambda f, s: move(0.3 + 0.7 * f, s))
+            if bearing or train is not None:
+                asked = bearings_asked(bearing or [], shaft_texts, train)
+                asked |= {} if tolerance is None else {"tolerance": tolerance}
+                done = _with_bearings(done, asked, band, record)
         try:
             files = save_tables(done.tables, tables)
             if figures is not None:
@@ -298,11 +306,14 @@ class Analysed:
     text: str
     tables: dict[str, Any]
     draw: Callable[[], dict[str, Any]]
-    of_set: bool = False
 
 
 def _of_record(
-    signal: Any, shaft: dict[str, Any], wheel: int, harmonics: int, progress: Callable[[float, str], None]
+    signal: Any,
+    shaft: dict[str, Any],
+    wheel: int,
+    harmonics: int,
+    progress: Callable[[float, str], None] | None = None,
 ) -> Analysed:
     """Analyse a record of gears or of any machine."""
     from gearmbs.signals import analyse as analyse_signal
@@ -326,25 +337,37 @@ def _of_set(signal: Any, shaft: dict[str, Any], teeth: str | None, planets: int,
         own = {"planetary": tooth_counts(teeth), "planets": planets, "member": member}
     report = analyse_signal(signal, **shaft, **own)
     draw = lambda: {"planetary": report.plot()}  # noqa: E731
-    return Analysed(signal, shaft, report, report.to_markdown(), report.tables(), draw, True)
+    return Analysed(signal, shaft, report, report.to_markdown(), report.tables(), draw)
 
 
-def _with_bearings(done: Analysed, asked: dict[str, Any], band: str | None) -> Analysed:
-    """Put the diagnosis of bearings before the report of a record."""
-    from gearmbs.signals import diagnose_bearing, shaft_phase
+def _with_bearings(
+    done: Analysed, asked: dict[str, Any], band: str | None, record: Callable[[dict[str, Any]], Analysed]
+) -> Analysed:
+    """Put the diagnosis of bearings before the report of a record, both at one speed.
+
+    Where a told speed is wrong, the bearings' is that of the mesh line if no family of the shaft's orders tells it, and
+    the record is analysed again at that of a family further off.
+    """
+    from gearmbs.signals import AnalysisReport, diagnose_bearing, shaft_phase
 
     known = done.shaft["speed"]
-    turns = known if isinstance(known, float) else done.report.speed
-    varies = done.shaft["tacho"] is not None or done.shaft["speed_channel"] is not None
-    if varies or not isinstance(known, float | None):
+    constant = isinstance(known, float) and done.shaft["tacho"] is None and done.shaft["speed_channel"] is None
+    if not constant and (known is not None or done.shaft["tacho"] or done.shaft["speed_channel"]):
         asked["phase"] = shaft_phase(done.signal, **done.shaft)
+    turns = known if isinstance(known, float) else done.report.speed
     asked["speed"] = asked.get("speed") if turns is None else turns
+    asked["band"] = None if band is None else pair_of(band)
     one = done.signal.sel(channel=done.report.levels["channel"].values)
-    bearings = diagnose_bearing(one, band=None if band is None else pair_of(band), **asked)
-    draw = lambda: done.draw() | {"bearings": bearings.plot()}  # noqa: E731
+    bearings = diagnose_bearing(one, **asked)
+    if constant and not bearings.speed_found and isinstance(done.report, AnalysisReport) and done.report.speed != known:
+        bearings = diagnose_bearing(one, **asked | {"speed": done.report.speed})
+    elif constant and bearings.speed_found and bearings.speed_remark and not isinstance(done.report, AnalysisReport):
+        done = record(done.shaft | {"speed": math.tau * bearings.shaft})
+    drawn = done.draw
     return replace(
-        done, draw=draw, text=f"{bearings.to_markdown()}\n\n{done.text}", tables=done.tables | bearings.tables()
-    )
+        done, draw=lambda: drawn() | {"bearings": bearings.plot()},
+        text=f"{bearings.to_markdown()}\n\n{done.text}", tables=done.tables | bearings.tables(),
+    )  # fmt: skip
 
 
 def trend(

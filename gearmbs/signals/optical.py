@@ -119,24 +119,7 @@ def repair_vibrometer(
     for name in kept:
         column = signal.values[:, names.index(name)]
         bound = None if full_scale is None else _in_unit(full_scale, units_of(signal)[names.index(name)])
-        found = {
-            "dark": dark,
-            "over the range": np.zeros_like(dark) if bound is None else np.abs(column) >= AT_RANGE * bound,
-            "held": _held(column),
-        }
-        told = np.any(list(found.values()), axis=0)
-        lost = _widened(told)
-        known = _widened(lost)
-        found["spikes"] = np.zeros_like(dark)
-        for _ in range(PASSES):
-            if spikes is None:
-                break
-            more = _spikes(_bridged(column, lost), lost, known, spikes) & ~lost
-            if not more.any():
-                break
-            found["spikes"] |= more
-            told |= more
-            lost = _widened(told)
+        lost, found = _lost(column, dark, bound, spikes)
         share = float(lost.mean())
         if share > MOST_LOST:
             raise SignalError(
@@ -154,17 +137,75 @@ def repair_vibrometer(
         shares.append(share)
         columns.append(_bridged(column, lost))
         if lost.any():
-            longest = max(b - a for a, b in _stretches(lost)) / rate
-            kinds = ", ".join(f"{len(_stretches(where))} {kind}" for kind, where in found.items() if where.any())
-            notes.append(
-                f"{name}: {len(_stretches(lost))} drop-outs ({kinds}), {100 * share:.3g} % of the record, the longest "
-                f"{1e3 * longest:.3g} ms, bridged by linear prediction."
-            )
+            notes.append(f"{name}: {_told(lost, found, rate)}, bridged by linear prediction.")
     at = [names.index(name) for name in kept]
     result = like(
         signal, np.stack(columns, axis=1), channels=kept, units=[units_of(signal)[k] for k in at], lost=shares
     )
     return result.assign_attrs(notes=notes) if notes else result
+
+
+def _lost(
+    column: np.ndarray, dark: np.ndarray, bound: float | None, spikes: float | None
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return which samples of a channel are lost with their neighbours, and which were found by what."""
+    found = {
+        "dark": dark,
+        "over the range": np.zeros_like(dark) if bound is None else np.abs(column) >= AT_RANGE * bound,
+        "held": _held(column),
+    }
+    told = np.any(list(found.values()), axis=0)
+    lost = _widened(told)
+    known = _widened(lost)
+    found["spikes"] = np.zeros_like(dark)
+    for _ in range(PASSES):
+        if spikes is None:
+            break
+        more = _spikes(_bridged(column, lost), lost, known, spikes) & ~lost
+        if not more.any():
+            break
+        found["spikes"] |= more
+        told |= more
+        lost = _widened(told)
+    return lost, found
+
+
+def _told(lost: np.ndarray, found: dict[str, np.ndarray], rate: float) -> str:
+    """Return how many drop-outs there are, in words."""
+    longest = max(b - a for a, b in _stretches(lost)) / rate
+    kinds = ", ".join(f"{len(_stretches(where))} {kind}" for kind, where in found.items() if where.any())
+    return (
+        f"{len(_stretches(lost))} drop-outs ({kinds}), {100 * float(lost.mean()):.3g} % of the record, the longest "
+        f"{1e3 * longest:.3g} ms"
+    )
+
+
+def instrument_faults(signal: xr.DataArray, beside: Sequence[str] = ()) -> list[str]:
+    """Return remarks on what instruments did to a record that nobody has mended: its tops cut off, drop-outs left.
+
+    Drop-outs are looked for in velocities, as of lasers, that `repair_vibrometer` has not seen. A record that ends at
+    exactly zero on one side, as a contact force does, is not taken for cut off. Channels `beside` hold no vibration.
+    """
+    remarks = []
+    seen = "lost" in signal.attrs
+    for name, unit, column in zip(signal["channel"].values, units_of(signal), signal.values.T, strict=True):
+        if str(name) in beside:
+            continue
+        if (top := flat_top(column)) is not None and top[0] != 0.0:
+            limit, count = top
+            remarks.append(
+                f"CLIPPED: {name} stands at {limit:.6g} {unit} in {count} samples, as where a range is exceeded: its "
+                "levels are wrong, and its harmonics not only its own. Measure with a larger range."
+            )
+        if seen or not _known_unit(unit) or unit_dimension(unit)[0] != "velocity" or np.ptp(column) == 0.0:
+            continue
+        lost, found = _lost(column, np.zeros(column.size, dtype=bool), None, SPIKE)
+        if lost.any():
+            remarks.append(
+                f"DROP-OUTS: {name} has {_told(lost, found, rate_of(signal))}, as lasers have; all levels are wrong by "
+                "them. Bridge them with repair_vibrometer (--repair), unless they are blows."
+            )
+    return remarks
 
 
 def flat_top(column: np.ndarray) -> tuple[float, int] | None:
@@ -174,7 +215,10 @@ def flat_top(column: np.ndarray) -> tuple[float, int] | None:
     value recurs. If there are several stretches of equal samples, far more than a step below do, too: vibration cut to
     coarse steps has stretches at its peaks, but nearly as many samples one step below.
     """
-    whole = np.round(column / (SAME * max(float(np.ptp(column)), np.finfo(float).tiny)))
+    near = SAME * float(np.ptp(column))
+    if near == 0.0 or max(np.sum(column >= column.max() - near), np.sum(column <= column.min() + near)) <= FLAT_SHARE:
+        return None
+    whole = np.round(column / near)
     for sign in (1.0, -1.0):
         x = sign * whole
         top = float(x.max())

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import subprocess
 import sys
 
@@ -209,3 +210,46 @@ def test_the_command_line_answers_what_is_asked(tmp_path):
     assert followed.exit_code == 0, followed.output
     assert "1800.0 rpm" in followed.output
     assert "'mmm' is not a unit; did you mean 'mm'" in run("analyse", path, "--units", "mmm").output
+
+
+def lines_of_shaft(turns, orders, level=0.3, more=None):
+    """Five seconds of noise with some orders of a shaft, Hz, in m/s^2."""
+    t = np.arange(5 * 12800) / 12800.0
+    values = 0.3 * np.random.default_rng(5).standard_normal(t.size)
+    values += sum(level * np.cos(2 * np.pi * k * turns * t + k) for k in orders)
+    return make_signal({"a": values if more is None else values + more(t)}, 12800.0, units="m/s^2")
+
+
+@pytest.mark.parametrize(("off", "orders", "told"), [
+    (0.004, (1,), "no family of its orders stands out near it"),
+    (0.004, range(1, 13), "from a family of its orders"),
+    (0.03, range(1, 13), "from a family of its orders"),
+])  # fmt: skip
+def test_bearings_and_vibration_are_reported_at_one_speed(tmp_path, off, orders, told):
+    """A single line says where orders are taken, and is called no speed; a family far off is that of both reports."""
+    write_signal(lines_of_shaft(1745.0 / 60.0 * (1.0 + off), orders), tmp_path / "x.csv")
+    result = run("analyse", tmp_path / "x.csv", "--bearing", "6205", "--speed", "1745 rpm")
+    assert result.exit_code == 0, result.output
+    assert told in result.output
+    assert "own line" not in result.output
+    bearings, vibration = (
+        float(re.search(rf"- {word}: ([0-9.]+) rpm", result.output).group(1)) for word in ("Shaft", "Speed")
+    )
+    # a line is known to some hundredths of the 0.2 Hz between those of a spectrum of 5 s, 12 rpm
+    assert vibration == pytest.approx(1745.0 * (1.0 + off), abs=0.5)
+    if len(orders) == 1:
+        assert bearings == 1745.0
+        assert "from the line at order 1, +0.39" in result.output
+    else:
+        assert bearings == pytest.approx(vibration, abs=0.5)
+
+
+def test_bearings_take_the_speed_of_the_mesh_line_where_no_family_tells_it(tmp_path):
+    signal = lines_of_shaft(29.3, (), more=lambda t: np.cos(2 * np.pi * 29.3 * 32 * t))
+    write_signal(signal, tmp_path / "x.csv")
+    result = run("analyse", tmp_path / "x.csv", "--bearing", "6205", "--speed", "1745 rpm", "--teeth", "32")
+    assert result.exit_code == 0, result.output
+    assert "Shaft: 1758.0 rpm" in result.output
+    result = run("analyse", tmp_path / "x.csv", "--bearing", "6205", "--speed", "29 Hz", "--planetary", "17,19,55")
+    assert result.exit_code != 0
+    assert "--planetary" in result.output

@@ -7,26 +7,21 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
+from benchmarks import instruments
 from gearmbs.cli import app
-from gearmbs.gears import GearPair
-from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.signals import (
     SignalError,
     add_noise,
+    analyse,
     camera,
     compare,
     convert,
     drop_outs,
-    force_to_acceleration,
-    joint_force,
-    laser_vibrometer,
     make_signal,
     point_track,
     repair_vibrometer,
-    sample,
     speckle,
     time_synchronous_average,
-    trim,
     turn_floor,
     write_signal,
 )
@@ -119,6 +114,27 @@ def test_a_few_drop_outs_to_the_range_are_told_unless_they_are_bridged():
     assert not any("CLIPPED" in note for note in repair_vibrometer(bad).attrs["notes"])
 
 
+@pytest.mark.parametrize("known", [{}, {"quantity": "acceleration", "band": ("100 Hz", "5 kHz")}])
+def test_a_comparison_says_loudly_that_drop_outs_were_left(known):
+    sound = {state: add_noise(vibration(seconds=1.0), seed=k, rms=1e-5) for k, state in enumerate(("healthy", "worn"))}
+    bad = {state: drop_outs(one, per_second=20, full_scale=0.2, seed=7) for state, one in sound.items()}
+    found = compare({"healthy": sound["healthy"], "worn": bad["worn"]}, **known)
+    assert found.summary()[0].startswith("CHECK THE RECORDS: levels of worn at load all")
+    assert any("DROP-OUTS: laser has" in note and "--repair" in note for note in found.notes)
+    for one in (sound, {state: repair_vibrometer(s, full_scale=0.2) for state, s in bad.items()}):
+        assert not any("DROP-OUTS" in note for note in compare(one, **known).notes)
+
+
+def test_an_analysis_says_that_a_range_was_exceeded():
+    """Of an accelerometer, too; of a contact force that ends at zero it does not."""
+    clean = add_noise(vibration(unit="m/s^2", seconds=1.0), seed=seed(7), rms=1e-5)
+    limit = 0.8 * float(clean.max())
+    for values, told in ((np.clip(clean.values, -limit, limit), 1), (np.maximum(clean.values, 0.0), 0)):
+        report = analyse(make_signal(values, RATE, units="m/s^2", speed=SHAFT), TEETH)
+        assert sum(note.startswith("CLIPPED") for note in report.notes) == told
+    assert not any(note.startswith("CLIPPED") for note in analyse(clean).notes)
+
+
 @pytest.mark.parametrize("per_period", [128, 32, 27.5862])
 def test_tones_that_repeat_their_samples_are_not_clipped(per_period):
     tone = np.cos(2 * np.pi / per_period * np.arange(20_000))
@@ -192,59 +208,16 @@ def test_what_a_conversion_loses_is_told():
     assert "notes" not in kept.attrs
 
 
-def rig(torque, **changes):
-    """The paper's pair with the driven wheel on springs: velocity and place of its centre, and the force there."""
-    pair, speed = GearPair.paper(backlash="0.1 mm", **changes), math.tau * 1000 / 60
-    place, m = pair.placement(), Mechanism("gears on an elastic bearing")
-    driver, driven = (
-        m.body(name, wheel.mass, wheel.inertia, position=origin, orientation=axes)
-        for name, wheel, origin, axes in zip(
-            ("driver", "driven"), pair.wheels, (place.origin_1, place.origin_2), (place.axes_1, place.axes_2)
-        )
-    )
-    bearing = m.revolute("bearing", driver, m.ground, at=place.origin_1)
-    m.rotation("drive", bearing, ramp(speed, over=0.03))
-    m.bushing(
-        "support", driven.marker_at(place.origin_2, np.eye(3)), m.ground.marker(place.origin_2),
-        stiffness=(5e7, 5e7, 5e7), damping=(3e3, 3e3, 3e3),
-        torsional_stiffness=(1e5, 1e5, 0), torsional_damping=(10, 10, 0),
-    )  # fmt: skip
-    m.torque("load", driven, step(0, 0, 0.03, torque))
-    m.gear_contact("mesh", driver, driven, pair)
-    run = m.simulate(0.9, rate=51_200)
-
-    def signal(values, units):
-        axes = ["x", "y", "z"]
-        return trim(make_signal(values, 51_200, units=units, channels=axes, speed=speed, teeth=(29, 29)), 0.06)
-
-    force = joint_force(signal(run.load("support")[0], "N"), (0, 1, 0))
-    return {
-        "velocity": laser_vibrometer(signal(run.com_velocity("driven"), "m/s"), (0, 1, 0)),
-        "place": signal(run.com_position("driven"), "m")[:, [1]],
-        "force": force_to_acceleration(force, pair.wheels[1].mass),
-    }
-
-
 @pytest.mark.slow
 def test_the_papers_comparison_by_laser_and_camera_says_what_the_force_says(tmp_path):
     """Misaligned and widened against healthy: by the force, a laser with drop-outs and speckle, and a camera."""
-    changes = {"healthy": {}, "misaligned": {"misalignment": "1 deg"}, "distance": {"centre_distance_error": "3 mm"}}
-    runs = {state: rig(200.0, **what) for state, what in changes.items()}
-    by_force = compare({state: sample(run["force"], RATE) for state, run in runs.items()})
-    laser, film = {}, {}
-    for number, (state, run) in enumerate(runs.items()):
-        seen = sample(run["velocity"], RATE)
-        angle = xr.DataArray(math.tau * 1000 / 60 * seen["time"].values, dims=("time",))
-        seen = add_noise(speckle(seen, angle, rms=2e-4, seed=number, recurring=0.9), seed=number, rms=1e-5)
-        laser[state] = drop_outs(seen, per_second=30, longest=0.7e-3, full_scale=0.2, seed=number)
-        film[state] = camera(run["place"], 6000.0, scale=20e-6, noise=0.02, seed=number)
-        write_signal(laser[state], tmp_path / f"{state}.csv")
-    known = {"quantity": "acceleration"}
-    by_laser = compare(
-        {state: repair_vibrometer(s, full_scale=0.2) for state, s in laser.items()}, band=("100 Hz", "5 kHz"), **known
-    )
-    by_camera = compare(
-        {state: point_track(s, "20 um") for state, s in film.items()}, band=("100 Hz", "2.4 kHz"), **known
+    runs = {state: instruments.rig(200.0, 0.9, **what) for state, what in instruments.STATES.items()}
+    seen = {state: instruments.seen_by(run, number) for number, (state, run) in enumerate(runs.items())}
+    for state, records in seen.items():
+        write_signal(records["as it came"], tmp_path / f"{state}.csv")
+    by_force, by_laser, by_camera = (
+        compare({state: records[by] for state, records in seen.items()}, **instruments.AS_ACCELERATION[by])
+        for by in ("force", "laser", "camera")
     )
     told = by_force.expectations()
     for other in (by_laser, by_camera):
@@ -256,20 +229,15 @@ def test_the_papers_comparison_by_laser_and_camera_says_what_the_force_says(tmp_
     assert any("drop-outs" in note for note in by_laser.notes)
     assert "## The records" in by_laser.to_markdown()
     states = [f"--experiment=high:{state}={tmp_path / state}.csv" for state in runs]
-    words = [
-        "compare",
-        *states,
-        "--as",
-        "acceleration",
-        "--band",
-        "100 Hz, 5 kHz",
-        "--repair",
-        "--full-scale",
-        "0.2 m/s",
-    ]
-    out = CliRunner().invoke(app, words)
+    words = ["compare", *states, "--as", "acceleration"]
+    band, repair = ["--band", "100 Hz, 5 kHz"], ["--repair", "--full-scale", "0.2 m/s"]
+    out = CliRunner().invoke(app, [*words, *band, *repair])
     assert out.exit_code == 0, out.output
     assert "drop-outs" in out.output
-    out = CliRunner().invoke(app, [*words[:-7], "--as", "acceleration"])
+    assert "CHECK THE RECORDS" not in out.output
+    out = CliRunner().invoke(app, [*words, *band])
+    assert out.exit_code == 0, out.output
+    assert "CHECK THE RECORDS: levels of healthy at load high" in out.output
+    out = CliRunner().invoke(app, words)
     assert out.exit_code != 0
     assert "band" in out.output

@@ -45,7 +45,7 @@ def test_levels_lines_orders_and_envelope():
     assert set(report.tables()) == {"levels", "lines", "spectrum", "orders", "impulsive", "envelope_lines"}
     text = report.to_markdown()
     assert "## Orders of the shaft, RMS" in text
-    assert "1500.0 rpm were given: orders are taken at the former, lines of bearings" in text
+    assert "1500.0 rpm were given: orders are taken at the former" in text
     assert "None" not in text
 
 

@@ -29,6 +29,7 @@ from gearmbs.signals.diagnosis.planetary import PlanetaryReport, diagnose_planet
 from gearmbs.signals.diagnosis.planetary_averages import planetary_lines
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.files.simulated import read_any
+from gearmbs.signals.optical import instrument_faults
 from gearmbs.signals.rotation.angular import angular_resample, samples_per_revolution, time_synchronous_average
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, mesh_shaft
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
@@ -179,10 +180,11 @@ def analyse(
     said = contradictions(
         own.get("teeth"), own.get("speed"), options.teeth, speed, str(own.get("source", "the signal"))
     )
-    if said:
-        data = with_metadata(data, notes=[*own.get("notes", ()), *said])
     known = any(value is not None for value in (options.speed, options.phase, options.tacho, options.speed_channel))
     data, own_speed = measured(data, channels or (), helpers, known)
+    said += instrument_faults(data, [*helpers, *([] if own_speed is None else [own_speed])])
+    if said:
+        data = with_metadata(data, notes=[*data.attrs.get("notes", ()), *said])
     if own_speed is not None:
         options = replace(options, speed_channel=own_speed)
     counts = options.teeth if options.teeth is not None else data.attrs.get("teeth")

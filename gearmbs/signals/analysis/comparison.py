@@ -14,10 +14,10 @@ from gearmbs.progress import staged
 from gearmbs.signals.analysis.analysis import analyse
 from gearmbs.signals.analysis.bands import HALF_WIDTH
 from gearmbs.signals.analysis.comparison_report import ComparisonReport
-from gearmbs.signals.analysis.report import AnalysisReport
+from gearmbs.signals.analysis.report import LOUD, AnalysisReport
 from gearmbs.signals.conversion import Dimension, convert
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.optical import turn_floor
+from gearmbs.signals.optical import instrument_faults, turn_floor
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
 from gearmbs.signals.signal.signal import like, require
 from gearmbs.units import to_si
@@ -104,6 +104,10 @@ def compare(
         raise SignalError(f"way: must be 'band' or 'orders', got {way!r}")
     experiment = _signals(experiment, rate=rate, units=units, teeth=teeth, speed=speed, gaps=gaps)
     if quantity is not None:
+        # a conversion hides what instruments did, which an analysis remarks on
+        experiment = {
+            load: {state: _remarked(signal) for state, signal in states.items()} for load, states in experiment.items()
+        }
         experiment = _converted(experiment, quantity, band)
     model = None if model is None else _signals(model)
     loads, states, left_out = _common_cases(experiment, model, reference)
@@ -117,23 +121,24 @@ def compare(
             progress((done + fraction) / total, stage)
 
     found: dict[str, dict[tuple[str, str], xr.Dataset]] = {}
+    notes: list[str] = []
     for side, cases, pick in sides:
         found[side] = {}
         for load, state in kept:
             signal = _picked(cases[load][state], pick, side, single=model is not None)
-            found[side][load, state] = _features(signal, harmonics, half_width, way, wheel, tell)
+            report, found[side][load, state] = _features(signal, harmonics, half_width, way, wheel, tell)
             done += 1
+            if side == "experiment":
+                own = signal.attrs.get("notes", ()) if quantity is not None else ()
+                told = [note for note in report.notes if note.startswith(LOUD) or "drop-outs" in note or note in own]
+                notes += [
+                    f"{state} at load {load}: {note}" for note in sorted(told, key=lambda n: not n.startswith(LOUD))
+                ]
     data = _tabulate(found["experiment"], loads, states, "experiment")
     if model is not None:
         data = _with_model(data, _tabulate(found["model"], loads, states, "model"), reference, scope)
     data = data.rename(rms="experiment")
     data.attrs.update(reference=reference, scope=scope, way=way, half_width=half_width)
-    notes = [
-        f"{state} at load {load}: {note}"
-        for load, state in kept
-        for note in experiment[load][state].attrs.get("notes", ())
-        if quantity is not None or "drop-outs" in note
-    ]
     return ComparisonReport(data, reference, left_out, notes)
 
 
@@ -163,6 +168,12 @@ def _converted(
         load: {state: convert(signal, quantity, band=(low, high)) for state, signal in states.items()}
         for load, states in experiment.items()
     }
+
+
+def _remarked(signal: xr.DataArray) -> xr.DataArray:
+    """Return a signal with remarks on what its instrument did to it."""
+    remarks = instrument_faults(signal)
+    return signal.assign_attrs(notes=[*signal.attrs.get("notes", ()), *remarks]) if remarks else signal
 
 
 def _with_model(data: xr.Dataset, model: xr.Dataset, reference: str, scope: str) -> xr.Dataset:
@@ -248,7 +259,7 @@ def _picked(signal: xr.DataArray, channel: str | None, side: str, single: bool) 
 
 def _features(
     signal: xr.DataArray, harmonics: int, half_width: float, way: str, wheel: int, tell: Progress
-) -> xr.Dataset:
+) -> tuple[AnalysisReport, xr.Dataset]:
     require(signal, "teeth", needed_for="the gear mesh frequency")
     report = analyse(signal, harmonics=harmonics, half_width=half_width, wheel=wheel, lines=1, progress=tell)
     assert isinstance(report, AnalysisReport)
@@ -272,7 +283,7 @@ def _features(
         else:
             data[name] = ("channel", np.full(signal.sizes["channel"], np.nan))
     data.attrs["units"] = report.harmonics["band"].attrs["units"]
-    return data
+    return report, data
 
 
 def _teeth(signal: xr.DataArray, wheel: int) -> int:

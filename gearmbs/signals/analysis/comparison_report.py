@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 
 from gearmbs._display import Shown
-from gearmbs.signals.analysis.report import markdown_table, significant
+from gearmbs.signals.analysis.report import LOUD, markdown_table, significant
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 
 # What each fault is expected to do to the mesh harmonics and the indicators.
@@ -361,8 +361,15 @@ class ComparisonReport(Shown):
         return found
 
     def summary(self) -> list[str]:
-        """What repeats at every load, and whether it was expected: two plain sentences a fault."""
-        return summary(self, CHANGE_DB)
+        """What repeats at every load, and whether it was expected: two plain sentences a fault.
+
+        Before them those records are named of which a remark says that their levels may be wrong.
+        """
+        doubted = [where for note in self.notes for where, _, rest in [note.partition(": ")] if rest.startswith(LOUD)]
+        if not doubted:
+            return summary(self, CHANGE_DB)
+        names = _listed(list(dict.fromkeys(doubted)))
+        return [f"CHECK THE RECORDS: levels of {names} may be wrong, see below.", *summary(self, CHANGE_DB)]
 
     def uncertain(self) -> list[str]:
         """Changes that speckle, marks or whatever else recurs with the shaft may have made or hidden.

@@ -52,6 +52,8 @@ SAME_LINE = 1e-9
 """Known lines closer than this part of their frequency are one."""
 IMPULSIVE = {"best_centre": "centre, Hz", "best_bandwidth": "bandwidth, Hz", "best_kurtosis": "kurtosis - 2"}
 BAND_FEATURES = {"best_centre": "band_centre_hz", "best_bandwidth": "band_width_hz", "best_kurtosis": "band_kurtosis"}
+LOUD = ("CHECK THE", "CLIPPED", "DROP-OUTS")
+"""How remarks begin on which all numbers may depend."""
 PURE = ("crest", "kurtosis", "skewness", "shape_factor", "impulse_factor")
 """Levels without a unit."""
 

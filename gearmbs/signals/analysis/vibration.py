@@ -220,7 +220,7 @@ here 0.4 of the record."""
 LEAST_BAND = 16
 """Envelopes are taken in bands of at least this part of half the sampling rate: a narrow one holds only slow lines."""
 SPEED_DIFFERS = 1e-3
-"""Share from which a report says in words that the shaft's own lines are beside the given speed."""
+"""Share from which a report says in words that lines of the shaft are beside the given speed."""
 NO_SPEED = "the speed is not known; give speed='1500 rpm' (--speed), a curve or a tacho"
 Progress = Callable[[float, str], None]
 
@@ -311,17 +311,20 @@ def _speed(signal: xr.DataArray, found: Shaft | float | None, notes: list[str]) 
         return None, "not known"
     if isinstance(found, Shaft):
         return found.speed, found.origin
-    refined = refined_speed(signal, found)
-    if refined is None:
+    told = refined_speed(signal, found)
+    if told is None:
         notes.append("No line of the shaft stands out near the given speed; orders are taken at exactly that speed.")
         return found, "as given"
+    refined, orders = told
+    lines = f"the line at order {orders[0]}" if len(orders) == 1 else f"lines at orders {', '.join(map(str, orders))}"
     if abs(refined / found - 1.0) > SPEED_DIFFERS:
+        said = "says" if len(orders) == 1 else "say"
         notes.append(
-            f"The shaft's own lines say {refined * 30.0 / math.pi:.1f} rpm, "
-            f"{found * 30.0 / math.pi:.1f} rpm were given: orders are taken at the former, "
-            "lines of bearings, if asked for, are looked for at the speed given."
+            f"{lines[0].upper()}{lines[1:]} {said} {refined * 30.0 / math.pi:.1f} rpm, "
+            f"{found * 30.0 / math.pi:.1f} rpm were given: orders are taken at the former. The diagnosis of bearings "
+            "takes a speed from a family of orders only."
         )
-    return refined, f"from the shaft's own lines, {100 * (refined / found - 1):+.3f} % off the given speed"
+    return refined, f"from {lines}, {100 * (refined / found - 1):+.3f} % off the given speed"
 
 
 def _velocity(signal: xr.DataArray) -> np.ndarray | str:

@@ -236,8 +236,8 @@ class PartFinding:
             return (
                 f"CHECK THE SPEED: clear lines at {self.found:.2f} Hz {place} are those of {WORDS[self.part]} of "
                 f"bearing {self.bearing} ({self.kinematic:.2f} Hz) if the shaft turns {100 * abs(self.slip):.1f} % "
-                f"{'faster' if self.slip > 0.0 else 'slower'} than told, and its own line is not found. Not certain: "
-                "give a tacho or a measured speed (speed=, --speed)."
+                f"{'faster' if self.slip > 0.0 else 'slower'} than told, and no family of its orders stands out. Not "
+                "certain: give a tacho or a measured speed (speed=, --speed)."
             )
         if self.grade == "quiet":
             kind = "the stiffness that varies as elements pass through the load" if self.part == OUTER else "waves"
@@ -344,19 +344,24 @@ class BearingReport(Shown):
         return " ".join([*parts, *self.remarks])
 
     @property
+    def speed_found(self) -> bool:
+        """Whether a family of the shaft's orders told the speed that was used."""
+        return len(self.stability) > 0 and bool(self.stability["found"].iloc[len(self.stability) // 2])
+
+    @property
     def remarks(self) -> list[str]:
         """What stands in the record but accuses nothing, in words."""
         found = [remark for finding in self.findings if (remark := finding.remark()) is not None]
         return found if self.speed_remark is None else [self.speed_remark, *found]
 
     def _limits(self) -> str:
-        """Return at which speeds nothing stands out, if the shaft's own line does not tell the speed."""
-        if len(self.stability) < 2 or self.stability["found"].iloc[len(self.stability) // 2]:
+        """Return at which speeds nothing stands out, if no family of the shaft's orders tells the speed."""
+        if len(self.stability) < 2 or self.speed_found:
             return ""
         low, told, high = (self.stability["told"].iloc[k] for k in (0, len(self.stability) // 2, -1))
         return (
-            f" The shaft's own line was not found: this holds for speeds of {60 * low:.1f} to {60 * high:.1f} rpm, "
-            f"+-{100 * (high / told - 1.0):.2g} % of the told one."
+            f" No family of the shaft's orders tells its speed: this holds for speeds of {60 * low:.1f} to "
+            f"{60 * high:.1f} rpm, +-{100 * (high / told - 1.0):.2g} % of the told one."
         )
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -420,10 +425,10 @@ class BearingReport(Shown):
         if len(self.stability) < 2:
             return ""
         told = self.stability.iloc[len(self.stability) // 2]
-        if not told["found"]:
-            return ", as told: its own line is not found"
+        if not self.speed_found:
+            return ", as told: no family of its orders stands out near it"
         off = told["used"] / told["told"] - 1.0
-        return f", from its own lines; told were {60 * told['told']:.1f} rpm, {100 * -off:+.2f} % beside"
+        return f", from a family of its orders; told were {60 * told['told']:.1f} rpm, {100 * -off:+.2f} % beside"
 
     def _margin(self) -> list[str]:
         """Return for which told speeds the answer is the same, and what it would be at the others."""

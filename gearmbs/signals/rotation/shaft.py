@@ -166,6 +166,8 @@ MOST_BACK = 0.01
 
 SPEED_TOLERANCE = 0.02
 """How far from its nominal speed a drive is looked for, as a part of it."""
+SAME_SHAFT = 0.5
+"""Lines of the spectrum by which either of two orders of one shaft may seem to be off."""
 VARYING = 0.02
 """A speed that strays more than this part from its mean is followed in angle, not in frequency."""
 OTHER_COMB = 0.03
@@ -446,8 +448,14 @@ def _related(blind: Comb, found: SpeedEstimate) -> bool:
     return any(abs(apart - k * shaft) < SPEED_TOLERANCE * shaft * k for shaft in turns for k in range(1, SIDEBANDS + 1))
 
 
-def refined_speed(signal: xr.DataArray, nominal: float) -> float | None:
-    """The speed (rad/s) within 2 % of a nominal one at which the shaft's own first lines stand out, or None."""
+def refined_speed(signal: xr.DataArray, nominal: float) -> tuple[float, list[int]] | None:
+    """The speed (rad/s) within 2 % of a nominal one at which lines of the shaft's first orders stand out, or None.
+
+    Returns
+    -------
+    (float, list of int) or None
+        The speed, and at which orders lines say so: one is enough to take orders by, a family it is not.
+    """
     rate, n = rate_of(signal), signal.sizes["time"]
     power, _ = periodograms(signal.values, rate, n, "hann", 0.0, True, "power")
     height = prominence(power).max(axis=1)
@@ -471,12 +479,17 @@ def refined_speed(signal: xr.DataArray, nominal: float) -> float | None:
     if math.sqrt(total[best] / present) < MIN_SCORE_DB or best in (0, candidates.size - 1):
         return None
     coarse = float(candidates[np.isclose(total, total[best])].mean())
-    return _from_peaks(power.max(axis=1), height, coarse, width) * math.tau
+    refined, orders = _from_peaks(power.max(axis=1), height, coarse, width)
+    return (refined * math.tau, orders) if orders else None
 
 
-def _from_peaks(power: np.ndarray, height: np.ndarray, shaft: float, width: float) -> float:
-    """Shaft frequency (Hz) from the peaks beside its first multiples, higher ones counting more."""
-    total = weights = 0.0
+def _from_peaks(power: np.ndarray, height: np.ndarray, shaft: float, width: float) -> tuple[float, list[int]]:
+    """Shaft frequency (Hz) from the peaks beside its first multiples, higher ones counting more, and which stand.
+
+    The surest of them, whose variance is the least, k^2 times its power by the noise, says which others are the
+    shaft's: of noise one in some dozens of lines is as high as the least that counts.
+    """
+    peaks = {}
     for k in range(1, SHAFT_HARMONICS + 1):
         middle = round(k * shaft / width)
         if middle + 3 >= power.size or middle < 3:
@@ -487,9 +500,13 @@ def _from_peaks(power: np.ndarray, height: np.ndarray, shaft: float, width: floa
         a, b, c = np.log(np.maximum(power[i - 1 : i + 2], 1e-300))
         curve = a - 2.0 * b + c
         shift = float(np.clip(0.5 * (a - c) / curve, -0.5, 0.5)) if curve < 0.0 else 0.0
-        total += (i + shift) * width
-        weights += k
-    return total / weights if weights else shaft
+        peaks[k] = (i + shift) * width, k * 10.0 ** (0.05 * height[i])
+    if not peaks:
+        return shaft, []
+    surest = max(peaks, key=lambda k: peaks[k][1])
+    sure = peaks[surest][0] / surest
+    orders = [k for k, (at, _) in peaks.items() if abs(at / k - sure) <= SAME_SHAFT * width * (1.0 / k + 1.0 / surest)]
+    return sum(peaks[k][0] for k in orders) / sum(orders), orders
 
 
 def _range(phase: xr.DataArray, mean: float) -> tuple[float, float] | None:
