@@ -83,7 +83,7 @@ class TransmissionError:
         return float(np.ptp(self.error if self.extremes is None else self.extremes))
 
     def harmonics(self, count: int = 5) -> np.ndarray:
-        """Amplitudes of the first mesh harmonics, m."""
+        """Peak amplitudes of the first mesh harmonics, m."""
         lines = 2 * np.abs(np.fft.rfft(self.error)) / self.error.size
         return lines[self.cycles : (count + 1) * self.cycles : self.cycles]
 

@@ -96,7 +96,7 @@ class SteadyMotion:
         return self.orbit.periods
 
     def harmonics(self, result: str | Callable[[Solution], Any], count: int = 3, every: int = 1) -> np.ndarray:
-        """Return complex amplitudes of the harmonics of a result.
+        """Return complex peak amplitudes of the harmonics of a result; their RMS is the amount by sqrt(2).
 
         Parameters
         ----------

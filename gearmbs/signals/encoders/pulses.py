@@ -26,6 +26,8 @@ SAME_MARK = 0.5
 """Share of the turns in which a mark must be missing to be one that the disc lacks, which numbers the others."""
 OVERFLOW = 0.5
 """Share of the span of times by which each fall is more than disorder: a counter falls by nearly all of it."""
+FEWEST_GAPS, ALIKE = 3, 0.8
+"""Distances of missing pulses, and the share of them that is the same, from which these are no chance."""
 INDEX_REACH = 1.0
 """Pitches within which a pulse must follow an index pulse to be that of mark 0."""
 
@@ -160,14 +162,19 @@ def _referenced(train: PulseTrain, index: np.ndarray | None, words: list[str]) -
         # an index pulse at the same instant as a mark may come a tick before or behind it
         zero = int(marks[0])
         apart = (marks - zero + train.lines // 2) % train.lines - train.lines // 2
-        if np.abs(apart).max() > INDEX_REACH:
+        gaps = np.diff(train.numbers[after])
+        turns = max(1, round(float(gaps.sum() / max(gaps.min(), 1)))) if gaps.size else 1
+        every = round(float(gaps.sum() / turns)) if gaps.size else train.lines
+        if np.abs(apart).max() > INDEX_REACH or abs(every - train.lines) > INDEX_REACH:
             raise SignalError(
-                f"index: pulses of {train.name!r} come at the marks {zero} to {zero + int(apart.max())} of "
-                f"{train.lines}, not once a turn; check the lines, or leave index out"
+                f"index: pulses of {train.name!r} come once in about {every} marks, not once in {train.lines}; check "
+                "the lines, or leave index out"
             )
         zero += round(float(np.median(apart)))
         return replace(train, numbers=train.numbers - zero, referenced=True), words
-    missing = np.setdiff1d(np.arange(train.numbers[0], train.numbers[-1]), train.numbers) % train.lines
+    missing = np.setdiff1d(np.arange(train.numbers[0], train.numbers[-1]), train.numbers)
+    _check_recurrence(missing, train)
+    missing %= train.lines
     marks, counts = np.unique(missing, return_counts=True)
     lacking = marks[counts > max(1.0, SAME_MARK * (train.turns - 1.0))]
     if not lacking.size:
@@ -175,6 +182,20 @@ def _referenced(train: PulseTrain, index: np.ndarray | None, words: list[str]) -
     zero = int(lacking[0])
     told = f"{train.name}: the disc lacks {lacking.size} of {train.lines} marks, mark 0 is one that is missing."
     return replace(train, numbers=train.numbers - zero, referenced=lacking.size == 1), [told]
+
+
+def _check_recurrence(missing: np.ndarray, train: PulseTrain) -> None:
+    """Refuse a count of lines that is none after which missing pulses recur: those of a mark that the disc lacks do."""
+    first = missing[np.diff(missing, prepend=missing[:1] - 2) > 1]
+    gaps = np.diff(first)
+    if gaps.size < FEWEST_GAPS:
+        return
+    every = int(np.median(gaps))
+    if np.mean(gaps == every) >= ALIKE and train.lines % every:
+        raise SignalError(
+            f"lines: a pulse of {train.name!r} is missing every {every}, as of a disc of {every} lines that lacks one, "
+            f"not of {train.lines}; give lines={every}, or take the pulses as they are with faults='keep'"
+        )
 
 
 @takes_data()

@@ -68,6 +68,8 @@ class MeasuredTransmissionError(Shown):
     places : dict of str to float
         Angle of the driven disc as mark 0 of the driver passes, rad, by load.
     lines_of : tuple of int
+    doubt : str or None
+        Why the told teeth or lines seem to be wrong (`gearmbs.signals.encoders.plausible`).
     """
 
     gearing: Gearing
@@ -83,6 +85,7 @@ class MeasuredTransmissionError(Shown):
     speed: float
     places: Mapping[str, float]
     lines_of: tuple[int, int]
+    doubt: str | None = None
     source: str = field(default="pulses")
 
     def _load(self, load: str | None) -> str:
@@ -93,7 +96,7 @@ class MeasuredTransmissionError(Shown):
         return load
 
     def lines_with_intervals(self, factors: Mapping[str, float], lines: Iterable[OrderLine]) -> pd.DataFrame:
-        """Return a combination of the loads' errors at some orders, with the intervals of the amplitudes.
+        """Return a combination of the loads' errors at some orders, with the intervals of the peak amplitudes, m.
 
         Parameters
         ----------
@@ -113,10 +116,13 @@ class MeasuredTransmissionError(Shown):
                 self.radius * low, self.radius * high, float(np.angle(value)), one.calibrated or cancels,
             ))  # fmt: skip
         columns = ["harmonic", "order_driver", "order_driven", "amplitude", "low", "high", "phase", "calibrated"]
-        return pd.DataFrame(rows, columns=columns)
+        table = pd.DataFrame(rows, columns=columns)
+        # a peak, as of spectra with this scaling
+        table.attrs |= {"units": "m", "scaling": "amplitude"}
+        return table
 
     def harmonics(self, load: str | None = None) -> pd.DataFrame:
-        """Mesh harmonics of a load: amplitude with its interval (m), phase (rad) at mark 0 of the driver."""
+        """Mesh harmonics of a load: peak amplitude with its interval (m), phase (rad) at mark 0 of the driver."""
         return self.lines_with_intervals({self._load(load): 1.0}, [o for o in self.lines if o.harmonic])
 
     def difference(self, load: str, other: str) -> pd.DataFrame:
@@ -281,8 +287,9 @@ class MeasuredTransmissionError(Shown):
         """What is sure, in a sentence."""
         mesh = self.harmonics()
         sure = mesh[mesh["low"] > 0.0]
+        doubt = "" if self.doubt is None else f"{self.doubt} "
         if not len(sure):
-            return (
+            return doubt + (
                 "No mesh harmonic stands clear of the marks: run the shafts free, or turn a disc, and give those runs."
             )
         first = sure.iloc[0]
@@ -293,7 +300,7 @@ class MeasuredTransmissionError(Shown):
             if open_ones
             else ""
         )
-        return (
+        return doubt + (
             f"Mesh harmonic {int(first['harmonic'])} of the transmission error is {1e6 * first['amplitude']:.3g} um "
             f"({1e6 * first['low']:.3g} to {1e6 * first['high']:.3g} um){rest}."
         )
@@ -311,7 +318,7 @@ class MeasuredTransmissionError(Shown):
         ]  # fmt: skip
         for load in self.loads:
             title = f" ({load})" if len(self.loads) > 1 else ""
-            parts += ["", f"## Mesh harmonics, um{title}", "", _micro(self.harmonics(load))]
+            parts += ["", f"## Mesh harmonics, peak amplitudes in um{title}", "", _micro(self.harmonics(load))]
             parts += ["", f"## Single-flank values, um{title}", "", _micro(self.single_flank(load))]
             for shaft in SHAFTS if self.teeth is not None else ():
                 teeth = self.tooth_errors(shaft, load)

@@ -24,6 +24,7 @@ from gearmbs.signals.encoders.orders import (
     lines,
     smooth_angle,
 )
+from gearmbs.signals.encoders.plausible import doubted_numbers
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
 from gearmbs.signals.encoders.visible import MOST_HARMONICS, Order, visible_orders
@@ -72,6 +73,7 @@ class _Measured:
     ratio: float
     place: float
     turns: int
+    doubt: str | None
 
     @property
     def wander(self) -> float:
@@ -175,7 +177,7 @@ def transmission_error_from_pulses(
         tooth_at_zero=(trains[0].tooth_at_zero, trains[1].tooth_at_zero),
         referenced=(trains[0].referenced, trains[1].referenced), speed=trains[0].mean_speed,
         places={m.run.load: m.place for m in reversed(measured)},
-        lines_of=(trains[0].lines, trains[1].lines),
+        lines_of=(trains[0].lines, trains[1].lines), doubt=next(filter(None, (m.doubt for m in measured)), None),
     )  # fmt: skip
 
 
@@ -291,7 +293,8 @@ def _lines_of(
     steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
     values = lines((first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh)
     mesh = [o.order for o in orders if o.harmonic]
-    return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)))
+    doubt = doubted_numbers(first, second, begin, end, gearing, (run.driver.lines, run.driven.lines))
+    return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)), doubt)
 
 
 def _check_clocks(run: CoupledRun, drift: float, mesh: float, turns: float) -> None:

@@ -48,10 +48,10 @@ class SteadyBranch:
         return self.branch.turns
 
     def levels(self, result: str | Callable[[Solution], Any], harmonic: int = 1) -> np.ndarray:
-        """Return the amplitude of a harmonic of a result over the curve, see `SteadyMotion.harmonics`."""
+        """Return the peak amplitude of a harmonic of a result over the curve, see `SteadyMotion.harmonics`."""
         return np.array([abs(motion.harmonics(result, harmonic)[harmonic]) for motion in self.motions])
 
-    def figure(self, levels: np.ndarray, xlabel: str = "parameter", ylabel: str = "amplitude") -> Any:
+    def figure(self, levels: np.ndarray, xlabel: str = "parameter", ylabel: str = "peak amplitude") -> Any:
         """Return levels over the parameter: stable motions drawn through, others dashed, turning points marked."""
         from gearmbs.view.figures.style import look, new_figure
 

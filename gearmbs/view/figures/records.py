@@ -528,7 +528,7 @@ def measured_error_plot(
                 axes.errorbar(
                     some["harmonic"], MICRO * some["amplitude"], yerr=reach, fmt="none", ecolor="#222222", capsize=4.0
                 )
-        axes.set(xlabel="mesh harmonic", ylabel=label("amplitude", "µm"), xticks=table["harmonic"])
+        axes.set(xlabel="mesh harmonic", ylabel=label("peak amplitude", "µm"), xticks=table["harmonic"])
         axes.set_title(f"Mesh harmonics with intervals of {100 * error.probability:g} %")
         axes.legend(loc="upper right")
         for column, shaft in enumerate(shafts):

@@ -248,6 +248,29 @@ def test_angles_of_records_with_speeds_are_their_integrals():
         shaft_angles(record, "ring")
 
 
+@pytest.mark.parametrize("told", [500, 256, 1024, 513, 512])
+def test_a_count_of_lines_that_index_pulses_or_missing_ones_contradict_is_refused(told):
+    """Of 512 lines; the index pulses of some turns may be lost, and two missing pulses are no disc."""
+    whole = encoder(steady(8.0), 512, index=True)
+    once = np.interp(512.0 * np.arange(1, 7) - 0.5, whole.numbers, whole.times)
+    lacking = encoder(steady(8.0), 512, lacking=[0])
+    if told != 512:
+        with pytest.raises(SignalError, match=says("index", "512", str(told))):
+            pulse_train(whole.times, told, index=once)
+        if told == 1024:
+            # a disc may lack two marks that face each other
+            assert not pulse_train(lacking.times, told).referenced
+        else:
+            with pytest.raises(SignalError, match=says("lines", "512", str(told))):
+                pulse_train(lacking.times, told)
+        assert pulse_train(lacking.times, told, faults="keep").lines == told
+        assert pulse_train(np.delete(whole.times, [700, 1212]), told).lines == told
+    else:
+        assert pulse_train(whole.times, told, index=np.delete(once, [2, 4])).referenced
+        assert pulse_train(lacking.times, told).referenced
+        assert pulse_train(encoder(steady(8.0), 512, lacking=[0, 1, 256, 300]).times, told).lines == 512
+
+
 def test_what_is_no_train_is_refused():
     times = np.arange(300) / 100.0
     with pytest.raises(SignalError, match=says("lines", "2.5")):

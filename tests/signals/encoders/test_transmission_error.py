@@ -9,7 +9,14 @@ import pytest
 from scipy import stats
 
 import gearmbs as gm
-from gearmbs.signals import CoupledRun, SignalError, encoder, mark_errors, transmission_error_from_pulses
+from gearmbs.signals import (
+    CoupledRun,
+    SignalError,
+    encoder,
+    mark_errors,
+    pulse_train,
+    transmission_error_from_pulses,
+)
 from gearmbs.signals.encoders.estimate import amplitude_interval
 from gearmbs.view import measured_error_plot
 from tests.generators import seed
@@ -286,6 +293,58 @@ def test_records_that_do_not_fit_are_refused():
     short = CoupledRun(encoder(angles[0][:9000], 200), encoder(angles[1][:9000], 200))
     with pytest.raises(SignalError, match=says("turns", "smooth")):
         transmission_error_from_pulses(short, TEETH, **known)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("told", "remedy"), [
+    (512, None), (500, "512 and 512 lines"), (513, "512 and 512 lines"), (256, "512 and 512 lines"),
+    (1024, "512 and 512 lines"),
+])  # fmt: skip
+def test_another_count_of_lines_is_told_by_the_mesh(told, remedy):
+    """Both discs told alike show the ratio all the same; index pulses contradict the count, and are asked first."""
+    error, radius = paper_error()
+    lag = closed(error.error)
+    angles = coupled(lambda turned: lag(29 * turned), TEETH, radius, 20, rate=20e3)
+    seen = [
+        encoder(a, 512, marks=mark_errors(512, 1e-3, k), index=True, jitter="50 ns", seed=k)
+        for k, a in enumerate(angles)
+    ]
+    trains = [pulse_train(train.times, told, name=name) for train, name in zip(seen, ("driver", "driven"))]
+    found = transmission_error_from_pulses(CoupledRun(*trains), TEETH, base_radius=radius)
+    if remedy is None:
+        assert found.doubt is None
+        assert found.verdict.startswith("Mesh harmonic 1")
+    else:
+        assert found.verdict.startswith("CHECK THE LINES AND TEETH")
+        assert remedy in found.verdict
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("told", "wrong"), [((29, 29), False), ((30, 30), True), ((58, 58), True), ((28, 28), True)])
+def test_other_teeth_of_an_even_pair_are_told_by_the_mesh(told, wrong):
+    error, radius = paper_error()
+    lag = closed(error.error)
+    angles = coupled(lambda turned: lag(29 * turned) + 5e-6 * np.cos(math.tau * turned), TEETH, radius, 15, rate=20e3)
+    found = transmission_error_from_pulses(Discs(512).run(angles), told, base_radius=radius)
+    assert ("CHECK THE LINES AND TEETH" in found.to_markdown()) == wrong
+    assert ("teeth of 29 and 29" in found.verdict) == wrong
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("teeth", [(29, 29), (20, 40), (21, 34)])
+def test_errors_of_every_tooth_are_no_other_mesh(teeth):
+    """Pitch errors stand at all orders of their shafts, two teeth that alternate at half the mesh order."""
+    rng = np.random.default_rng(seed(12))
+    steps = [3e-6 * rng.standard_normal(z) for z in teeth]
+
+    def lag(turned):
+        tooth = np.floor(teeth[0] * turned).astype(int)
+        wrong = sum(step[tooth % z] for step, z in zip(steps, teeth))
+        return 3e-6 * np.cos(math.tau * teeth[0] * turned) + wrong * np.sin(np.pi * teeth[0] * turned) ** 2
+
+    angles = coupled(lag, teeth, 0.04, turns=15 * teeth[1] / teeth[0], rate=15e3)
+    found = transmission_error_from_pulses(Discs(360, seed=seed(13)).run(angles), teeth, base_radius=0.04)
+    assert found.doubt is None
 
 
 @pytest.mark.slow
