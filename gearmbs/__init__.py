@@ -38,7 +38,7 @@ Units and files
 
 Packages, which hold the rest, as ``gm.signals.power_cepstrum``
     `adams`, `bearings`, `campaigns`, `contact`, `dae`, `drivetrain`, `flexible`, `gears`, `identify`, `mechanism`,
-    `signals`, `studies`, `units`, `view`
+    `native`, `signals`, `studies`, `units`, `view`
 """
 
 from gearmbs._lazy import late

@@ -8,6 +8,7 @@ from . import flexible as flexible
 from . import gears as gears
 from . import identify as identify
 from . import mechanism as mechanism
+from . import native as native
 from . import signals as signals
 from . import studies as studies
 from . import units as units

@@ -18,6 +18,7 @@ from gearmbs.identify.commands import identify
 from gearmbs.signals.commands import analyse, compare, trend, waterfall
 from gearmbs.signals.encoders.commands import transmission_error
 from gearmbs.studies.commands import bench, campbell, gearbox, paper, resonance, run, sweep
+from gearmbs.studies.export import export
 
 app = typer.Typer(
     name="gearmbs",
@@ -28,7 +29,7 @@ app = typer.Typer(
 )
 
 of_records = (analyse, waterfall, trend, compare, transmission_error)
-for command in (paper, run, sweep, bench, gearbox, resonance, campbell, *of_records, identify, adams, plant):
+for command in (paper, run, sweep, bench, gearbox, resonance, campbell, *of_records, identify, adams, plant, export):
     app.command()(command)
 app.add_typer(campaign)
 

@@ -85,7 +85,8 @@ def test_every_name():
 
 def test_packages_are_found_without_importing_them():
     names = (
-        "adams bearings campaigns contact dae drivetrain flexible gears identify mechanism signals studies units view"
+        "adams bearings campaigns contact dae drivetrain flexible gears identify mechanism native signals studies "
+        "units view"
     )
     code = f"import gearmbs as gm; print(*(getattr(gm, name).__name__ for name in {names.split()}))"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

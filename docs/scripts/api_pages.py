@@ -27,6 +27,7 @@ PACKAGES = {
     "gearmbs.identify": "Identification: parameters from measurements",
     "gearmbs.adams": "ADAMS: decks in, results out",
     "gearmbs.view": "View: figures",
+    "gearmbs.native": "Native: models as libraries without Python",
     "gearmbs.units": "Units, descriptions, files, progress and compilation",
 }
 

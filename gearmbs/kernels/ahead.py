@@ -31,8 +31,8 @@ HELPER = "GEARMBS_COMPILING"
 INTRODUCE = "introduce"
 """What a helper process is asked first; see `_introduction`."""
 
-KEPT_FILES = {".entry", ".part", ".lock", ".tmp"}
-"""What is in a folder of kernels: machine code, LLVM code, and what processes that were killed may have left."""
+KEPT_FILES = {".entry", ".part", ".object", ".lock", ".tmp"}
+"""What is in a folder of kernels: machine code of this machine and of others, LLVM code, what killed processes left."""
 
 PRUNED_AFTER = 30.0
 """Days without use after which `--prune` deletes a kernel: a month, so that work on a branch survives a holiday."""
@@ -214,7 +214,7 @@ def prune(days: float, package: str = "gearmbs") -> tuple[int, int]:
             # another process may delete it first
             with contextlib.suppress(OSError):
                 told = path.stat()
-                if path.suffix in KEPT_FILES and max(told.st_atime, told.st_mtime) < oldest:
+                if path.suffix.partition("_")[0] in KEPT_FILES and max(told.st_atime, told.st_mtime) < oldest:
                     path.unlink()
                     files, size = files + 1, size + told.st_size
     return files, size

@@ -26,7 +26,9 @@ MAKES_KERNELS = re.compile(
 )
 MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "late")}
 """Modules that make kernels and hold none."""
-OTHER_MODE = tuple(f"gearmbs.kernels.{name}" for name in (("cache", "late", "library") if PLAIN else ("plain",)))
+OTHER_MODE = tuple(
+    f"gearmbs.kernels.{name}" for name in (("cache", "late", "library", "objects") if PLAIN else ("plain",))
+)
 """Where the modules are, or their names begin, that are not imported in this mode."""
 
 NAMED = {"LOAD_NAME", "LOAD_GLOBAL", "LOAD_ATTR", "LOAD_METHOD", "LOAD_DEREF"}

@@ -243,15 +243,8 @@ class Run:
 
     def _loop(self, interrupt: InterruptFlag) -> tuple[Status, str]:
         """Call the compiled loop until the run has ended; return how."""
-        if not self.started:
-            failure = begin(self)
-            if self.user_exception() is not None:
-                return self.user_failure()
-            failure = failure or self._below_rounding(LEAST_DIGITS)
-            if failure is not None:
-                return failure
-            self.started = True
-            self._goes_on()
+        if not self.started and (failure := self.begin()) is not None:
+            return failure
         chunk, st = FIRST_CHUNK, self.state
         while True:
             tic = time.perf_counter()
@@ -280,6 +273,17 @@ class Run:
                     chunk *= 8 if elapsed < CHUNK_SECONDS / 16 else 2
                 elif elapsed > 2.0 * CHUNK_SECONDS and chunk > 1:
                     chunk //= 2
+
+    def begin(self) -> tuple[Status, str] | None:
+        """Evaluate the equations at the start and choose the first pivots; return a failure or None."""
+        failure = begin(self)
+        if self.user_exception() is not None:
+            return self.user_failure()
+        failure = failure or self._below_rounding(LEAST_DIGITS)
+        if failure is None:
+            self.started = True
+            self._goes_on()
+        return failure
 
     def _goes_on(self) -> bool:
         """Return whether the run is to go on beyond a pause, and until when."""

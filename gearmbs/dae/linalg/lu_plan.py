@@ -307,7 +307,7 @@ class SingularMatrixError(ValueError):
     nogil=True,
     error_model="numpy",
 )
-def _choose(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns, rows_left):
+def scale_and_choose(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns, rows_left):
     """Scale the matrix, leave out what is negligible and choose pivots.
 
     Parameters
@@ -403,7 +403,7 @@ def analyse(
     """
     if not np.isfinite(vals).all():
         raise ValueError("the matrix has entries that are not finite")
-    scale, choose = np.asarray(scale, dtype=float), direct(_choose)
+    scale, choose = np.asarray(scale, dtype=float), direct(scale_and_choose)
     n = len(indptr) - 1
     size = 3 * len(indices) + 4 * n
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted

@@ -272,7 +272,7 @@ def _orders_of_substitution(n, tail, order, u_pos, u_col):
     nogil=True,
     error_model="numpy",
 )
-def _schedule(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col):
+def operations_in_order(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col):
     """Return what `schedule` returns, in its order.
 
     Parameters
@@ -331,7 +331,7 @@ FIELDS = (
     "div_to", "div_by",
 )  # fmt: skip
 STEP, U_AT = len(FIELDS), len(FIELDS) + 1
-"""Behind these in what `_schedule` returns."""
+"""Behind these in what `operations_in_order` returns."""
 
 
 def schedule(
@@ -364,7 +364,7 @@ def schedule(
     u_at : ndarray of int
         Where the entries of U stand among the numbers of the factors.
     """
-    found = _schedule(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)
+    found = operations_in_order(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)
     return dict(zip(FIELDS, found[:STEP], strict=True)), found[STEP], found[U_AT]
 
 

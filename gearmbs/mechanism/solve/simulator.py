@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from operator import itemgetter
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
-from gearmbs.dae.problem import ModelError, Number
+from gearmbs.dae.problem import DAEProblem, ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State, equations_of
@@ -49,6 +49,16 @@ new_point = tuple.__new__
 """Makes a point of its parts in half the time that its class takes."""
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")
 """Options of integrators that are about outputs and events of a run that is told its end."""
+
+
+class Begun(NamedTuple):
+    """What stands behind a simulation: its run, the present point, the model, its equations, what is set in them."""
+
+    run: HeldRun
+    point: Point
+    system: Any
+    problem: DAEProblem
+    cells: np.ndarray
 
 
 class Simulator(Told):
@@ -296,6 +306,31 @@ class Simulator(Told):
                 raise KeyboardInterrupt
             self._failed = failure[1]
             raise ModelError(failure[1])
+
+    def begun(self) -> Begun:
+        """Return what stands behind the simulation, with its start evaluated and pivots chosen.
+
+        Raises
+        ------
+        ModelError
+            If that fails, or something of it is in Python: functions, controllers, stops; or an input is on its way.
+        """
+        held = [
+            *(["functions of Python"] if self._functions or self._options.errors is not None else []),
+            *(["controllers"] if self._controls else []),
+            *(["stops"] if self._stops else []),
+            *(["inputs on their way"] if self._settings.on_the_way(self.t) is not None else []),
+        ]
+        if self._members is not None:
+            held.append("bodies that have been lumped (make it with lump=False)")
+        if held:
+            raise ModelError(f"simulator: it cannot go on without Python: it has {', '.join(held)}")
+        self.take_effect()
+        if not self._run.started and (failure := self._run.begin()) is not None:
+            self._failed = failure[1]
+        if self._failed is not None:
+            raise ModelError(f"the simulation has failed: {self._failed}")
+        return Begun(self._run, self._point, self._system, self._base, self._settings.cells)
 
     @property
     def failed(self) -> bool:

@@ -228,7 +228,7 @@ class HeldRun(Run):
 
     def _find_crossings(self, t: float) -> None:
         """Find those behind a time in the last step, of which another run has told nothing."""
-        st, problem, last = self.state, self.problem, self._last_step()
+        st, problem, last = self.state, self.problem, self.last_step()
         self.crossings, st.n_crossings = [], 0
         if problem.events is None:
             return
@@ -258,7 +258,7 @@ class HeldRun(Run):
     def _write_within(self, t: float) -> None:
         """Write values at a time within the last step."""
         rows, row = self.rows, self.row
-        rows.y[row], rows.yp[row] = value_in(self, self._last_step(), t)
+        rows.y[row], rows.yp[row] = value_in(self, self.last_step(), t)
         rows.kept[row] = self.state.rdata[self.state.kept]
 
     def change(self, point: tuple, cells: np.ndarray, change: tuple[np.ndarray, bool, bool, bool, Any]) -> None:
@@ -279,7 +279,7 @@ class HeldRun(Run):
         values, loads, jumps, leads, *_ = change
         y, yp = rows.y[row], rows.yp[row]
         if self.last_records.changed_at == st.steps or (self._given is not None and self._given[0] == st.steps):
-            last = self._last_step()
+            last = self.last_step()
             kept = np.array_equal(last.idata, st.idata)
             if not kept:
                 # the coordinates were changed at an end of the step that is no end any more
@@ -332,7 +332,7 @@ class HeldRun(Run):
         if not steps or st.n_events:
             return None
         told = self.last_records.changed_at == steps or (given is not None and given[0] == steps)
-        if told and not np.array_equal(self._last_step().idata, st.idata):
+        if told and not np.array_equal(self.last_step().idata, st.idata):
             return None
         t, rows, row = point[0], point[1], point[2]
         values = np.empty(len(cells))
@@ -350,7 +350,7 @@ class HeldRun(Run):
         given, jumped = self._given, self._jumped
         told = self.last_records.changed_at == st.steps or (given and given[0] == st.steps)
         told = told or (jumped and jumped[0] == st.steps)
-        return History(self.options.method, Held(self, self._last_step() if told else None), self.plan, equations)
+        return History(self.options.method, Held(self, self.last_step() if told else None), self.plan, equations)
 
     def put_back(self, history: History) -> None:
         """Go on with a history; the tables are those of its state."""
@@ -379,7 +379,8 @@ class HeldRun(Run):
         self.stall = StallWatch(st.steps, st.t)
         self._given, self._jumped = None if last is None else (int(st.steps), last), None
 
-    def _last_step(self) -> LastStep:
+    def last_step(self) -> LastStep:
+        """Return the last step as values within it are told."""
         st = self.state
         if self._given is None or self._given[0] != st.steps:
             if self._jumped is not None and self._jumped[0] == st.steps:

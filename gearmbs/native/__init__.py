@@ -1,0 +1,5 @@
+"""Models as shared libraries with a C header, which run without Python and without a compiler."""
+
+from gearmbs._lazy import late
+
+__all__ = late(__name__)

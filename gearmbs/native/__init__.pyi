@@ -1,0 +1,2 @@
+from .library import Exported as Exported
+from .library import export as export

@@ -1,0 +1,238 @@
+"""Models as shared libraries: what they are made of, compiled with the C compiler of the system."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from gearmbs.dae.problem import ModelError
+from gearmbs.kernels import PLAIN
+from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.solve.simulator import Begun, Simulator
+from gearmbs.native.kernels import Kernels
+from gearmbs.native.memory import Memory, memory_of
+from gearmbs.native.outputs import Told, chosen_outputs
+
+PORTABLE = {"x86_64": "x86-64-v3", "AMD64": "x86-64-v3"}
+"""Processors that libraries are made for, by the kind of machine: those of the last ten years, with fused products."""
+COMPILERS = (("cc",), ("gcc",), ("clang",))
+FLAGS = ("-O2", "-std=c11", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra")
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A library that was made.
+
+    Attributes
+    ----------
+    folder, library, header : Path
+    numbers, outputs : dict of str to str
+        What can be set and what is told, with their units, in the order of the library.
+    left_out : list of str
+        Outputs of the mechanism that the library does not tell.
+    processor : str
+        What it runs on.
+    """
+
+    folder: Path
+    library: Path
+    header: Path
+    numbers: dict[str, str]
+    outputs: dict[str, str]
+    left_out: list[str]
+    processor: str
+
+
+def export(
+    model: Mechanism | Simulator,
+    folder: str | Path,
+    *,
+    t_end: Any = None,
+    name: str | None = None,
+    outputs: Sequence[Any] | None = None,
+    processor: str | None = None,
+    compiler: str | None = None,
+    report: Callable[[str], None] | None = None,
+    **options: Any,
+) -> Exported:
+    """Write a model as a shared library with a C header, which needs neither Python nor a compiler where it is used.
+
+    Parameters
+    ----------
+    model : Mechanism or Simulator
+        A simulator is exported as it stands.
+    folder : str or Path
+        Where the library, its header and an example are written; it is made.
+    t_end : float or str, optional
+        Latest time that can be asked for, s; needed for a mechanism. The first step depends on it.
+    name : str, optional
+        Of the model and its library; default: that of the mechanism.
+    outputs : sequence, optional
+        Outputs of the mechanism by name, and quantities as `gearmbs.Mechanism.output` takes them, of one number each.
+        Default: the outputs of the mechanism, or if it has none all motions, loads, diagnostics and reactions.
+    processor : str, optional
+        A name of LLVM's, or "native" for that of this machine. Default: any x86-64 with AVX2 and FMA, and of other
+        machines this one.
+    compiler : str, optional
+        Command of the C compiler. Default: cc, gcc or clang, whichever there is, or that of the package ziglang.
+    report : callable, optional
+        Called with the name of each kernel that is about to be compiled.
+    **options
+        Of `gearmbs.Simulator`, for a mechanism.
+
+    Returns
+    -------
+    Exported
+
+    Raises
+    ------
+    ModelError
+        If there is no C compiler, something of the model is in Python, or an output cannot be told.
+    """
+    if PLAIN:
+        raise ModelError("export: libraries are made by the compiler's own mode; unset GEARMBS_COMPILER")
+    if isinstance(model, Mechanism):
+        if t_end is None:
+            raise ModelError("t_end: an exported model has a latest time that can be asked for; give it, s")
+        model = Simulator(model, t_end, lump=options.pop("lump", False), records=False, **options)
+    elif t_end is not None or options:
+        raise ModelError("a simulator has its end and options already; give t_end and options with a mechanism")
+    command = c_compiler(compiler)
+    begun = model.begun()
+    title = name or begun.system.mechanism.name
+    told, left = chosen_outputs(begun.system, begun.problem, outputs)
+    numbers = {
+        name: number
+        for name, number in begun.problem.numbers.items()
+        if not number.prescribes and all(place.order == 0 for place in number.places)
+    }
+    kernels = Kernels(begun)
+    memory = memory_of(begun, numbers, told, kernels.number, deforms=begun.problem.small_entries)
+    processor = processor or PORTABLE.get(platform.machine(), "native")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = re.sub(r"\W+", "_", title).strip("_") or "model"
+    library = folder / f"{stem}.so"
+    with tempfile.TemporaryDirectory(prefix="gearmbs-") as room:
+        texts = _texts(begun, title, memory, numbers, told, model.t_end)
+        _compile(Path(room), command, kernels, processor, memory, texts, library, report or (lambda name: None))
+    header = folder / "gearmbs.h"
+    for file in ("gearmbs.h", "example.c"):
+        (folder / file).write_bytes(_source(file))
+    units = {name: number.unit for name, number in numbers.items()}
+    return Exported(folder, library, header, units, {one.name: one.unit for one in told}, left, processor)
+
+
+def c_compiler(given: str | None) -> list[str]:
+    """Return the command of a C compiler.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    for command in COMPILERS if given is None else ((given,),):
+        if shutil.which(command[0]) is not None:
+            return list(command)
+    if given is None:
+        try:
+            import ziglang  # noqa: F401
+
+            return [sys.executable, "-m", "ziglang", "cc"]
+        except ImportError:
+            pass
+    tried = given or ", ".join(command[0] for command in COMPILERS)
+    raise ModelError(
+        f"compiler: {tried} was not found; install gcc or clang, or the package ziglang (pip install ziglang)"
+    )
+
+
+def _source(name: str) -> bytes:
+    return resources.files("gearmbs.native").joinpath("source", name).read_bytes()
+
+
+def _text(value: str) -> str:
+    """Return a text as a literal of C."""
+    return (
+        '"' + "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in value.encode()) + '"'
+    )
+
+
+def _array(kind: str, name: str, items: Sequence[Any]) -> str:
+    """Return an array of C; one of nothing holds a zero."""
+    return f"static {kind} {name}[] = {{{', '.join(map(str, items)) or '0'}}};"
+
+
+def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[Told], t_end: float) -> str:
+    """Return the part of the model's description that does not depend on its objects."""
+    layout = memory.layout
+    digest = hashlib.sha256(layout.block.tobytes() + repr(memory[1:]).encode()).hexdigest()[:16]
+    names = {
+        "number_names": list(numbers), "number_units": [n.unit for n in numbers.values()],
+        "output_names": [one.name for one in told], "output_units": [one.unit for one in told],
+        "unknown_names": list(begun.problem.names),
+    }  # fmt: skip
+    lines = [_array("const char *const", key, [_text(text) for text in texts]) for key, texts in names.items()]
+    lines.append(_array("const int64_t", "inside", layout.inside.tolist()))
+    lines.append(_array("const int64_t", "functions", layout.functions.ravel().tolist()))
+    fields = {
+        "name": _text(title), "digest": _text(digest),
+        "t_start": repr(float(begun.point.t)), "t_end": repr(float(t_end)),
+        "block": layout.block.size, "state": layout.state, "size": layout.size,
+        "inside_count": len(layout.inside), "function_count": len(layout.functions),
+        "inside": "inside", "functions": "functions", "kernels": "kernels",
+        "late_count": "LATE", "late_names": "late_names", "late": "late",
+        **memory.structs, **memory.members,
+        "numbers": len(numbers), "outputs": len(told), "unknowns": begun.problem.n,
+        **{key: key for key in names},
+    }  # fmt: skip
+    described = ",\n    ".join(f".{key} = {value}" for key, value in fields.items())
+    return "\n".join(lines) + f"\n\nconst gearmbs_model gearmbs_this = {{\n    {described}\n}};\n"
+
+
+def _compile(
+    room: Path, command: list[str], kernels: Kernels, processor: str, memory: Memory, texts: str, library: Path,
+    report: Callable[[str], None],
+) -> None:  # fmt: skip
+    """Compile kernels and sources in a folder, and link them."""
+    called, numbered, late = kernels.objects(processor, report)
+    objects = {one.symbol: one.code for one in (*called.values(), *numbered, *late.values())}
+    for symbol, code in objects.items():
+        (room / f"{symbol}.o").write_bytes(code)
+    memory.layout.block.tofile(room / "block.bin")
+    declared = sorted({one.symbol for one in (*numbered, *late.values())})
+    head = [
+        '#include "model.h"',
+        *(f"extern int {symbol}();" for symbol in declared),
+        f"enum {{ LATE = {len(late)} }};",
+        _array("void *const", "kernels", [f"(void *){one.symbol}" for one in numbered]),
+        _array("void *const", "late", [f"(void *){one.symbol}" for one in late.values()]),
+        _array("const char *const", "late_names", [_text(name) for name in late]),
+        '__asm__(".section .rodata\\n.balign 64\\n.global gearmbs_block\\n.hidden gearmbs_block\\n"',
+        '        "gearmbs_block:\\n.incbin \\"block.bin\\"\\n.previous\\n");',
+    ]
+    (room / "described.c").write_text("\n".join([*head, texts]))
+    for file in ("gearmbs.c", "gearmbs.h", "model.h", "runtime.c"):
+        (room / file).write_bytes(_source(file))
+    names = [f"-Dgearmbs_{name}={one.symbol}" for name, one in called.items()]
+    sources = ["gearmbs.c", "runtime.c", "described.c"]
+    made = [f"{symbol}.o" for symbol in objects]
+    run = [*command, "-shared", *FLAGS, *names, *sources, *made, "-lm", "-Wl,-z,defs", "-s", "-o", "made.so"]
+    done = subprocess.run(run, cwd=room, capture_output=True, text=True)
+    if done.returncode:
+        raise ModelError(f"compiler: {' '.join(command)} could not link the library: {done.stderr.strip()[:2000]}")
+    # the file appears when it is whole
+    part = library.with_suffix(".part")
+    shutil.copyfile(room / "made.so", part)
+    part.chmod(0o755)
+    part.replace(library)

@@ -1,0 +1,323 @@
+"""The memory of an exported run: its structs and what they need beside them, laid out in an `Image`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.run_state import RunState
+from gearmbs.dae.integrators.stepping.jumps import TERMS
+from gearmbs.dae.linalg.lu_plan import LUPlan, analyse, new_lines
+from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
+from gearmbs.dae.model.evaluator import new_records, pattern
+from gearmbs.dae.problem import INPUT, DAEProblem, Number
+from gearmbs.kernels.bound import NAMES
+from gearmbs.mechanism.solve.simulator import Begun
+from gearmbs.native.driver import Driver
+from gearmbs.native.image import CONSTANT, SCRATCH, STATE, Image, Layout, member_of, word_of
+from gearmbs.native.kernels import BY_ADDRESS
+from gearmbs.native.outputs import Told
+from gearmbs.native.pivots import PlanRoom
+from gearmbs.native.teller import Teller
+
+ROWS = 2
+"""Rows of outputs: the present point, and the next."""
+FILL = 2
+"""Times the entries of a matrix that each of L and U has room for. Of a pair of gears, a planetary set, a drivetrain on
+rolling bearings, flexible shafts and a slider crank they have up to 0.74 times as many with pivots for all entries."""
+OPERATIONS = 6
+"""Times the entries of a matrix that a factorisation may have operations: of the same up to 2.2."""
+POOL = 4
+"""Times the room that the search for pivots begins with in Python, where it is doubled when it is full."""
+REFERENCED = 1
+"""Count of references to what is never given back."""
+
+PER_COLUMN = ("a_ptr", "u_ptr", "l_ptr", "pivot_ptr", "op_ptr", "div_ptr")
+OF_TAIL = (
+    "tail_at", "tail_src", "tail_scale", "block_col", "lane_ptr", "act_ptr", "act_to", "act_by", "act_u", "part_ptr",
+    "part_at", "part_col",
+)  # fmt: skip
+"""Arrays of a plan that no plan made without Python has."""
+OF_MATRIX = ("a_pos", "a_src", "a_scale", "a_to", "left_src", "left_limit", "limit")
+OF_FACTORS = ("u_pos", "u_col", "l_pos", "l_col", "l_to", "l_by", "u_to", "u_by", "div_to", "div_by")
+OF_OPERATIONS = ("op_to", "op_l", "op_u")
+
+
+class Memory(NamedTuple):
+    """The memory of an exported run.
+
+    Attributes
+    ----------
+    layout : Layout
+    structs : dict of str to int
+        Offset of each struct.
+    members : dict of str to int
+        Offset of single members and arrays that are read and written from outside.
+    """
+
+    layout: Layout
+    structs: dict[str, int]
+    members: dict[str, int]
+
+
+class _Factored(NamedTuple):
+    """Parts of a plan, its factors, their room, and scratch for the choice of pivots."""
+
+    plan: int
+    factors: int
+    room: int
+    columns: int
+    rows: int
+
+
+def memory_of(
+    begun: Begun, numbers: Mapping[str, Number], told: list[Told], function: Callable[[Any], int], deforms: bool
+) -> Memory:
+    """Lay out the memory of a run.
+
+    Parameters
+    ----------
+    begun : Begun
+    numbers : mapping of str to Number
+        What can be set.
+    told : list of Told
+        Outputs.
+    function : callable
+        Returns the number of a kernel by its address in this process, or by its name where the driver calls it.
+    deforms : bool
+        Whether pivots are chosen for all entries.
+    """
+    run, image = begun.run, Image()
+    st = _state(begun)
+    parts = {"run": image.struct(st, STATE, dict.fromkeys(("entry_row", "entry_col"), CONSTANT))}
+    parts["part"] = image.struct(run.algebraic.part, STATE)
+    parts["bound"] = _functions(image, begun.problem, function)
+    matrix = run.indptr, run.indices, run.scale, run.counted
+    assert run.plan is not None
+    assert run.factors is not None
+    own = _factored(image, run.plan, run.factors, *matrix)
+    driver = _driver(begun, numbers, deforms)
+    parts["driver"] = image.struct(driver, STATE, {"scratch": SCRATCH, **dict.fromkeys(_FIXED, CONSTANT)})
+    for kernel in BY_ADDRESS:
+        image.function_at(parts["driver"], member_of(Driver, kernel.__name__), function(kernel.__name__))
+    teller, plan, indptr, indices = _teller(begun, told)
+    ones, counted = np.ones(indptr.size - 1), np.zeros(indices.size)
+    found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted)
+    others = {**dict.fromkeys(_RECORDS, SCRATCH), **dict.fromkeys(_ASKED, CONSTANT)}
+    parts["teller"] = image.struct(teller, STATE, others)
+    image.function_at(parts["teller"], member_of(Teller, "evaluate"), function("evaluate_rows"))
+    parts |= {name: getattr(own, name) for name in own._fields}
+    parts |= {f"told_{name}": getattr(found, name) for name in found._fields}
+    # kernels of elements stand in the tables of integers
+    addressed = {id(table): table for table in (st.idata, driver.table, driver.table_before, driver.last_table)}
+    for table in addressed.values():
+        part = image.array(table, STATE)
+        for at in np.flatnonzero(np.isin(table, np.fromiter(NAMES, dtype=np.int64))).tolist():
+            image.function_at(part, 8 * at, function(int(table[at])))
+    layout = image.lay_out()
+    structs = {name: image.places[part] for name, part in parts.items()}
+    members = {
+        "time": structs["driver"] + member_of(Driver, "t"),
+        "present": structs["driver"] + member_of(Driver, "present"),
+        "steps": structs["run"] + member_of(RunState, "steps"),
+    }
+    arrays = {
+        "waiting": driver.waiting,
+        "wanted": driver.wanted,
+        "values": st.y_out,
+        "rates": st.yp_out,
+        "out": teller.out,
+    }
+    members |= {name: image.places[image.array(array, STATE)] if array.size else 0 for name, array in arrays.items()}
+    return Memory(layout, structs, members)
+
+
+def _state(begun: Begun) -> RunState:
+    """Return a copy of the state of a run that has room for two outputs, of which the first is the present point."""
+    st, point = begun.run.state, begun.point
+    y_out, yp_out = np.zeros((ROWS, begun.problem.n)), np.zeros((ROWS, begun.problem.n))
+    y_out[0], yp_out[0] = point.y, point.yp
+    kept = np.zeros((ROWS, len(st.kept)))
+    return st.with_members(
+        outputs=np.full(ROWS, np.inf), y_out=y_out, yp_out=yp_out, kept_out=kept, next_output=ROWS, t_pause=np.inf
+    )
+
+
+def _functions(image: Image, problem: DAEProblem, function: Callable[[Any], int]) -> int:
+    """Take in a stand-in for the functions bound together: a counted record with three words for each of the four."""
+    words = np.zeros(6 + 12, dtype=np.int64)
+    words[0], words[4] = REFERENCED, 96
+    number = image.array(words, STATE)
+    image.address_of(number, 8 * 3, number, 8 * 6)
+    for k, name in enumerate(("residual", "jacobian", "hook", "events")):
+        image.function_at(number, 8 * (6 + 3 * k + 2), function(name))
+    return number
+
+
+def _room_for(name: str, n: int, entries: int, present: int) -> int:
+    """Return how long an array of a plan may become."""
+    if name in OF_TAIL:
+        return present
+    if name in PER_COLUMN:
+        wanted = n + 1
+    elif name in OF_MATRIX:
+        wanted = entries
+    elif name in OF_FACTORS:
+        wanted = FILL * entries
+    elif name in OF_OPERATIONS:
+        wanted = OPERATIONS * entries
+    else:
+        wanted = n
+    return max(wanted, present)
+
+
+def _factored(
+    image: Image, plan: LUPlan, factors: LUFactors, indptr: np.ndarray, indices: np.ndarray, scale: np.ndarray,
+    counted: np.ndarray,
+) -> _Factored:  # fmt: skip
+    """Take in a plan and its factors, with room for others of the same matrix."""
+    n, entries = len(indptr) - 1, len(indices)
+    members = type(plan).array_members
+    rooms = np.array([_room_for(name, n, entries, getattr(plan, name).size) for name in members], dtype=np.int64)
+    at, sizes = np.zeros(len(members), dtype=np.int64), {"i8": 0, "u4": 0, "f8": 0}
+    for k, (kind, _) in enumerate(members.values()):
+        at[k] = sizes[kind]
+        sizes[kind] += int(rooms[k])
+    pools = {kind: np.zeros(max(size, 1), dtype=kind) for kind, size in sizes.items()}
+    for k, (name, (kind, _)) in enumerate(members.items()):
+        array = getattr(plan, name)
+        pools[kind][at[k] : at[k] + array.size] = array
+    plan_part = image.record(plan, STATE)
+    for k, (name, (kind, _)) in enumerate(members.items()):
+        inside = int(at[k]) * pools[kind].itemsize
+        image.address_of(plan_part, word_of(plan, name), image.array(pools[kind], STATE), inside)
+    size = max(2 * FILL * entries + n + 1, factors.lu.size)
+    lu = np.zeros(size)
+    lu[: factors.lu.size] = factors.lu
+    factors_part = image.record(factors, STATE)
+    for name in type(factors).array_members:
+        array = lu if name == "lu" else getattr(factors, name)
+        image.address_of(factors_part, word_of(factors, name), image.array(array, STATE))
+    room = PlanRoom(
+        words=np.zeros(2 * len(members), dtype=np.int64),
+        factor_words=np.zeros(2 * len(type(factors).array_members), dtype=np.int64),
+        head=np.zeros(2, dtype=np.int64),
+        at=at,
+        room=rooms,
+        ints=pools["i8"],
+        places=pools["u4"],
+        numbers=pools["f8"],
+        lu=lu,
+        x=factors.x,
+        w=factors.w,
+        indptr=np.asarray(indptr, dtype=np.int64),
+        indices=np.asarray(indices, dtype=np.int64),
+        scale=np.asarray(scale, dtype=float),
+        counted=np.asarray(counted).astype(np.int64),
+    )
+    part = image.record(room, STATE)
+    aliases = {
+        "words": (plan_part, word_of(plan, next(iter(members)))),
+        "factor_words": (factors_part, word_of(factors, "lu")),
+        "head": (plan_part, member_of(LUPlan, "tail")),
+    }
+    fixed = ("at", "room", "indptr", "indices", "scale")
+    for name in type(room).array_members:
+        number, inside = aliases.get(name, (-1, 0))
+        if number < 0:
+            number = image.array(getattr(room, name), CONSTANT if name in fixed else STATE)
+        image.address_of(part, word_of(room, name), number, inside)
+    columns, rows = new_lines(n, POOL * (3 * entries + 4 * n))
+    lines = [image.struct(one, STATE, dict.fromkeys(type(one).array_members, SCRATCH)) for one in (columns, rows)]
+    return _Factored(plan_part, factors_part, part, *lines)
+
+
+_FIXED = ("cells", "is_input", "loads", "first", "place", "coefficients", "per_unit", "offset", "plain")
+_RECORDS = ("work", "vals", "pose", "solution", "phi", "strayed", "loads", "force", "moment", "rdata")
+_ASKED = ("slots", "turns", "first", "kind", "at")
+
+
+def _driver(begun: Begun, numbers: Mapping[str, Number], deforms: bool) -> Driver:
+    """Return what drives the run, which stands at the present point."""
+    run, st, point = begun.run, begun.run.state, begun.point
+    n, cells, records = begun.problem.n, begun.cells, run.last_records
+    given = run.last_step() if st.steps else None
+    last: dict[str, Any] = {
+        "last_t": np.zeros(HISTORY), "last_rows": np.zeros((HISTORY, n)), "last_y": np.zeros(n),
+        "last_yp": np.zeros(n), "last_table": st.idata.copy(), "last_count": 0, "given_at": -1,
+    }  # fmt: skip
+    if given is not None:
+        count = len(given.nodes)
+        last["last_t"][:count], last["last_rows"][:count] = given.nodes, given.rows
+        last |= {"last_y": given.y.copy(), "last_yp": given.yp.copy(), "last_table": given.idata.copy()}
+        last |= {"last_count": count, "given_at": int(st.steps)}
+    own = [number.moved_to(cells) for number in numbers.values()]
+    places = [place for number in own for place in number.places]
+    return Driver(
+        **last,
+        t=point.t,
+        before=not np.array_equal(point.idata, records.table),
+        changed_at=int(records.changed_at),
+        jumped_at=-1,
+        look_at=int(st.steps),
+        watch_steps=int(st.steps),
+        watch_t=float(st.t),
+        repivots=run.repivots,
+        deforms=deforms,
+        jump_y=np.zeros(n),
+        jump_yp=np.zeros(n),
+        table=records.table.copy(),
+        table_before=records.before.copy(),
+        cells=cells.astype(np.int64),
+        held=np.array(point.held, dtype=float),
+        values=np.zeros(cells.size),
+        is_input=np.array([number.kind == INPUT for number in own], dtype=np.int64),
+        loads=np.array([number.loads for number in own], dtype=np.int64),
+        first=np.cumsum([0, *(len(number.places) for number in own)]).astype(np.int64),
+        place=np.array([place.at for place in places], dtype=np.int64),
+        coefficients=np.array([place.size for place in places], dtype=np.int64),
+        per_unit=np.array([place.factor for place in places], dtype=float),
+        offset=np.array([place.offset for place in places], dtype=float),
+        plain=np.array([(place.at, place.size) for place in places], dtype=np.int64).ravel(),
+        waiting=np.zeros(len(own), dtype=np.int64),
+        wanted=np.zeros(len(own)),
+        scratch=np.zeros((TERMS + 3, n)),
+    )
+
+
+def _teller(begun: Begun, told: list[Told]) -> tuple[Teller, LUPlan, np.ndarray, np.ndarray]:
+    """Return what tells outputs, a plan for its matrix, and the pattern of that."""
+    problem, model = begun.problem, begun.system.model
+    indptr, indices, slots = pattern(problem.idata, problem.rdata, problem.work_size, problem.t0, problem.y0)
+    names, modes = model.names, sum(model.modes)
+    most = max((len(d) for d in model.diagnostics), default=0)
+    records = new_records(1, len(names.bodies), len(names.rows), len(names.forces), most, modes)
+    n, angles = len(indptr) - 1, int(problem.idata[T.H_QF] - problem.idata[T.H_THETA])
+    # a plan of a diagonal matrix stands there until pivots are chosen
+    plan = analyse(np.arange(n + 1), np.arange(n), np.ones(n), np.ones(n))
+    places = [place for one in told for place in one.places]
+    teller = Teller(
+        elements=records.loads.shape[1],
+        columns=records.loads.shape[2],
+        slots=slots.astype(np.int64),
+        turns=np.sin(1.0 + np.arange(angles)),
+        rdata=np.zeros(len(problem.rdata)),
+        work=np.zeros(problem.work_size),
+        vals=np.zeros(len(indices)),
+        pose=records.pose,
+        solution=records.solution,
+        phi=records.phi,
+        strayed=records.strayed,
+        loads=records.loads.ravel(),
+        force=records.force.ravel(),
+        moment=records.moment.ravel(),
+        first=np.cumsum([0, *(len(one.places) for one in told)]).astype(np.int64),
+        kind=np.array([kind for kind, _ in places], dtype=np.int64),
+        at=np.array([at for _, at in places], dtype=np.int64),
+        out=np.zeros(len(told)),
+    )
+    return teller, plan, indptr, indices

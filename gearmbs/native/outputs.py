@@ -1,0 +1,175 @@
+"""Outputs of an exported model: names for numbers among the unknowns and records of an instant, or sums of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.accelerations import FORCE_RECORD
+from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.problem import DAEProblem, ModelError
+from gearmbs.native.teller import FORCE, LOADS, MOMENT, POSE, SOLUTION, UNKNOWN
+
+AXES = ("x", "y", "z")
+WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
+OF_BODY = {
+    "com_position": (POSE, POSE_R, "m"),
+    "com_velocity": (POSE, POSE_V, "m/s"),
+    "angular_velocity": (POSE, POSE_W, "rad/s"),
+    "com_acceleration": (SOLUTION, 0, "m/s^2"),
+    "angular_acceleration": (SOLUTION, 3, "rad/s^2"),
+}
+"""Quantities of bodies with three components: the record, the first place in that of a body, and the unit."""
+
+
+class Told(NamedTuple):
+    """An output.
+
+    Attributes
+    ----------
+    name, unit : str
+    places : tuple of (int, int)
+        Records, and places in them, of the numbers that add up to it.
+    """
+
+    name: str
+    unit: str
+    places: tuple[tuple[int, int], ...]
+
+
+class Finder:
+    """Finds where quantities of a solution stand in the records of an instant.
+
+    Parameters
+    ----------
+    system : System
+    problem : DAEProblem
+    """
+
+    def __init__(self, system: Any, problem: DAEProblem) -> None:
+        self.model, self.problem, self.states = system.model, problem, list(system.state_names)
+        self.most = max((len(d) for d in self.model.diagnostics), default=0)
+
+    @property
+    def columns(self) -> int:
+        """Length of the record of an element's load."""
+        return FORCE_RECORD + self.most
+
+    def find(self, name: str, asked: Sequence[Any]) -> Told:
+        """Return an output by what `Mechanism.output` takes: a quantity of a solution, what it is of, its component.
+
+        Raises
+        ------
+        ModelError
+            For one that is not among the numbers of an instant.
+        """
+        what, *rest = asked
+        try:
+            if what in OF_BODY:
+                record, first, unit = OF_BODY[what]
+                body, component = rest
+                width = POSE_COLUMNS if record == POSE else 6
+                place = self._index(self.model.names.bodies, body, "body") * width + first
+                return Told(name, unit, ((record, place + _component(AXES, component)),))
+            if what == "orientation":
+                body, row, column = rest
+                place = self._index(self.model.names.bodies, body, "body") * POSE_COLUMNS + POSE_A
+                return Told(name, "1", ((POSE, place + 3 * int(row) + int(column)),))
+            if what == "reaction":
+                joint, component = rest
+                return self._reaction(name, joint, _component(WRENCH, component))
+            if what == "reaction_force":
+                joint, component = rest
+                return self._reaction(name, joint, _component(AXES, component))
+            if what == "load":
+                element, component = rest
+                k, c = self._index(self.model.names.forces, element, "force element"), _component(WRENCH, component)
+                return Told(name, "N" if c < 3 else "N m", ((LOADS, k * self.columns + c),))
+            if what in ("diagnostics", "contact"):
+                element, quantity = rest
+                k = self._index(self.model.names.forces, element, "force element")
+                told = self.model.diagnostics[k]
+                c = self._index([d.name for d in told], quantity, f"diagnostic of {element}")
+                return Told(name, told[c].unit, ((LOADS, k * self.columns + FORCE_RECORD + c),))
+            if what == "state":
+                (state,) = rest
+                return Told(name, "1", ((UNKNOWN, int(self.problem.idata[T.H_Z]) + self.states.index(state)),))
+        except (ValueError, TypeError) as error:
+            raise ModelError(f"output {name!r}: {tuple(asked)!r} cannot be told: {error}") from None
+        known = ", ".join([*OF_BODY, "orientation", "reaction", "reaction_force", "load", "diagnostics", "state"])
+        raise ModelError(f"output {name!r}: a library does not tell {what!r}; it tells {known}")
+
+    def _reaction(self, name: str, joint: str, c: int) -> Told:
+        rows = self.model.rows_of_joint.get(joint)
+        if rows is None:
+            raise ModelError(f"output {name!r}: joint {joint!r}; the joints are {', '.join(self.model.rows_of_joint)}")
+        record, unit = (FORCE, "N") if c < 3 else (MOMENT, "N m")
+        return Told(name, unit, tuple((record, 3 * row + c % 3) for row in rows))
+
+    @staticmethod
+    def _index(names: Sequence[str], name: str, what: str) -> int:
+        if name not in names:
+            raise ValueError(f"there is no {what} {name!r}; there are {', '.join(names) or 'none'}")
+        return list(names).index(name)
+
+    def everything(self) -> list[Told]:
+        """Return motions of all bodies, loads and diagnostics of all elements, reactions of all joints, all states."""
+        names = self.model.names
+        asked: list[tuple[str, ...]] = []
+        for body in names.bodies:
+            asked += [(what, body, axis) for what in OF_BODY for axis in AXES]
+        for k, element in enumerate(names.forces):
+            asked += [("load", element, component) for component in WRENCH]
+            asked += [("diagnostics", element, d.name) for d in self.model.diagnostics[k]]
+        for joint in self.model.rows_of_joint:
+            asked += [("reaction", joint, component) for component in WRENCH]
+        asked += [("state", state) for state in self.states]
+        return [self.find(f"{of}.{'.'.join((what, *rest))}", (what, of, *rest)) for what, of, *rest in asked]
+
+
+def _component(names: Sequence[str], component: Any) -> int:
+    if component not in names:
+        raise ValueError(f"there is no component {component!r}; there are {', '.join(names)}")
+    return list(names).index(component)
+
+
+def chosen_outputs(system: Any, problem: DAEProblem, outputs: Sequence[Any] | None) -> tuple[list[Told], list[str]]:
+    """Return the outputs of an export, and the names of those of the mechanism that are left out.
+
+    Parameters
+    ----------
+    system, problem
+        As of `Finder`.
+    outputs : sequence, optional
+        Names of outputs of the mechanism, and quantities as `Mechanism.output` takes them. Default: all outputs of the
+        mechanism that can be told, or everything if it has none.
+
+    Raises
+    ------
+    ModelError
+        For one that is asked for and cannot be told.
+    """
+    finder, named, left = Finder(system, problem), system.mechanism.outputs, []
+    if outputs is None and not named:
+        return finder.everything(), []
+    if outputs is not None:
+        return [_asked(finder, named, item) for item in outputs], []
+    found = []
+    for name in named:
+        try:
+            found.append(_asked(finder, named, name))
+        except ModelError:
+            left.append(name)
+    return found, left
+
+
+def _asked(finder: Finder, named: Any, item: Any) -> Told:
+    if not isinstance(item, str):
+        return finder.find(".".join(map(str, item)), item)
+    if item not in named:
+        raise ModelError(f"output {item!r}; the outputs are {', '.join(named) or 'none'}")
+    made = named[item]
+    if made.text is not None:
+        raise ModelError(f"output {item!r}: a library tells no expressions; give it as a quantity with its component")
+    return finder.find(item, made.what)

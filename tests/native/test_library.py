@@ -1,0 +1,269 @@
+"""Exported models against the same models in Python: what they do is the same, bit for bit."""
+
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.drivetrain import RollingContactBearing
+from gearmbs.gears import GearSpec, PlanetarySet, planetary_mechanism
+from gearmbs.mechanism import ModelError
+from gearmbs.native import export
+from gearmbs.studies.run.simulation import case_mechanism
+from tests.drivetrain.support import stage
+from tests.mechanism.test_stepping import slider_crank, top
+from tests.native.support import Instance, Library
+from tests.says import says
+
+COMPILER = shutil.which("cc") or shutil.which("gcc")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")]
+
+PAIR_END = 0.02
+TOLD = {
+    "com_position": "xyz", "com_velocity": "xyz", "angular_velocity": "xyz", "com_acceleration": "xyz",
+    "angular_acceleration": "xyz",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """The pair of the paper as a library, and the mechanism."""
+    m = case_mechanism(gm.Case())
+    made = export(m, tmp_path_factory.mktemp("pair"), t_end=PAIR_END)
+    return m, made, Library(made.library)
+
+
+def expected(m, sim, name):
+    """Return an output by its name in a library as a simulator tells it."""
+    owners = {*m.bodies, *m.elements, *m.joints, *m.state_names}
+    for owner in sorted(owners, key=len, reverse=True):
+        if name.startswith(f"{owner}."):
+            what, _, rest = name[len(owner) + 1 :].partition(".")
+            if what == "state":
+                return sim.get("state", owner)
+            if what == "diagnostics":
+                return sim.get("diagnostics", owner)[rest]
+            if what in TOLD:
+                return sim.get(what, owner)["xyz".index(rest)]
+            place = ("fx", "fy", "fz", "tx", "ty", "tz").index(rest)
+            return sim.get(what, owner)[place // 3][place % 3]
+    raise KeyError(name)
+
+
+def compared(m, library, end, points=1000, changes=(), looks=23, **options):
+    """Hold a library against a simulator at some points, with numbers set at some of them; return the simulator."""
+    instance, sim = Instance(library), gm.Simulator(m, end, lump=False, **options)
+    times = np.linspace(0.0, end, points + 1)
+    told, told_rates = [], []
+    for k, t in enumerate(times[1:].tolist()):
+        for at, name, value in changes:
+            if at == k:
+                instance.set(name, value)
+                sim.set(name, value)
+                assert instance.number(name) == sim.get("input", name) == value
+        instance.advance(t)
+        sim.advance(t)
+        y, yp = instance.unknowns()
+        told.append(y)
+        told_rates.append(yp)
+        if k % looks == looks - 1 and t < end:
+            wanted = [expected(m, sim, name) for name in library.output_names]
+            np.testing.assert_array_equal(instance.outputs(), wanted)
+    result = sim.solution().result
+    np.testing.assert_array_equal(told, result.y[1:])
+    np.testing.assert_array_equal(told_rates, result.yp[1:])
+    assert library.steps(instance.address) == result.stats.steps
+    return sim
+
+
+CHANGES = [
+    (100, "load.torque", 100.0), (200, "mesh.stiffness", 5e9), (300, "load.torque", 120.0), (300, "mesh.damping", 2e3),
+    (301, "load.torque", 121.0), (302, "load.torque", 121.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("changes", [[], CHANGES])
+def test_pair_of_the_paper(pair, changes):
+    m, _, library = pair
+    sim = compared(m, library, PAIR_END, changes=changes)
+    # not all pivots are those of the export
+    assert sim.solution().result.stats.repivots > 0
+
+
+def misaligned():
+    return case_mechanism(gm.make_case({"fault": {"misalignment": "1 deg"}})), 0.01, {}
+
+
+def planetary():
+    wheels = GearSpec(28, "2 mm"), GearSpec(36, "2 mm"), GearSpec.ring(100, "2 mm")
+    gears = PlanetarySet(*wheels, planets=4, ideal=(1e8, 1e8))
+    m = planetary_mechanism(gears, speeds={"sun": 50.0}, torques={"carrier": -20.0}, run_up=0.01)
+    return m, 0.05, {"tol": 1e-6}
+
+
+def rolling():
+    bearings = [
+        RollingContactBearing(name=f"{shaft} {k}", shaft=shaft, station=station, rolling="6206", settings={})
+        for shaft in ("in", "out")
+        for k, station in (("a", 0.02), ("b", 0.08))
+    ]
+    train = stage(bearings=bearings, run_up=0.01, running=True)
+    return train.build(), 0.004, {"tol": 1e-7, "rate_scale": train.rate_scale}
+
+
+def tumbling():
+    """Its Euler angles change their reference on the way."""
+    return top(), 2.0, {}
+
+
+def of_expressions():
+    """Expressions, states of its own, and algebraic ones that are solved for at outputs."""
+    return slider_crank(), 1.0, {}
+
+
+@pytest.mark.parametrize("model", [misaligned, planetary, rolling, tumbling, of_expressions])
+def test_other_mechanisms(model, tmp_path):
+    m, end, options = model()
+    made = export(m, tmp_path, t_end=end, **options)
+    compared(m, Library(made.library), end, **options)
+
+
+def test_states(pair):
+    """What follows from a state is the same in the instance, in another one, and after others have gone on."""
+    _, _, library = pair
+    times = np.linspace(0.0, PAIR_END, 201)[1:]
+    first, second = Instance(library), Instance(library)
+    for t in times[:80]:
+        first.advance(t)
+    first.set("load.torque", 60.0)
+    state = first.save()
+    rest = []
+    for t in times[80:]:
+        first.advance(t)
+        rest.append(np.append(first.unknowns().ravel(), first.outputs()))
+    second.advance(times[3])
+    second.outputs()
+    for instance in (first, second, Instance(library)):
+        instance.restore(state)
+        assert instance.t == times[79]
+        assert instance.save() == state
+        for t, wanted in zip(times[80:], rest, strict=True):
+            instance.advance(t)
+            np.testing.assert_array_equal(np.append(instance.unknowns().ravel(), instance.outputs()), wanted)
+
+
+def test_instances_in_threads(pair):
+    """Twenty instances in four threads do what each does alone."""
+    _, _, library = pair
+    times = np.linspace(0.0, 0.25 * PAIR_END, 26)[1:]
+
+    def run(torque):
+        instance = Instance(library)
+        instance.set("load.torque", torque)
+        for t in times:
+            instance.advance(t)
+        return np.append(instance.unknowns().ravel(), instance.outputs())
+
+    torques = np.linspace(50.0, 150.0, 20)
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(run, torques))
+    np.testing.assert_array_equal(together, [run(torque) for torque in torques])
+
+
+def test_a_number_that_is_set_at_the_start(pair):
+    """Python starts afresh with it, a library goes on from the start: they agree within the tolerance."""
+    m, _, library = pair
+    instance, sim = Instance(library), gm.Simulator(m, PAIR_END, lump=False)
+    for one in (instance, sim):
+        one.set("load.torque", 60.0)
+        one.advance(0.5 * PAIR_END)
+    assert instance.get("mesh.load.ty") == pytest.approx(sim.get("load", "mesh")[1][1], rel=1e-3)
+
+
+def test_a_simulator_is_exported_as_it_stands(pair, tmp_path):
+    m, _, _ = pair
+    sim = gm.Simulator(m, PAIR_END, lump=False, records=False)
+    sim.set("load.torque", 80.0)
+    sim.advance(0.004)
+    instance = Instance(Library(export(sim, tmp_path, name="later").library))
+    assert instance.t == 0.004
+    assert instance.number("load.torque") == 80.0
+    for t in np.linspace(0.004, 0.006, 41)[1:].tolist():
+        instance.advance(t)
+        sim.advance(t)
+        np.testing.assert_array_equal(instance.unknowns()[0], sim.state().y)
+
+
+def test_refusals(pair):
+    """They change nothing, and what is meant goes on."""
+    _, _, library = pair
+    instance, refused = Instance(library), -20
+    instance.advance(0.001)
+    before = instance.save()
+    assert library.advance(instance.address, 0.0005) == refused
+    assert library.advance(instance.address, PAIR_END * 1.01) == refused
+    assert library.advance(instance.address, float("nan")) == refused
+    assert library.set(instance.address, library.numbers(), 1.0) == refused
+    assert library.set(instance.address, 0, float("inf")) == refused
+    assert library.restore(instance.address, before, len(before) - 1) == refused
+    assert library.restore(instance.address, b"x" + before[1:], len(before)) == refused
+    assert library.number_name(library.numbers()) is None
+    assert b"no use" in library.message(refused)
+    assert instance.save() == before
+    instance.advance(0.001)
+    instance.advance(PAIR_END)
+
+
+def test_the_example(pair, tmp_path):
+    """It is compiled against the library and prints an output at a hundred points."""
+    _, made, library = pair
+    program = tmp_path / "example"
+    command = [COMPILER, "-Wall", "-Werror", str(made.folder / "example.c"), str(made.library), "-o", str(program)]
+    subprocess.run([*command, f"-Wl,-rpath,{made.folder}"], check=True)
+    told = [line.split() for line in subprocess.check_output([program], text=True).splitlines()]
+    assert len(told) == 100
+    instance = Instance(library)
+    for k, (t, value, unit) in enumerate(told, start=1):
+        instance.advance(PAIR_END * k / 100.0 if k < 100 else PAIR_END)
+        assert float(t) == pytest.approx(instance.t)
+        assert float(value) == instance.outputs()[0]
+        assert unit == "m"
+
+
+def test_what_cannot_be_exported_is_refused(tmp_path):
+    def disc(torque):
+        m = gm.Mechanism("disc")
+        body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+        pin = m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+        m.torque("drive", body, torque(m))
+        m.output("power", "WZ(pin.I, pin.J)")
+        m.output("speed", ("angular_velocity", "disc", "z"))
+        return m, pin
+
+    constant, _ = disc(lambda m: m.input("load", "N m", 1.0))
+    with pytest.raises(ModelError, match=says("t_end", "latest", "exported")):
+        export(constant, tmp_path)
+    with pytest.raises(ModelError, match=says("compiler", "no-such-command", "install")):
+        export(constant, tmp_path, t_end=1.0, compiler="no-such-command")
+    with pytest.raises(ModelError, match=says("power", "expressions", "quantity")):
+        export(constant, tmp_path, t_end=1.0, outputs=["power"])
+    with pytest.raises(ModelError, match=says("load", "pin", "force element")):
+        export(constant, tmp_path, t_end=1.0, outputs=[("load", "pin", "fx")])
+    with pytest.raises(ModelError, match=says("lump=False", "without", "Python")):
+        export(gm.Simulator(constant, 1.0, lump=True), tmp_path)
+    held = gm.Simulator(constant, 1.0, lump=False)
+    held.control("load", lambda t, sim: 2.0, 0.1)
+    with pytest.raises(ModelError, match=says("controllers", "without", "Python")):
+        export(held, tmp_path)
+    made = export(constant, tmp_path, t_end=1.0)
+    assert made.left_out == ["power"]
+    assert made.outputs == {"speed": "rad/s"}
+    assert made.numbers == {"load": "N m"}
+    instance = Instance(Library(made.library))
+    instance.set("load", 4.0)
+    instance.advance(0.5)
+    # 2 w' = 4
+    assert instance.get("speed") == pytest.approx(1.0, rel=1e-6)
