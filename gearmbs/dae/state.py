@@ -9,6 +9,7 @@ import hashlib
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,9 +18,15 @@ import numpy as np
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.files import whole_file
 from gearmbs.kernels.bound import NAMES
+from gearmbs.wording import did_you_mean
 
-FORMAT = 2
+FORMAT = 3
 """Number of the format of files; others are refused."""
+
+
+SEE = "see its names"
+FOLLOWING = ("p_", "lambda(", "mu(", "F_", "N_")
+"""Beginnings of the names of momenta, multipliers and loads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +75,16 @@ def equations_of(problem: DAEProblem) -> str:
     return found.hexdigest()
 
 
+def _digest(arrays: Mapping[str, Any]) -> np.ndarray:
+    """Return a digest of named arrays, as bytes."""
+    found = hashlib.blake2b(digest_size=16)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        found.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        found.update(array.tobytes())
+    return np.frombuffer(found.digest(), dtype=np.uint8)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class State:
     """A DAE at an instant.
@@ -90,6 +107,8 @@ class State:
         Of the integrator; without it a run starts afresh, at order one.
     controllers : mapping of str to Memory
         Of a simulator, by the inputs they set.
+    told : tuple of (float, bytes, bytes) or None
+        ``t``, ``y`` and ``yp`` that the history is one of. With others, written there, a run starts afresh.
     """
 
     t: float
@@ -102,6 +121,7 @@ class State:
     reals: tuple[np.ndarray, np.ndarray]
     history: History | None = field(default=None)
     controllers: Mapping[str, Memory] = field(default_factory=dict)
+    told: tuple[float, bytes, bytes] | None = None
 
     @classmethod
     def of(
@@ -140,7 +160,8 @@ class State:
         sizes = len(own[0]), len(own[1])
         t_model = float(problem.t0) if origin is None else origin.t_model
         names = tuple(problem.names)
-        return cls(float(t), y.copy(), yp.copy(), names, t_model, sizes, integers, reals, history)
+        t, told = float(t), None if history is None else (float(t), y.tobytes(), yp.tobytes())
+        return cls(t, y.copy(), yp.copy(), names, t_model, sizes, integers, reals, history, told=told)
 
     def tables(self, problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
         """Return the tables of a problem, as assembled at ``t_model``, as they are in this state."""
@@ -173,9 +194,14 @@ class State:
         Its last step may end after ``t``. So it is of no use to another integrator, nor to other equations.
         """
         history = self.history
-        if history is None or history.method != method or history.equations != equations_of(problem):
+        if history is None or not self.is_own or history.method != method or history.equations != equations_of(problem):
             return None
         return history
+
+    @property
+    def is_own(self) -> bool:
+        """Whether time, unknowns and rates are those that the history belongs to."""
+        return self.told == (self.t, self.y.tobytes(), self.yp.tobytes())
 
     def check(self, problem: DAEProblem) -> None:
         """Raise a ModelError that names what differs if this is no state of a problem."""
@@ -199,11 +225,43 @@ class State:
         """Return the state alone, from which a run starts afresh."""
         return replace(self, history=None)
 
+    def changed(self, values: Mapping[str, float]) -> State:
+        """Return the state with other initial values, from which a run starts afresh.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Unknowns by their names, SI: positions, velocities and states of a mechanism, from which momenta,
+            multipliers and loads follow. Values that leave constraints open by more than a little are refused where the
+            run starts.
+
+        Raises
+        ------
+        ModelError
+            For a name that is not there or of something that follows, and a value that is no finite number.
+        """
+        y = self.y.copy()
+        for name, value in values.items():
+            if str(name).startswith(FOLLOWING):
+                raise ModelError(
+                    f"state: {name!r} follows from positions and velocities; give these (R, theta, u, eps)"
+                )
+            if not isinstance(value, Real) or isinstance(value, bool) or not np.isfinite(value):
+                raise ModelError(f"state: {name!r} = {value!r}; give a finite number in SI")
+            y[self._place(name)] = value
+        return replace(self, y=y, history=None)
+
+    def _place(self, name: str) -> int:
+        if name not in self.names:
+            raise ModelError(f"state: there is no unknown {name!r}; {did_you_mean(name, self.names, otherwise=SEE)}")
+        return self.names.index(name)
+
     def __getitem__(self, name: str) -> float:
         """Return an unknown by its name in ``names``."""
-        if name not in self.names:
-            raise KeyError(f"state has no unknown {name!r}; see its names")
-        return float(self.y[self.names.index(name)])
+        try:
+            return float(self.y[self._place(name)])
+        except ModelError as error:
+            raise KeyError(str(error)) from None
 
     def __repr__(self) -> str:
         told = f"with the history of {self.history.method}" if self.history is not None else "without history"
@@ -238,7 +296,7 @@ class State:
         for name, memory in self.controllers.items():
             arrays |= {f"schedule {name}": memory.schedule, f"memory {name}": memory.numbers}
         with whole_file(path) as part, open(part, "wb") as file:
-            np.savez(file, **arrays)
+            np.savez(file, **arrays, digest=_digest(arrays))
         return path
 
     @classmethod
@@ -252,12 +310,19 @@ class State:
         FileNotFoundError
             If there is none.
         """
+        if Path(path).is_file() and not zipfile.is_zipfile(path):
+            raise ModelError(
+                f"{path}: not a whole file of a state, as State.save writes it (it is no .npz, or cut off)"
+            )
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             form = int(arrays["format"])
             if form != FORMAT:
                 raise ModelError(f"{path}: a state of format {form}, this version reads {FORMAT}; save it anew")
+            digest = arrays.pop("digest")
+            if not np.array_equal(digest, _digest(arrays)):
+                raise ValueError("its numbers are not those that were saved")
             t, t_model = map(float, arrays["times"])
             integers, reals = ((arrays[f"{name} at"], arrays[name]) for name in ("integers", "reals"))
             sizes = int(arrays["sizes"][0]), int(arrays["sizes"][1])
@@ -272,11 +337,14 @@ class State:
             names = tuple(map(str, arrays["names"]))
             inputs = [name.removeprefix("memory ") for name in arrays if name.startswith("memory ")]
             held = {name: Memory(arrays[f"schedule {name}"], arrays[f"memory {name}"]) for name in inputs}
-            return cls(t, arrays["y"], arrays["yp"], names, t_model, sizes, integers, reals, history, held)
+            y, yp = arrays["y"], arrays["yp"]
+            told = t, y.tobytes(), yp.tobytes()
+            return cls(t, y, yp, names, t_model, sizes, integers, reals, history, held, told)
         except ModelError:
             raise
         except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-            raise ModelError(f"{path}: not a whole file of a state, as State.save writes it ({error})") from None
+            why = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+            raise ModelError(f"{path}: not a whole file of a state, as State.save writes it ({why})") from None
 
 
 __all__ = ["History", "Memory", "State"]

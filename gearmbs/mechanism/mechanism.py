@@ -24,7 +24,7 @@ from gearmbs.mechanism.parts.inputs import Input, Output, Parameter
 from gearmbs.mechanism.parts.joints import JointMethods
 from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
-from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, reader, vector
+from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, reader, vector
 from gearmbs.mechanism.value_methods import ValueMethods
 from gearmbs.units import truth
 
@@ -433,7 +433,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         """
         from gearmbs.mechanism.compile import compile_mechanism
 
-        return compile_mechanism(self, t0)
+        return compile_mechanism(self, quantity(t0, "time", "t"))
 
     def simulate(self, t_end: float, **options):
         """Integrate from 0 to ``t_end`` seconds; see :func:`gearmbs.mechanism.simulate`."""

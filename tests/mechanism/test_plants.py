@@ -500,3 +500,40 @@ def test_a_plant_at_the_run_of_another_mechanism_has_its_own_numbers():
     for at in (sim.solution(), sim.state()):
         found = turning().linearize(["load"], outputs, at=at)
         np.testing.assert_allclose(np.sort_complex(found.poles), np.sort_complex(stiffer.poles), atol=1e-6)
+
+
+def test_motions_that_nothing_resists_have_poles_that_are_zero():
+    """Two discs of 2 and 5 kg m^2 on a stiff shaft; a state of its own, and an input led by its acceleration."""
+    stiffness, damping = 3e8, 40.0
+    m = gm.Mechanism("two discs")
+    markers = []
+    for name, inertia in (("a", 2.0), ("b", 5.0)):
+        body = m.body(name, mass=1.0, inertia=(inertia,) * 3)
+        m.revolute(f"pin {name}", body, m.ground, axis=(0, 0, 1))
+        markers.append(body.marker(name=f"on {name}"))
+    m.torsion_spring("shaft", *markers, stiffness=stiffness, damping=damping)
+    plant = m.linearize([("torque", "pin a")], [("joint_angle", "pin b")])
+    reduced = 2.0 * 5.0 / 7.0
+    fast = np.roots([1.0, damping / reduced, stiffness / reduced])
+    assert (plant.poles[:2] == 0.0).all()
+    np.testing.assert_allclose(np.sort_complex(plant.poles[2:]), np.sort_complex(fast), rtol=1e-9)
+    assert (plant.transfer_function().den[-2:] == 0.0).all()
+    # two more of an angle that is given by its second rate, one of a state that decays
+    third = m.body("c", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    m.rotation("motor", m.revolute("pin c", third, m.ground, axis=(0, 0, 1)), 0.0)
+    m.differential_state("lag", '-3*DIF(lag) + WZ("on b")')
+    plant = m.linearize([("motion", "motor", "acceleration")], [("joint_angle", "pin c")])
+    assert plant.poles.size == len(plant.A) == 7
+    assert (plant.poles[:4] == 0.0).all()
+    np.testing.assert_allclose(np.sort_complex(plant.poles[4:]), np.sort_complex([*fast, -3.0]), rtol=1e-9)
+
+
+def test_poles_are_the_eigenvalues_of_the_matrix():
+    """Of what is held, where both can be computed."""
+    m = gm.Mechanism("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", mass=1.0, inertia=(0.01, 0.01, 0.01), position=(0, 0, -0.5))
+    pin = m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    m.differential_state("lag", "AZ(pin.I, pin.J) - 5*DIF(lag)")
+    m.torsion_spring("spring", pin.i, pin.j, stiffness=2.0, damping=0.3)
+    plant = m.linearize([("torque", "pin")], [("joint_angle", "pin"), ("state", "lag")])
+    np.testing.assert_allclose(np.sort_complex(plant.poles), np.sort_complex(np.linalg.eigvals(plant.A)), rtol=1e-9)

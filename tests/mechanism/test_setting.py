@@ -235,7 +235,8 @@ def test_a_state_holds_what_controllers_remember(tmp_path):
     # without what it remembers the torque is another one
     bare = gm.Simulator(two_discs(), 1.0, initial=state)
     pi = PI()
-    bare.control("load", lambda t, s: pi(t, s), PERIOD)
+    with pytest.warns(UserWarning, match=says("'load'", "restore(numbers)")):
+        bare.control("load", lambda t, s: pi(t, s), PERIOD)
     bare.advance(0.02)
     assert abs(unknowns(bare)[2] - wanted[2]) > 1e-6
     odd = PI()

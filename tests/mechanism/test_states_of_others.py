@@ -74,3 +74,28 @@ def test_joints_elsewhere_are_refused_with_what_to_do():
     assert "check_start" not in run.message
     with pytest.raises(ModelError, match=told):
         gm.Simulator(pendulum(place=0.6), 1.0, initial=state).advance(0.4)
+
+
+def test_initial_values_have_names():
+    """A speed and a state are others: w = w0 + T t / J, and the state decays from there; what is unknown is told."""
+    m = turning_disc(2.0)
+    m.differential_state("lag", "-4*DIF(lag)", start=1.0)
+    state = gm.Simulator(m, 1.0).state()
+    other = state.changed({"eps_psi(disc)": 7.0, "z(lag)": 3.0})
+    assert (state["eps_psi(disc)"], other["eps_psi(disc)"], other["z(lag)"]) == (1.0, 7.0, 3.0)
+    run = m.simulate(0.5, initial=other, tol=1e-9)
+    assert run.angular_velocity("disc")[-1, 2] == pytest.approx(7.0 + 0.5 * TORQUE / 2.0, rel=1e-6)
+    assert run.state("lag")[-1] == pytest.approx(3.0 * np.exp(-2.0), rel=1e-6)
+    for values, words in (
+        ({"eps_psi(disk)": 1.0}, ("'eps_psi(disk)'", "eps_psi(disc)")),
+        ({"p_psi(disc)": 1.0}, ("'p_psi(disc)'", "velocities", "eps")),
+        ({"z(lag)": np.nan}, ("'z(lag)'", "nan", "SI")),
+        ({"z(lag)": "1 s"}, ("'z(lag)'", "'1 s'", "SI")),
+    ):
+        with pytest.raises(ModelError, match=says(*words)):
+            state.changed(values)
+    with pytest.raises(KeyError, match=says("'z(lug)'", "z(lag)")):
+        state["z(lug)"]
+    run = m.simulate(0.5, initial=state.changed({"R_x(disc)": 0.1}))
+    assert not run.success
+    assert "R_x(disc)" in run.message

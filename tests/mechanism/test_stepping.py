@@ -452,11 +452,15 @@ def test_a_failure_can_be_gone_back_from():
     np.testing.assert_allclose(sim.solution().com_velocity("body"), one.com_velocity("body"), atol=1e-9)
 
 
-def test_planetary_set():
-    """Its meshes are forces given by equations, unknowns of their own."""
+def planets():
+    """A planetary set whose meshes are forces given by equations, unknowns of their own."""
     wheels = GearSpec(28, "2 mm"), GearSpec(36, "2 mm"), GearSpec.ring(100, "2 mm")
     gears = PlanetarySet(*wheels, planets=4, ideal=(1e8, 1e8))
-    m = planetary_mechanism(gears, speeds={"sun": 50.0}, torques={"carrier": -20.0}, run_up=0.01)
+    return planetary_mechanism(gears, speeds={"sun": 50.0}, torques={"carrier": -20.0}, run_up=0.01), {"tol": 1e-5}
+
+
+def test_planetary_set():
+    m, _ = planets()
     times = np.linspace(0.0, 0.02, 41)
     sim = gm.Simulator(m, 0.02, tol=1e-5)
     for t in times[1:21]:

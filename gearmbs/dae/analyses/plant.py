@@ -15,17 +15,20 @@ The state that held r vanishes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, expm, hessenberg, schur, solve_sylvester
 
+from gearmbs.dae.analyses.eigenvalues import spectrum
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Driven, Reduced, reduce, warn_of_varying
 from gearmbs.dae.problem import ModelError, SingularModelError
+from gearmbs.units import to_si
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
@@ -82,6 +85,8 @@ class LinearPlant:
     time_unit : float
         Unit of time, s.
     point : OperatingPoint or None
+    own_poles : ndarray or None
+        Eigenvalues of A as the linearisation has them, in which motions that nothing resists are zeros.
     """
 
     A: np.ndarray
@@ -96,6 +101,7 @@ class LinearPlant:
     input_units: list[str] = field(default_factory=list)
     output_units: list[str] = field(default_factory=list)
     point: OperatingPoint | None = None
+    own_poles: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for names, units in (
@@ -110,11 +116,16 @@ class LinearPlant:
 
     @property
     def poles(self) -> np.ndarray:
-        """Eigenvalues of A, shape (n,)."""
+        """Eigenvalues of A, shape (n,); exactly zero of what nothing resists, by magnitude.
+
+        The matrix itself tells a double zero from the root of its rounding only, 1e-4 rad/s beside 1e4.
+        """
+        if self.own_poles is not None:
+            return self.own_poles.copy()
         return np.linalg.eigvals(self.A) if self.A.size else np.zeros(0, dtype=complex)
 
-    def place(self, name: str | int, kind: str = "input") -> int:
-        """Return the number of an input, output or state, given by its name or number.
+    def place(self, name: str | int | Sequence[Any], kind: str = "input") -> int:
+        """Return the number of an input, output or state, given by its name, its number or what it was asked for by.
 
         Raises
         ------
@@ -122,6 +133,10 @@ class LinearPlant:
             If there is none.
         """
         names = {"input": self.inputs, "output": self.outputs, "state": self.states}[kind]
+        if isinstance(name, tuple | list):
+            # as it was asked for; the level of a position is not in the name
+            parts = [str(getattr(part, "name", part)) for part in name]
+            name = " ".join(parts[:-1] if parts[-1:] == ["position"] else parts)
         if isinstance(name, str) and name in names:
             return names.index(name)
         if isinstance(name, int | np.integer) and -len(names) <= name < len(names):
@@ -151,7 +166,7 @@ class LinearPlant:
             Amplitude and phase lead of each output over each input; infinite at a pole.
         """
         # A = Q H Q^T once: each frequency is then a solution with a matrix that has one diagonal below its main one
-        points = 2j * np.pi * self.time_unit * np.atleast_1d(np.asarray(f, dtype=float))
+        points = 2j * np.pi * self.time_unit * np.atleast_1d(_read(f, "frequency", "f"))
         out = np.zeros((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
         out += self.D
         if not len(self.A) or not out.size:
@@ -168,13 +183,15 @@ class LinearPlant:
                 row[:] = np.inf
         return out
 
-    def transfer_function(self, which: str | int = 0, output: str | int = 0) -> TransferFunction:
+    def transfer_function(
+        self, which: str | int | Sequence[Any] = 0, output: str | int | Sequence[Any] = 0
+    ) -> TransferFunction:
         """Return the transfer function from one input to one output as polynomials in s.
 
         Parameters
         ----------
-        which, output : str or int
-            Input and output, by name or number.
+        which, output : str, int or tuple
+            Input and output, by name or number, or as they were asked for, ``("torque", "pin")``.
 
         Returns
         -------
@@ -229,15 +246,15 @@ class LinearPlant:
             moved = slow_part @ moved
         return gain
 
-    def step(self, times: np.ndarray, which: str | int = 0) -> np.ndarray:
+    def step(self, times: np.ndarray, which: str | int | Sequence[Any] = 0) -> np.ndarray:
         """Return the outputs after a unit step of one input from rest.
 
         Parameters
         ----------
         times : ndarray, shape (m,)
             In the unit of time of the plant.
-        which : str or int
-            The input, by name or number.
+        which : str, int or tuple
+            The input, as of :meth:`transfer_function`.
 
         Returns
         -------
@@ -246,7 +263,10 @@ class LinearPlant:
         n, j = len(self.A), self.place(which)
         held = np.zeros((n + 1, n + 1))
         held[:n, :n], held[:n, n] = self.A, self.B[:, j]
-        out = [self.C @ expm(held * float(t))[:n, n] + self.D[:, j] for t in np.asarray(times, dtype=float)]
+        instants = np.atleast_1d(_read(times, "time", "times", self.time_unit))
+        if (instants < 0.0).any():
+            raise ModelError(f"times: {instants.min():g} lies before the step, which is at 0")
+        out = [self.C @ expm(held * float(t))[:n, n] + self.D[:, j] for t in instants]
         return np.array(out).reshape(-1, len(self.outputs))
 
     def save(self, path: str | Path) -> Path:
@@ -291,6 +311,46 @@ class LinearPlant:
 
     def __repr__(self) -> str:
         return f"LinearPlant({len(self.A)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs)"
+
+
+def _read(values: Any, unit: str, field: str, factor: float = 1.0) -> np.ndarray:
+    """Return numbers, or texts with a unit in a unit of some factor; refuse what is neither."""
+    try:
+        found = np.asarray(math.nan if values is None else values, dtype=float)
+    except (TypeError, ValueError):
+        try:
+            every = [values] if isinstance(values, str) else values
+            found = np.array([to_si(v, unit, field) / (factor if isinstance(v, str) else 1.0) for v in every])
+        except (TypeError, ValueError) as error:
+            raise ModelError(str(error)) from None
+    if found.ndim > 1 or not np.isfinite(found).all():
+        raise ModelError(f"{field}: {' '.join(repr(values).split())}; give finite numbers in a row")
+    return found
+
+
+def poles_of(reduced: Reduced, own: np.ndarray, integrators: int = 0) -> np.ndarray:
+    """Return the eigenvalues of a linearisation with some of its states, and of what integrates inputs: zeros.
+
+    Parameters
+    ----------
+    reduced : Reduced
+    own : ndarray of int
+        Differential states that are states of the plant.
+    integrators : int
+
+    Returns
+    -------
+    ndarray of complex, shape (2 n + own + integrators,)
+        By magnitude, of pairs the one with the positive frequency first.
+    """
+    part = replace(
+        reduced, state_force=reduced.state_force[:, own], state_position=reduced.state_position[own],
+        state_velocity=reduced.state_velocity[own], state_state=reduced.state_state[np.ix_(own, own)],
+    )  # fmt: skip
+    values = spectrum(part).values
+    values = values[np.lexsort((-values.imag, np.abs(values)))]
+    zeros = 2 * len(reduced.mass) + own.size - values.size + integrators
+    return np.concatenate([np.zeros(zeros, dtype=complex), values])
 
 
 def check_format(path: str | Path) -> Path:
@@ -520,7 +580,8 @@ def linear_plant(
     moving = _moving(instant, reduced)
     states = [f"x{k + 1} ({body})" for k, body in enumerate(moving)]
     states += [f"v{k + 1} ({body})" for k, body in enumerate(moving)] + [names[k] for k in own]
-    return LinearPlant(a, b, c, d, states, [names[k] for k in u], [names[k] for k in y], time_unit)
+    poles = time_unit * poles_of(reduced, own)
+    return LinearPlant(a, b, c, d, states, [names[k] for k in u], [names[k] for k in y], time_unit, own_poles=poles)
 
 
 def _moving(instant: Instant, reduced: Reduced) -> list[str]:

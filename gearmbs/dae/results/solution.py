@@ -22,11 +22,12 @@ from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V,
 from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.model.system import System
-from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.frames import Evaluated
 from gearmbs.dae.state import State
 from gearmbs.progress import waiting
+from gearmbs.units import to_si
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -590,7 +591,11 @@ class Solution(Shown):
         """
         from gearmbs.dae.results.frames import state_at
 
-        return state_at(self, t)
+        try:
+            instant = to_si(t, "time", "state_at: t")
+        except (TypeError, ValueError) as error:
+            raise ModelError(str(error)) from None
+        return state_at(self, instant)
 
     @property
     def multipliers(self) -> np.ndarray:

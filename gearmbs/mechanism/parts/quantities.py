@@ -90,6 +90,9 @@ def quantity(value: Any, unit: str, field: str, factor: float = 1.0) -> float:
         value = value.item()
     try:
         number = to_si(value, unit, field)
+    except OverflowError:
+        digits = len(str(abs(value)))
+        raise ModelError(f"{field}: an integer of {digits} digits is beyond all floats; give less") from None
     except (TypeError, ValueError) as error:
         raise ModelError(str(error)) from None
     return number / factor if isinstance(value, str) and factor != 1.0 else number

@@ -8,10 +8,12 @@ steps, for nothing. With w both weigh equally in a motion of that frequency, and
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.elements import ForceElement
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.parts.modal import ModalBody
@@ -42,6 +44,8 @@ def chosen_accuracy(
     tol, rate_scale : float, optional
         As of `gearmbs.mechanism.simulate`; None where they are not given.
     """
+    if rate_scale is not None and not (isinstance(rate_scale, Real) and 0.0 < rate_scale < np.inf):
+        raise ModelError(f"rate_scale = {rate_scale!r}; it must be a positive number, 1/s")
     scale = rate_scale
     if scale is None:
         scale = mechanism.rate_scale or max(1.0, meshing_rate(mechanism, *span))

@@ -17,6 +17,7 @@ from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.parts.quantities import quantities
 from gearmbs.mechanism.solve.simulate import just_inside
 from gearmbs.progress import waiting
 
@@ -130,7 +131,7 @@ def quasi_static(mechanism: Mechanism, t_eval: np.ndarray, *, tol: float = 1e-10
     SingularModelError, ModelError
         As :func:`static_equilibrium`.
     """
-    times = np.asarray(t_eval, dtype=float)
+    times = quantities(t_eval, "time", "t_eval")
     if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
         raise ModelError("t_eval: give a sequence of finite times")
     _warn_of_friction(mechanism)
@@ -186,7 +187,7 @@ def kinematic(mechanism: Mechanism, t_eval: np.ndarray) -> Solution:
     ModelError
         If the mechanism has degrees of freedom, or locks at some time.
     """
-    times = np.asarray(t_eval, dtype=float)
+    times = quantities(t_eval, "time", "t_eval")
     if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
         raise ModelError("t_eval: give a sequence of finite times")
     solution = _kinematic.kinematic(mechanism.compile(float(times[0])), times)

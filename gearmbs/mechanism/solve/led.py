@@ -53,7 +53,13 @@ def simulate_led(
     tables = [table for name, given in inputs.items() if (table := _begin(sim, name, given)) is not None]
     for table in tables:
         value = float(np.interp(sim.t, table.times, table.values))
-        if table.hold == 1 and sim.get("input", table.name) != value:
+        if table.hold == 1 and (now := sim.get("input", table.name)) != value:
+            positions = [row for row, order in sim.number(table.name).prescribes if order == 0]
+            if positions:
+                raise ModelError(
+                    f"inputs: {table.name!r} is {value:g} at {sim.t:g} s, and the position of {positions[0]!r}, which "
+                    f"stands at {now:g} there and cannot jump; begin with {now:g}"
+                )
             sim.set(table.name, value)
     sim.take_effect()
     stops = np.unique(np.concatenate([t_eval, *(table.times for table in tables)]))
@@ -74,8 +80,7 @@ def _begin(sim: Simulator, name: str, given: Any) -> Table | None:
     """Set an input that is constant or has a function; return the table of another one."""
     if isinstance(given, Sequence) and not isinstance(given, str):
         if len(given) == 2 and callable(given[0]):
-            function: Callable[[float], Any] = given[0]
-            sim.control(name, lambda t, _: function(t), given[1])
+            sim.control(name, _of_time(given[0]), given[1])
             return None
         if len(given) in (2, 3):
             return _table(sim, name, *given)
@@ -83,6 +88,18 @@ def _begin(sim: Simulator, name: str, given: Any) -> Table | None:
         raise ModelError(f"inputs: {name!r} is {given!r}; {REMEDY}")
     sim.set(name, given)
     return None
+
+
+def _of_time(function: Callable[[float], Any]) -> Callable[[float, Simulator], Any]:
+    """Return a controller that calls a function of t, with what it remembers if it has ``state`` and ``restore``."""
+
+    def controller(t: float, _: Simulator) -> Any:
+        return function(t)
+
+    for name in ("state", "restore"):
+        if hasattr(function, name):
+            setattr(controller, name, getattr(function, name))
+    return controller
 
 
 def _table(sim: Simulator, name: str, times: Any, values: Any, hold: int = 0) -> Table:

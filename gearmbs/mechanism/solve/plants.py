@@ -12,7 +12,7 @@ from scipy.linalg import qr
 
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Inputs, Reduced, reduce, warn_of_varying
-from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, Realised, lowered, realised
+from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, Realised, lowered, poles_of, realised
 from gearmbs.dae.analyses.turning import skew, turning
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
@@ -50,7 +50,6 @@ def linearize(
     inputs : sequence
         Of texts and tuples:
 
-        * ``"load"``: an input of the mechanism, see `Mechanism.input`
         * ``"load"``: an input of the mechanism, see `Mechanism.input`, in its unit, whatever it enters
         * ``("torque", joint or element)``: about z_J, on I's body and back on J's, N m; ``("force", ...)`` along z_J, N
         * ``("torque", body or marker, axis)``, ``("force", ...)`` with axis "x", "y" or "z": from the ground along a
@@ -102,6 +101,9 @@ def linearize(
     0.203874
     """
     warn_of_stiff_seats(mechanism.joints, mechanism.elements)
+    for what, asked in (("inputs", inputs), ("outputs", outputs)):
+        if isinstance(asked, str):
+            raise ModelError(f"{what}: {asked!r} is one name; give a list, [{asked!r}]")
     names = PlantNames(mechanism)
     point = point_of(mechanism, at, t)
     with markers_kept((mechanism.ground, *mechanism.bodies.values())):
@@ -365,6 +367,7 @@ def _plant(
     return LinearPlant(
         change @ a @ back, change @ b, c @ back, d, states, [one.name for one in given], labels, 1.0, state_units,
         [one.unit for one in given], [one.unit for one in told], point,
+        poles_of(reduced, own, len(a) - 2 * n - own.size),
     )  # fmt: skip
 
 

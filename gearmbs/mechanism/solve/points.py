@@ -19,6 +19,7 @@ from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
+from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.simulate import prepared
 
 if TYPE_CHECKING:
@@ -79,16 +80,23 @@ def point_of(mechanism: Mechanism, at: Any, t: float | None) -> Point:
     """
     if isinstance(at, Point):
         return at
+    if t is not None:
+        t = quantity(t, "time", "t")
     if isinstance(at, Solution):
-        time = float(at.t[-1]) if t is None else float(t)
-        state = at.state_at(time)
+        bodies = at.system.body_names
+        if list(mechanism.bodies) != bodies:
+            raise ModelError(
+                f"at: a solution with the bodies {', '.join(bodies)}; mechanism '{mechanism.name}' has "
+                f"{', '.join(mechanism.bodies)}; take a solution of this one"
+            )
+        state = at.state_at(float(at.t[-1]) if t is None else t)
         return _of_solution(at.system, at.problem, at.members, state)
     if isinstance(at, State):
         if t is not None and t != at.t:
             raise ModelError(f"t = {t:g} s; the state is one at t = {at.t:g} s; leave t away")
         return _of_state(mechanism, at)
     if isinstance(at, str) and at in ("initial", "equilibrium"):
-        time = 0.0 if t is None else float(t)
+        time = 0.0 if t is None else t
         if at == "initial":
             return Point(time)
         at = _static_equilibrium(mechanism.compile(time))

@@ -75,6 +75,7 @@ class Settings:
 
     def number(self, name: str) -> Number:
         """Return what is set under a name; raise a ModelError if there is nothing."""
+        name = getattr(name, "name", name)
         known = self.aliases.get(name, name)
         if known in self.numbers:
             return self.numbers[known]
@@ -85,13 +86,13 @@ class Settings:
                 "another mechanism with it and go on there from the state (initial=)"
             )
         names = [*self.aliases, *self.numbers]
-        hint = did_you_mean(known, names)
+        hint = did_you_mean(known, names, otherwise=did_you_mean(str(known).lower(), names))
         listed = f"there are {', '.join(names)}" if names else "the mechanism has none; add one with m.input(...)"
         raise ModelError(f"there is no input or parameter {known!r}{': ' + hint if hint else ''}; {listed}")
 
     def set(self, name: str, value: Any, hold: int = 0) -> None:
         """Let a number take another value from the next change on; see `Simulator.set`."""
-        number = self.numbers.get(name) or self.number(name)
+        number = (self.numbers.get(name) if isinstance(name, str) else None) or self.number(name)
         if hold != 0 or isinstance(hold, bool):
             if isinstance(hold, bool) or hold != 1:
                 raise ModelError(f"set: hold = {hold!r} of {name!r}; 0 holds the value, 1 goes there evenly")

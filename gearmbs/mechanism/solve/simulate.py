@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,8 +34,9 @@ from gearmbs.mechanism.checks import (
 )
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
-from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.mechanism.parts.quantities import quantities, quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
+from gearmbs.mechanism.solve.controllers import warn_of_unmet
 from gearmbs.progress import time_bar
 from gearmbs.wording import any_of, did_you_mean
 
@@ -108,11 +110,27 @@ def with_stops(problem: DAEProblem, names: Sequence[str], first: int, stops: Seq
     return replace(problem, idata=idata, rdata=rdata, events=passes, n_events=len(stops))
 
 
+def check_stops(stops: Any) -> None:
+    """Raise a ModelError if something is no sequence of ends, or one of them cannot be meant."""
+    remedy = "give [StopAt('state', 1.0)], from gearmbs.mechanism.solve.simulate"
+    if not isinstance(stops, Sequence) or isinstance(stops, str):
+        raise ModelError(f"stops: {stops!r} is no list; {remedy}")
+    for stop in stops:
+        if not isinstance(stop, StopAt):
+            raise ModelError(f"stops: {stop!r} is no StopAt; {remedy}")
+        if isinstance(stop.value, bool) or not isinstance(stop.value, Real) or not np.isfinite(stop.value):
+            raise ModelError(f"stops: value = {stop.value!r} of {stop.state!r}; give a finite number, as the state is")
+        if stop.direction not in (-1, 0, 1):
+            raise ModelError(f"stops: direction = {stop.direction!r} of {stop.state!r}; 1 rises, -1 falls, 0 is either")
+
+
 def stop_options(stops: Sequence[StopAt]) -> dict[str, Any]:
     """Return the options of the integrator that go with `with_stops`."""
     return {"event_direction": [stop.direction for stop in stops], "event_action": [STOP] * len(stops)}
 
 
+LONGEST = 60
+"""Characters of a value that a message shows."""
 LOOSEST = 1e-3
 """Tolerance of runs whose states others go on from: a looser one leaves constraints visibly open."""
 
@@ -260,6 +278,7 @@ def simulate(
             lump=lump, initial=initial, advice=advice, **options,
         )  # fmt: skip
     name = checked(integrator, tol, options)
+    check_stops(stops)
     # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
     INTEGRATORS[name].load()
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
@@ -268,6 +287,8 @@ def simulate(
         continued or initial is not None,
     )  # fmt: skip
     if initial is not None:
+        if initial.controllers:
+            warn_of_unmet(initial.controllers, stacklevel=4)
         # events in what is left of the last step would be missed
         history = None if stops else initial.history_for(problem, name)
         options |= starting_options(name, history)
@@ -337,8 +358,12 @@ def with_brief_changes(system: System, start: float, end: float, options: Mappin
 
 def check_state(label: str, state: Any) -> None:
     """Raise a ModelError if something is no State."""
-    if not hasattr(state, "yp"):
-        raise ModelError(f"{label}: {state!r} is no State; read a file with gearmbs.State.load")
+    if not isinstance(state, State):
+        told = repr(state)
+        # a mechanism tells itself in many lines
+        told = told if len(told) < LONGEST and "\n" not in told else f"a {type(state).__name__}"
+        remedy = "take its state_at(t)" if hasattr(state, "state_at") else "read a file with gearmbs.State.load"
+        raise ModelError(f"{label}: {told} is no State; {remedy}")
 
 
 def start_time(t_start: float, initial: State | None) -> float:
@@ -382,14 +407,20 @@ def _closed(stream: Stream, solution: Solution, name: str) -> Solution:
     return stream.close(solution)
 
 
-def checked(integrator: str, tol: float, options: Mapping[str, Any]) -> str:
-    """Return the integrator's name in capitals; raise a ModelError for a setting or an option that it cannot have."""
-    if not np.isfinite(tol) or tol <= 0.0:
-        raise ModelError(f"tol = {tol}; it must be a positive number")
-    name = integrator.upper()
+def checked(
+    integrator: str, tol: float, options: Mapping[str, Any], caller: Mapping[str, Sequence[str]] | None = None
+) -> str:
+    """Return the integrator's name in capitals; raise a ModelError for a setting or an option that it cannot have.
+
+    ``caller`` is the name of who is called, with its settings beside those of integrators; default `simulate`.
+    """
+    if isinstance(tol, bool) or not isinstance(tol, Real) or not np.isfinite(tol) or tol <= 0.0:
+        raise ModelError(f"tol = {tol!r}; it must be a positive number")
+    name = str(integrator).upper()
     if name not in INTEGRATORS:
         raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
-    _check_options(name, options)
+    ((who, own),) = (caller or {"simulate": SETTINGS}).items()
+    _check_options(name, options, who, own)
     return name
 
 
@@ -421,7 +452,7 @@ def _output_times(
         raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
     if given is not None:
         # a column of a table is taken apart from it, for the kernels
-        return np.ascontiguousarray(given, dtype=float)
+        return np.ascontiguousarray(quantities(given, "time", "t_eval"))
     if not np.isfinite(end) or end <= start:
         raise ModelError(f"t_end = {end} s; it must be later than the start {start} s")
     if rate is None:
@@ -451,18 +482,26 @@ def _sampled(start: float, end: float, rate: float) -> np.ndarray:
     return np.append(times, end) if span > count + 1e-6 else times
 
 
-def _check_options(name: str, options: Mapping[str, Any]) -> None:
+def _check_options(name: str, options: Mapping[str, Any], who: str, own: Sequence[str]) -> None:
     """Raise a ModelError for an option the integrator does not have."""
     known = Options.names(name)
     for option in options:
         if option in known:
             continue
-        remark = "outputs are set by rate, t_eval or every_step" if "step" in option or "out" in option else ""
-        hint = remark or did_you_mean(option, [*known, *SETTINGS])
+        times = ", ".join(key for key in OUTPUTS if key in own)
+        about_times = option in OUTPUTS or "step" in option or "out" in option
+        remark = f"outputs are set by {times}" if times else "its points are the times that advance is called with"
+        if not about_times:
+            elsewhere = option in SETTINGS and option not in own
+            remark = "simulate() has it" if elsewhere else did_you_mean(option, [*known, *own])
         raise ModelError(
-            f"simulate has no option {option!r}{': ' + hint if hint else ''}; besides {', '.join(SETTINGS)} the "
-            f"integrator {name} takes {', '.join(k for k in known if k not in SETTINGS)}"
+            f"{who} has no option {option!r}{': ' + remark if remark else ''}; besides {', '.join(own)} the "
+            f"integrator {name} takes {', '.join(k for k in known if k not in own)}"
         )
+
+
+OUTPUTS = ("rate", "t_eval", "every_step")
+"""Settings that say at which times there are outputs."""
 
 
 SETTINGS = (

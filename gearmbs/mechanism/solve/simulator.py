@@ -26,12 +26,13 @@ from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
-from gearmbs.mechanism.solve.controllers import Control
+from gearmbs.mechanism.solve.controllers import Control, check_takes, warn_of_unmet
 from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.mechanism.solve.simulate import (
     ADVICE,
     StopAt,
     check_state,
+    check_stops,
     checked,
     just_inside,
     prepared,
@@ -47,6 +48,10 @@ NOTHING = nullcontext()
 """Null context, used when the mechanism has no functions of Python."""
 new_point = tuple.__new__
 """Makes a point of its parts in half the time that its class takes."""
+OWN = {
+    "Simulator": ("t_start", "integrator", "formulation", "tol", "rate_scale", "lump", "initial", "records", "stops"),
+}
+"""Its name, and its settings beside the options of integrators."""
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")
 """Options of integrators that are about outputs and events of a run that is told its end."""
 
@@ -137,18 +142,22 @@ class Simulator(Told):
     ) -> None:
         if not isinstance(mechanism, Mechanism):
             raise ModelError(f"mechanism is {mechanism!r}; give a Mechanism")
+        for what, given in (("lump", lump), ("records", records)):
+            if not isinstance(given, bool | np.bool_ | None):
+                raise ModelError(f"{what} = {given!r}; give True or False")
         t_start = start_time(quantity(t_start, "time", "t_start"), initial)
         self.t_end = quantity(t_end, "time", "t_end")
         if not (np.isfinite(self.t_end) and self.t_end > t_start):
             raise ModelError(f"t_end = {self.t_end} s; it must be later than the start {t_start} s")
         tol, rate_scale = chosen_accuracy(mechanism, (t_start, self.t_end), tol, rate_scale)
-        name = checked(integrator, tol, options)
+        name = checked(integrator, tol, options, OWN)
         if not INTEGRATORS[name].compiled:
             raise ModelError(f"integrator: {name} cannot be held between calls; take {any_of(those_that('history'))}")
         for option in REFUSED:
             if option in options:
                 raise ModelError(f"Simulator has no option {option!r}; simulate() and initial= have what it is for")
         INTEGRATORS[name].load()
+        check_stops(stops)
         lump = mechanism.lump and not stops if lump is None else lump
         if stops and lump:
             raise ModelError("stops: they need all bodies; give lump=False")
@@ -162,7 +171,10 @@ class Simulator(Told):
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []
-        self._sampling = False
+        self._inside = ""
+        """Whose controller has been called and has not returned, or that a function in the equations has."""
+        self._unmet: list[str] = []
+        """Inputs whose controllers are in the state gone on from, and have not been given."""
         if stops:
             first = int(self._base.idata[T.H_Z])
             self._watched = partial(with_stops, names=mechanism.state_names, first=first, stops=stops)
@@ -179,6 +191,8 @@ class Simulator(Told):
         vars(self)["t"] = 0.0
         self._begin(initial)
         self._t_start = self.t
+        if initial is not None:
+            self._unmet = list(initial.controllers)
 
     def _begin(self, state: State | None, repair: bool = False) -> None:
         """Make a run that starts in a state, by default in that which the model was assembled in.
@@ -237,8 +251,11 @@ class Simulator(Told):
             For a time that is no number, that lies behind or after the end, and where the integration fails: the
             simulator then stands where it stood, and can only be restored to an earlier state.
         """
-        if not (type(t) is float and self.t <= t <= self.t_end and self._failed is None):
+        if not (type(t) is float and self.t <= t <= self.t_end and self._failed is None and not self._inside):
             t = float(self._time(t))
+        if self._unmet:
+            warn_of_unmet(self._unmet)
+            self._unmet = []
         settings = self._settings
         while self.t < t:
             end = self._sample(t) if self._controls else t
@@ -261,6 +278,7 @@ class Simulator(Told):
 
     def _time(self, t: Any) -> float:
         """Return a time to go on to, s; raise a ModelError for any other."""
+        self._check_outside("advance")
         t = quantity(t, "time", "t")
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
@@ -296,8 +314,12 @@ class Simulator(Told):
         own = self.__dict__
         run, began = own["_run"], perf_counter()
         if own["_functions"]:
-            with raised_errors(self._functions):
-                failure = run.go_to(t, keep)
+            own["_inside"] = "a function"
+            try:
+                with raised_errors(self._functions):
+                    failure = run.go_to(t, keep)
+            finally:
+                own["_inside"] = ""
         else:
             failure = run.go_to(t, keep)
         own["_took"] += perf_counter() - began
@@ -306,6 +328,13 @@ class Simulator(Told):
                 raise KeyboardInterrupt
             self._failed = failure[1]
             raise ModelError(failure[1])
+
+    def _check_outside(self, what: str) -> None:
+        if self._inside:
+            raise ModelError(
+                f"{what}: {self._inside!r} is being asked for its value; let its controller or function return that, "
+                "and go on or back after advance has returned"
+            )
 
     def begun(self) -> Begun:
         """Return what stands behind the simulation, with its start evaluated and pivots chosen.
@@ -413,32 +442,50 @@ class Simulator(Told):
         Raises
         ------
         ModelError
-            For a name that is not there or has a controller, and a sample time that is not positive.
+            For a name that is not there or has a controller, the position of a motion, and a sample time that is not
+            positive.
+
+        Warns
+        -----
+        UserWarning
+            If the state gone on from has a memory that the function cannot take.
         """
         self.number(name)
         if not callable(function):
             raise ModelError(f"control: {function!r} for {name!r} cannot be called; give a function of t and simulator")
+        check_takes(name, function)
         if name in (control.name for control in self._controls):
             raise ModelError(f"control: {name!r} has a controller already; let one function do what both are to")
         period = quantity(sample_time, "time", "control: sample_time")
         if not (np.isfinite(period) and period > 0.0):
             raise ModelError(f"control: sample_time = {period} s for {name!r}; it must be positive")
+        positions = [row for row, order in self.number(name).prescribes if order == 0]
+        if positions:
+            raise ModelError(
+                f"control: {name!r} is the position of {positions[0]!r}, which cannot jump from sample to sample; let "
+                "it be the speed of the motion (level='velocity') and control that"
+            )
         made = Control(name, function, self.t, period)
         if self._origin is not None and self._origin.t == self.t and name in self._origin.controllers:
             made.go_back(self.t, self._origin.controllers[name])
+        self._unmet = [other for other in self._unmet if other != name]
         self._controls.append(made)
 
     def _sample(self, t: float) -> float:
         """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""
-        if self._sampling:
-            raise ModelError("advance: a controller cannot go on itself; let it return the value for its input")
+        own = self.__dict__
         for control in self._controls:
             if control.next <= self.t:
-                self._sampling = True
+                # past the look at names, as in `_stand_at`
+                own["_inside"] = control.name
                 try:
-                    self.set(control.name, control.function(self.t, self))
+                    value = control.function(self.t, self)
                 finally:
-                    self._sampling = False
+                    own["_inside"] = ""
+                try:
+                    self.set(control.name, value)
+                except ModelError as error:
+                    raise ModelError(f"control: what the controller returns at t = {self.t:.6g} s: {error}") from None
                 control.count += 1
         return min([t, *(control.next for control in self._controls)])
 
@@ -515,8 +562,14 @@ class Simulator(Told):
         Raises
         ------
         ModelError
-            If the state is one of another model, or lies outside the span of this simulator.
+            If the state is one of another model, or lies outside the span of this simulator; from within a controller.
+
+        Warns
+        -----
+        UserWarning
+            If the state has the memory of a controller that is not here, or samples otherwise.
         """
+        self._check_outside("restore")
         check_state("restore", state)
         if not self._t_start <= state.t < self.t_end:
             remedy = "pass it as initial=" if state.t < self._t_start else "make it with a later t_end"
@@ -540,8 +593,13 @@ class Simulator(Told):
                 # what stood there up to the state, which a jump may follow
                 self._problem, self._origin = origin
                 self._points[:] = kept
-        for control in self._controls:
-            control.go_back(self.t, state.controllers.get(control.name))
+        if self._controls or state.controllers:
+            given = [control.name for control in self._controls]
+            self._unmet = [name for name in state.controllers if name not in given]
+            for control in self._controls:
+                control.go_back(self.t, state.controllers.get(control.name))
+        elif self._unmet:
+            self._unmet = []
 
     def _own_point(self, state: State) -> int | None:
         """Return which of the points a state is, or None."""
@@ -555,7 +613,9 @@ class Simulator(Told):
     def _go_back(self, state: State) -> bool:
         """Go to a state of the present run in place, as a new run from it would; return whether it is one of it."""
         history = state.history
-        if history is None or history.equations != self._equations or not self._run.go_back(history):
+        if history is None or not state.is_own or history.equations != self._equations:
+            return False
+        if not self._run.go_back(history):
             return False
         self._tell_clock()
         look = state.t if self._system.has_dropped_rows else np.inf
@@ -566,6 +626,17 @@ class Simulator(Told):
         place = self._run.place(state.y, state.yp, keep=False)
         self._stand_at(Point(state.t, *place, table, self._settings.held), False)
         return True
+
+    def __copy__(self) -> Simulator:
+        raise ModelError(
+            "a simulator is not copied: both would go on with one run; make another one with initial=sim.state()"
+        )
+
+    def __deepcopy__(self, _: Any) -> Simulator:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple:
+        raise ModelError("a simulator is not pickled; save its state() and make another one with initial=")
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"

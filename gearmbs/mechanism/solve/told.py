@@ -109,7 +109,12 @@ class Told(OwnAttributes):
             m = self._mechanism
             made = m.measures(self._now()).named_output(*names)
             with markers_kept((m.ground, *m.bodies.values())):
-                return made.of(self._got(*made.asked))
+                try:
+                    return made.of(self._got(*made.asked))
+                except ModelError as error:
+                    raise ModelError(f"output {made.name!r}: {error}") from None
+                except KeyError as error:
+                    raise KeyError(f"output {made.name!r}: {error.args[0]}") from None
         if what not in AT_AN_INSTANT + COUNTED:
             known = [*AT_AN_INSTANT, *COUNTED, "input", "output"]
             hint = did_you_mean(what, known)
