@@ -90,6 +90,7 @@ EXCEPTIONS = {
     ("studies", "gearmbs"): "a result says which version made it",
     ("studies", "dae.analyses"): "the modes of a drivetrain, the type alone",
     ("studies", "dae.model"): "kernels of a run whose bodies turn about fixed axes, imported ahead of it",
+    ("native", "gearmbs"): "an FMU says which version made it",
     ("campaigns", "gearmbs"): "the card of a data set says which version made it",
     ("cli", "gearmbs"): "the version",
 }

@@ -26,7 +26,7 @@ from gearmbs.kernels.pointers import address, no_events, no_hook
 from gearmbs.mechanism.solve.simulator import Begun
 from gearmbs.native.driver import DRIVER_TYPE, go_to
 from gearmbs.native.pivots import ROOM_TYPE, choose_for_run, factor_anew
-from gearmbs.native.setting import present_value, take_effect
+from gearmbs.native.setting import apply, present_value
 from gearmbs.native.teller import TELLER_TYPE, choose_for_outputs, factor_for_outputs, tell
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ _PLANNED = PLAN_TYPE, FACTORS_TYPE
 _ROOM = ROOM_TYPE, LINES_TYPE, LINES_TYPE
 CALLED = {
     "go_to": (go_to, int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, *_PLANNED, DRIVER_TYPE, float64)),
-    "take_effect": (take_effect, int64(FUNCTIONS_TYPE, STATE_TYPE, *_PLANNED, DRIVER_TYPE)),
+    "apply": (apply, int64(FUNCTIONS_TYPE, STATE_TYPE, *_PLANNED, DRIVER_TYPE, int64)),
     "present_value": (present_value, float64(STATE_TYPE, DRIVER_TYPE, int64)),
     "choose_for_run": (choose_for_run, int64(STATE_TYPE, DRIVER_TYPE, *_ROOM)),
     "factor_anew": (factor_anew, int64(STATE_TYPE, DRIVER_TYPE, *_PLANNED)),

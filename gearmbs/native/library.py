@@ -15,17 +15,26 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import gearmbs
 from gearmbs.dae.problem import ModelError
+from gearmbs.files import write_whole
 from gearmbs.kernels import PLAIN
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulator import Begun, Simulator
+from gearmbs.native.fmu import Description, variables_of, write_fmu
 from gearmbs.native.kernels import Kernels
 from gearmbs.native.memory import Memory, memory_of
 from gearmbs.native.outputs import Told, chosen_outputs
+from gearmbs.wording import any_of
 
 PORTABLE = {"x86_64": "x86-64-v3", "AMD64": "x86-64-v3"}
 """Processors that libraries are made for, by the kind of machine: those of the last ten years, with fused products."""
 COMPILERS = (("cc",), ("gcc",), ("clang",))
+TARGETS = {"so": None, "fmu2": "2.0", "fmu3": "3.0"}
+"""What can be written: a library, or an FMU of a version of FMI."""
+SOURCES = {"so": (), "fmu2": ("fmu.c", "fmi2.c"), "fmu3": ("fmu.c", "fmi3.c")}
+"""Sources beside those of every library."""
+HEADERS = ("gearmbs.h", "model.h", "fmu.h")
 FLAGS = ("-O2", "-std=c11", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra")
 
 
@@ -35,7 +44,8 @@ class Exported:
 
     Attributes
     ----------
-    folder, library, header : Path
+    folder, library : Path
+        Where it is, and the library or FMU.
     numbers, outputs : dict of str to str
         What can be set and what is told, with their units, in the order of the library.
     left_out : list of str
@@ -46,7 +56,6 @@ class Exported:
 
     folder: Path
     library: Path
-    header: Path
     numbers: dict[str, str]
     outputs: dict[str, str]
     left_out: list[str]
@@ -57,6 +66,7 @@ def export(
     model: Mechanism | Simulator,
     folder: str | Path,
     *,
+    target: str = "so",
     t_end: Any = None,
     name: str | None = None,
     outputs: Sequence[Any] | None = None,
@@ -72,7 +82,9 @@ def export(
     model : Mechanism or Simulator
         A simulator is exported as it stands.
     folder : str or Path
-        Where the library, its header and an example are written; it is made.
+        Where the library, its header and an example are written, or the FMU; it is made.
+    target : {"so", "fmu2", "fmu3"}
+        A shared library, or an FMU for Co-Simulation by FMI 2.0 or 3.0.
     t_end : float or str, optional
         Latest time that can be asked for, s; needed for a mechanism. The first step depends on it.
     name : str, optional
@@ -99,6 +111,8 @@ def export(
     ModelError
         If there is no C compiler, something of the model is in Python, or an output cannot be told.
     """
+    if target not in TARGETS:
+        raise ModelError(f"target = {target!r}; choose {any_of(list(TARGETS))}")
     if PLAIN:
         raise ModelError("export: libraries are made by the compiler's own mode; unset GEARMBS_COMPILER")
     if isinstance(model, Mechanism):
@@ -116,21 +130,39 @@ def export(
         for name, number in begun.problem.numbers.items()
         if not number.prescribes and all(place.order == 0 for place in number.places)
     }
+    names = ["time", *numbers, *(one.name for one in told)]
+    for twice in {name for name in names if names.count(name) > 1}:
+        raise ModelError(
+            f"output {twice!r}: the name is given twice; leave one of the two out, or give it another name"
+        )
     kernels = Kernels(begun)
     memory = memory_of(begun, numbers, told, kernels.number, deforms=begun.problem.small_entries)
     processor = processor or PORTABLE.get(platform.machine(), "native")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     stem = re.sub(r"\W+", "_", title).strip("_") or "model"
-    library = folder / f"{stem}.so"
     with tempfile.TemporaryDirectory(prefix="gearmbs-") as room:
-        texts = _texts(begun, title, memory, numbers, told, model.t_end)
-        _compile(Path(room), command, kernels, processor, memory, texts, library, report or (lambda name: None))
-    header = folder / "gearmbs.h"
-    for file in ("gearmbs.h", "example.c"):
-        (folder / file).write_bytes(_source(file))
-    units = {name: number.unit for name, number in numbers.items()}
-    return Exported(folder, library, header, units, {one.name: one.unit for one in told}, left, processor)
+        texts, token = _texts(begun, title, memory, numbers, told, model.t_end)
+        made = _compile(Path(room), command, SOURCES[target], kernels, processor, memory, texts, report or _silent)
+        version = TARGETS[target]
+        if version is None:
+            library = write_whole(folder / f"{stem}.so", made.read_bytes())
+            library.chmod(0o755)
+            for file in ("gearmbs.h", "example.c"):
+                (folder / file).write_bytes(_source(file))
+        else:
+            rdata, t = begun.run.state.rdata, begun.point.t
+            known = {key: (number.kind, number.unit, number.value(rdata, t)) for key, number in numbers.items()}
+            described = Description(
+                title, stem, token, f"gearmbs {gearmbs.__version__}", float(t), model.t_end, variables_of(known, told)
+            )
+            library = write_fmu(folder / f"{stem}.fmu", described, version, made)
+    units = {key: number.unit for key, number in numbers.items()}
+    return Exported(folder, library, units, {one.name: one.unit for one in told}, left, processor)
+
+
+def _silent(name: str) -> None:
+    """Tell nothing of a kernel."""
 
 
 def c_compiler(given: str | None) -> list[str]:
@@ -173,8 +205,8 @@ def _array(kind: str, name: str, items: Sequence[Any]) -> str:
     return f"static {kind} {name}[] = {{{', '.join(map(str, items)) or '0'}}};"
 
 
-def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[Told], t_end: float) -> str:
-    """Return the part of the model's description that does not depend on its objects."""
+def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[Told], t_end: float) -> tuple[str, str]:
+    """Return the part of the model's description that does not depend on its objects, and a token for all of it."""
     layout = memory.layout
     digest = hashlib.sha256(layout.block.tobytes() + repr(memory[1:]).encode()).hexdigest()[:16]
     names = {
@@ -185,8 +217,9 @@ def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[T
     lines = [_array("const char *const", key, [_text(text) for text in texts]) for key, texts in names.items()]
     lines.append(_array("const int64_t", "inside", layout.inside.tolist()))
     lines.append(_array("const int64_t", "functions", layout.functions.ravel().tolist()))
+    token = hashlib.sha256("\n".join([digest, title, *lines]).encode()).hexdigest()[:32]
     fields = {
-        "name": _text(title), "digest": _text(digest),
+        "name": _text(title), "digest": _text(digest), "token": _text(token),
         "t_start": repr(float(begun.point.t)), "t_end": repr(float(t_end)),
         "block": layout.block.size, "state": layout.state, "size": layout.size,
         "inside_count": len(layout.inside), "function_count": len(layout.functions),
@@ -197,14 +230,14 @@ def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[T
         **{key: key for key in names},
     }  # fmt: skip
     described = ",\n    ".join(f".{key} = {value}" for key, value in fields.items())
-    return "\n".join(lines) + f"\n\nconst gearmbs_model gearmbs_this = {{\n    {described}\n}};\n"
+    return "\n".join(lines) + f"\n\nconst gearmbs_model gearmbs_this = {{\n    {described}\n}};\n", token
 
 
 def _compile(
-    room: Path, command: list[str], kernels: Kernels, processor: str, memory: Memory, texts: str, library: Path,
+    room: Path, command: list[str], others: Sequence[str], kernels: Kernels, processor: str, memory: Memory, texts: str,
     report: Callable[[str], None],
-) -> None:  # fmt: skip
-    """Compile kernels and sources in a folder, and link them."""
+) -> Path:  # fmt: skip
+    """Compile kernels and sources in a folder, and link them; return the library."""
     called, numbered, late = kernels.objects(processor, report)
     objects = {one.symbol: one.code for one in (*called.values(), *numbered, *late.values())}
     for symbol, code in objects.items():
@@ -222,17 +255,26 @@ def _compile(
         '        "gearmbs_block:\\n.incbin \\"block.bin\\"\\n.previous\\n");',
     ]
     (room / "described.c").write_text("\n".join([*head, texts]))
-    for file in ("gearmbs.c", "gearmbs.h", "model.h", "runtime.c"):
+    sources = ["gearmbs.c", "runtime.c", *others]
+    for file in (*sources, *HEADERS):
         (room / file).write_bytes(_source(file))
     names = [f"-Dgearmbs_{name}={one.symbol}" for name, one in called.items()]
-    sources = ["gearmbs.c", "runtime.c", "described.c"]
     made = [f"{symbol}.o" for symbol in objects]
-    run = [*command, "-shared", *FLAGS, *names, *sources, *made, "-lm", "-Wl,-z,defs", "-s", "-o", "made.so"]
+    run = [
+        *command,
+        "-shared",
+        *FLAGS,
+        *names,
+        *sources,
+        "described.c",
+        *made,
+        "-lm",
+        "-Wl,-z,defs",
+        "-s",
+        "-o",
+        "made.so",
+    ]
     done = subprocess.run(run, cwd=room, capture_output=True, text=True)
     if done.returncode:
         raise ModelError(f"compiler: {' '.join(command)} could not link the library: {done.stderr.strip()[:2000]}")
-    # the file appears when it is whole
-    part = library.with_suffix(".part")
-    shutil.copyfile(room / "made.so", part)
-    part.chmod(0o755)
-    part.replace(library)
+    return room / "made.so"

@@ -88,7 +88,7 @@ def _return_to_coordinates(st, d):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def take_effect(bound, st, plan, factors, d):
+def apply(bound, st, plan, factors, d, shows):
     """Cut the last step back to the present point and go on from there with the numbers that have been set.
 
     Parameters
@@ -96,6 +96,8 @@ def take_effect(bound, st, plan, factors, d):
     bound, st, plan, factors
         Of a run, see `gearmbs.dae.integrators.step.advance`.
     d : Driver
+    shows : int
+        Whether what is told at the present point is to be with these numbers, and not with those before.
 
     Returns
     -------
@@ -106,7 +108,7 @@ def take_effect(bound, st, plan, factors, d):
     for k in range(d.waiting.shape[0]):
         if d.waiting[k] == 1:
             count, only = count + 1, k
-    if count == 0:
+    if count == 0 and shows == 0:
         return 0
     y, yp = st.y_out[d.present], st.yp_out[d.present]
     kept, done, steered = _keeps_coordinates(st, d), False, False
@@ -148,4 +150,7 @@ def take_effect(bound, st, plan, factors, d):
         d.given_at, d.jumped_at, d.t_jumped = -1, st.steps, d.t
         copy(y, d.jump_y)
         copy(yp, d.jump_yp)
+    if shows == 1:
+        for c in range(d.cells.shape[0]):
+            d.held[c] = st.rdata[d.cells[c]]
     return int(done)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gearmbs._command import fail, guarded, kind_of
+from gearmbs._command import guarded, kind_of
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism
@@ -46,27 +46,24 @@ def described_model(path: Path) -> tuple[Mechanism, float, dict[str, Any]]:
 def export(
     file: Annotated[Path, typer.Argument(help="Case, planetary set or drivetrain in TOML.")],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder; default: beside the file.")] = None,
-    target: Annotated[str, typer.Option(help="so: a shared library with a C header.")] = "so",
+    target: Annotated[
+        str, typer.Option(help="so: a shared library with a C header; fmu2, fmu3: an FMU by FMI 2.0 or 3.0.")
+    ] = "so",
     t_end: Annotated[str | None, typer.Option(help='Latest time, e.g. "2 s"; default: the end of the record.')] = None,
     name: Annotated[str | None, typer.Option(help="Of the library; default: that of the mechanism.")] = None,
     processor: Annotated[
         str | None, typer.Option(help="A name of LLVM's, or native; default: any x86-64 with AVX2 and FMA.")
     ] = None,
 ) -> None:
-    """Write a model as a library that runs without Python; a C compiler is needed here, and none where it is used."""
-    if target not in TARGETS:
-        fail(f"--target {target}: choose {' or '.join(TARGETS)}")
+    """Write a model as a library or an FMU that runs without Python; a C compiler is needed here alone."""
     with guarded():
         from gearmbs.native import export as exported
 
         mechanism, end, options = described_model(file)
         folder = out or file.with_suffix("")
-        made = exported(mechanism, folder, t_end=t_end or end, name=name, processor=processor, **options)
+        made = exported(mechanism, folder, target=target, t_end=t_end or end, name=name, processor=processor, **options)
         for what, given in (("set", made.numbers), ("told", made.outputs)):
             typer.echo(f"can be {what}: {len(given)}")
         if made.left_out:
             typer.echo(f"note: left out, for they are expressions: {', '.join(made.left_out)}", err=True)
         typer.echo(f"wrote {made.library}")
-
-
-TARGETS = ("so",)

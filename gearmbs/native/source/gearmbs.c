@@ -123,15 +123,17 @@ int gearmbs_number(gearmbs_instance *instance, size_t number, double *value) {
 }
 
 /* Let what has been set take effect at the present time. */
-static int apply(gearmbs_instance *i) {
+static int apply(gearmbs_instance *i, int64_t shows) {
     void *error = NULL;
     int64_t changes;
     if (i->failure == GEARMBS_OK &&
-        gearmbs_take_effect(&changes, &error, at(i, model->bound), at(i, model->run), at(i, model->plan),
-                            at(i, model->factors), at(i, model->driver)))
+        gearmbs_apply(&changes, &error, at(i, model->bound), at(i, model->run), at(i, model->plan),
+                      at(i, model->factors), at(i, model->driver), shows))
         i->failure = GEARMBS_KERNEL_FAILED;
     return i->failure;
 }
+
+int gearmbs_take_effect(gearmbs_instance *instance) { return apply(instance, 1); }
 
 /* Go on to a time, with new pivots on the way where they are asked for. */
 static int go(gearmbs_instance *i, double t) {
@@ -155,7 +157,7 @@ int gearmbs_advance(gearmbs_instance *instance, double time) {
     if (instance->failure != GEARMBS_OK) return instance->failure;
     if (!(time >= gearmbs_time(instance) && time <= model->t_end)) return GEARMBS_REFUSED;
     if (time == gearmbs_time(instance)) return GEARMBS_OK;
-    if (apply(instance) == GEARMBS_OK) instance->failure = go(instance, time);
+    if (apply(instance, 0) == GEARMBS_OK) instance->failure = go(instance, time);
     return instance->failure;
 }
 
@@ -189,7 +191,7 @@ size_t gearmbs_state_size(void) { return DIGEST + (size_t)model->state; }
 
 int gearmbs_save(gearmbs_instance *instance, void *state) {
     unsigned char *copy = (unsigned char *)state + DIGEST;
-    if (apply(instance) != GEARMBS_OK) return instance->failure;
+    if (apply(instance, 0) != GEARMBS_OK) return instance->failure;
     memcpy(state, model->digest, DIGEST);
     memcpy(copy, instance->memory, (size_t)model->state);
     /* offsets and numbers travel, addresses do not */

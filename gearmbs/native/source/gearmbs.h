@@ -68,10 +68,13 @@ GEARMBS_API int gearmbs_set(gearmbs_instance *instance, size_t number, double va
 /* Write the present value of a number, the one that was set last. */
 GEARMBS_API int gearmbs_number(gearmbs_instance *instance, size_t number, double *value);
 
+/* Let what has been set take effect now: outputs at the present time are then those with it. */
+GEARMBS_API int gearmbs_take_effect(gearmbs_instance *instance);
+
 /* Go on to a time, s, from the present one up to the end. */
 GEARMBS_API int gearmbs_advance(gearmbs_instance *instance, double time);
 
-/* Write all outputs at the present time, as they are before what has been set there. */
+/* Write all outputs at the present time, as they are before what has been set there has taken effect. */
 GEARMBS_API int gearmbs_get(gearmbs_instance *instance, double *outputs);
 
 /* Write the unknowns of the equations and their rates at the present time; either may be NULL. */

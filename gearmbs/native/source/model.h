@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct {
-    const char *name, *digest;                 /* digest: 16 characters */
+    const char *name, *digest, *token;         /* digest: of the memory, 16 characters; token: of all */
     double t_start, t_end;
     int64_t block, state, size;                /* bytes: of what is given, of a state, of an instance */
     int64_t inside_count, function_count;
@@ -33,8 +33,8 @@ extern const unsigned char gearmbs_block[];
 /* Kernels: they return 0, or another number where something has gone wrong, and write their result first. */
 int gearmbs_go_to(int64_t *code, void **error, void *bound, void *run, void *part, void *plan, void *factors,
                   void *driver, double t);
-int gearmbs_take_effect(int64_t *changes, void **error, void *bound, void *run, void *plan, void *factors,
-                        void *driver);
+int gearmbs_apply(int64_t *changes, void **error, void *bound, void *run, void *plan, void *factors, void *driver,
+                  int64_t shows);
 int gearmbs_present_value(double *value, void **error, void *run, void *driver, int64_t number);
 int gearmbs_choose_for_run(int64_t *code, void **error, void *run, void *driver, void *room, void *columns,
                            void *rows);

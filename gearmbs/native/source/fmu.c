@@ -1,0 +1,123 @@
+/* See fmu.h. */
+
+#include "fmu.h"
+#include "model.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double SAME_TIME = 1e-9; /* part of the time within which importers may have rounded it */
+
+static double span_of(double t) { return SAME_TIME * (t > 1.0 ? t : 1.0); }
+
+/* Tell why something has not been done. */
+int fmu_refuse(const fmu *self, const char *message) {
+    if (self->tell != NULL) self->tell(self, FMU_ERROR, message);
+    return FMU_ERROR;
+}
+
+static int status_of(const fmu *self, int code) {
+    return code == GEARMBS_OK ? FMU_OK : fmu_refuse(self, gearmbs_message(code));
+}
+
+fmu *fmu_new(const char *name, const char *token, void *environment, void *logger,
+             void (*tell)(const fmu *, int, const char *)) {
+    fmu *made = calloc(1, sizeof *made);
+    if (made == NULL) return NULL;
+    made->environment = environment;
+    made->logger = logger;
+    made->tell = logger == NULL ? NULL : tell;
+    made->name = malloc(strlen(name) + 1);
+    made->outputs = malloc((gearmbs_outputs() + 1) * sizeof *made->outputs);
+    made->instance = gearmbs_create();
+    if (made->name != NULL) strcpy(made->name, name);
+    if (made->name == NULL || made->outputs == NULL || made->instance == NULL ||
+        (token != NULL && strcmp(token, gearmbs_this.token) != 0)) {
+        if (made->name != NULL) fmu_refuse(made, "The description is that of another model, or memory is short.");
+        fmu_free(made);
+        return NULL;
+    }
+    return made;
+}
+
+void fmu_free(fmu *self) {
+    if (self == NULL) return;
+    gearmbs_free(self->instance);
+    free(self->outputs);
+    free(self->name);
+    free(self);
+}
+
+/* Write the values of variables; what has been set at the present time has taken effect in them. */
+int fmu_get(fmu *self, const unsigned *references, size_t count, double *values) {
+    size_t numbers = gearmbs_numbers();
+    for (size_t k = 0; k < count; k++) {
+        unsigned r = references[k];
+        int code = GEARMBS_OK;
+        if (r < numbers) {
+            code = gearmbs_number(self->instance, r, &values[k]);
+        } else if (r - numbers == gearmbs_outputs()) {
+            values[k] = gearmbs_time(self->instance);
+        } else if (r - numbers > gearmbs_outputs()) {
+            return fmu_refuse(self, "There is no variable of this reference.");
+        } else {
+            if (!self->known) code = gearmbs_take_effect(self->instance);
+            if (code == GEARMBS_OK && !self->known) code = gearmbs_get(self->instance, self->outputs);
+            self->known = code == GEARMBS_OK;
+            values[k] = self->outputs[r - numbers];
+        }
+        if (code != GEARMBS_OK) return status_of(self, code);
+    }
+    return FMU_OK;
+}
+
+int fmu_set(fmu *self, const unsigned *references, size_t count, const double *values) {
+    for (size_t k = 0; k < count; k++) {
+        int code = gearmbs_set(self->instance, references[k], values[k]);
+        if (code != GEARMBS_OK) return status_of(self, code);
+    }
+    self->known = 0;
+    return FMU_OK;
+}
+
+int fmu_span(const fmu *self, double start, int has_stop, double stop) {
+    char text[200];
+    double first = gearmbs_start_time(), last = gearmbs_end_time();
+    if (start >= first - span_of(first) && start <= first + span_of(first) && !(has_stop && stop > last + span_of(last)))
+        return FMU_OK;
+    snprintf(text, sizeof text, "The model was exported for %.9g s to %.9g s; start there, or export it with a later end.",
+             first, last);
+    return fmu_refuse(self, text);
+}
+
+/* Go on by a step from a time, which is the present one but for rounding. */
+int fmu_step(fmu *self, double time, double size) {
+    double now = gearmbs_time(self->instance), end = time + size, last = gearmbs_end_time();
+    if (time < now - span_of(now) || time > now + span_of(now) || !(size >= 0.0))
+        return fmu_refuse(self, "The step does not begin at the present time, or goes back.");
+    if (end > last && end <= last + span_of(last)) end = last;
+    self->known = 0;
+    return end <= now ? FMU_OK : status_of(self, gearmbs_advance(self->instance, end));
+}
+
+int fmu_reset(fmu *self) {
+    gearmbs_instance *fresh = gearmbs_create();
+    if (fresh == NULL) return fmu_refuse(self, "Memory is short.");
+    gearmbs_free(self->instance);
+    self->instance = fresh;
+    self->known = 0;
+    return FMU_OK;
+}
+
+/* Write the state, into memory that is made where there is none. */
+int fmu_save(fmu *self, void **state) {
+    if (*state == NULL) *state = malloc(gearmbs_state_size());
+    if (*state == NULL) return fmu_refuse(self, "Memory is short.");
+    return status_of(self, gearmbs_save(self->instance, *state));
+}
+
+int fmu_restore(fmu *self, const void *state, size_t size) {
+    self->known = 0;
+    return status_of(self, gearmbs_restore(self->instance, state, size));
+}

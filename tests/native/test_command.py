@@ -1,0 +1,42 @@
+"""``gearmbs export``: what files describe, as libraries."""
+
+import shutil
+
+import pytest
+from typer.testing import CliRunner
+
+from gearmbs.cli import app
+from gearmbs.studies.export import described_model
+from gearmbs.studies.presets.files import FOLDER
+from tests.native.support import Instance, Library
+
+CASE = '[operation]\nspeed = "1000 rpm"\nrun_up = "10 ms"\nsettling = "10 ms"\nduration = "20 ms"\n'
+PLANETARY = '[planetary]\nteeth = [28, 36, 100]\nmodule = "2 mm"\nplanets = 4\n[operation]\nspeeds = { sun = 50.0 }\n'
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("cc") or shutil.which("gcc")), reason="no C compiler is installed")
+def test_a_case_becomes_a_library(tmp_path):
+    file = tmp_path / "pair.toml"
+    file.write_text(CASE)
+    done = CliRunner().invoke(app, ["export", str(file), "--name", "my pair"])
+    assert done.exit_code == 0, done.output
+    assert f"wrote {tmp_path / 'pair' / 'my_pair.so'}" in done.output
+    library = Library(tmp_path / "pair" / "my_pair.so")
+    assert library.end_time() == pytest.approx(0.04)
+    instance = Instance(library)
+    instance.advance(0.001)
+    refused = CliRunner().invoke(app, ["export", str(file), "--target", "exe"])
+    assert refused.exit_code == 1
+    assert "'exe'" in refused.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["planetary set", "drivetrain"])
+def test_what_files_describe(kind, tmp_path):
+    file = tmp_path / "set.toml"
+    file.write_text(PLANETARY)
+    mechanism, end, options = described_model(file if kind == "planetary set" else FOLDER / "gearbox.toml")
+    assert end > 0.1
+    assert options["tol"] > 0.0
+    assert ("planet 1" if kind == "planetary set" else "high") in " ".join(mechanism.bodies)

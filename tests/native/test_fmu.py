@@ -1,0 +1,211 @@
+"""FMUs of exported models, judged and driven by FMPy."""
+
+import shutil
+from functools import cache
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.mechanism import ModelError
+from gearmbs.native import export
+from gearmbs.native.fmu import Description, model_description, variables_of
+from gearmbs.native.outputs import Told
+from gearmbs.studies.run.simulation import case_mechanism
+from tests.says import says
+
+fmpy = pytest.importorskip("fmpy")
+COMPILER = shutil.which("cc") or shutil.which("gcc")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")]
+
+END = 0.02
+VERSIONS = ("fmu2", "fmu3")
+
+
+@cache
+def mechanism():
+    return case_mechanism(gm.Case())
+
+
+@pytest.fixture(scope="module", params=VERSIONS)
+def made(request, tmp_path_factory):
+    return export(mechanism(), tmp_path_factory.mktemp(request.param), t_end=END, target=request.param)
+
+
+class Driven:
+    """An FMU that is driven call by call, in both versions by the same names."""
+
+    def __init__(self, path, folder):
+        from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi3 import FMU3Slave
+
+        told = fmpy.read_model_description(path)
+        self.second = told.fmiVersion == "2.0"
+        self.references = {v.name: v.valueReference for v in told.modelVariables}
+        where = fmpy.extract(path, unzipdir=folder)
+        slave = FMU2Slave if self.second else FMU3Slave
+        self.fmu = slave(
+            guid=told.guid if self.second else told.instantiationToken, unzipDirectory=where, instanceName="pair",
+            modelIdentifier=told.coSimulation.modelIdentifier,
+        )  # fmt: skip
+        self.fmu.instantiate()
+        self.t = 0.0
+
+    def begin(self, **numbers):
+        if self.second:
+            self.fmu.setupExperiment(startTime=0.0)
+            self.fmu.enterInitializationMode()
+        else:
+            self.fmu.enterInitializationMode(startTime=0.0)
+        self.set(**numbers)
+        self.fmu.exitInitializationMode()
+        return self
+
+    def set(self, **numbers):
+        put = self.fmu.setReal if self.second else self.fmu.setFloat64
+        for name, value in numbers.items():
+            put([self.references[name.replace("__", ".")]], [value])
+
+    def get(self, *names):
+        take = self.fmu.getReal if self.second else self.fmu.getFloat64
+        return np.array(take([self.references[name] for name in names]))
+
+    def step(self, size):
+        self.fmu.doStep(currentCommunicationPoint=self.t, communicationStepSize=size)
+        self.t += size
+
+    def save(self):
+        state = self.fmu.getFMUstate() if self.second else self.fmu.getFMUState()
+        return state, self.t
+
+    def restore(self, state):
+        (self.fmu.setFMUstate if self.second else self.fmu.setFMUState)(state[0])
+        self.t = state[1]
+
+    def end(self):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+NAMES = ("mesh.load.fx", "mesh.load.ty", "load.torque")
+
+
+def test_fmpy_finds_nothing_wrong(made):
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(made.library)) == []
+    told = fmpy.read_model_description(str(made.library), validate=True)
+    by_name = {variable.name: variable for variable in told.modelVariables}
+    assert by_name["load.torque"].unit == "N m"
+    assert float(by_name["load.torque"].start) == pytest.approx(100.0)
+    assert by_name["mesh.load.fx"].causality == "output"
+    assert len(told.initialUnknowns) == len(told.outputs) == len(made.outputs)
+
+
+def test_an_fmu_does_what_python_does(made, tmp_path):
+    """The same points, with a torque set on the way: unknowns are equal, and so are the outputs."""
+    driven, sim = Driven(str(made.library), tmp_path).begin(), gm.Simulator(mechanism(), END, lump=False, records=False)
+    size = END / 400
+    for k in range(399):
+        if k in (100, 250):
+            driven.set(load__torque=60.0 + k)
+            sim.set("load.torque", 60.0 + k)
+        t = driven.t
+        driven.step(size)
+        sim.advance(t + size)
+        if k % 20 == 0:
+            force, moment = sim.get("load", "mesh")
+            np.testing.assert_array_equal(driven.get(*NAMES), [force[0], moment[1], sim.get("input", "load.torque")])
+    driven.end()
+
+
+def test_states_of_an_fmu(made, tmp_path):
+    """Rollback, and a state that another instance takes from its bytes."""
+    driven = Driven(str(made.library), tmp_path / "a").begin()
+    size = END / 200
+    for _ in range(50):
+        driven.step(size)
+    state = driven.save()
+
+    def go_on(one):
+        out = []
+        for _ in range(60):
+            one.step(size)
+            out.append(one.get(*NAMES))
+        return out
+
+    first = go_on(driven)
+    driven.restore(state)
+    np.testing.assert_array_equal(go_on(driven), first)
+    serial = driven.fmu.serializeFMUstate if driven.second else driven.fmu.serializeFMUState
+    bytes_ = serial(state[0])
+    other = Driven(str(made.library), tmp_path / "b").begin()
+    back = other.fmu.deSerializeFMUstate if other.second else other.fmu.deserializeFMUState
+    other.restore((back(bytes_), state[1]))
+    np.testing.assert_array_equal(go_on(other), first)
+    for one in (driven, other):
+        one.end()
+
+
+def test_outputs_follow_what_is_set(made, tmp_path):
+    """A torque that is set is told at once, and the acceleration it gives."""
+    driven = Driven(str(made.library), tmp_path).begin()
+    driven.step(0.25 * END)
+    name = next(n for n in made.outputs if (n.startswith("load.load") and n.endswith("tz")) or n == "load.load.ty")
+    before = driven.get(name)[0]
+    driven.set(load__torque=2.0 * driven.get("load.torque")[0])
+    assert driven.get(name)[0] == pytest.approx(2.0 * before)
+    driven.end()
+
+
+def test_a_whole_simulation(made):
+    """By the importer's own loop, with start values that are not the model's."""
+    result = fmpy.simulate_fmu(
+        str(made.library), stop_time=0.5 * END, output_interval=END / 200, start_values={"load.torque": 60.0},
+        output=["mesh.load.ty"],
+    )  # fmt: skip
+    sim = gm.Simulator(mechanism(), END, lump=False)
+    sim.set("load.torque", 60.0)
+    sim.advance(0.5 * END)
+    assert result["mesh.load.ty"][-1] == pytest.approx(sim.get("load", "mesh")[1][1], rel=1e-3)
+
+
+def test_a_span_that_was_not_exported_is_refused(made, tmp_path):
+    """With a word on what was; up to its end it goes, and no further."""
+    from fmpy.fmi1 import FMICallException
+
+    refused = Driven(str(made.library), tmp_path / "a")
+    span = {"startTime": 0.0, "stopTime": 2.0 * END}
+    with pytest.raises(FMICallException):
+        (refused.fmu.setupExperiment if refused.second else refused.fmu.enterInitializationMode)(**span)
+    driven = Driven(str(made.library), tmp_path / "b").begin()
+    driven.step(END)
+    with pytest.raises(FMICallException):
+        driven.step(0.5 * END)
+    for one in (refused, driven):
+        one.fmu.freeInstance()
+
+
+def test_names_and_targets():
+    m = gm.Mechanism("disc")
+    disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    m.torque("drive", disc, m.input("load", "N m", 1.0))
+    speed = ("angular_velocity", "disc", "z")
+    with pytest.raises(ModelError, match=says("angular_velocity.disc.z", "twice", "another")):
+        export(m, "nowhere", t_end=1.0, target="fmu2", outputs=[speed, speed])
+    with pytest.raises(ModelError, match=says("target", "fmu4", "fmu3")):
+        export(m, "nowhere", t_end=1.0, target="fmu4")
+
+
+def test_units_of_a_description():
+    """By base units where their powers are whole, else by name."""
+    variables = variables_of({"k": ("parameter", "N/m^1.3", 2.0), "u": ("input", "N*m", 1.0)}, [Told("w", "rad/s", ())])
+    told = Description("model", "model", "token", "tool", 0.0, 1.0, variables)
+    for version in ("2.0", "3.0"):
+        root = ElementTree.fromstring(model_description(told, version))
+        units = {unit.get("name"): dict(unit[0].attrib) if len(unit) else None for unit in root.iter("Unit")}
+        assert units == {
+            "N/m^1.3": None, "N m": {"m": "2", "kg": "1", "s": "-2"}, "rad/s": {"s": "-1", "rad": "1"}
+        }  # fmt: skip
