@@ -221,6 +221,42 @@ def test_a_file_is_read_as_its_laboratory_means_it(tmp_path, logger, language):
     assert report.speed == pytest.approx(RPM * np.pi / 30, rel=1e-3)
 
 
+ANGLE = np.round((6.0 * RPM * TIME) % 360.0, 4)
+FORMS: dict[str, tuple[str, str, tuple[np.ndarray, ...], int]] = {
+    "a temperature called T beside a speed in front": ("Fs: 12800\nn [1/min];a [g];T [°C]", ";", (SPEED, A1, OIL), 1),
+    "a unit of time for a name": ("ms,acc", ",", (1e3 * TIME, A1), 1),
+    "units alone below names": ("dt = 7.8125E-05 s\nGehäuse\tDrehzahl\nm/s²\t1/min", "\t", (A1, SPEED), 1),
+    "times of each column": ("time[0]\tY[0]\ttime[1]\tY[1]", "\t", (TIME, A1, TIME, A2), 2),
+    "turns in Hz": ("t [s],shaft [Hz],acc [g]", ",", (TIME, SPEED / 60.0, A1), 1),
+    "the angle of a shaft": ("t [s],Winkel [°],acc [g]", ",", (TIME, ANGLE, A1), 1),
+    "vibration in degrees": ("t [s],torsion [deg],acc [g]", ",", (TIME, A2, A1), 2),
+    "Italian": ("Tempo [s];Accelerazione [m/s2];Giri [giri/min]", ";", (TIME, A1, SPEED), 1),
+    "Polish": ("Czas [s];Drgania [m/s2];Obroty [obr/min]", ";", (TIME, A1, SPEED), 1),
+    "an oscilloscope": ("Time,Channel A,Channel B\n(ms),(mV),(V)\n", ",", (1e3 * TIME, A1, A2), 2),
+}
+"""What a header says, the sign between columns, the columns, and how many are vibration."""
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_of_other_programs(tmp_path, form):
+    head, sign, columns, count = FORMS[form]
+    path = tmp_path / "x.csv"
+    path.write_text("\n".join([head, *(sign.join(f"{v:.9g}" for v in row) for row in zip(*columns))]), encoding="utf-8")
+    report = gm.analyse(path)
+    assert report.rate == pytest.approx(RATE)
+    assert report.levels.sizes["channel"] == count
+    if any(column is SPEED for column in columns) or "Hz" in form:
+        assert report.speed == pytest.approx(RPM * np.pi / 30, rel=1e-3)
+
+
+def test_an_even_first_column_in_another_unit_than_seconds_is_asked_for(tmp_path):
+    path = tmp_path / "x.csv"
+    np.savetxt(path, np.stack([1e6 * TIME, A1], axis=1), fmt="%.8e", delimiter=",")
+    with pytest.raises(MissingMetadataError, match=says("rate", "x.csv")):
+        read_signal(path)
+    assert read_signal(path, rate=RATE).sizes["channel"] == 1
+
+
 def test_bare_numbers_with_an_even_first_column(tmp_path):
     path = tmp_path / "bare.txt"
     np.savetxt(path, np.stack([TIME, A1], axis=1), fmt="%.8e")

@@ -21,6 +21,7 @@ from gearmbs.signals.signal.labels import (
     name_and_unit,
     rises_evenly,
     role_of,
+    tells_time,
     unique_names,
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
@@ -112,7 +113,9 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         units = [unit for _, unit in bare] or [UNKNOWN_UNITS] * width
     stamps = tuple(i for i, kind in enumerate(kinds) if kind in ("stamp", "date", "clock"))
     empty = tuple(i for i, kind in enumerate(kinds) if kind == "gap" and i == width - 1 and not names[i].strip())
-    clock = stamps[0] if stamps else next((i for i, n in enumerate(names) if is_clock(n)), None)
+    if units[0].lower() in ("", UNKNOWN_UNITS) and names[0].strip().lower() in TIME_UNITS:
+        names, units = ["time", *names[1:]], [names[0].strip(), *units[1:]]
+    clock = stamps[0] if stamps else next((i for i, (n, u) in enumerate(zip(names, units)) if tells_time(n, u)), None)
     times = [unit.lower() in TIME_UNITS for unit in units]
     if clock is None and width > 1 and times[0] and sum(times) == 1 and role_of(names[0], units[0]) is None:
         # an abscissa, whatever it is called; several columns of times are those of pulses
@@ -242,7 +245,12 @@ def _units_row(
         return upper, [(m.group(1).strip() if m else "") or UNKNOWN_UNITS for m in in_brackets]
     plain = [label.strip() for label in labels]
     stated = plain[0] and all(not unit or is_unit_of_column(unit) for unit in plain)
-    if len(upper) == width and is_clock(upper[0]) and stated:
+    # of a row of units alone the names above need not begin with the time's
+    if (
+        len(upper) == width
+        and stated
+        and (is_clock(upper[0]) or (all(plain) and not any(map(is_unit_of_column, upper))))
+    ):
         return upper, [unit or UNKNOWN_UNITS for unit in plain]
     return None
 
@@ -287,6 +295,8 @@ FACTORS = {"ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min":
 NAMED_UNIT = re.compile(r"[_\s](ms|us|ns|min)$", re.IGNORECASE)
 DAY = 86400.0
 """Seconds."""
+LONGEST_SECONDS = 1.0
+"""Largest step of an unnamed column of times that is taken for seconds: more are parts of one."""
 EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 """Numbers this large are not seconds since 1970 but parts of them."""
 
@@ -401,6 +411,11 @@ def index_meaning(
         return "The first column only numbers the rows and is left out.", None
     even = np.all(steps > 0.0) and np.allclose(steps, steps.mean(), rtol=0.05)
     if (even or rises_evenly(column)) and clock is None:
+        if (step := float(steps.mean())) > LONGEST_SECONDS:
+            return (
+                f"The first column rises evenly, by {step:.6g} a row, too much for seconds; its unit is nowhere said, "
+                "and it is left out."
+            ), None
         return "The first column rises evenly; it is taken for the time in s.", column
     return None, None
 

@@ -1,8 +1,9 @@
 """Labels of columns as laboratories write them: names, units, and what a column is if it is no vibration.
 
 Labels hold a name and a unit in one of the ways of standards and instruments: ``a [m/s^2]``, ``a (g)``, DIN 461's
-``a / (m/s²)`` and ``a in m/s²``, ``t_ms``; in English, German, French and Czech. Names, units and values tell which
-columns hold times, speeds, pulses of a tacho, temperatures or counts: what is no vibration is not analysed as one.
+``a / (m/s²)`` and ``a in m/s²``, ``t_ms``; in English, German, French, Czech and, of speeds, some more languages.
+Names, units and values tell which columns hold times, speeds, angles, pulses of a tacho, temperatures or counts: what
+is no vibration is not analysed as one.
 """
 
 from __future__ import annotations
@@ -25,18 +26,24 @@ QUOTIENT = re.compile(r"^(.*?\S)\s*/\s*(?:\((.+)\)|(\S.*?))\s*$")
 IN_WORDS = re.compile(r"^(.*?\S)\s+(?:in|en|v)\s+(?:\((.+)\)|(\S+))\s*$", re.IGNORECASE)
 """``t in ms``, in French and Czech ``en`` and ``v``."""
 SUFFIX = re.compile(r"[_\s](s|sec|ms|us|µs|ns|min)$", re.IGNORECASE)
+PARTS_OF_TIME = frozenset("s sec ms msec us µs ns min h".split())
 CLOCK_NAMES = frozenset(
     "time t times timesec timeseconds timestamp timestamps zeit zeitpunkt datetime elapsedtime relativetime "
     "xvalue sampletime tempo temps timems timeus cas".split()
 )
 RPM_UNITS = frozenset(
-    "rpm 1/min min-1 min^-1 u/min umin r/min rev/min tr/min t/min tpm ot/min ot./min otmin 1/minute".split()
+    "rpm 1/min min-1 min^-1 u/min umin r/min rev/min tr/min t/min tpm ot/min ot./min otmin 1/minute giri/min obr/min "
+    "obr./min varv/min omw/min rev./min об/мин".split()
 )
 HERTZ = frozenset("hz 1/s s-1 s^-1 rps".split())
 OF_ROTATION = HERTZ | {"rad/s"}
 SPEED_COLUMN = re.compile(
     r"speed|rpm|drehzahl|umdrehung|otack|otacek|vitesse(?!vib)|regimemoteur|^n$|^n\d$|^omega$|shaftfreq|rotationfreq"
 )
+SHAFT_COLUMN = re.compile(r"shaft|welle|hridel|arbre|spindle|spindel|rotor|motor")
+ANGLE_UNITS = frozenset(("deg", "°", "rad", "grad"))
+FORWARD = 0.9
+"""Share of the steps of a column of angles that go on: of a vibration half do, and each turn may have one step back."""
 TACHO_COLUMN = re.compile(
     r"tach|keyph|trigger|pulse|impuls|encoder|drehgeber|zeroindex|indexpuls|toptour|otackomer|znacka|codeur|^tac$"
 )
@@ -49,7 +56,7 @@ FEWEST_EVEN = 16
 STEADY = 0.2
 """Standard deviation by mean up to which a column named n, without a unit, is a speed."""
 
-Role = Literal["time", "speed", "tacho", "temperature", "count"]
+Role = Literal["time", "speed", "tacho", "temperature", "count", "angle"]
 SLOW_ROLES = ("speed", "temperature")
 """Columns of these may have fewer samples than the others, and are interpolated."""
 SLOW_SAID = "{name} has fewer samples than the {size} of the others; between them it is interpolated."
@@ -59,6 +66,7 @@ WORDS: dict[str, str] = {
     "tacho": "holds the pulses of a tacho",
     "temperature": "holds a temperature",
     "count": "counts or tells time: it rises evenly",
+    "angle": "holds the angle of a shaft",
 }
 
 
@@ -83,8 +91,8 @@ def name_and_unit(label: str) -> tuple[str, str]:
     --------
     >>> name_and_unit("acc [m/s^2]"), name_and_unit("a / (m/s²)"), name_and_unit("Drehzahl in 1/min")
     (('acc', 'm/s^2'), ('a', 'm/s²'), ('Drehzahl', '1/min'))
-    >>> name_and_unit("left/right")
-    ('left/right', 'unknown')
+    >>> name_and_unit("left/right"), name_and_unit("Y[0]")
+    (('left/right', 'unknown'), ('Y[0]', 'unknown'))
     """
     for pattern in (QUOTIENT, IN_WORDS):
         found = pattern.match(label)
@@ -92,7 +100,7 @@ def name_and_unit(label: str) -> tuple[str, str]:
         if found and is_unit_of_column(unit):
             return found.group(1).strip(), unit
     found = NAME_UNIT.match(label)
-    if found and found.group(1):
+    if found and found.group(1) and not found.group(2).strip().isdigit():
         return found.group(1), found.group(2).strip() or UNKNOWN_UNITS
     return label, UNKNOWN_UNITS
 
@@ -106,6 +114,12 @@ def is_unit_of_column(text: str) -> bool:
 def is_clock(name: str) -> bool:
     """True for the names that columns of times have."""
     return key_of(SUFFIX.sub("", name))[0] in CLOCK_NAMES
+
+
+def tells_time(name: str, unit: str) -> bool:
+    """Return whether a column is called as times are and has no unit of something else, as a temperature T has."""
+    low = unit.strip().lower()
+    return is_clock(name) and (low in ("", UNKNOWN_UNITS) or low in PARTS_OF_TIME or not is_unit_of_column(unit))
 
 
 def unique_names(names: Sequence[str]) -> list[str]:
@@ -132,14 +146,18 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
     ----------
     name, unit : str
     values : ndarray, optional
-        Where they are known, columns that rise evenly are counts or times, and one that is called n and has no unit is
-        a speed only if it is positive and nearly constant.
+        Where they are known, columns that rise evenly are counts or times, angles that go on are a shaft's, and one
+        that is called n and has no unit is a speed only if it is positive and nearly constant.
     """
     key, low = key_of(name)[0], unit.strip().lower()
     unknown = low in ("", UNKNOWN_UNITS)
     timed = low in ("s", "ms", "us", "µs", "sec")
     if low in RPM_UNITS or (SPEED_COLUMN.search(key) and low in OF_ROTATION):
         return "speed"
+    if SHAFT_COLUMN.search(key) and low in HERTZ:
+        return "speed"
+    if low in ANGLE_UNITS and values is not None and np.mean(np.diff(values) > 0.0) >= FORWARD:
+        return "angle"
     if is_clock(name) and (unknown or timed):
         return "time"
     if low in TEMPERATURE_UNITS or (TEMPERATURE_COLUMN.search(key) and (unknown or low in ("k", "c", "f"))):
