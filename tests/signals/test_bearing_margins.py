@@ -330,3 +330,20 @@ def test_a_simulated_bearing_without_noise(defect, part):
         assert named
     else:
         assert named == {part}
+
+
+def test_an_acquittal_says_what_limits_it():
+    """Of few turns, of tops cut off; whole records say neither."""
+    knocks, sound = record(pulses(LINES.bpfo * SHAFT), RUNNING), record(RUNNING)
+    limit = float(np.percentile(np.abs(knocks.values), 97.0))
+    cut = make_signal(np.clip(knocks.values, -limit, limit), RATE, units="m/s^2")
+    short = sound[: round(22 / SHAFT * RATE)]
+    named, clipped, acquitted, hardly = (
+        diagnose_bearing(one, "6205", rpm(0.0), shafts=()) for one in (knocks, cut, sound, short)
+    )
+    assert named.fault == clipped.fault == "outer race"
+    assert not named.notes
+    assert clipped.notes[0].startswith("CLIPPED")
+    assert acquitted.fault is hardly.fault is None
+    assert "has 22 turns, in which only strong lines stand out: take 60 or more" in hardly.verdict
+    assert "turns, in which" not in acquitted.verdict

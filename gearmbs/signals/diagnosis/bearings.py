@@ -34,6 +34,7 @@ from gearmbs.signals.diagnosis.bearing_margins import LEAST_LEVEL, Answer, Weigh
 from gearmbs.signals.diagnosis.bearing_report import CAGE, BearingLines, BearingReport, PartFinding, bearing_lines
 from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE
 from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.optical import instrument_faults
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.separation import level_lines, prewhiten
@@ -240,6 +241,7 @@ def diagnose_bearing(
     elif phase is None and speed is None and shaft_coords(signal):
         phase = shaft_phase(signal)
     told, notes = _shaft(signal, speed, phase)
+    notes += instrument_faults(signal)
     rate = rate_of(signal)
     highest = max(order for lines in known for order in lines.orders.values()) * told
     _check_record(signal.sizes["time"], rate, told, None if phase is not None else highest)
