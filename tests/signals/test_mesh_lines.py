@@ -102,3 +102,28 @@ def test_one_line_alone_is_doubted():
     signal = make_signal(np.sin(math.tau * 800.0 * t) + 0.1 * np.random.default_rng(1).standard_normal(t.size), RATE)
     assert re.search(says("CHECK", "800.00 Hz", "one line", "Give"), " ".join(analyse(signal, 20).notes))
     assert not any("CHECK" in note for note in analyse(signal, 20, speed="2400 rpm").notes)
+
+
+@pytest.mark.parametrize("teeth", [29, 43])
+@pytest.mark.parametrize("off", [0.0, -0.015, 0.03, -0.03])
+def test_a_sideband_within_the_tolerance_is_no_mesh_line(teeth, off):
+    """Told 3 % off, the first sideband lies where the mesh line should."""
+    t, turns = np.arange(3 * 12800) / 12800.0, 16.3
+    mesh = sum(a * np.cos(2 * np.pi * k * teeth * turns * t + k) for k, a in enumerate((1.0, 0.6, 0.3), 1))
+    values = (1.0 + 0.1 * np.cos(2 * np.pi * turns * t)) * mesh
+    values += 0.05 * np.random.default_rng(1).standard_normal(t.size)
+    report = analyse(values, teeth, rate=12800, speed=2 * np.pi * turns * (1.0 + off))
+    told = any(note.startswith("CHECK THE SPEED") for note in report.notes)
+    assert told == (abs(off) > 0.02)
+    assert told or report.speed == pytest.approx(2 * np.pi * turns, rel=1e-3)
+
+
+def test_hum_is_doubted_as_a_mesh_line():
+    t = np.arange(3 * 12800) / 12800.0
+    noise = 0.1 * np.random.default_rng(2).standard_normal(t.size)
+    hum = sum(np.cos(2 * np.pi * 50.0 * k * t) / k for k in range(1, 15))
+    report = analyse(hum + noise, 29, rate=12800)
+    assert any("of the mains" in note for note in report.notes)
+    # a mesh at 450 Hz alone is none
+    mesh = sum(np.cos(2 * np.pi * 450.0 * k * t) / k for k in range(1, 4))
+    assert not any("mains" in note for note in analyse(mesh + noise, 29, rate=12800).notes)

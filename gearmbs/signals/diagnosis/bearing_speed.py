@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearmbs.signals.diagnosis.bearing_judgement import LEAST_RATIO, LINE_BINS, EnvelopeSpectrum, log_tail, ratio_at
+from gearmbs.signals.rotation.speed import MAINS, MAINS_SHARE
 
 TOLERANCE = 0.005
 """Share by which a told speed may be off: a motor's slip changes by so much between a third and full load."""
@@ -47,10 +48,6 @@ PLATEAU = 0.98
 good as it."""
 FAR = 0.06
 """Share by which a wrong speed may be off: below 1/13 no harmonic of the first twelve is taken for its neighbour."""
-MAINS = (50.0, 60.0)
-"""Hz: families of all harmonics of the supply are not looked at far from the told speed."""
-MAINS_SHARE = 1e-3
-"""Share by which a large grid's frequency varies in daily work."""
 STEPS = 5
 """Speeds that are tried on either side of the told one within its tolerance: a thousandth apart by default."""
 

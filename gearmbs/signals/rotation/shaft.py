@@ -15,6 +15,7 @@ from gearmbs.signals.rotation.phase import phase_from_line, phase_from_speed, ph
 from gearmbs.signals.rotation.speed import (
     MIN_QUALITY,
     MIN_SCORE_DB,
+    SAME_COMB,
     SIDEBANDS,
     Comb,
     SpeedEstimate,
@@ -406,7 +407,9 @@ def _remark_other(
         blind = find_comb(signal, counts, speed_range=None)
     except SignalError:
         return False
-    if abs(blind.speed / nominal - 1.0) < OTHER_COMB:
+    # a sideband within the tolerance may have been taken for a mesh line that lies just beyond it
+    apart = nominal if found is None else found.speed
+    if abs(blind.speed / apart - 1.0) < (OTHER_COMB if found is None else SAME_COMB):
         return False
     ratio = blind.speed / nominal
     here = "no mesh line" if found is None else f"only a comb of {found.score:.0f} dB"

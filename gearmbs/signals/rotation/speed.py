@@ -79,6 +79,10 @@ HOLLOW_POWER, HOLLOW_HEIGHT = 1.0 / 64.0, 0.5
 
 AGREED_BINS = 1.5
 """By which the peak at a harmonic may be off the frequency on which all agree; what is further off is another line."""
+MAINS, MAINS_SHARE = (50.0, 60.0), 1e-3
+"""Hz, and the share by which a large grid's frequency varies in daily work."""
+MAINS_LINES = 8
+"""Multiples of the supply's frequency that are looked at: hum has its strongest lines among these."""
 MOST_NAMED = 3
 """Other mesh lines that are named in a doubt."""
 
@@ -398,8 +402,24 @@ def find_comb(
     if abs(gmf / guess - 1.0) > SAME_COMB:
         score, direct = _comb(height, np.array([gmf]), bin_width, count)
         best = 0
-    doubt = "" if ahead else _doubt(one._replace(gmf=gmf), others, count)
+    doubt = _mains(height, float(gmf), bin_width) or ("" if ahead else _doubt(one._replace(gmf=gmf), others, count))
     return Comb(count, float(gmf), float(direct[best]), float(score[best]), first, doubt)
+
+
+def _mains(height: np.ndarray, gmf: float, bin_width: float) -> str:
+    """Why a mesh line may be hum: at a multiple of the supply's frequency, of which others stand, too; else empty."""
+    for mains in MAINS:
+        k = round(gmf / mains)
+        if k < 1 or abs(k * mains - gmf) > MAINS_SHARE * gmf:
+            continue
+        others = np.array([m * mains for m in range(1, 4 * k + 1) if m % k])
+        others = others[others < (height.size - 1) * bin_width][:MAINS_LINES]
+        if others.size > 1 and np.mean(_at(height, others, bin_width) >= MIN_SCORE_DB) > 0.5:
+            return (
+                f"CHECK THE SPEED: the mesh line was taken to be {gmf:.2f} Hz, {k} times the {mains:g} Hz of the "
+                "mains, of which other multiples stand in the record as well. Give the speed or a tacho."
+            )
+    return ""
 
 
 def _doubt(one: Explained, others: list[Explained], teeth: int) -> str:
