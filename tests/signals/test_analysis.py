@@ -42,6 +42,7 @@ def test_analysis_finds_speed_harmonics_and_sidebands():
     # the mean speed of the wobbling angle over the part that was followed differs by at most its swing over its length
     assert report.gmf == pytest.approx(TEETH * 29.75, abs=0.2)
     assert report.speed == pytest.approx(2 * math.pi * report.gmf / TEETH)
+    assert all(report.harmonics[way].attrs["long_name"].startswith("RMS") for way in ("band", "orders"))
     expected = np.array([1.0, 0.6, 0.3]) / math.sqrt(2)
     np.testing.assert_allclose(report.harmonics["orders"][:, 0], expected, rtol=0.01)
     # the band holds the carrier, two sidebands of depth / 2, and noise: 0.05^2 over 6400 Hz, 7 / 12 GMF + of it

@@ -394,9 +394,12 @@ def _harmonic_table(
 ) -> xr.Dataset:
     dims = ("harmonic", "channel")
     numbers = np.arange(1, band.shape[0] + 1)
-    units = {"units": common_unit(signal)}
+    units = common_unit(signal)
     return xr.Dataset(
-        {"band": (dims, band, units), "orders": (dims, orders, units)},
+        {
+            "band": (dims, band, {"units": units, "long_name": "RMS in the band around the GMF harmonic"}),
+            "orders": (dims, orders, {"units": units, "long_name": "RMS of the line at the GMF harmonic"}),
+        },
         coords={
             "harmonic": numbers,
             "frequency": ("harmonic", numbers * gmf, {"units": "Hz"}),

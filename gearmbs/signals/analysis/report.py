@@ -282,8 +282,8 @@ class AnalysisReport(Shown):
     speed_origin : str
         Where the speed comes from, in words.
     harmonics : xarray.Dataset
-        `band` and `orders` of dimensions (harmonic, channel), as `gmf_rms`; coordinate `frequency` (Hz). `orders`
-        follows the speed's drift: it is taken from the time-synchronous average.
+        RMS by `band` and by `orders`, dimensions (harmonic, channel), as `gmf_rms`; coordinate `frequency` (Hz).
+        `orders` follows the speed's drift: it is taken from the time-synchronous average.
     sidebands : xarray.DataArray or None
         RMS of the lines beside each harmonic, dimensions (harmonic, sideband, channel), sideband -3 ... 3 shaft
         orders.

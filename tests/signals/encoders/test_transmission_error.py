@@ -314,6 +314,9 @@ def test_another_count_of_lines_is_told_by_the_mesh(told, remedy):
     if remedy is None:
         assert found.doubt is None
         assert found.verdict.startswith("Mesh harmonic 1")
+        # peaks, as the exact ones
+        assert found.harmonics().attrs == {"units": "m", "scaling": "amplitude"}
+        assert "peak amplitude, µm" in [axes.get_ylabel() for axes in found.plot().axes]
     else:
         assert found.verdict.startswith("CHECK THE LINES AND TEETH")
         assert remedy in found.verdict
