@@ -249,6 +249,18 @@ def test_forms_of_other_programs(tmp_path, form):
         assert report.speed == pytest.approx(RPM * np.pi / 30, rel=1e-3)
 
 
+def test_a_temperature_called_T_is_no_time_in_tables_and_hdf5(tmp_path):
+    import h5py
+
+    report = gm.analyse(pd.DataFrame({"T [°C]": OIL, "t [s]": TIME, "a [g]": A1}))
+    assert (report.rate, list(report.levels["channel"].values)) == (pytest.approx(RATE), ["a"])
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        for name, values, unit in (("T", OIL, "°C"), ("a", A1, "g"), ("t", TIME, "s")):
+            file.create_dataset(name, data=values).attrs["unit"] = unit
+    report = gm.analyse(tmp_path / "x.h5")
+    assert (report.rate, list(report.levels["channel"].values)) == (pytest.approx(RATE), ["a"])
+
+
 def test_an_even_first_column_in_another_unit_than_seconds_is_asked_for(tmp_path):
     path = tmp_path / "x.csv"
     np.savetxt(path, np.stack([1e6 * TIME, A1], axis=1), fmt="%.8e", delimiter=",")

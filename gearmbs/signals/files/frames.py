@@ -11,7 +11,7 @@ import pandas as pd
 
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.table import Content, Format, begins_with
-from gearmbs.signals.signal.labels import is_clock, key_of, name_and_unit, unique_names
+from gearmbs.signals.signal.labels import is_clock, key_of, name_and_unit, tells_time, unique_names
 from gearmbs.signals.signal.record import (
     STEP_NAMES,
     Record,
@@ -135,7 +135,7 @@ def _clock(frame: pd.DataFrame, notes: list[str]) -> tuple[np.ndarray | None, An
         name, unit = name_and_unit(str(label))
         if column.dtype.kind in "mM":
             return _seconds(pd.Index(column)), label
-        if is_clock(name) and column.dtype.kind in "fiu" and len(frame.columns) > 1:
+        if tells_time(name, unit) and column.dtype.kind in "fiu" and len(frame.columns) > 1:
             return CLOCK_UNITS.get(unit, 1.0) * column.to_numpy(dtype=float), label
     index = frame.index
     if isinstance(index, (pd.DatetimeIndex, pd.TimedeltaIndex)):

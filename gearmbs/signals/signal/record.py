@@ -15,7 +15,7 @@ import xarray as xr
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
-from gearmbs.signals.signal.labels import RPM_UNITS, SLOW_ROLES, SLOW_SAID, is_clock, key_of, rises_evenly, role_of
+from gearmbs.signals.signal.labels import RPM_UNITS, SLOW_ROLES, SLOW_SAID, key_of, rises_evenly, role_of, tells_time
 from gearmbs.signals.signal.signal import (
     SHAFT,
     UNKNOWN_UNITS,
@@ -496,7 +496,8 @@ def assemble(
     above it or, if there is none, anywhere. With `channels`, only the arrays they name (or whose columns they name)
     count. A rate that the caller has `given` (Hz) decides where the file names two.
     """
-    clocks = [k for k, v in arrays.items() if is_clock(k.rsplit(".", 1)[-1]) and v.size > 1]
+    told = {k: units.get(k, UNKNOWN_UNITS) for k in arrays}
+    clocks = [k for k, v in arrays.items() if tells_time(k.rsplit(".", 1)[-1], told[k]) and v.size > 1]
     columns: dict[str, np.ndarray] = {}
     column_units: dict[str, str] = {}
     owner: dict[str, str] = {}
