@@ -70,12 +70,12 @@ def variables_of(numbers: Mapping[str, tuple[str, str, float]], told: Sequence[T
 
 
 def _unit_name(unit: str) -> str:
-    return "1" if unit in ("", "1", "dimensionless") else unit.replace("*", " ")
+    return "1" if unit in ("1", "dimensionless") else unit.replace("*", " ")
 
 
 def _units(parent: xml.Element, variables: Sequence[Variable]) -> None:
     """Define the units of all variables by base units, where their powers are whole; others have a name alone."""
-    names = dict.fromkeys(_unit_name(variable.unit) for variable in variables)
+    names = dict.fromkeys(_unit_name(variable.unit) for variable in variables if variable.unit)
     if not names:
         return
     defined = xml.SubElement(parent, "UnitDefinitions")
@@ -127,7 +127,8 @@ def model_description(told: Description, version: str) -> bytes:
         }  # fmt: skip
         if variable.start is None:
             attributes["initial"] = "calculated"
-        real = {"unit": _unit_name(variable.unit)}
+        # the unit of an expression is not known
+        real = {"unit": _unit_name(variable.unit)} if variable.unit else {}
         if variable.start is not None:
             real["start"] = repr(variable.start)
         if second:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from numba import float64, int64
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.expressions.evaluate import eval_request
 from gearmbs.dae.integrators.algebraic import PART_TYPE, settle_output
 from gearmbs.dae.integrators.run_state import STATE_TYPE
 from gearmbs.dae.integrators.step import advance
@@ -73,6 +74,7 @@ class Kernels:
         self._by_name: dict[str, Any] = {
             **{kernel.__name__: kernel for kernel in BY_ADDRESS},
             "evaluate_rows": evaluate_rows,
+            "eval_request": eval_request,
             "residual": problem.residual,
             "jacobian": problem.jacobian,
             "hook": problem.hook or no_hook,

@@ -90,7 +90,8 @@ def export(
     name : str, optional
         Of the model and its library; default: that of the mechanism.
     outputs : sequence, optional
-        Outputs of the mechanism by name, and quantities as `gearmbs.Mechanism.output` takes them, of one number each.
+        Outputs of the mechanism by name, and quantities as `gearmbs.Mechanism.output` takes them, of one number each,
+        expressions among them.
         Default: the outputs of the mechanism, or if it has none all motions, loads, diagnostics and reactions.
     processor : str, optional
         A name of LLVM's, or "native" for that of this machine. Default: any x86-64 with AVX2 and FMA, and of other
@@ -124,12 +125,12 @@ def export(
     command = c_compiler(compiler)
     begun = model.begun()
     title = name or begun.system.mechanism.name
-    told, left = chosen_outputs(begun.system, begun.problem, outputs)
     numbers = {
         name: number
         for name, number in begun.problem.numbers.items()
         if not number.prescribes and all(place.order == 0 for place in number.places)
     }
+    told, left = chosen_outputs(begun.system, begun.problem, list(numbers), outputs)
     names = ["time", *numbers, *(one.name for one in told)]
     for twice in {name for name in names if names.count(name) > 1}:
         raise ModelError(

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.run_state import RunState
 from gearmbs.dae.integrators.stepping.jumps import TERMS
@@ -20,7 +21,7 @@ from gearmbs.mechanism.solve.simulator import Begun
 from gearmbs.native.driver import Driver
 from gearmbs.native.image import CONSTANT, SCRATCH, STATE, Image, Layout, member_of, word_of
 from gearmbs.native.kernels import BY_ADDRESS
-from gearmbs.native.outputs import Told
+from gearmbs.native.outputs import Expressions, Told, expressions_of
 from gearmbs.native.pivots import PlanRoom
 from gearmbs.native.teller import Teller
 
@@ -104,12 +105,15 @@ def memory_of(
     parts["driver"] = image.struct(driver, STATE, {"scratch": SCRATCH, **dict.fromkeys(_FIXED, CONSTANT)})
     for kernel in BY_ADDRESS:
         image.function_at(parts["driver"], member_of(Driver, kernel.__name__), function(kernel.__name__))
-    teller, plan, indptr, indices = _teller(begun, told)
+    asked = expressions_of(begun.system, told)
+    teller, plan, indptr, indices = _teller(begun, told, asked)
     ones, counted = np.ones(indptr.size - 1), np.zeros(indices.size)
     found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted)
     others = {**dict.fromkeys(_RECORDS, SCRATCH), **dict.fromkeys(_ASKED, CONSTANT)}
     parts["teller"] = image.struct(teller, STATE, others)
     image.function_at(parts["teller"], member_of(Teller, "evaluate"), function("evaluate_rows"))
+    if asked.bounds.size:
+        image.function_at(parts["teller"], member_of(Teller, "request"), function("eval_request"))
     parts |= {name: getattr(own, name) for name in own._fields}
     parts |= {f"told_{name}": getattr(found, name) for name in found._fields}
     # kernels of elements stand in the tables of integers
@@ -237,8 +241,27 @@ def _factored(
 
 
 _FIXED = ("cells", "is_input", "loads", "first", "place", "coefficients", "per_unit", "offset", "plain")
-_RECORDS = ("work", "vals", "pose", "solution", "phi", "strayed", "loads", "force", "moment", "rdata")
-_ASKED = ("slots", "turns", "first", "kind", "at")
+_RECORDS = (
+    "work",
+    "vals",
+    "pose",
+    "solution",
+    "phi",
+    "strayed",
+    "loads",
+    "force",
+    "moment",
+    "rdata",
+    "kin",
+    "acc",
+    "reference",
+    "tape_work",
+    "tape_y",
+)
+_ASKED = (
+    "slots", "turns", "first", "kind", "at", "ints", "floats", "bounds", "own_first", "own_kind", "own_at",
+    "marker_body", "marker_frame",
+)  # fmt: skip
 
 
 def _driver(begun: Begun, numbers: Mapping[str, Number], deforms: bool) -> Driver:
@@ -289,7 +312,7 @@ def _driver(begun: Begun, numbers: Mapping[str, Number], deforms: bool) -> Drive
     )
 
 
-def _teller(begun: Begun, told: list[Told]) -> tuple[Teller, LUPlan, np.ndarray, np.ndarray]:
+def _teller(begun: Begun, told: list[Told], asked: Expressions) -> tuple[Teller, LUPlan, np.ndarray, np.ndarray]:
     """Return what tells outputs, a plan for its matrix, and the pattern of that."""
     problem, model = begun.problem, begun.system.model
     indptr, indices, slots = pattern(problem.idata, problem.rdata, problem.work_size, problem.t0, problem.y0)
@@ -319,5 +342,18 @@ def _teller(begun: Begun, told: list[Told]) -> tuple[Teller, LUPlan, np.ndarray,
         kind=np.array([kind for kind, _ in places], dtype=np.int64),
         at=np.array([at for _, at in places], dtype=np.int64),
         out=np.zeros(len(told)),
+        ints=asked.ints,
+        floats=asked.floats,
+        bounds=asked.bounds,
+        own_first=asked.first,
+        own_kind=asked.kind,
+        own_at=asked.at,
+        marker_body=asked.marker_body,
+        marker_frame=asked.marker_frame,
+        kin=np.zeros((asked.frames, KIN_COLUMNS)),
+        acc=np.zeros((asked.frames, 6)),
+        reference=np.zeros(1),
+        tape_work=np.zeros(asked.work),
+        tape_y=np.zeros(max(1, asked.unknowns)),
     )
     return teller, plan, indptr, indices

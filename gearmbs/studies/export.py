@@ -65,5 +65,6 @@ def export(
         for what, given in (("set", made.numbers), ("told", made.outputs)):
             typer.echo(f"can be {what}: {len(given)}")
         if made.left_out:
-            typer.echo(f"note: left out, for they are expressions: {', '.join(made.left_out)}", err=True)
+            why = "they count angles or look at frames of bodies that deform"
+            typer.echo(f"note: left out, for {why}: {', '.join(made.left_out)}", err=True)
         typer.echo(f"wrote {made.library}")
