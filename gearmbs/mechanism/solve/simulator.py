@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from operator import itemgetter
 from time import perf_counter
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,7 +142,8 @@ class Simulator(Told):
         **options: Any,
     ) -> None:
         if not isinstance(mechanism, Mechanism):
-            raise ModelError(f"mechanism is {mechanism!r}; give a Mechanism")
+            remedy = "give what its build() returns" if hasattr(mechanism, "build") else "give a Mechanism"
+            raise ModelError(f"mechanism is {mechanism!r}; {remedy}")
         for what, given in (("lump", lump), ("records", records)):
             if not isinstance(given, bool | np.bool_ | None):
                 raise ModelError(f"{what} = {given!r}; give True or False")
@@ -184,7 +186,7 @@ class Simulator(Told):
         self._records = records
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
-        self.numbers = self._base.numbers
+        self.numbers = MappingProxyType(dict(self._base.numbers))
         parts = {**mechanism.bodies, **mechanism.elements}
         self._settings = Settings(self.numbers, mechanism.aliases, parts)
         self._simulated, self._took, self._since = 0.0, 0.0, 0.0
