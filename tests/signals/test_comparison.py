@@ -203,3 +203,9 @@ def test_units_must_agree():
     force = {"low": {"healthy": tone((1, 1, 1)).assign_coords(units=("channel", ["N"])).assign_attrs(units="N")}}
     with pytest.raises(SignalError, match=says("'m/s^2'", "'N'", "experiment")):
         compare({"low": {"healthy": tone((1, 1, 1))}}, force)
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1000.0, True), (0.01, True), (10.0, False)])
+def test_records_that_differ_as_by_a_unit_are_told(factor, told):
+    report = compare({"healthy": tone(BASE["healthy"]), "misaligned": tone(BASE["misaligned"], factor)})
+    assert report.summary()[0].startswith("CHECK THE UNITS") == told

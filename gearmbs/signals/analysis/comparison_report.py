@@ -192,6 +192,9 @@ STAYS_DB = 3.0
 """Within which a level counts as unchanged where it is expected to stay: a factor 1.4."""
 INDICATOR_TIE = 0.05
 """Relative change of an indicator from which it counts: a twentieth, as they scatter from record to record."""
+LEVELS_APART_DB = 30.0
+"""By which the whole of a record may differ from the reference: a factor of 32, where a thousandth of a unit is 60 dB
+and a gain of a hundred 40."""
 CONTRADICTION_DB = 3.0
 """By which a level has to fall on one channel and rise on another for the report to say that channels contradict."""
 
@@ -366,10 +369,19 @@ class ComparisonReport(Shown):
         Before them those records are named of which a remark says that their levels may be wrong.
         """
         doubted = [where for note in self.notes for where, _, rest in [note.partition(": ")] if rest.startswith(LOUD)]
-        if not doubted:
-            return summary(self, CHANGE_DB)
-        names = _listed(list(dict.fromkeys(doubted)))
-        return [f"CHECK THE RECORDS: levels of {names} may be wrong, see below.", *summary(self, CHANGE_DB)]
+        said = []
+        if doubted:
+            names = _listed(list(dict.fromkeys(doubted)))
+            said.append(f"CHECK THE RECORDS: levels of {names} may be wrong, see below.")
+        level = self.data["level"]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = 20.0 * np.log10((level / level.sel(state=self.reference, drop=True)).values)
+        if (most := float(np.nanmax(np.abs(change)))) > LEVELS_APART_DB:
+            said.append(
+                f"CHECK THE UNITS: whole records differ from {self.reference!r} by up to {most:.0f} dB, as by a "
+                "wrong unit or gain."
+            )
+        return [*said, *summary(self, CHANGE_DB)]
 
     def uncertain(self) -> list[str]:
         """Changes that speckle, marks or whatever else recurs with the shaft may have made or hidden.
