@@ -77,6 +77,8 @@ class Bearing(Described):
     youngs_modulus, poisson_ratio, density
         Of elements and rings, Pa and kg/m^3.
     designation : str
+    estimated : tuple of str
+        Names of the fields that are what is usual, and not this bearing's own; see `gearmbs.bearings.estimate`.
 
     Raises
     ------
@@ -110,6 +112,7 @@ class Bearing(Described):
     poisson_ratio: Annotated[Quantity, Measure(low=0, below=0.5)] = 0.3
     density: Annotated[Quantity, Measure("density", above=0)] = 7800.0
     designation: str = ""
+    estimated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -146,7 +149,7 @@ class Bearing(Described):
             require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of {self.kind}s it is 0")
 
     @classmethod
-    def from_designation(cls, designation: str, **changes: Any) -> Bearing:
+    def from_designation(cls, designation: str, *, estimate: bool = False, **changes: Any) -> Bearing:
         """Return a bearing by its designation, such as "6205" or "NU206"; see `gearmbs.bearings.catalogue`.
 
         Parameters
@@ -158,6 +161,10 @@ class Bearing(Described):
             J, ...), snap rings (N, NR), precision (P4 to P6), grease and heat treatment.
             Fields may stand behind it, with commas:
             "6305, elements=7, element_diameter=13.49 mm".
+        estimate : bool
+            Whether number and size of elements that makers do not publish are taken as is usual, see
+            `gearmbs.bearings.estimate`; the field ``estimated`` then names them. C and C_0 are those of a maker's
+            catalogue where they are tabulated.
         **changes
             Fields that differ, or that the catalogue does not know.
 
@@ -170,9 +177,14 @@ class Bearing(Described):
         Warns
         -----
         UserWarning
-            Of suffixes that are not known.
+            Of suffixes that are not known, and of what is estimated.
         """
-        found = look_up(designation, changes, [item.name for item in fields(cls)])
+
+        def rating(own: dict[str, Any]) -> float:
+            return dynamic_rating(cls(**{**own, "dynamic_rating": None}))
+
+        names = [item.name for item in fields(cls)]
+        found = look_up(designation, changes, names, rating if estimate else None)
         rollers = found.get("kind") in KINDS and KINDS[found["kind"]].rollers
         if rollers and found.get("roller_length") is None and {"designation", "dynamic_rating"} <= found.keys():
             return roller_length_for(cls(**{**found, "roller_length": found["element_diameter"]}))
@@ -281,6 +293,7 @@ class Bearing(Described):
         rows = {
             "kind": self.kind, "elements": f"{self.elements}", "d": f"{1e3 * self.element_diameter:.4g} mm",
             "D": f"{1e3 * self.pitch_diameter:.4g} mm", "contact angle": f"{math.degrees(self.contact_angle):.4g} deg",
+            **({"estimated": ", ".join(self.estimated)} if self.estimated else {}),
             **{name: f"{value:.4f}" for name, value in self.multiples.items()},
             "C": f"{1e-3 * self.rating:.3g} kN", "C0": f"{1e-3 * self.rating_at_rest:.3g} kN",
         }  # fmt: skip

@@ -12,38 +12,24 @@ import re
 import warnings
 from typing import Any
 
+from gearmbs.bearings.boundary import RATINGS, boundary
+from gearmbs.bearings.estimate import TAPERED_ANGLES, Rating, estimated
 from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of
 
 
 def dimension_series(designation: str) -> tuple[str, str, str] | None:
-    """Return dimension series, "62" or "63", bore code and suffixes of a designation; None if it has no series."""
+    """Return dimension series, bore code and suffixes of a designation; None if it has no series of a kind."""
     for kind in KINDS.values():
         if kind.designation is not None and (found := kind.designation.match(designation)):
-            return f"6{found[1]}", found[2], designation[found.end() :]
+            return kind.series[found[1]], found[2], designation[found.end() :]
     return None
 
 
 INCH = 25.4e-3
 """Metres."""
 
-OUTSIDE = {
-    "60": {8: 22, 9: 24, 10: 26, 12: 28, 15: 32, 17: 35, 20: 42, 25: 47, 30: 55, 35: 62, 40: 68, 45: 75, 50: 80,
-           55: 90, 60: 95, 65: 100, 70: 110, 75: 115, 80: 125},
-    "62": {8: 24, 9: 26, 10: 30, 12: 32, 15: 35, 17: 40, 20: 47, 25: 52, 30: 62, 35: 72, 40: 80, 45: 85, 50: 90,
-           55: 100, 60: 110, 65: 120, 70: 125, 75: 130, 80: 140},
-    "63": {10: 35, 12: 37, 15: 42, 17: 47, 20: 52, 25: 62, 30: 72, 35: 80, 40: 90, 45: 100, 50: 110, 55: 120, 60: 130,
-           65: 140, 70: 150, 75: 160, 80: 170},
-}  # fmt: skip
-"""Outside diameters by bore, mm, of dimension series 10, 02 and 03."""
-WIDTH = {
-    "60": {8: 7, 9: 7, 10: 8, 12: 8, 15: 9, 17: 10, 20: 12, 25: 12, 30: 13, 35: 14, 40: 15, 45: 16, 50: 16, 55: 18,
-           60: 18, 65: 18, 70: 20, 75: 20, 80: 22},
-    "62": {8: 8, 9: 8, 10: 9, 12: 10, 15: 11, 17: 12, 20: 14, 25: 15, 30: 16, 35: 17, 40: 18, 45: 19, 50: 20, 55: 21,
-           60: 22, 65: 23, 70: 24, 75: 25, 80: 26},
-    "63": {10: 11, 12: 12, 15: 13, 17: 14, 20: 15, 25: 17, 30: 19, 35: 21, 40: 23, 45: 25, 50: 27, 55: 29, 60: 31,
-           65: 33, 70: 35, 75: 37, 80: 39},
-}  # fmt: skip
-"""Widths by bore, mm."""
+DEEP_GROOVE = {"60": "10", "62": "02", "63": "03", "64": "04"}
+"""Dimension series of deep groove bearings by the first two digits of their designations."""
 
 ELEMENTS = {
     "6203": (8, 6.746, 28.5),
@@ -89,6 +75,11 @@ CLEARANCES = (
     (24, (0, 10), (5, 20), (13, 28), (20, 36), (28, 48)), (30, (1, 11), (5, 20), (13, 28), (23, 41), (30, 53)),
     (40, (1, 11), (6, 20), (15, 33), (28, 46), (40, 64)), (50, (1, 11), (6, 23), (18, 36), (30, 51), (45, 73)),
     (65, (1, 15), (8, 28), (23, 43), (38, 61), (55, 90)), (80, (1, 15), (10, 30), (25, 51), (46, 71), (65, 105)),
+    (100, (1, 18), (12, 36), (30, 58), (53, 84), (75, 120)), (120, (2, 20), (15, 41), (36, 66), (61, 97), (90, 140)),
+    (140, (2, 23), (18, 48), (41, 81), (71, 114), (105, 160)),
+    (160, (2, 23), (18, 53), (46, 91), (81, 130), (120, 180)),
+    (180, (2, 25), (20, 61), (53, 102), (91, 147), (135, 200)),
+    (200, (2, 30), (25, 71), (63, 117), (107, 163), (150, 230)),
 )  # fmt: skip
 """Clearances of deep groove bearings up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3,
 C4, C5 by ISO 5753-1, um."""
@@ -97,6 +88,12 @@ ROLLER_CLEARANCES = (
     (40, (5, 30), (25, 50), (45, 70), (60, 85), (80, 105)), (50, (5, 35), (30, 60), (50, 80), (70, 100), (95, 125)),
     (65, (10, 40), (40, 70), (60, 90), (80, 110), (110, 140)),
     (80, (10, 45), (40, 75), (65, 100), (90, 125), (130, 165)),
+    (100, (15, 50), (50, 85), (75, 110), (105, 140), (155, 190)),
+    (120, (15, 55), (50, 90), (85, 125), (125, 165), (180, 220)),
+    (140, (15, 60), (60, 105), (100, 145), (145, 190), (200, 245)),
+    (160, (20, 70), (70, 120), (115, 165), (165, 215), (225, 275)),
+    (180, (25, 75), (75, 125), (120, 170), (170, 220), (250, 300)),
+    (200, (35, 90), (90, 145), (140, 195), (195, 250), (275, 330)),
 )  # fmt: skip
 """The same of cylindrical roller bearings with a cylindrical bore."""
 SUFFIX = re.compile(
@@ -108,7 +105,6 @@ precision."""
 APART = re.compile(r"[CE]|2?HRS|MT\d+|GJN|WT|LHT\d+|V[LAT]\d+|TN|S[0-4]|X?\dK|[25]K|2AS|NS7S?|Q\d+|L\d+|P[456]|")
 """The same of those written apart only: design, grease, heat treatment, quality."""
 MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO)\s*")
-SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
 
 
 def known() -> list[str]:
@@ -116,10 +112,13 @@ def known() -> list[str]:
     return [*ELEMENTS, *RECORDINGS]
 
 
-def look_up(designation: str, changes: dict[str, Any], names: list[str]) -> dict[str, Any]:
+def look_up(
+    designation: str, changes: dict[str, Any], names: list[str], rating: Rating | None = None
+) -> dict[str, Any]:
     """Return the fields of a designation's bearing; ``names`` are those there are, see `Bearing.from_designation`.
 
-    Of rollers without a length ``dynamic_rating`` is among them, from which it follows.
+    Of rollers without a length ``dynamic_rating`` is among them, from which it follows. What the designation leaves
+    open is estimated where ``rating`` tells how C of ISO 281 follows from fields.
     """
     if not isinstance(designation, str) or not designation.strip():
         raise BearingError(f"designation is {designation!r}; give a text such as '6205'")
@@ -136,9 +135,9 @@ def look_up(designation: str, changes: dict[str, Any], names: list[str]) -> dict
     bare = MAKERS.sub("", designation.upper().strip())
     group = dimension_series(bare)
     if group is not None:
-        fixed = known_of(bare, _boundary("".join(group[:2])))
+        fixed = known_of(bare, boundary(group[0], int(group[1])))
         if fixed is not None:
-            return _asked(designation, fixed, changes, _named_class(designation, group[2], changes))
+            return _asked(designation, fixed, changes, _named_class(designation, group[2], changes), rating)
     digits = re.match(r"^(\d{4,5})", bare)
     series = digits[1] if digits else ""
     named = None
@@ -151,17 +150,20 @@ def look_up(designation: str, changes: dict[str, Any], names: list[str]) -> dict
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
         found |= _clearance(named, _boundary(series))
         return {**found, **_boundary(series), "designation": designation.strip(), **changes}
-    boundary = _boundary(series)
-    if boundary:
-        if {"elements", "element_diameter"} <= changes.keys():
-            middle = 0.5 * (boundary["bore"] + boundary["outside_diameter"])
-            own = {"pitch_diameter": middle, **boundary, "designation": designation.strip()}
-            own |= _clearance(named, boundary)
-            return {**own, **changes}
-        sizes = ", ".join(f"{key.replace('_', ' ')} {1e3 * value:g} mm" for key, value in boundary.items())
+    sizes_of = _boundary(series)
+    if sizes_of:
+        own = {**sizes_of, "designation": designation.strip(), **_clearance(named, sizes_of), **changes}
+        open_ones = [name for name in ("elements", "element_diameter") if own.get(name) is None]
+        if not open_ones:
+            return {"pitch_diameter": 0.5 * (sizes_of["bore"] + sizes_of["outside_diameter"]), **own}
+        if rating is not None:
+            own = {**_ratings(series[:2], sizes_of["bore"]), **own}
+            return _estimated(designation, series, own, open_ones, rating)
+        sizes = ", ".join(f"{key.replace('_', ' ')} {1e3 * value:g} mm" for key, value in sizes_of.items())
         raise BearingError(
             f"designation {designation!r}: {sizes}, but how many balls it has, and of which diameter, differs between "
-            "makers; count them and give elements= and element_diameter= (and pitch_diameter= if it is not the mean)"
+            "makers; count them and give elements= and element_diameter= (and pitch_diameter= if it is not the mean), "
+            "or estimate=True for what is usual"
         )
     if {"elements", "element_diameter", "pitch_diameter"} <= changes.keys():
         if named is not None and "clearance" not in changes:
@@ -250,12 +252,17 @@ def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> N
         )
 
 
-def _asked(designation: str, fixed: Known, changes: dict[str, Any], named: str | None) -> dict[str, Any]:
+def _asked(
+    designation: str, fixed: Known, changes: dict[str, Any], named: str | None, rating: Rating | None
+) -> dict[str, Any]:
     """Return the fields of a bearing whose designation fixes some; rollers may be without a length if rated."""
     own = {**fixed.fields, **_class_of(designation, fixed, named), "designation": designation.strip(), **changes}
     missing = [name for name in fixed.asked if own.get(name) is None]
     if not missing or (missing == ["roller_length"] and own.get("dynamic_rating") is not None):
         return own
+    if rating is not None:
+        own = {**_ratings(fixed.rated, own["bore"]), **own}
+        return _estimated(designation, fixed.rated, own, missing, rating)
     sizes = ", ".join(
         f"{key.replace('_', ' ')} {1e3 * value:.4g} mm"
         if key != "contact_angle"
@@ -268,7 +275,7 @@ def _asked(designation: str, fixed: Known, changes: dict[str, Any], named: str |
     )
     raise BearingError(
         f"designation {designation!r}: {fixed.fields['kind']} bearing, {sizes}; the rest differs between makers: give "
-        f"{', '.join(f'{name}=' for name in missing)}{hint}"
+        f"{', '.join(f'{name}=' for name in missing)}{hint}, or estimate=True for what is usual"
     )
 
 
@@ -301,11 +308,41 @@ def _clearance(named: str | None, boundary: dict[str, Any], classes: tuple = CLE
 
 def _boundary(series: str) -> dict[str, float]:
     """Return bore, outside diameter and width of a deep groove bearing by its digits, empty if unknown."""
-    if len(series) != 4 or series[:2] not in OUTSIDE:
+    if len(series) != 4 or series[:2] not in DEEP_GROOVE:
         return {}
-    code = int(series[2:])
-    bore = SMALL_BORES.get(code, 5 * code)
-    if bore not in OUTSIDE[series[:2]]:
-        return {}
-    outside, width = OUTSIDE[series[:2]][bore], WIDTH[series[:2]][bore]
-    return {"bore": 1e-3 * bore, "outside_diameter": 1e-3 * outside, "width": 1e-3 * width}
+    return boundary(DEEP_GROOVE[series[:2]], int(series[2:]))
+
+
+def _ratings(series: str, bore: float) -> dict[str, float]:
+    """Return C and C_0 of a series of `RATINGS` and a bore, N; empty if they are not tabulated."""
+    found = RATINGS.get(series, {}).get(round(1e3 * bore))
+    return {} if found is None else {"dynamic_rating": 1e3 * found[0], "static_rating": 1e3 * found[1]}
+
+
+def _estimated(
+    designation: str, series: str, own: dict[str, Any], missing: list[str], rating: Rating
+) -> dict[str, Any]:
+    """Return the fields of a bearing with those that its designation leaves open as they usually are.
+
+    Warns
+    -----
+    UserWarning
+        With what was taken, and how far it may be from the bearing at hand.
+    """
+    kind = own.get("kind", next(iter(KINDS)))
+    found = estimated(kind, own, [name for name in missing if name != "contact_angle"], rating)
+    if "contact_angle" in missing:
+        found["contact_angle"] = TAPERED_ANGLES[series[-1]]
+    count = int(found.get("elements") or own["elements"])
+    told = f"{count} elements"
+    if "element_diameter" in found:
+        told += f" of {1e3 * found['element_diameter']:.4g} mm"
+    rated = "its C is that of a maker's catalogue" if "dynamic_rating" in own else "its C is estimated from them, too"
+    warnings.warn(
+        f"designation {designation!r}: {told} are estimated, for makers do not publish them: one element more or less "
+        f"moves the lines of its races by {100.0 / count:.2g} %, and its radial "
+        f"stiffness is known to some 10 %; {rated}. Count the elements and give elements= and element_diameter= where "
+        "that matters",
+        stacklevel=6,
+    )
+    return {**own, **{key: value for key, value in found.items() if own.get(key) is None}, "estimated": tuple(missing)}

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -33,10 +33,30 @@ Bearing = Any
 
 @dataclass(frozen=True)
 class Known:
-    """Fields of a bearing that its designation fixes, and the names of those that must be counted or measured."""
+    """Fields that a designation fixes, the names of those to be counted or measured, and the series of the ratings."""
 
     fields: dict[str, Any]
     asked: tuple[str, ...]
+    rated: str = ""
+
+
+@dataclass(frozen=True)
+class Usual:
+    """What elements usually are in bearings of a kind; see `gearmbs.bearings.estimate`.
+
+    Attributes
+    ----------
+    size : float
+        Diameter of an element over D - d.
+    fill : float
+        Share of the circle of the centres that the elements take.
+    length : float
+        Effective length of rollers over the width; zero of balls.
+    """
+
+    size: float
+    fill: float
+    length: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,9 +80,14 @@ class Kind:
     load_factors : callable
         ``load_factors(bearing, radial, axial)`` returns e, X and Y of ISO 281.
     designation : re.Pattern, optional
-        Beginning of designations: digit of the dimension series, code of the bore.
+        Beginning of designations: its digits of the series, code of the bore.
+    series : dict
+        Dimension series by these digits, as of `gearmbs.bearings.boundary`.
     known : callable, optional
         ``known(found, boundary)`` returns what such a designation fixes.
+    usual : Usual
+        Elements where makers do not publish them: means of bearings whose elements are known, of cylindrical ones of
+        standardised raceways; cages of the other kinds leave as much room as these shares say.
     unclassed : str
         Why a class of radial clearance says nothing of such bearings; empty if it does.
     """
@@ -75,8 +100,10 @@ class Kind:
     reduction: float
     load_factors: Callable[[Bearing, float, float], tuple[float, float, float]]
     designation: re.Pattern[str] | None = None
+    series: dict[str, str] = field(default_factory=dict)
     known: Callable[[re.Match[str], dict[str, Any]], Known] | None = None
     unclassed: str = ""
+    usual: Usual
 
 
 # Factors of the equivalent load by ISO 281.
@@ -158,24 +185,27 @@ def _middle(boundary: dict[str, Any]) -> float:
 
 
 def _cylindrical(found: re.Match[str], boundary: dict[str, Any]) -> Known:
-    raceways = RACEWAYS[found[1]].get(round(1e3 * boundary["bore"]))
+    # the wider series have the rings of the narrower ones
+    raceways = RACEWAYS.get(found[1][-1], {}).get(round(1e3 * boundary["bore"]))
+    rated = f"NU{found[1]}"
     if raceways is None:
         fields = {**boundary, "pitch_diameter": _middle(boundary)}
-        return Known(fields, ("elements", "element_diameter", "roller_length"))
+        return Known(fields, ("elements", "element_diameter", "roller_length"), rated)
     inner, outer = (1e-3 * value for value in raceways)
     own = {"element_diameter": 0.5 * (outer - inner), "pitch_diameter": 0.5 * (outer + inner)}
-    return Known({**boundary, **own}, ("elements", "roller_length"))
+    return Known({**boundary, **own}, ("elements", "roller_length"), rated)
 
 
 def _tapered(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     fields = {**boundary, "pitch_diameter": _middle(boundary)}
     asked: tuple[str, ...] = ("elements", "element_diameter", "roller_length")
-    taper = TAPERS[found[1]].get(round(1e3 * boundary["bore"]))
+    narrow = found[1][0] == "0"
+    taper = TAPERS.get(found[1][1], {}).get(round(1e3 * boundary["bore"])) if narrow else None
     if taper is None:
-        return Known(fields, (*asked, "contact_angle"))
+        return Known(fields, (*asked, "contact_angle"), found[1])
     width, degrees, minutes, seconds = taper
     angle = math.radians(degrees + minutes / 60.0 + seconds / 3600.0)
-    return Known({**fields, "width": 1e-3 * width, "contact_angle": angle}, asked)
+    return Known({**fields, "width": 1e-3 * width, "contact_angle": angle}, asked, found[1])
 
 
 def _angular(found: re.Match[str], boundary: dict[str, Any]) -> Known:
@@ -191,14 +221,18 @@ def _four_point(found: re.Match[str], boundary: dict[str, Any]) -> Known:
 SET_WHEN_MOUNTED = "their clearance is set when they are mounted"
 
 KINDS: dict[str, Kind] = {
-    "deep groove": Kind(angle="free", reduction=0.95, load_factors=_deep_groove_factors),
+    "deep groove": Kind(
+        angle="free", reduction=0.95, load_factors=_deep_groove_factors, usual=Usual(size=0.300, fill=0.595)
+    ),
     "angular contact": Kind(
         angle="needed",
         one_shoulder=True,
         preloaded=True,
         reduction=0.95,
         load_factors=_angular_factors,
-        designation=re.compile(r"^7([23])(\d\d)\s*-?\s*(AC|[ABC])(?![A-Z])"),
+        usual=Usual(size=0.300, fill=0.82),
+        designation=re.compile(r"^7([023])(\d\d)\s*-?\s*(AC|[ABC])(?:EC?[ABC]?)?(?:G[ABC]?)?(?:JP|[DFJMPY])?(?![A-Z])"),
+        series={"0": "10", "2": "02", "3": "03"},
         known=_angular,
         unclassed=SET_WHEN_MOUNTED,
     ),
@@ -207,7 +241,9 @@ KINDS: dict[str, Kind] = {
         both_ways=True,
         reduction=0.95,
         load_factors=_angular_factors,
+        usual=Usual(size=0.300, fill=0.80),
         designation=re.compile(r"^QJ\s*([23])(\d\d)(?!\d)"),
+        series={"2": "02", "3": "03"},
         known=_four_point,
         unclassed="it is one of axial clearance",
     ),
@@ -216,7 +252,9 @@ KINDS: dict[str, Kind] = {
         angle="none",
         reduction=0.83,
         load_factors=_cylindrical_factors,
-        designation=re.compile(r"^(?:NU|NJ|NUP|N)\s*([23])(\d\d)(?!\d)"),
+        usual=Usual(size=0.270, fill=0.80, length=0.60),
+        designation=re.compile(r"^(?:NU|NJ|NUP|N)\s*(10|22|23|[234])(\d\d)(?!\d)"),
+        series={"10": "10", "2": "02", "3": "03", "4": "04", "22": "22", "23": "23"},
         known=_cylindrical,
     ),
     "tapered roller": Kind(
@@ -225,7 +263,9 @@ KINDS: dict[str, Kind] = {
         preloaded=True,
         reduction=0.83,
         load_factors=_tapered_factors,
-        designation=re.compile(r"^30([23])(\d\d)(?!\d)"),
+        usual=Usual(size=0.235, fill=0.90, length=0.62),
+        designation=re.compile(r"^3(20|02|03|22|23)(\d\d)(?!\d)"),
+        series={digits: f"3{digits}" for digits in ("20", "02", "03", "22", "23")},
         known=_tapered,
         unclassed=SET_WHEN_MOUNTED,
     ),

@@ -30,12 +30,14 @@ def rolling_bearing(value: Any) -> Any:
     if isinstance(value, bearings.Bearing):
         return value
     if isinstance(value, str):
-        return bearings.Bearing.from_designation(value)
+        return bearings.Bearing.from_designation(value, estimate=True)
     if isinstance(value, Mapping):
         settings = dict(value)
         designation = settings.pop("designation", None)
         return (
-            bearings.Bearing.from_designation(designation, **settings) if designation else bearings.Bearing(**settings)
+            bearings.Bearing.from_designation(designation, estimate=True, **settings)
+            if designation
+            else bearings.Bearing(**settings)
         )
     raise TypeError(f"rolling is {value!r}; give a designation such as '6205', a table, or a gearmbs.bearings.Bearing")
 

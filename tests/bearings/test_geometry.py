@@ -11,6 +11,7 @@ import pytest
 
 from gearmbs.bearings import Bearing, BearingError, equivalent_load, groove_contact, mean_load, rating_life
 from gearmbs.bearings.bearing import dynamic_rating, load_factors
+from gearmbs.bearings.catalogue import ELEMENTS
 from gearmbs.bearings.laws_kernel import line_contact
 from tests.says import says
 
@@ -123,7 +124,12 @@ def test_an_uncertain_bearing_asks():
     own = Bearing.from_designation("6305", elements=7, element_diameter="11.5 mm")
     assert own.pitch_diameter == pytest.approx(0.0435)
     with pytest.raises(BearingError, match="in the catalogue"):
-        Bearing.from_designation("NU2206")
+        Bearing.from_designation("NU3206")
+    with pytest.warns(UserWarning, match=says("6305", "estimated", "Count")):
+        usual = Bearing.from_designation("6305", estimate=True)
+    assert usual.estimated == ("elements", "element_diameter")
+    assert (usual.bore, usual.outside_diameter, usual.width) == (0.025, 0.062, 0.017)
+    assert usual.elements == 7
 
 
 @pytest.mark.parametrize(
@@ -178,7 +184,7 @@ def test_contact_angles_of_tapered_bearings_give_the_makers_load_factors(designa
     ("designation", "asked"),
     [("NU206", "give elements=, roller_length= (or dynamic_rating="), ("30206", "element_diameter=, roller_length="),
      ("7206-B", "contact angle 40 deg"), ("QJ208", "four point bearing"), ("30215", "contact_angle="),
-     ("NU2206", "in the catalogue")],
+     ("NU3206", "in the catalogue"), ("NU2206", "give elements=, roller_length=")],
 )  # fmt: skip
 def test_asks_for_what_designations_leave_open(designation, asked):
     with pytest.raises(BearingError, match=re.escape(asked)):
@@ -268,8 +274,9 @@ def test_other_suffixes_never_stand_for_a_class_in_silence():
         assert Bearing.from_designation("6205-XYZ/C3").clearance == pytest.approx(20.5e-6)
     sizes = {"elements": 10, "element_diameter": 20e-3, "pitch_diameter": 130e-3}
     with pytest.raises(BearingError, match=says("C3", "clearance", "catalogue")):
-        Bearing.from_designation("6220/C3", **sizes)
-    assert Bearing.from_designation("6220", **sizes).clearance == 0.0
+        Bearing.from_designation("6244/C3", **sizes)
+    assert Bearing.from_designation("6244", **sizes).clearance == 0.0
+    assert Bearing.from_designation("6220/C3", **sizes).clearance == pytest.approx(44e-6)
 
 
 def test_loads_count_by_their_size():
@@ -312,3 +319,49 @@ def test_a_modulus_in_a_wrong_unit_is_remarked_on():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         Bearing.from_designation("6205", youngs_modulus="310 GPa", density=3200.0)  # silicon nitride
+
+
+BOUNDARY = """
+6008 40 68 15|6030 150 225 35|6211 55 100 21|6217 85 150 28|6232 160 290 48|6313 65 140 33|6324 120 260 55
+6408 40 110 27|7211 B 55 100 21|7311 BECBP 55 120 29|7216-B-JP 80 140 26|7020AC 100 150 24|QJ 312 60 130 31
+NU 213 65 120 23|NU2213 ECP 65 120 31|NJ 2310 ECP/C3 50 110 40|NUP2320 100 215 73|NU1016 80 125 22|NU415 75 190 45
+30310 50 110 29.25|32216 80 140 35.25|32313 65 140 51|30215 75 130 27.25|32011 X 55 90 23
+"""
+"""Designations with bore, outside diameter and width, mm, as makers' catalogues have them."""
+
+
+@pytest.mark.parametrize("row", [row for row in BOUNDARY.replace("\n", "|").split("|") if row])
+def test_boundary_dimensions_of_industrial_gearboxes(row):
+    *name, bore, outside, width = row.split()
+    with pytest.warns(UserWarning, match=says("elements=", "estimated")):
+        bearing = Bearing.from_designation(" ".join(name), estimate=True)
+    found = (bearing.bore, bearing.outside_diameter, bearing.width)
+    assert found == pytest.approx((1e-3 * float(bore), 1e-3 * float(outside), 1e-3 * float(width)), abs=1e-9)
+    assert "elements" in bearing.estimated
+    # the elements fit beside each other and between the rings, and ISO 281 gives what is printed
+    assert bearing.element_diameter < 0.5 * (bearing.outside_diameter - bearing.bore)
+    by_formula = bearing.changed(dynamic_rating=None)
+    if bearing.dynamic_rating is not None:
+        assert by_formula.rating == pytest.approx(bearing.dynamic_rating, rel=0.1)
+
+
+def test_usual_elements_are_those_of_the_bearings_that_are_known(monkeypatch):
+    diameters = []
+    for name, (count, diameter, _) in list(ELEMENTS.items()):
+        monkeypatch.delitem(ELEMENTS, name)
+        with pytest.warns(UserWarning, match=says(name, "estimated")):
+            usual = Bearing.from_designation(name, estimate=True)
+        assert usual.elements == count, name
+        diameters.append(1e3 * usual.element_diameter / diameter - 1.0)
+    assert np.sort(np.abs(diameters))[-3] < 0.01
+    assert np.max(np.abs(diameters)) < 0.08
+
+
+@pytest.mark.parametrize(
+    ("text", "kilonewtons"), [("6211", 43.4), ("6313", 92.7), ("6408", 64.0), ("NU213 ECP", 108.0), ("NU2320", 570.0)]
+)
+def test_ratings_of_makers_where_they_are_tabulated(text, kilonewtons):
+    with pytest.warns(UserWarning, match=says(text, "estimated", "catalogue")):
+        bearing = Bearing.from_designation(text, estimate=True)
+    assert bearing.rating == pytest.approx(1e3 * kilonewtons)
+    assert rating_life(bearing, 0.1 * bearing.rating) == pytest.approx(1e6 * 10.0 ** (10 / 3 if bearing.rollers else 3))
