@@ -56,6 +56,8 @@ def check(train: Drivetrain) -> None:
     _groups(train)
     for shaft in train.shafts:
         _held(train, shaft)
+    for housing in train.housings:
+        _stands(housing)
     _collisions(train, places)
 
 
@@ -181,6 +183,29 @@ def _held(train: Drivetrain, shaft: Shaft) -> None:
         raise DrivetrainError(
             f"{shaft.label}: its bearings {', '.join(repr(b.name) for b in mine)} leave it free to {free}; "
             "add a bearing, or stiffness in that direction"
+        )
+
+
+def _stands(housing: Housing) -> None:
+    """The mounts of a housing of finite elements must hold its six motions, for nothing else does."""
+    if housing.model is None:
+        return
+    places = np.array([mount.at for mount in housing.mounts], dtype=float)
+    arms = places - places.mean(axis=0)
+    reach = max(float(np.abs(arms).max()), COAXIAL)
+    rows = []
+    for arm, mount in zip(arms, housing.mounts):
+        turned = np.cross(np.eye(3), arm / reach).T
+        rows.append(np.sqrt(np.asarray(mount.stiffness, dtype=float))[:, None] * np.hstack([np.eye(3), turned]))
+    _, sizes, motions = np.linalg.svd(np.vstack(rows))
+    if sizes.size < 6 or sizes[-1] < np.sqrt(HELD) * sizes[0]:
+        way = motions[-1]
+        turning = np.linalg.norm(way[3:]) > np.linalg.norm(way[:3])
+        axis = "xyz"[int(np.argmax(np.abs(way[3:] if turning else way[:3])))]
+        raise DrivetrainError(
+            f"{housing.label}: its mounts {', '.join(repr(m.name) for m in housing.mounts)} leave it free to "
+            f"{'turn about' if turning else 'move along'} {axis}; give three or more that are not on one line, with "
+            "stiffness in that direction"
         )
 
 

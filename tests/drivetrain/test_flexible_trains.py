@@ -322,10 +322,10 @@ model = { program = "mnf", files = ["case.mnf"] }
 at = [0.0, -0.05, 0.0]
 seats = { a = 1, b = 2, c = 3, d = 4 }
 
-[housings.case.mounts.foot]
-at = [0.0, -0.05, 0.0]
-stiffness = ["5e7 N/m", "5e7 N/m", "5e7 N/m"]
-radius = "80 mm"
+[housings.case.mounts]
+one = { at = [-0.1, -0.05, 0.0], stiffness = ["5e7 N/m", "5e7 N/m", "5e7 N/m"], radius = "200 mm" }
+two = { at = [0.1, -0.05, 0.0], stiffness = [5e7, 5e7, 5e7], radius = "200 mm" }
+three = { at = [0.0, -0.05, 0.2], stiffness = [5e7, 5e7, 5e7], radius = "200 mm" }
 
 [drives.motor]
 shaft = "input"
@@ -435,7 +435,9 @@ def test_what_a_housing_of_finite_elements_is_refused_for():
     for changed, message in (
         ({"seats": {}}, ("'a'", "seats", "outside diameter")),
         ({"seats": dict.fromkeys("abcd", (0.02, 0.02))}, ("'a'", "0 nodes", "larger seat")),
-        ({"mounts": [foot]}, ("foot", "radius", "give")),
+        ({"mounts": [replace(m, radius=None) for m in train.housings[0].mounts]}, ("foot 0", "radius", "give")),
+        ({"mounts": [foot]}, ("case", "'foot'", "free to turn")),
+        ({"mounts": train.housings[0].mounts[:2]}, ("case", "'foot 0'", "free to turn")),
     ):
         with pytest.raises(DrivetrainError, match=says(*message)):
             _ = train.with_parts(replace(train.housings[0], **changed)).modal_models
