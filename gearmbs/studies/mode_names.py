@@ -162,7 +162,8 @@ def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Datas
         part = orders[float(order)].split(" x ", 1)[1]
         share = one["kinetic"].sel(body=part) if isinstance(train.parts[part], Shaft) else one["energy"].sel(part=part)
         ratio = float(one["damping_ratio"])
-        gains.append(float(share) / (2.0 * ratio) if ratio > 0.0 else np.inf)
+        # the force that a mesh carries turns with its wheels, and may make a share that is all but none negative
+        gains.append(max(float(share), 0.0) / (2.0 * ratio) if ratio > 0.0 else np.inf)
     names = [str(named["name"].sel(mode=int(k)).values) for k in diagram["mode"].values]
     return diagram.assign(
         critical_gain=("crossing", np.array(gains, dtype=float), {"units": "1"}),
