@@ -1,7 +1,9 @@
 """FMUs of exported models, judged and driven by FMPy."""
 
+import re
 import shutil
 from functools import cache
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -209,3 +211,13 @@ def test_units_of_a_description():
         assert units == {
             "N/m^1.3": None, "N m": {"m": "2", "kg": "1", "s": "-2"}, "rad/s": {"s": "-1", "rad": "1"}
         }  # fmt: skip
+
+
+def test_the_page_says_what_comes_out(tmp_path, monkeypatch, capsys):
+    """A disc of 2 kg m^2 under 4 N m: 1 rad/s after half a second, and 2 rad/s at the end of the importer's run."""
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "native.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names)
+    assert capsys.readouterr().out.splitlines()[-1] == "1.0"
+    assert names["result"]["speed"][-1] == pytest.approx(2.0, rel=1e-6)
