@@ -1,4 +1,4 @@
-"""Models as shared libraries with a C header, which run without Python and without a compiler."""
+"""Models as shared libraries with a C header and as FMUs, which run without Python and without a compiler."""
 
 from gearmbs._lazy import late
 
