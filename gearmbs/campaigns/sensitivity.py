@@ -11,6 +11,7 @@ References
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ import numpy as np
 
 from gearmbs.campaigns.plans.designs import SEQUENCES
 from gearmbs.campaigns.plans.factors import Choice
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning
 from gearmbs.schema.described import chosen
 
 if TYPE_CHECKING:
@@ -209,11 +210,18 @@ def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, int
     coded : ndarray, shape (n, d)
         -1 and 1.
     values : ndarray, shape (n,)
+
+    Raises
+    ------
+    CampaignError
+        If a result is missing: in what is left effects are no longer told from each other.
     """
     import pandas as pd
 
-    good = np.isfinite(values)
-    coded, values = coded[good], np.asarray(values, dtype=float)[good]
+    values = np.asarray(values, dtype=float)
+    missing = int((~np.isfinite(values)).sum())
+    if missing:
+        raise CampaignError(f"effects: {missing} of {values.size} cases have no result; a factorial needs them all")
     terms = {name: coded[:, k] for k, name in enumerate(names)}
     if interactions:
         for i, j in itertools.combinations(range(len(names)), 2):
@@ -363,7 +371,12 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
     Raises
     ------
     CampaignError
-        For a design that is made for something else.
+        For a design that is made for something else, constraints, and results that are missing of a grid or factorial.
+
+    Warns
+    -----
+    CampaignWarning
+        If results are missing, of cases that failed or are not done.
     """
     plan = campaign.plan
     names, points = coordinates(campaign)
@@ -372,13 +385,26 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
         raise CampaignError(
             "sensitivity: not of crossed choices; make the choice a factor, or ask for one option's cases"
         )
+    if plan.constraints:
+        raise CampaignError(
+            f"sensitivity: constraints have left points of the {plan.design} design out; fit the table's columns by "
+            "fit_surface or fit_chaos"
+        )
+    missing = int((~np.isfinite(values)).sum())
+    if missing:
+        warnings.warn(
+            f"{result}: {missing} of {values.size} cases have no result; what decides it is told of the others alone, "
+            "which are no longer spread over the whole ranges",
+            CampaignWarning,
+            stacklevel=3,
+        )
     if plan.design == "saltelli":
         return sobol_indices(values, names, points=points, levels=_levels(plan))
     if plan.design == "morris":
         return morris_effects(values, points, names)
     if plan.design in ("factorial", "plackett burman"):
         return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
-    if plan.design == "grid" and not plan.constraints:
+    if plan.design == "grid":
         # crossed choices, which take no coordinate, were refused above
         varied = [k for k, count in enumerate(plan.counts()) if count > 1]
         return grid_indices(values, [plan.counts()[k] for k in varied], [names[k] for k in varied])

@@ -97,7 +97,7 @@ class CaseProblem:
         if way not in WAYS:
             raise IdentifyError(f"way is {way!r}; choose one of {', '.join(WAYS)}")
         precise = {"tolerance": TOLERANCE}
-        self.cases = {name: case.as_one_of_many().changed(solver=precise) for name, case in cases.items()}
+        self.cases = {str(name): case.as_one_of_many().changed(solver=precise) for name, case in cases.items()}
         self.way, self.workers = way, workers
         self.free = [_in_si(item, self.cases) for item in ((free,) if isinstance(free, str | Free) else free)]
         paths = [path for item in self.free for path in (item.name, *item.also)]
@@ -441,6 +441,10 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
     if table.empty:
         raise IdentifyError("measured: the table has no rows")
     table = table.copy()
+    for name in ("case", "channel"):
+        if table[name].isna().any():
+            raise IdentifyError(f"measured: {name} is missing in a row")
+        table[name] = table[name].map(str)
     if "sigma" not in table.columns:
         table["sigma"] = 0.02
     for name in ("harmonic", "value", "sigma"):

@@ -4,15 +4,16 @@ the cases, and fits described in files: recordings, the cases that model them, w
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gearmbs.identify.cases import COLUMNS, CaseProblem
+from gearmbs.identify.cases import COLUMNS, WAYS, CaseProblem
 from gearmbs.identify.parameters import Free, IdentifyError
-from gearmbs.schema.described import check_keys, make, read_toml
+from gearmbs.schema.described import check_keys, chosen, make, read_toml
+from gearmbs.schema.quantities import Measure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,6 +23,11 @@ if TYPE_CHECKING:
 
 SECTIONS = ("recording", "case", "free", "measured", "gains", "channels", "starts", "workers", "experiment")
 LEVELS = ("harmonics", "way", "sections", "floor")
+FORMS: tuple[tuple[str, type, type], ...] = (
+    ("recording", dict, str), ("case", dict, dict), ("free", list, dict), ("measured", dict, object),
+    ("channels", dict, str), ("experiment", dict, dict),
+)  # fmt: skip
+"""Sections of a file, and of what they consist."""
 
 
 def harmonic_table(
@@ -49,8 +55,8 @@ def harmonic_table(
         Through the band-pass about each harmonic, or by lines at the orders; see `gearmbs.signals.gmf_rms`.
     sections : int
     floor : float
-        Least relative standard deviation.
-    channels : sequence of str, optional
+        Least relative standard deviation, positive.
+    channels : str or sequence of str, optional
         Default all.
     **settings
         For `gmf_rms`: ``gmf``, ``speed``, ``teeth``.
@@ -59,18 +65,30 @@ def harmonic_table(
     -------
     DataFrame
         With the columns `COLUMNS`.
+
+    Raises
+    ------
+    IdentifyError
+        For whatever is none of these.
     """
     import pandas as pd
 
     from gearmbs.signals import gmf_rms
 
     rows = []
-    if not isinstance(signals, Mapping):
+    if not isinstance(signals, Mapping) or not signals:
         raise IdentifyError("signals: give recordings by the name of the case that models them, {name: signal}")
+    sections, harmonics = _whole(sections, "sections"), _whole(harmonics, "harmonics")
+    chosen(WAYS, way, "", IdentifyError, "way")
+    if not 0.0 < floor < np.inf:
+        raise IdentifyError(f"floor = {floor!r}; give the least relative standard deviation, as 0.02")
+    wanted = (channels,) if isinstance(channels, str) else channels
     for case, signal in signals.items():
         if "channel" not in getattr(signal, "dims", ()) or "time" not in signal.dims:
             raise IdentifyError(f"signals: {case} is no signal with time and channels; read it by gearmbs.read_signal")
         names = [str(c) for c in signal.channel.values]
+        for name in wanted or ():
+            chosen(names, name, f"signals: {case}: ", IdentifyError, "channel")
         size = signal.sizes["time"] // sections
         levels = []
         for k in range(sections):
@@ -82,7 +100,7 @@ def harmonic_table(
         mean = np.sqrt((stack**2).mean(axis=0))
         scatter = stack.std(axis=0, ddof=1) / np.sqrt(sections) / mean if sections > 1 else np.zeros_like(mean)
         for j, name in enumerate(names):
-            if channels is not None and name not in channels:
+            if wanted is not None and name not in wanted:
                 continue
             for h in range(harmonics):
                 sigma = float(max(scatter[h, j], floor))
@@ -111,6 +129,9 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
     for key in ("recording", "free"):
         if not tree.get(key):
             raise IdentifyError(f"{path}: [{key}] is missing")
+    for key, form, inner in FORMS:
+        if not isinstance(found := tree.get(key, form()), form) or not all(isinstance(v, inner) for v in _items(found)):
+            raise IdentifyError(f"{path}: {key} = {found!r:.60} is none; see the page on identification for its form")
     measured = dict(tree.get("measured", {}))
     way = str(measured.get("way", "band"))
     table = _table(tree["recording"], measured, path.parent, tuple(tree.get("channels", {})))
@@ -122,9 +143,21 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
         gains=tree.get("gains", "channel"),
         channels=tree.get("channels"),
         way=way,
-        workers=int(tree.get("workers", 1)),
+        workers=_whole(tree.get("workers", 1), "workers"),
     )
-    return problem, {"starts": int(tree.get("starts", 1)), "experiments": tree.get("experiment")}
+    return problem, {"starts": _whole(tree.get("starts", 1), "starts"), "experiments": tree.get("experiment")}
+
+
+def _items(found: Any) -> Collection:
+    return found.values() if isinstance(found, dict) else found
+
+
+def _whole(value: Any, name: str) -> int:
+    """Return a whole number, 1 or more."""
+    try:
+        return int(Measure(low=1, whole=True).as_given(value))
+    except ValueError as error:
+        raise IdentifyError(f"{name} = {value!r}; {error}") from None
 
 
 def _free(item: dict[str, Any], path: Path) -> Free | str:

@@ -56,6 +56,9 @@ class Free:
     also: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for path, factor in self.also.items():
+            if not (isinstance(factor, (int, float)) and np.isfinite(factor)):
+                raise IdentifyError(f"{self.name}: also: {path} = {factor!r}; give the multiple, a finite number")
         if self.log and not (isinstance(self.start, str) or self.start > 0.0):
             raise IdentifyError(
                 f"{self.name}: start = {self.start:g} has no logarithm; give a positive one or log=False"

@@ -71,6 +71,8 @@ def test_bad_plans(settings, words):
         ({"levels": 0}, "levels = 0; give a whole number, 1 or more"),
         ({"levels": 2.5}, "levels = 2.5; give a whole number"),
         ({"low": 2.5, "high": 7.0, "whole": True}, "2.5 to 7 is no range of whole numbers"),
+        ({"name": 5}, "path and name are texts"),
+        ({"whole": "no"}, "whole is true or false"),
         ({"name": "index"}, "index is the name of another column"),
         ({"name": "case"}, "case is the name of another column"),
     ],

@@ -233,6 +233,15 @@ def test_a_reference_takes_out_what_a_sensor_makes_of_every_state():
         against_reference(x, sensor, reference & (sensor == "a"))
 
 
+@pytest.mark.parametrize("part", [np.nan, -0.1, 1.0])
+def test_parts_that_are_none(part):
+    with pytest.raises(CampaignError, match=says("split", "test", "parts")):
+        split_by_group(np.arange(10), test=part)
+    with pytest.raises(CampaignError, match=says("duration", "length")):
+        data_set_plan(96, specimens=4, duration=min(part, 0.0))
+    assert set(split_by_group(np.arange(10), test=0.0, validation=0.0)) == {"train"}
+
+
 def test_no_specimen_is_in_two_splits():
     groups = np.repeat(np.arange(50), 7)
     split = split_by_group(groups, test=0.2, validation=0.1, seed=1)

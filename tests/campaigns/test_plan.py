@@ -158,6 +158,13 @@ def test_a_plan_in_a_file(tmp_path):
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("text", ["factor = 3", "subject = 4\nfactor = []", "[factor]\npath = 'x'", "factor = ['x']"])
+def test_files_without_the_tables_of_plans(tmp_path, text):
+    (tmp_path / "plan.toml").write_text(f"{text}\n")
+    with pytest.raises(CampaignError, match=says("subject", "factor", "once")):
+        load_plan(tmp_path / "plan.toml")
+
+
 def test_rows_of_a_list(tmp_path):
     rows = [{"x1": 1.0, "x2": 2.0}, {"x1": 3.0, "x2": 4.0}]
     plan = make_plan(function(), (), "list", options={"rows": rows})

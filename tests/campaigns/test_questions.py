@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,6 +15,7 @@ from typer.testing import CliRunner
 from gearmbs.campaigns import (
     Campaign,
     CampaignError,
+    CampaignWarning,
     Factor,
     condition_map,
     fit_chaos,
@@ -133,6 +136,37 @@ def test_main_effects_and_interactions():
     assert table.effect["x1"] == pytest.approx(4.0)
     assert table.effect["x2 x x3"] == pytest.approx(-1.0)
     assert table.effect.drop(["x1", "x2 x x3"]).abs().max() < 1e-12
+    # without one corner the effects are mixed with each other
+    with pytest.raises(CampaignError, match=says("1 of 8", "factorial")):
+        main_effects(runs, np.where(np.arange(8) == 3, np.nan, y), NAMES)
+
+
+@pytest.mark.slow
+def test_results_that_are_missing_are_told(tmp_path):
+    """With all of them nothing is said."""
+    campaign = small(tmp_path / "c", "picky", design="one at a time")
+    campaign.run(workers=0)
+    count = campaign.status().failed
+    assert count > 0
+    with pytest.warns(CampaignWarning, match=says("y", f"{count} of {campaign.folder.case_count}")):
+        campaign.sensitivity("y")
+    whole = small(tmp_path / "d", design="one at a time")
+    whole.run(workers=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        whole.sensitivity("y")
+
+
+@pytest.mark.slow
+def test_points_that_constraints_left_out_are_no_design(tmp_path):
+    """The results of the others would be taken for those of other points."""
+    factors = [Factor(name, -1.0, 1.0, levels=3) for name in ("x1", "x2")]
+    for design in ("one at a time", "factorial", "grid", "sobol"):
+        plan = make_plan(function(), factors, design, n=16 * (design == "sobol"), constraints=["x1 + x2 < 1"], unit=16)
+        campaign = Campaign(tmp_path / design, plan)
+        campaign.run(workers=0)
+        with pytest.raises(CampaignError, match=says("constraints", "design")):
+            campaign.sensitivity("y")
 
 
 def test_response_surface_tells_its_own_error():

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from gearmbs.identify import CaseProblem, Free, IdentifyError, fit, harmonic_table
 from gearmbs.identify.measured import load_problem
+from gearmbs.signals import make_signal
 from gearmbs.studies import Case
 from tests.says import says
 
@@ -37,6 +40,7 @@ DEPTH = ("contact.depth",)
             {"free": [Free("friction.dynamic", 0.05, also={"friction.statc": 2})]},
             "friction.statc: a case has no such",
         ),
+        ({"measured": TABLE.assign(case=np.nan)}, "case is missing in a row"),
     ],
 )
 def test_bad_problems(settings, words):
@@ -89,6 +93,64 @@ def test_noise_known_up_to_a_factor():
     assert "larger than the noise" not in scaled.report()
     with pytest.raises(IdentifyError, match="level = 95"):
         told.interval("a", 95)
+
+
+def test_numbers_as_names_of_cases():
+    """A column of numbers is what a table of cases 1 and 2 is read as."""
+    problem = CaseProblem(TABLE.assign(case=1), {1: Case()}, DEPTH)
+    assert list(problem.cases) == ["1"]
+    assert set(problem.table["case"]) == {"1"}
+    for factor in (np.nan, "2"):
+        with pytest.raises(IdentifyError, match=says("also", "friction.static")):
+            Free("friction.dynamic", 0.05, also={"friction.static": factor})
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"sections": 0}, "sections = 0"),
+        ({"sections": 2.5}, "sections = 2.5"),
+        ({"harmonics": 0}, "harmonics = 0"),
+        ({"way": "foo"}, "way 'foo'"),
+        ({"floor": np.nan}, "floor = nan"),
+        ({"floor": -1.0}, "floor = -1"),
+        ({"channels": ["zz"]}, "channel 'zz'"),
+        ({"channels": "a"}, "channel 'a'"),
+    ],
+)
+def test_bad_settings_of_tables(settings, words):
+    rate = 12800.0
+    x = np.sin(2 * np.pi * 500.0 * np.arange(1 << 14) / rate)
+    signal = make_signal({"a1": x, "a2": x}, rate, units="m/s^2").assign_attrs(speed=40 * np.pi, teeth=25)
+    with pytest.raises(IdentifyError, match=re.escape(words)):
+        harmonic_table({"a": signal}, **settings)
+    table = harmonic_table({"a": signal}, channels="a1", sections=2, harmonics=1)
+    assert table["channel"].tolist() == ["a1"]
+    assert table["value"][0] == pytest.approx(np.sqrt(0.5), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("starts = 2.7", "starts = 2.7"),
+        ("workers = 0", "workers = 0"),
+        ("case = 3", "case = 3"),
+        ('channels = ["a"]', "channels = ['a']"),
+        ("[case]\na = 3", "case = "),
+    ],
+)
+def test_files_whose_sections_are_none(tmp_path, text, words):
+    TABLE.drop(columns="case").to_csv(tmp_path / "a.csv", index=False)
+    file, rest = tmp_path / "fit.toml", '[recording]\na = "a.csv"\n[[free]]\npath = "contact.depth"\n'
+    file.write_text(f"{text}\n{rest}")
+    with pytest.raises(IdentifyError, match=re.escape(words)):
+        load_problem(file)
+    for wrong in ("free = ['contact.depth']\n[recording]\na = 'a.csv'\n", rest.replace('"a.csv"', "5")):
+        file.write_text(wrong)
+        with pytest.raises(IdentifyError, match="page on identification"):
+            load_problem(file)
+    file.write_text(f"starts = 3\n{rest}")
+    assert load_problem(file)[1]["starts"] == 3
 
 
 def test_bad_recordings(tmp_path):

@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gearmbs.bearings.defects import PARTS
 from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.plans.factors import AnyFactor, Choice, Factor, Specimens
@@ -231,6 +233,8 @@ def data_set_plan(
     layers = layers or SensorLayers()
     states = box.states()
     each = len(states) * len(box.accelerometers)
+    if not 0.0 < duration < np.inf:
+        raise CampaignError(f"data set: duration = {duration!r}; give the length of a record, s")
     points = -(-signals // each)
     if points < specimens:
         raise CampaignError(

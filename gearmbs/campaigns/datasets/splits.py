@@ -24,9 +24,11 @@ def split_by_group(
     Raises
     ------
     CampaignError
-        If there are too few groups.
+        If there are too few groups, or no such parts.
     """
     groups = np.asarray(groups)
+    if not (0.0 <= test < 1.0 and 0.0 <= validation < 1.0):
+        raise CampaignError(f"split: test = {test!r}, validation = {validation!r}; give parts from 0 to below 1")
     names = np.unique(groups)
     counts = [max(1, round(part * names.size)) if part > 0.0 else 0 for part in (test, validation)]
     if sum(counts) >= names.size:

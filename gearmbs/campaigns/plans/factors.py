@@ -59,6 +59,8 @@ class Factor:
     name: str = ""
 
     def __post_init__(self) -> None:
+        if not (isinstance(self.path, str) and isinstance(self.name, str) and isinstance(self.whole, bool)):
+            raise CampaignError(f"factor {self.path!r}: path and name are texts, whole is true or false")
         if isinstance(self.values, str) or not isinstance(self.values, Sequence | np.ndarray):
             raise CampaignError(f"factor {self.path!r}: values = {self.values!r}; give a list of them")
         object.__setattr__(self, "values", tuple(python_scalar(v) for v in self.values))
@@ -169,7 +171,7 @@ class Choice:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", self.name or self.path)
-        if not self.options:
+        if not (isinstance(self.options, Mapping) and self.options):
             raise CampaignError(f"choice {self.path!r}: give at least one option by name")
 
     @property

@@ -527,10 +527,13 @@ def load_plan(path: str | Path) -> Plan:
     path = Path(path)
     tree = read_toml(path, CampaignError)
     subject = tree.pop("subject", {})
+    tables = tree.pop("factor", [])
+    if not (isinstance(subject, dict) and isinstance(tables, list) and all(isinstance(t, dict) for t in tables)):
+        raise CampaignError(f"{path}: write [subject] once, and [[factor]] above each factor")
     kind = subject.pop("kind", "pair")
+    factors = [factor_from(table) for table in tables]
     if "base" in tree:
         subject["case"] = tree.pop("base")
-    factors = [factor_from(table) for table in tree.pop("factor", [])]
     if "factors" in tree:
         raise CampaignError(f"{path}: factors is no entry of a plan's file; write [[factor]] above each of them")
     for key in FILES:

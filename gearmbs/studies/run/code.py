@@ -40,9 +40,9 @@ from gearmbs.files import write_whole
 PACKAGE = Path(__file__).parents[2]
 
 OUTSIDE = (
-    "__main__", "_command", "campaigns.campaign", "campaigns.cluster", "campaigns.datasets", "campaigns.page",
-    "campaigns.results", "campaigns.sensitivity", "campaigns.sobol_bounds", "campaigns.status", "campaigns.stored",
-    "campaigns.surrogates", "cli", "compile", "identify", "saving", "view",
+    "__main__", "_command", "campaigns.campaign", "campaigns.cluster", "campaigns.datasets", "campaigns.figures",
+    "campaigns.page", "campaigns.report", "campaigns.results", "campaigns.sensitivity", "campaigns.sobol_bounds",
+    "campaigns.status", "campaigns.stored", "campaigns.surrogates", "cli", "compile", "identify", "saving", "view",
 )  # fmt: skip
 """Modules and folders of the package that simulate nothing: they ask, show, write and distribute."""
 

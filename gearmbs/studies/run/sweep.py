@@ -187,7 +187,8 @@ def cases_of_sweep(case: Case, field: str, values: Sequence[Any]) -> list[Case]:
     section, _, name = field.partition(".")
     _check_field(case, field)
     case = case.as_one_of_many()
-    if isinstance(values, str) or not len(values):
+    values = values if isinstance(values, str) else list(values)
+    if isinstance(values, str) or not values:
         raise CaseError(f"values: {values!r}; give a sequence of values of {field}")
     cases = []
     for place, value in enumerate(values, 1):
