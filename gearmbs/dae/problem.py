@@ -273,6 +273,9 @@ class DAEProblem:
         Typical magnitude of each unknown, for scaling the Newton matrix.
     differential : ndarray of bool, shape (n,)
         Unknowns whose derivative appears in G.
+    continuous : ndarray of bool, shape (n,), optional
+        Unknowns without a derivative in G that cannot jump all the same, as functions of those with one: velocities
+        that follow from momenta. Where a run starts afresh their error is tested as that of the others. Default: none.
     index_one : ndarray of bool, shape (n,), optional
         Algebraic unknowns that equations without derivatives determine: the corrector satisfies them to their
         tolerance at every step. What others, multipliers of index two and more, do to the rest shrinks with the step,
@@ -336,6 +339,7 @@ class DAEProblem:
     scale: np.ndarray
     differential: np.ndarray
     t0: float = 0.0
+    continuous: np.ndarray | None = None
     index_one: np.ndarray | None = None
     nonlinear_rates: bool = False
     start_note: str = ""

@@ -231,6 +231,14 @@ def differential_mask(at: dict[str, int], formulation: int, states: np.ndarray) 
     return mask
 
 
+def given_by_momenta(at: dict[str, int], formulation: int) -> np.ndarray:
+    """Return which unknowns under error control follow from the momenta p and p_f: eps and v_f, with rate rows."""
+    mask = np.zeros(at["n"], dtype=bool)
+    if has_rate_rows.py_func(formulation):
+        mask[at["eps"] : at["R"]] = True
+    return mask
+
+
 def error_mask(at: dict[str, int], formulation: int, states: np.ndarray) -> np.ndarray:
     """Return whose error an integrator is to control: positions, with rate rows velocities, differential states."""
     mask = np.zeros(at["n"], dtype=bool)

@@ -229,6 +229,8 @@ def _set_tolerances(st: RunState, problem: DAEProblem, options: Options, span: f
     st.watches_poles = not (problem.finite_rates or problem.nonlinear_rates)
     st.tested[:] = np.maximum(st.controlled, st.index_one) if options.corrector == "modified" else 1.0
     st.differential[:] = problem.differential
+    if problem.continuous is not None:
+        st.differential[problem.continuous] = 1.0
     st.coupled[:] = np.maximum(np.maximum(st.controlled, st.differential), st.index_one)
 
 
@@ -440,7 +442,7 @@ def _algebraic_note(run: Run) -> str:
     st = run.state
     y, res, delta = st.y, st.res, st.delta
     allowed = JUMP_LIMIT * (st.atol + st.rtol * np.abs(y))
-    replaced = (np.abs(delta) > allowed) & ~run.problem.differential
+    replaced = (np.abs(delta) > allowed) & (st.differential == 0.0)
     # over a vanishing step an equation that is satisfied up to rounding can move an unknown of a high index too
     if not np.max(np.abs(res)) > ROUNDED_RESIDUAL * (1.0 + np.max(np.abs(y))):
         replaced[:] = False
@@ -458,7 +460,7 @@ def _repair_within(run: Run, h: float, limit: float, refusal: Failure | None) ->
     if choose_first_pivots(run, h) is not None or not _correction(run) <= limit:
         return refusal
     failure = _repair(run, h)
-    back = ~run.problem.differential
+    back = st.differential == 0.0
     # multipliers over a vanishing step are impulses; those of the state are near, and the first step finds them
     if failure is not None or np.max(np.abs(st.y - start) * st.w_error) > limit:
         if refusal is not None:
@@ -485,7 +487,7 @@ def _repair(run: Run, h: float) -> Failure | None:
         _residual(run)
         if not np.isfinite(_correction(run)):
             break
-        y -= st.delta if sweep < REPAIR_SWEEPS else np.where(run.problem.differential, 0.0, st.delta)
+        y -= st.delta if sweep < REPAIR_SWEEPS else np.where(st.differential != 0.0, 0.0, st.delta)
     st.yp[:] = rates
     newest_point(st)[:] = y
     st.record_y[0, : len(y)] = y

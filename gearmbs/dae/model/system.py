@@ -202,6 +202,7 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
         atol_scale=allowed,
         scale=scale,
         differential=unknowns.differential_mask(at, form, differential),
+        continuous=unknowns.given_by_momenta(at, form),
         t0=system.t0,
         index_one=index_one if index_one.any() else None,
         names=[unknown.name for unknown in model.unknowns(formulation)],
