@@ -361,3 +361,8 @@ class DAEProblem:
     numbers: Mapping[str, Number] = field(default_factory=dict)
     counted: Counted | None = None
     watched: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def goes_on(self) -> np.ndarray:
+        """Which unknowns cannot jump, ndarray of bool, shape (n,): ``differential`` and ``continuous`` ones."""
+        return self.differential if self.continuous is None else self.differential | self.continuous

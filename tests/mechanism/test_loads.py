@@ -232,15 +232,16 @@ def test_arrays_in_expressions():
 
 
 @pytest.mark.parametrize("tol", [1e-7, 1e-9])
-@pytest.mark.parametrize("formulation", ["SI2", "SI1"])
+@pytest.mark.parametrize(("formulation", "integrator"), [("SI2", "WSTIFF"), ("SI1", "GSTIFF"), ("SI2", "IDA")])
 @pytest.mark.parametrize("jump", [0.0, 0.5])
-def test_a_load_that_grows_from_nothing(tol, formulation, jump):
+def test_a_load_that_grows_from_nothing(tol, formulation, integrator, jump):
     """w = a (t - t_j)^2 / 2 I: the first step's error is the speed's alone, which follows from the momentum."""
     m = Mechanism("from rest")
     disc = m.body("disc", 1.0, (2, 2, 2))
     m.revolute("hinge", m.ground, disc)
     m.torque("load", disc, f"IF(TIME-{jump}: 0, 0, 239.9*(TIME-{jump}))")
-    run = m.simulate(1.0, tol=tol, formulation=formulation, dense_output=True, breakpoints=[jump] if jump else ())
+    places = [jump] if jump else ()
+    run = m.simulate(1.0, rate=500.0, tol=tol, formulation=formulation, integrator=integrator, breakpoints=places)
     exact = 239.9 * np.clip(run.t - jump, 0.0, None) ** 2 / 4
     # steps add up what each may leave
     assert np.abs(run.angular_velocity("disc")[:, 2] - exact).max() < 10 * tol * max(1.0, exact.max())

@@ -16,7 +16,7 @@ import numpy as np
 
 from gearmbs.dae.integrators import messages
 from gearmbs.dae.integrators import run_state as s
-from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
+from gearmbs.dae.integrators.algebraic.outputs import AlgebraicOutputs
 from gearmbs.dae.integrators.branches import has_pole_ahead, stays_on_jump
 from gearmbs.dae.integrators.corrector import rounding_level
 from gearmbs.dae.integrators.initial_state import begin, choose_steps, initial_state

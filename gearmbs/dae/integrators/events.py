@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.integrators.algebraic import note_moves, settle, settle_between
+from gearmbs.dae.integrators.algebraic.between import note_moves, settle_between
+from gearmbs.dae.integrators.algebraic.instant import settle
 from gearmbs.dae.integrators.corrector import GOLDEN_FRACTION
 from gearmbs.dae.integrators.run_state import copy, rows_from, times_from
 from gearmbs.kernels.jit import njit

@@ -228,9 +228,7 @@ def _set_tolerances(st: RunState, problem: DAEProblem, options: Options, span: f
     # equations that are not linear in y' need not be defined for y' = 0, at which poles are looked for
     st.watches_poles = not (problem.finite_rates or problem.nonlinear_rates)
     st.tested[:] = np.maximum(st.controlled, st.index_one) if options.corrector == "modified" else 1.0
-    st.differential[:] = problem.differential
-    if problem.continuous is not None:
-        st.differential[problem.continuous] = 1.0
+    st.differential[:] = problem.goes_on
     st.coupled[:] = np.maximum(np.maximum(st.controlled, st.differential), st.index_one)
 
 

@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gearmbs.dae.integrators.algebraic import UNRESOLVED, AlgebraicOutputs, follow, settle_on_steps
+from gearmbs.dae.integrators.algebraic.between import UNRESOLVED, follow, settle_on_steps
+from gearmbs.dae.integrators.algebraic.outputs import AlgebraicOutputs
 from gearmbs.dae.integrators.messages import unresolved
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState

@@ -13,7 +13,7 @@ from numba import int64
 
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
-from gearmbs.dae.integrators.algebraic import PART_TYPE
+from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.branches import is_lost, keeps_its_index, kept_its_index, passes_pole, stays_on_branch
 from gearmbs.dae.integrators.controller import after_error_failure, after_start, after_success
 from gearmbs.dae.integrators.corrector import (

@@ -17,7 +17,9 @@ from weakref import ref
 import numpy as np
 from numba import float64, int64, types
 
-from gearmbs.dae.integrators.algebraic import PART_TYPE, AlgebraicOutputs, AlgebraicPart, settle_between, settle_output
+from gearmbs.dae.integrators.algebraic.between import settle_between, settle_output
+from gearmbs.dae.integrators.algebraic.outputs import AlgebraicOutputs
+from gearmbs.dae.integrators.algebraic.part import PART_TYPE, AlgebraicPart
 from gearmbs.dae.integrators.bdf import HISTORY, MAX_ORDER
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.records import Records

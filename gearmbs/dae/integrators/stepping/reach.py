@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import float64, int64, types
 
-from gearmbs.dae.integrators.algebraic import PART_TYPE
+from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.run_state import (
     BUFFER_FULL,
