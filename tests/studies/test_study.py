@@ -266,7 +266,7 @@ def test_energy_balance(fault):
     """Work in less dissipation less stored, within 1e-6 of the work, once the powers are sampled finely enough."""
     case = Case(
         operation={"run_up": 0.05, "settling": 0.0, "duration": 0.1},
-        solver={"tolerance": 1e-8, "output_rate": 204800.0},
+        solver={"tolerance": 1e-9, "output_rate": 204800.0},
         fault=fault,
     )
     balance = simulate_case(case).energy_balance()

@@ -146,12 +146,11 @@ def other_rounding(problem, number):
 @pytest.mark.parametrize("loops", LOOPS)
 @pytest.mark.parametrize("tol", [1e-8, 1e-9, 1e-10, 1e-11])
 def test_chain_of_index_three_passes_at_the_level_of_rounding(loops, tol):
-    """The bound of the other forms, in the middle of five runs whose numbers differ by their last digit.
+    """The bound of the other forms, and kicks of positions that end next to a singular position.
 
-    Velocities are outside error control at index three. A step that ends next to a singular position moves positions
-    by up to the tolerance over the constant of its error, and by that times gamma it kicks the velocities for good.
-    Whether one ends there is chance, and rounding draws: of fifteen runs at 1e-10 one is at 1.7 times the bound, so
-    that three of five are over it once in 300 times. Their middle is at 0.1 to 0.6 of it.
+    Velocities are outside error control at index three. A step that ends there moves positions by up to the tolerance
+    over the constant of its error, and by that times gamma it kicks the velocities for good. Whether one ends there is
+    chance, and rounding draws, so that some runs are made whose numbers differ by their last digit.
     """
     reference = chain_problem(loops, 2.0)
     runs = [
@@ -159,7 +158,9 @@ def test_chain_of_index_three_passes_at_the_level_of_rounding(loops, tol):
         for number in range(5 if loops < 100 else 3)
     ]
     assert all(run.success for run in runs)
-    assert np.median([reference.error(run.t, run.y) for run in runs]) < 400 * tol + 5e-9
+    # positions move by tol over 1 / (k + 1), velocities by gamma = 137 / (60 h) of that, at order k = 5 and h = 0.036
+    kick = SINGULAR_POSITIONS * 6.0 * 137.0 / 60.0 / 0.036
+    assert max(reference.error(run.t, run.y) for run in runs) < (400 + kick) * tol + 5e-9
     assert np.median([run.stats.newton_rejections for run in runs]) <= SINGULAR_POSITIONS
     if tol >= 1e-8:
         assert np.median([run.stats.noise_limited for run in runs]) == 0
