@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.integrators import run_state as s
-from gearmbs.dae.integrators.algebraic import settle_output
+from gearmbs.dae.integrators.algebraic.between import settle_output
 from gearmbs.dae.integrators.driver import HOPELESS, HOPELESS_DIGITS, UNSATISFIED
 from gearmbs.dae.integrators.messages import WINDOW
 from gearmbs.dae.integrators.run_state import copy, rows_from, times_from

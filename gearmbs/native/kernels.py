@@ -10,7 +10,8 @@ from numba import float64, int64
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions.evaluate import eval_request
-from gearmbs.dae.integrators.algebraic import PART_TYPE, settle_output
+from gearmbs.dae.integrators.algebraic.between import settle_output
+from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.run_state import STATE_TYPE
 from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.integrators.stepping.jumps import pass_jump, steer
