@@ -21,7 +21,7 @@ Rolling bearings
     `Bearing`, `RollingBearing`
 Mechanisms
     `Mechanism`, `JointFriction`, `simulate`, `Simulator`, `State`, `static_equilibrium`, `quasi_static`,
-    `linear_modes`, `linearize`, `forward_sensitivities`, `Solution`
+    `linear_modes`, `linearize`, `forward_sensitivities`, `steady_sensitivities`, `Solution`
 Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals

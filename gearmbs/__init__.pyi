@@ -48,6 +48,7 @@ from .mechanism import linearize as linearize
 from .mechanism import quasi_static as quasi_static
 from .mechanism import simulate as simulate
 from .mechanism import static_equilibrium as static_equilibrium
+from .mechanism import steady_sensitivities as steady_sensitivities
 from .saving import save as save
 from .signals import CoupledRun as CoupledRun
 from .signals import analyse as analyse

@@ -25,7 +25,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gearmbs.dae.orbits import CLOSED, IN_TOLERANCES, Orbit, Search
+from gearmbs.dae.orbits import CLOSED, IN_TOLERANCES, Orbit, Search, directions_at
 from gearmbs.dae.problem import DAEProblem
 
 BY = 1e-3
@@ -188,11 +188,16 @@ class _Curve:
         self.start, self.span, self.tol, self.method = start, abs(stop - start), tol, method
         self.values: list[float] = []
         self.orbits: list[Orbit] = []
+        self.places: np.ndarray | None = None
 
     def search(self, p: float) -> tuple[Search, AtValue]:
         """Return a search for orbits at a value."""
         at = self.posed(p)
-        return Search(at.problem, at.period, at.advance, self.tol, self.method, SEARCHED, CLOSED), at
+        search = Search(at.problem, at.period, at.advance, self.tol, self.method, SEARCHED, CLOSED)
+        if self.places is not None:
+            # x is of the same unknowns all along the curve
+            search.directions = directions_at(at.problem, self.places)
+        return search, at
 
     def begin(self, first: Orbit | None) -> np.ndarray:
         """Take the first orbit; return z of it."""
@@ -206,7 +211,7 @@ class _Curve:
                 search, at = self.search(self.start)
                 search.problem = first.problem
                 first = search.found()
-        self.places, self.basis = first.directions.places, first.directions.basis
+        self.places = first.directions.places
         # x in units of the orbit's own size
         weights = np.abs(search.weights).max(axis=0)
         self.unit = first.size / np.where(weights > 0.0, weights, 1.0)
@@ -227,10 +232,10 @@ class _Curve:
     def tried(self, z: np.ndarray, matrix: np.ndarray | None) -> tuple[Orbit, np.ndarray]:
         """Return the motion over a period from z, and by what it misses itself, in units of x."""
         search, at = self.search(float(z[-1] * self.span))
-        last = self.orbits[-1].problem
+        last, basis = self.orbits[-1].problem, self.orbits[-1].directions.basis
         # all other unknowns move with the origin, and with x
         y = last.y0 + at.origin - self.posed(self.values[-1]).origin
-        y = y + self.basis @ (at.origin[self.places] + z[:-1] * self.unit - y[self.places])
+        y = y + basis @ (at.origin[self.places] + z[:-1] * self.unit - y[self.places])
         orbit = search.tried(replace(at.problem, y0=y, yp0=last.yp0), matrix)
         return orbit, search.missing(orbit) / self.unit
 

@@ -57,7 +57,7 @@ class Directions:
     basis: np.ndarray
 
 
-def directions_at(problem: DAEProblem) -> Directions:
+def directions_at(problem: DAEProblem, places: np.ndarray | None = None) -> Directions:
     """Return in which directions the initial values of a problem may be moved.
 
     Equations without rates hold at each instant, those of velocities with those of positions as in the stabilised form
@@ -68,26 +68,47 @@ def directions_at(problem: DAEProblem) -> Directions:
     ----------
     problem : DAEProblem
         At consistent values; of index one, or two with all constraints among its equations.
+    places : ndarray of int, optional
+        Independent unknowns that were chosen at other values; default by pivots here.
     """
     n = problem.n
     scale = np.asarray(problem.scale, dtype=float)
     differential = np.flatnonzero(problem.differential)
-    whole, rates = (_dense(problem, cj) for cj in (0.0, 1.0))
-    rates -= whole
-    algebraic = ~(rates != 0.0).any(axis=1)
-    if not algebraic.any():
+    algebraic, rows, _ = algebraic_rows(problem)
+    if not algebraic.size:
         return Directions(differential, np.eye(n)[:, differential])
-    rows = whole[algebraic] * scale
-    rows /= np.maximum(np.abs(rows).max(axis=1, keepdims=True), np.finfo(float).tiny)
     null = scipy.linalg.null_space(rows, rcond=INDEPENDENT)
-    left, sizes, _ = np.linalg.svd(null[differential], full_matrices=False)
-    left = left[:, sizes > INDEPENDENT * sizes.max(initial=0.0)]
-    _, _, order = scipy.linalg.qr(left.T, pivoting=True, mode="economic")
-    places = np.sort(differential[order[: left.shape[1]]])
+    if places is None:
+        left, sizes, _ = np.linalg.svd(null[differential], full_matrices=False)
+        left = left[:, sizes > INDEPENDENT * sizes.max(initial=0.0)]
+        _, _, order = scipy.linalg.qr(left.T, pivoting=True, mode="economic")
+        places = np.sort(differential[order[: left.shape[1]]])
     # of what does not change with them, as multipliers, the least is taken
     basis = scale[:, None] * (null @ np.linalg.pinv(null[places], rcond=INDEPENDENT)) / scale[places]
-    tested = np.asarray(problem.error_mask) | np.asarray(problem.differential)
-    return Directions(places, np.where(tested[:, None], basis, 0.0))
+    return Directions(places, np.where(moved_at_start(problem)[:, None], basis, 0.0))
+
+
+def algebraic_rows(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the equations without rates, dG_a/dy in units of the unknowns' magnitudes, rows of size one, and sizes.
+
+    Returns
+    -------
+    places : ndarray of int, shape (a,)
+    rows : ndarray, shape (a, n)
+    sizes : ndarray, shape (a,)
+        By which the equations are divided.
+    """
+    whole, rates = (_dense(problem, cj) for cj in (0.0, 1.0))
+    rates -= whole
+    places = np.flatnonzero(~(rates != 0.0).any(axis=1))
+    rows = whole[places] * np.asarray(problem.scale, dtype=float)
+    sizes = np.maximum(np.abs(rows).max(axis=1, initial=0.0), np.finfo(float).tiny)
+    return places, rows / sizes[:, None], sizes
+
+
+def moved_at_start(problem: DAEProblem) -> np.ndarray:
+    """Return which unknowns have a direction at the start; the first step finds the others, ndarray of bool."""
+    return np.asarray(problem.error_mask) | np.asarray(problem.differential)
 
 
 def check_repeats(
@@ -169,6 +190,8 @@ class Orbit:
         It starts on the orbit.
     period : float
         s.
+    advance : ndarray, shape (n,)
+        What unknowns advance by in it.
     result : DAEResult
         Over the period, with dense output.
     directions : Directions
@@ -188,6 +211,7 @@ class Orbit:
 
     problem: DAEProblem
     period: float
+    advance: np.ndarray
     result: DAEResult
     directions: Directions
     near: np.ndarray
@@ -455,7 +479,7 @@ class Search:
             step = self.step(orbit)
             step *= min(1.0, FARTHEST * orbit.size / self.size_of(step))
             for _ in range(HALVINGS + 1):
-                start = orbit.result.y[0] + self.directions.basis @ step
+                start = orbit.result.y[0] + orbit.directions.basis @ step
                 moved = replace(self.problem, y0=start, yp0=orbit.result.yp[-1].copy())
                 found = self.tried(moved, orbit.near)
                 if found.defect < orbit.defect:
@@ -472,12 +496,15 @@ class Search:
         result = self.integrate(problem)
         start = replace(problem, y0=result.y[0].copy(), yp0=result.yp[0].copy())
         own = matrix is None
+        # the tangent space is another one at each start
+        directions = directions_at(start, self.directions.places)
         if matrix is None:
-            matrix = monodromy_of(start, result, self.directions)
+            matrix = monodromy_of(start, result, directions)
         gone = (result.t - result.t[0])[:, None] / self.period * self.advance[self.tested]
         apart = (result.y[:, self.tested] - gone) * self.weight
         size = 0.5 * float(np.ptp(apart, axis=0).max(initial=0.0)) + np.finfo(float).tiny
-        orbit = Orbit(start, self.period, result, self.directions, matrix, own, 0.0, 0.0, size, self.periods)
+        known = self.advance, result, directions, matrix, own
+        orbit = Orbit(start, self.period, *known, 0.0, 0.0, size, self.periods)
         return self.with_matrix(replace(orbit, defect=self.size_of(self.missing(orbit))), matrix, own)
 
     def with_matrix(self, orbit: Orbit, matrix: np.ndarray, own: bool) -> Orbit:

@@ -263,10 +263,11 @@ def follow_run(
         for i in range(n):
             tr.y[0, i] = y[m, i]
         if afresh:
-            # algebraic unknowns may jump where a run starts afresh
-            for p in range(count):
-                for i in range(n):
-                    if tr.differential[i] == 0.0:
+            # algebraic unknowns may jump where a run starts afresh, and be impulses in a start that was repaired
+            for i in range(n):
+                if tr.differential[i] == 0.0:
+                    tr.y[1, i] = tr.y[0, i]
+                    for p in range(count):
                         tr.s[count + p, i] = tr.s[p, i]
         look_for_jumps(functions, tr, plan, factors, k, yp[m], idata, rdata, work)
         tr.n_past = min(past + 1, HISTORY)
@@ -463,7 +464,7 @@ def _track(problem: DAEProblem, directions: list[Direction]) -> Track:
         weight=np.concatenate([d.weights for d in directions] or [np.zeros(0)]).astype(float),
         first=first,
         scale=np.asarray(problem.scale, dtype=float).copy(),
-        differential=np.asarray(problem.differential, dtype=float),
+        differential=np.asarray(problem.goes_on, dtype=float),
         vals=np.zeros(len(problem.indices)),
         kept=np.zeros(max(1, numbers)),
         before=np.zeros((HISTORY, n)),

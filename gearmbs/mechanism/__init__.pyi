@@ -34,6 +34,8 @@ from .solve.analyses import kinematic as kinematic
 from .solve.analyses import linear_modes as linear_modes
 from .solve.analyses import quasi_static as quasi_static
 from .solve.analyses import static_equilibrium as static_equilibrium
+from .solve.orbit_sensitivities import SteadySensitivities as SteadySensitivities
+from .solve.orbit_sensitivities import steady_sensitivities as steady_sensitivities
 from .solve.orbits import SteadyMotion as SteadyMotion
 from .solve.orbits import steady_motion as steady_motion
 from .solve.plants import linearize as linearize

@@ -113,18 +113,7 @@ class SteadyMotion:
         ndarray of complex, shape (count + 1, ...)
             c_k of sum Re(c_k exp(2 pi i k every t / T)), t from the start; c_0 is the mean.
         """
-        from scipy.interpolate import PchipInterpolator
-
-        solution = self.solution
-        values = np.asarray(solution.evaluate(result) if isinstance(result, str) else result(solution), dtype=float)
-        samples = SAMPLES * every
-        times = solution.t[0] + np.arange(samples) * (self.period / samples)
-        at = PchipInterpolator(solution.t, values.reshape(solution.t.size, -1), axis=0)(times)
-        # what differs at the two ends, as a force that jumps there, counts half from each side
-        at[0] = 0.5 * (values[0] + values[-1]).ravel()
-        wanted = np.fft.rfft(at, axis=0)[every * np.arange(count + 1)] / samples
-        wanted[1:] *= 2.0
-        return wanted.reshape(count + 1, *values.shape[1:])
+        return harmonics_of(self.solution, self.period, result, count, every)
 
     def __repr__(self) -> str:
         first = abs(self.orbit.largest)
@@ -133,6 +122,23 @@ class SteadyMotion:
             f"SteadyMotion(period {self.period:.6g} s, {kind}: largest multiplier {first:.3g}, off by "
             f"{self.error:.1e} of its size, {self.periods} periods integrated)"
         )
+
+
+def harmonics_of(
+    solution: Solution, period: float, result: str | Callable[[Solution], Any], count: int, every: int
+) -> np.ndarray:
+    """Return complex amplitudes of the harmonics of a result over a period; see `SteadyMotion.harmonics`."""
+    from scipy.interpolate import PchipInterpolator
+
+    values = np.asarray(solution.evaluate(result) if isinstance(result, str) else result(solution), dtype=float)
+    samples = SAMPLES * every
+    times = solution.t[0] + np.arange(samples) * (period / samples)
+    at = PchipInterpolator(solution.t, values.reshape(solution.t.size, -1), axis=0)(times)
+    # what differs at the two ends, as a force that jumps there, counts half from each side
+    at[0] = 0.5 * (values[0] + values[-1]).ravel()
+    wanted = np.fft.rfft(at, axis=0)[every * np.arange(count + 1)] / samples
+    wanted[1:] *= 2.0
+    return wanted.reshape(count + 1, *values.shape[1:])
 
 
 @dataclass(frozen=True)

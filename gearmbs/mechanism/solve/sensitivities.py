@@ -155,13 +155,9 @@ def forward_sensitivities(
     if not INTEGRATORS.get(name, INTEGRATORS[DEFAULT]).can("dense_output"):
         able = any_of(those_that("dense_output"))
         raise ModelError(f"integrator: {name!r} does not keep its steps for sensitivities; choose {able}")
-    if not parameters:
-        raise ModelError("parameters: there is none; give names and values, as {'stiffness': 2e8}")
-    values, scales = {}, {}
-    for key, given in parameters.items():
-        values[key], scales[key] = _value_and_scale(key, given)
+    values, scales = values_and_scales(parameters)
     start, end = quantity(t_start, "time", "t_start"), quantity(t_end, "time", "t_end")
-    mechanism = _built(build, values)
+    mechanism = built(build, values)
     usual, rate_scale = chosen_accuracy(mechanism, (start, end), tol, rate_scale)
     tol = TIGHTER * usual if tol is None else usual
     solution = simulate(
@@ -173,15 +169,15 @@ def forward_sensitivities(
     lumped = mechanism.lump if lump is None else lump
 
     def made(key: str, value: float):
-        other = _built(build, values | {key: value})
-        _check_functions(key, mechanism, other)
+        other = built(build, values | {key: value})
+        check_functions(key, mechanism, other)
         return prepared(other, start, lumped, formulation, rate_scale, True)
 
     directions = []
     for key, value in values.items():
         by = MOST * scales[key]
         plus, minus = made(key, value + by)[1], made(key, value - by)[1]
-        directions.append(_direction(key, solution.problem, plus, minus, 2.0 * by / scales[key]))
+        directions.append(direction_of(key, solution.problem, plus, minus, 2.0 * by / scales[key]))
     followed: Followed = follow(solution.problem, solution.result, directions)
     unknowns = {key: followed.s[p] / scales[key] for p, key in enumerate(values)}
     rates = {key: followed.sp[p] / scales[key] for p, key in enumerate(values)}
@@ -201,6 +197,14 @@ def forward_sensitivities(
     return Sensitivities(solution, values, unknowns, rates, errors, beside, scales)
 
 
+def values_and_scales(parameters: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, float]]:
+    """Return values and scales of parameters by name."""
+    if not parameters:
+        raise ModelError("parameters: there is none; give names and values, as {'stiffness': 2e8}")
+    pairs = {name: _value_and_scale(name, given) for name, given in parameters.items()}
+    return {name: value for name, (value, _) in pairs.items()}, {name: scale for name, (_, scale) in pairs.items()}
+
+
 def _value_and_scale(name: str, given: Any) -> tuple[float, float]:
     """Return value and scale of a parameter."""
     pair = given if isinstance(given, tuple) else (given, None)
@@ -214,14 +218,14 @@ def _value_and_scale(name: str, given: Any) -> tuple[float, float]:
     return value, scale
 
 
-def _built(build: Callable[..., Mechanism], values: Mapping[str, float]) -> Mechanism:
+def built(build: Callable[..., Mechanism], values: Mapping[str, float]) -> Mechanism:
     made = build(**values)
     if not isinstance(made, Mechanism):
         raise ModelError(f"build: it returned {made!r}; it has to return the Mechanism of these parameters")
     return made
 
 
-def _check_functions(name: str, mechanism: Mechanism, other: Mechanism) -> None:
+def check_functions(name: str, mechanism: Mechanism, other: Mechanism) -> None:
     """Refuse functions of Python that are other ones each time: what of the parameter is in them cannot be seen."""
     for key, known in mechanism.functions.items():
         found = other.functions.get(key)
@@ -232,7 +236,7 @@ def _check_functions(name: str, mechanism: Mechanism, other: Mechanism) -> None:
             )
 
 
-def _direction(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEProblem, width: float) -> Direction:
+def direction_of(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEProblem, width: float) -> Direction:
     """Return how tables and start change by the scale of a parameter; refuse one that changes what there is."""
     for side in (plus, minus):
         same = side.n == problem.n and side.idata.shape == problem.idata.shape
