@@ -132,8 +132,8 @@ def steady_sensitivities(
     def placed(problem: DAEProblem) -> DAEProblem:
         """Return equations of another value on the orbit."""
         idata = np.where(there, orbit.problem.idata, problem.idata)
-        at = {"t0": orbit.problem.t0, "y0": orbit.problem.y0, "yp0": orbit.problem.yp0}
-        return replace(problem, rdata=problem.rdata + gone, idata=idata, **at)
+        at = orbit.problem
+        return replace(problem, rdata=problem.rdata + gone, idata=idata, t0=at.t0, y0=at.y0, yp0=at.yp0)
 
     directions = []
     for key, value in values.items():

@@ -247,7 +247,8 @@ def direction_of(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEPro
         if not same or side.rdata.shape != problem.rdata.shape:
             raise ModelError(
                 f"parameter {name!r}: with another value the model has other parts or other tables, so that nothing "
-                "can be differentiated by it; take one that changes numbers only"
+                "can be differentiated by it; take one that changes numbers only (in an expression 0 and 1 may vanish: "
+                "give m.parameter there)"
             )
     change = (plus.rdata - minus.rdata) / width
     places = np.flatnonzero(change)
