@@ -11,6 +11,7 @@ import pytest
 import gearmbs as gm
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.solve.simulate import StopAt
+from gearmbs.studies import Case, case_mechanism
 from tests.mechanism.test_setting import PERIOD, PI, disc, driven, two_discs
 from tests.says import says
 
@@ -216,3 +217,26 @@ def test_what_is_meant_runs():
     pin = stopped.revolute("pin", body, stopped.ground, axis=(0, 0, 1))
     stopped.algebraic_state("angle", f"AZ({pin.i.name}, {pin.j.name})")
     assert gm.Simulator(stopped, 1.0, stops=(StopAt("angle", 0.5, 1),)).advance(1.0).state == "angle"
+
+
+def test_sample_times_that_no_time_tells_apart_are_refused_and_short_ones_are_not():
+    m = Mechanism("disc")
+    disc = m.body("disc", 1.0, (1, 1, 1))
+    m.revolute("pin", m.ground, disc)
+    m.torque("load", disc, m.input("load", "N m"))
+    sim = gm.Simulator(m, 1.0)
+    with pytest.raises(ModelError, match=says("sample_time", "told apart")):
+        sim.control("load", lambda t, now: 1.0, sample_time=1e-17)
+    sim.control("load", lambda t, now: 1.0, sample_time="1 us")
+    sim.advance(1e-4)
+    assert sim.get("angular_velocity", "disc")[2] == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_what_goes_by_two_names_is_listed_under_both_and_what_needs_another_model_says_so():
+    sim = gm.Simulator(case_mechanism(Case()), 1.0)
+    assert sim.numbers["operation.torque"] == sim.numbers["load.torque"]
+    sim.set("operation.torque", "50 N m")
+    assert sim.get("input", "operation.torque") == 50.0
+    for name in ("gears.teeth", "mesh.backlash", "operation.speed"):
+        with pytest.raises(ModelError, match=says(name, "another mechanism")):
+            sim.set(name, 1.0)

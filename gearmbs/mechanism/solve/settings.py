@@ -88,7 +88,11 @@ class Settings:
         names = [*self.aliases, *self.numbers]
         hint = did_you_mean(known, names, otherwise=did_you_mean(str(known).lower(), names))
         listed = f"there are {', '.join(names)}" if names else "the mechanism has none; add one with m.input(...)"
-        raise ModelError(f"there is no input or parameter {known!r}{': ' + hint if hint else ''}; {listed}")
+        raise ModelError(
+            f"there is no input or parameter {known!r}{': ' + hint if hint else ''}; {listed}. What other numbers "
+            "follow from, as masses, geometry and speeds of drives, takes another mechanism, which goes on from the "
+            "state (initial=)"
+        )
 
     def set(self, name: str, value: Any, hold: int = 0) -> None:
         """Let a number take another value from the next change on; see `Simulator.set`."""

@@ -47,6 +47,9 @@ from gearmbs.wording import any_of
 
 NOTHING = nullcontext()
 """Null context, used when the mechanism has no functions of Python."""
+RESOLVED = 1e-12
+"""Least sample time of a controller, as part of the end of the run: some thousand times what tells two times apart
+there, 2e-16 of it, so that samples lie where they are meant."""
 new_point = tuple.__new__
 """Makes a point of its parts in half the time that its class takes."""
 OWN = {
@@ -186,9 +189,9 @@ class Simulator(Told):
         self._records = records
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
-        self.numbers = MappingProxyType(dict(self._base.numbers))
-        parts = {**mechanism.bodies, **mechanism.elements}
-        self._settings = Settings(self.numbers, mechanism.aliases, parts)
+        numbers, aliases = dict(self._base.numbers), mechanism.aliases
+        self.numbers = MappingProxyType(numbers | {alias: numbers[name] for alias, name in aliases.items()})
+        self._settings = Settings(numbers, aliases, {**mechanism.bodies, **mechanism.elements})
         self._simulated, self._took, self._since = 0.0, 0.0, 0.0
         vars(self)["t"] = 0.0
         self._begin(initial)
@@ -461,6 +464,11 @@ class Simulator(Told):
         period = quantity(sample_time, "time", "control: sample_time")
         if not (np.isfinite(period) and period > 0.0):
             raise ModelError(f"control: sample_time = {period} s for {name!r}; it must be positive")
+        if period < RESOLVED * self.t_end:
+            raise ModelError(
+                f"control: sample_time = {period:g} s for {name!r}: times up to t_end = {self.t_end:g} s are not told "
+                f"apart by it; give {RESOLVED * self.t_end:.2g} s or more"
+            )
         positions = [row for row, order in self.number(name).prescribes if order == 0]
         if positions:
             raise ModelError(
