@@ -103,6 +103,25 @@ def test_a_deck_names_its_variables():
     assert sim.get("output", "VARIABLE_2") == pytest.approx(6.0 * (1.5 - 2.0 * (1.0 - np.exp(-0.75))), rel=1e-6)
 
 
+def test_two_variables_of_one_name_are_two_inputs():
+    """The second goes by its number, which is told; apart by name both keep theirs."""
+    text = DECK.replace(
+        "VARIABLE/2, FUNCTION=DX", "! adams_view_name='{}'\nVARIABLE/4, FUNCTION=5\nVARIABLE/2, FUNCTION=DX"
+    )
+    text = text.replace("PINPUT/2, VARIABLES=3", "PINPUT/2, VARIABLES=4").replace("+VARVAL(3)", "+2*VARVAL(4)")
+    for second, names, remarks in (("push", ["push", "VARIABLE_4"], 1), ("pull", ["push", "pull"], 0)):
+        deck = parse_deck(text.format(second))
+        m = build_mechanism(deck)
+        assert list(m.inputs) == names
+        assert len(deck.diagnostics) == remarks
+        assert all(re.search(says("VARIABLE_4", "push"), d.message) for d in deck.diagnostics)
+        sim = gm.Simulator(m, 1.0)
+        sim.set(names[1], 0.5)
+        sim.advance(1.0)
+        # 2 v' = 3 + 2 x 0.5
+        assert sim.get("com_velocity", next(iter(m.bodies)))[0] == pytest.approx(2.0, rel=1e-6)
+
+
 def test_a_drivetrain_has_its_loads_and_sensors_in_the_deck():
     train = stage()
     old = next(one for one in train.loads)

@@ -27,9 +27,19 @@ def name_plants(model: AdamsModel) -> None:
     """
     m, deck = model.mechanism, model.deck
     there = deck.of(st.Variable)
+    owners: dict[tuple[str, str], int] = {}
+
+    def remark(plant: st.Plant, text: str) -> None:
+        deck.diagnostics.append(Diagnostic(WARNING, f"{plant.label()}: {text}", deck.file, plant.line))
+
     for plant in deck.each(st.Plant):
         for variable in (there[n] for n in plant.variables if n in there):
-            name = (variable.name or f"VARIABLE_{variable.id}").replace('"', "").replace("'", "")
+            own = f"VARIABLE_{variable.id}"
+            name = (variable.name or own).replace('"', "").replace("'", "")
+            owner = owners.setdefault((plant.keyword, name), variable.id)
+            if owner != variable.id:
+                remark(plant, f"{variable.label()} goes by {own!r}: {name!r} is VARIABLE/{owner}")
+                name = own
             try:
                 if plant.keyword == "POUTPUT":
                     if name not in m.outputs:
@@ -37,8 +47,7 @@ def name_plants(model: AdamsModel) -> None:
                 elif name not in m.inputs:
                     _name_input(model, variable, name)
             except ModelError as error:
-                text = f"{plant.label()}: {variable.label()} has no name in the mechanism: {error}"
-                deck.diagnostics.append(Diagnostic(WARNING, text, deck.file, plant.line))
+                remark(plant, f"{variable.label()} has no name in the mechanism: {error}")
 
 
 def _name_input(model: AdamsModel, variable: st.Variable, name: str) -> None:
