@@ -17,6 +17,7 @@ The seed is also that of ``GEARMBS_SEED``, the count that of ``GEARMBS_CASES``.
 
 from __future__ import annotations
 
+import argparse
 import errno
 import functools
 import importlib
@@ -471,9 +472,17 @@ def flips(folder: Path, count: int, seed: int) -> tuple[dict[str, int], list[str
 
 
 if __name__ == "__main__":
-    place, count, seed = Path(sys.argv[1]), *(int(text) for text in [*sys.argv[2:], "100", "20"][:2])
-    ends = Counter(end.partition(":")[0] for list_ in faults(place, count, seed).values() for end in list_)
-    print(dict(ends))
-    hit, wrong = flips(place, 10 * count, seed)
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.campaign_faults", description=(__doc__ or "").partition(":")[0]
+    )
+    parser.add_argument("folder", type=Path, help="where the campaigns are made")
+    parser.add_argument(
+        "count", type=int, nargs="?", default=100, help="faults; bits are ten times as many (%(default)s)"
+    )
+    parser.add_argument("seed", type=int, nargs="?", default=20, help="of what happens when (%(default)s)")
+    asked = parser.parse_args()
+    found = faults(asked.folder, asked.count, asked.seed)
+    print(dict(Counter(end.partition(":")[0] for list_ in found.values() for end in list_)))
+    hit, wrong = flips(asked.folder, 10 * asked.count, asked.seed)
     kinds = Counter(answer.partition("/")[0] for answer in wrong)
     print(f"single bits flipped: {hit}; answers that were wrong: {len(wrong)} {dict(kinds)}")

@@ -45,6 +45,7 @@ from gearmbs.studies.run.claims import owner, take, told
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
 UNITS_A_FILE = 64
 """Units whose cases stand in one file."""
@@ -175,6 +176,15 @@ class Folder:
         CampaignError
             If it is missing or not what the ledger says.
         """
+        file = self._unit_file(unit)
+        known = None if columns is None else [name for name in columns if name in file.schema_arrow.names]
+        return file.read(known)
+
+    def unit_columns(self, unit: int) -> list[str]:
+        """Return the names of the columns of a unit that is done; see `unit_table`."""
+        return list(self._unit_file(unit).schema_arrow.names)
+
+    def _unit_file(self, unit: int) -> pq.ParquetFile:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -184,9 +194,30 @@ class Folder:
             raise self.damaged(unit, f"{self.table(unit)}: {error.strerror}") from None
         if hashlib.sha256(content).hexdigest() != self.entry(unit)["digests"]["table"]:
             raise self.damaged(unit, f"{self.table(unit)}: is not as its ledger says")
-        file = pq.ParquetFile(pa.BufferReader(content))
-        known = None if columns is None else [name for name in columns if name in file.schema_arrow.names]
-        return file.read(known)
+        return pq.ParquetFile(pa.BufferReader(content))
+
+    def record(self, unit: int, index: int) -> bytes:
+        """Return the content of the file of a case's record, or of what a failed one had computed.
+
+        Raises
+        ------
+        CampaignError
+            If there is none, or it is not what the ledger says.
+        """
+        entry = self.entry(unit) if self.result(unit) else {"files": {}}
+        for name in entry["files"]:
+            if not name.endswith(f"/{index:07d}.nc"):
+                continue
+            try:
+                content = (self.path / name).read_bytes()
+            except OSError as error:
+                raise self.damaged(unit, f"{name}: {error.strerror}") from None
+            if hashlib.sha256(content).hexdigest() != entry["files"][name]:
+                raise self.damaged(unit, f"{name}: is not as its ledger says")
+            return content
+        raise CampaignError(
+            f'case {index}: no record is kept; it is not done yet, or the plan keeps none (keep "record")'
+        )
 
     def stored_signals(self, spec: SignalSpec, slots: np.ndarray) -> Signals:
         """Return the signals of some slots, which are read when they are asked for."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +14,13 @@ import numpy as np
 from gearmbs.campaigns.folder import REMEDY, Folder
 from gearmbs.campaigns.plans.conditions import names_in, satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
-from gearmbs.campaigns.settings import CampaignError, local, texts
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local, texts
 from gearmbs.campaigns.subjects.base import ABOUT_RECORD
 from gearmbs.files import whole_file, write_whole
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
     import xarray as xr
 
     from gearmbs.campaigns.campaign import Campaign
@@ -46,26 +47,27 @@ def read_table(
     if not done:
         raise CampaignError(f"{folder.path}: no unit is finished yet; run the campaign")
     wanted = None if columns is None else list(dict.fromkeys(texts(columns, "columns")))
-    asked = []
+    asked, known = [], []
+    chosen_units = done[:1] if units is not None and not units else done if units is None else list(units)
     if where is not None:
-        first = folder.unit_table(done[0])
-        asked = names_in(where, first.column_names)
+        known = _known_columns(folder, chosen_units)
+        asked = names_in(where, known)
         # names that are none are told with all that there are
-        satisfied(where, {name: first[name].to_numpy() for name in first.column_names}, folder.plan.unit_of)
+        satisfied(where, _with_missing(folder.unit_table(chosen_units[0]), known), folder.plan.unit_of)
     # of what is not wanted nothing is read
     read = None if wanted is None else ["index", *wanted, *asked]
     tables = []
-    for unit in done[:1] if units is not None and not units else done if units is None else units:
+    for unit in chosen_units:
         table = folder.unit_table(unit, read)
         if where is not None:
-            held = satisfied(where, {name: table[name].to_numpy() for name in table.column_names}, folder.plan.unit_of)
-            table = table.filter(pa.array(held))
+            columns_here = _with_missing(table, known if read is None else ["index", *asked])
+            table = table.filter(pa.array(satisfied(where, columns_here, folder.plan.unit_of)))
         tables.append(table)
     table = pa.concat_tables(tables, promote_options="permissive")
     missing = [name for name in wanted or () if name not in table.column_names]
     if missing:
-        known_names = folder.unit_table(done[0]).column_names
-        raise CampaignError(f"columns: {', '.join(missing)} unknown; the table has {', '.join(known_names)}")
+        told = ", ".join(_known_columns(folder, chosen_units))
+        raise CampaignError(f"columns: {', '.join(missing)} unknown; the table has {told}")
     found = table.to_pandas(self_destruct=True).sort_values("index", ignore_index=True)
     if where is not None and units is None:
         # rows go by the numbers of their cases, so that they join with those of other columns
@@ -73,23 +75,23 @@ def read_table(
     return found if wanted is None else found[wanted]
 
 
+def _known_columns(folder: Folder, units: Sequence[int]) -> list[str]:
+    """Return the names of the columns of some units: one whose cases all failed has none of results."""
+    return list(dict.fromkeys(name for unit in units for name in folder.unit_columns(unit)))
+
+
+def _with_missing(table: pa.Table, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return some columns of a unit, NaN for results that none of its cases has."""
+    none = np.full(len(table), np.nan)
+    return {name: table[name].to_numpy() if name in table.column_names else none for name in names}
+
+
 def read_record(folder: Folder, unit: int, index: int) -> xr.Dataset:
     """Return the record of a case, or what a failed one had computed; see `Campaign.record`."""
     import xarray as xr
 
-    entry = folder.entry(unit) if folder.result(unit) else {"files": {}}
-    for name in entry["files"]:
-        if not name.endswith(f"/{index:07d}.nc"):
-            continue
-        try:
-            content = (folder.path / name).read_bytes()
-        except OSError as error:
-            raise folder.damaged(unit, f"{name}: {error.strerror}") from None
-        if hashlib.sha256(content).hexdigest() != entry["files"][name]:
-            raise folder.damaged(unit, f"{name}: is not as its ledger says")
-        with xr.open_dataset(io.BytesIO(content), engine="h5netcdf") as found:
-            return found.load()
-    raise CampaignError(f'case {index}: no record is kept; it is not done yet, or the plan keeps none (keep "record")')
+    with xr.open_dataset(io.BytesIO(folder.record(unit, index)), engine="h5netcdf") as found:
+        return found.load()
 
 
 def factor_names(folder: Folder) -> list[str]:
@@ -221,19 +223,36 @@ def _matlab(campaign: Campaign, target: Path) -> Path:
 
     data = campaign.open().load()
     found: dict[str, Any] = {}
-    for name in (*data.data_vars, *data.coords):
+    for name, variable in _variable_names([str(name) for name in (*data.data_vars, *data.coords)]).items():
         values = data[name].values
-        found[_variable_name(str(name))] = (
-            np.array([str(v) for v in values], dtype=object) if values.dtype == object else values
-        )
+        found[variable] = np.array([str(v) for v in values], dtype=object) if values.dtype == object else values
     with whole_file(target) as part, part.open("wb") as file:
         savemat(file, found, long_field_names=True, do_compression=True)
     return target
 
 
-def _variable_name(name: str) -> str:
-    text = "".join(c if c.isalnum() else "_" for c in name)
-    return (text if text[0].isalpha() else f"v_{text}")[:60]
+VARIABLE_LENGTH = 63
+"""Characters of a name in MATLAB, its ``namelengthmax``."""
+
+
+def _variable_names(names: Sequence[str]) -> dict[str, str]:
+    """Return a name that MATLAB takes for each: those that would be one are numbered, and told."""
+    found: dict[str, str] = {}
+    for name in names:
+        text = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
+        text = variable = (text if text[:1].isalpha() else f"v_{text}")[:VARIABLE_LENGTH]
+        number = 1
+        while variable in found.values():
+            number += 1
+            variable = f"{text[: VARIABLE_LENGTH - len(str(number)) - 1]}_{number}"
+        found[name] = variable
+        if number > 1:
+            warnings.warn(
+                f"matlab: {name} is the variable {variable}, since {text} is that of another column",
+                CampaignWarning,
+                stacklevel=5,
+            )
+    return found
 
 
 def _parquet(campaign: Campaign, target: Path, split: np.ndarray | None, add: Mapping[str, Any]) -> list[Path]:

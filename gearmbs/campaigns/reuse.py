@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.campaigns.folder import Folder
+from gearmbs.campaigns.plans.plan import TAKEN
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning
 from gearmbs.campaigns.subjects.base import DONE, Kept
 
@@ -28,10 +29,12 @@ class Reuse:
     Raises
     ------
     CampaignError
-        If one of them keeps something else: its results would not do.
+        If one of them keeps something else: its results would not do. Records and signals beyond those that are kept do
+        no harm; of numbers nothing says which of the entries they come from.
     """
 
     def __init__(self, paths: tuple[str, ...], keep: tuple[str, ...]) -> None:
+        self._keep = keep
         self._at: dict[str, tuple[Folder, int, int]] = {}
         self._tables: dict[tuple[Path, int], list[dict[str, Any]]] = {}
         for path in paths:
@@ -39,6 +42,11 @@ class Reuse:
             if set(keep) - set(folder.plan.keep):
                 missing = ", ".join(sorted(set(keep) - set(folder.plan.keep)))
                 raise CampaignError(f"reuse: {path} does not keep {missing}; leave it out, or keep the same")
+            if more := sorted(item for item in set(folder.plan.keep) - set(keep) if not _apart(item)):
+                raise CampaignError(
+                    f"reuse: {path} keeps {', '.join(more)} besides, whose numbers cannot be told from the others; "
+                    "leave it out, or keep the same"
+                )
             for unit in folder.done():
                 try:
                     ids = folder.unit_table(unit, ["id", "status"]).to_pydict()
@@ -60,6 +68,15 @@ class Reuse:
             _known[key] = cls(plan.reuse, plan.keep)
         return _known[key]
 
+    def record(self, key: str) -> bytes | None:
+        """Return the content of the file of the record of a case with this key, or None."""
+        folder, unit, k = self._at[key]
+        try:
+            return folder.record(unit, folder.cases(unit)[k]["index"])
+        except CampaignError as error:
+            warnings.warn(f"reuse: {folder.path}: {error}; the case is simulated", CampaignWarning, stacklevel=2)
+            return None
+
     def find(self, key: str) -> Kept | None:
         """Return what is kept of a case with this key, or None."""
         place = self._at.get(key)
@@ -71,17 +88,38 @@ class Reuse:
             if at not in self._tables:
                 self._tables = {at: folder.unit_table(unit).to_pylist()}
             row = self._tables[at][k]
-            skip = {*folder.cases(unit)[0], "slot", "id", "status", "message", "advice"}
-            numbers = {n: float(v) for n, v in row.items() if n not in skip and v is not None}
-            return Kept(numbers, _signals(folder, row["slot"]))
+            planned = folder.cases(unit)[0]
+            taken = {*planned, *TAKEN, *(spec.name for spec in folder.specs)}
+            numbers = {
+                # a name that a column of that plan had taken
+                n.removeprefix("result.") if n.removeprefix("result.") in taken else n: float(v)
+                for n, v in row.items()
+                if n not in {*planned, *TAKEN} and v is not None
+            }
+            kept = Kept(numbers, _signals(folder, row["slot"], self._keep))
+            return None if _in_doubt(folder, unit, kept) else kept
         except CampaignError as error:
             warnings.warn(f"reuse: {folder.path}: {error}; the case is simulated", CampaignWarning, stacklevel=2)
             return None
 
 
-def _signals(folder: Folder, slot: int) -> dict[str, np.ndarray]:
+def _apart(item: str) -> bool:
+    """Whether what an entry of ``keep`` leaves behind stands apart from the numbers."""
+    return item == "record" or item.startswith("signal:")
+
+
+def _in_doubt(folder: Folder, unit: int, kept: Kept) -> bool:
+    """Whether a signal may end with values that are no numbers, which are stored as what lies beyond its end."""
+    if not folder.entry(unit)["not_numbers"] or not kept.finite:
+        return False
+    return any(kept.signals[s.name].shape[1] < s.samples for s in folder.specs if s.name in kept.signals)
+
+
+def _signals(folder: Folder, slot: int, keep: tuple[str, ...]) -> dict[str, np.ndarray]:
     found = {}
     for spec in folder.specs:
+        if f"signal:{spec.name}" not in keep:
+            continue
         values = folder.stored_signals(spec, np.array([slot])).read((0, slice(None), slice(None)))
         long = np.flatnonzero(np.isfinite(values).any(axis=0))
         found[spec.name] = values[:, : int(long[-1]) + 1 if long.size else 0]

@@ -157,7 +157,9 @@ def _indices(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (b * (mixed - a)).mean(axis=0) / variance, 0.5 * ((a - mixed) ** 2).mean(axis=0) / variance
 
 
-def morris_effects(values: np.ndarray, points: np.ndarray, names: list[str], *, seed: int = 0) -> pd.DataFrame:
+def morris_effects(
+    values: np.ndarray, points: np.ndarray, names: list[str], *, places: np.ndarray | None = None, seed: int = 0
+) -> pd.DataFrame:
     """Return the elementary effects on a Morris design: mean, mean of the absolute value, spread, and its confidence.
 
     Parameters
@@ -166,12 +168,16 @@ def morris_effects(values: np.ndarray, points: np.ndarray, names: list[str], *, 
         In the order of `gearmbs.campaigns.plans.designs.morris`; trajectories with a NaN are left out.
     points : ndarray, shape (n (d + 1), d)
         The design.
+    places : ndarray, shape (n (d + 1), d), optional
+        Where the values lie in their ranges, which a step of the design moves: of two values by 1 where it moves the
+        coordinate by 2/3. NaN for what has no order; default the points.
 
     Returns
     -------
     DataFrame
         ``mu``, ``mu_star`` (Campolongo 2007), ``sigma`` and ``confidence`` (half width of the 95 % interval of mu_star)
-        by factor. An effect is the change of the result over the whole range of the factor.
+        by factor. An effect is the change of the result over the whole range of the factor; from one alternative to
+        another of what has no order.
     """
     import pandas as pd
     from scipy.stats import norm
@@ -179,14 +185,18 @@ def morris_effects(values: np.ndarray, points: np.ndarray, names: list[str], *, 
     d = len(names)
     y, x = np.asarray(values, dtype=float).reshape(-1, d + 1), np.asarray(points).reshape(-1, d + 1, d)
     good = np.isfinite(y).all(axis=1)
-    y, x = y[good], x[good]
+    at = x if places is None else np.asarray(places).reshape(x.shape)
+    y, x, at = y[good], x[good], at[good]
     if not len(y):
         raise CampaignError("morris: no trajectory has all its results")
     moves = np.diff(x, axis=1)
     axis = np.abs(moves).argmax(axis=2)
     effect = np.empty((len(y), d))
     rows = np.arange(len(y))[:, None]
-    effect[rows, axis] = np.diff(y, axis=1) / np.take_along_axis(moves, axis[..., None], axis=2)[..., 0]
+    move, step = (np.take_along_axis(m, axis[..., None], axis=2)[..., 0] for m in (moves, np.diff(at, axis=1)))
+    step = np.where(np.isnan(step), np.sign(move), step)
+    # a value that did not move, as one of a range of one whole number, has no effect
+    effect[rows, axis] = np.divide(np.diff(y, axis=1), step, out=np.zeros_like(step), where=step != 0.0)
     size = np.abs(effect)
     drawn = np.random.default_rng(seed).integers(len(y), size=(RESAMPLES, len(y)))
     spread = size[drawn].mean(axis=1).std(axis=0, ddof=1)
@@ -401,7 +411,7 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
     if plan.design == "saltelli":
         return sobol_indices(values, names, points=points, levels=_levels(plan))
     if plan.design == "morris":
-        return morris_effects(values, points, names)
+        return morris_effects(values, points, names, places=plan.places(points))
     if plan.design in ("factorial", "plackett burman"):
         return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
     if plan.design == "grid":

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import math
 import os
 import pickle
 import select
@@ -26,8 +25,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 import gearmbs
 from gearmbs.campaigns.codes import OtherCode, admit, plan_modules
@@ -167,10 +164,23 @@ class CaseRunner:
                     return
             result.outcome, result.kept = Outcome(), kept
 
+    def taken_over(self, row: dict[str, Any], kept: Kept, key: str, record: bytes | None) -> CaseResult:
+        """Return the result of a case as that of an equal one, with the content of its record's file if it has one."""
+        result = CaseResult(Outcome(), kept, key, reused=True)
+        if record is not None:
+            place = self._place("records", row)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(place, record, durable=self.folder.path)
+            result.files.append(str(place.relative_to(self.folder.path)))
+        return result
+
+    def _place(self, kind: str, row: dict[str, Any]) -> Path:
+        return self.folder.path / kind / f"{row['unit']:05d}" / f"{row['index']:07d}.nc"
+
     def _write(self, kind: str, row: dict[str, Any], record: Any, result: CaseResult) -> None:
         from gearmbs.studies.run.store import write_dataset
 
-        place = self.folder.path / kind / f"{row['unit']:05d}" / f"{row['index']:07d}.nc"
+        place = self._place(kind, row)
         result.files.append(str(write_dataset(place, record, durable=self.folder.path).relative_to(self.folder.path)))
 
     def close(self) -> None:
@@ -375,7 +385,7 @@ def enter(
         "cases": len(rows),
         "failed": sum(r.outcome.status != DONE for r in results),
         "reused": sum(r.reused for r in results),
-        "not_numbers": sum(not _finite(r.kept) for r in results),
+        "not_numbers": sum(not r.kept.finite for r in results),
         "index": [rows[0]["index"], rows[-1]["index"] + 1],
         "status": {str(row["index"]): r.outcome.status for row, r in zip(rows, results) if r.outcome.status != DONE},
         "seconds": seconds,
@@ -395,24 +405,22 @@ def _taken(folder: Folder, row: dict[str, Any]) -> set[str]:
     return {*row, *TAKEN, *(spec.name for spec in folder.specs)}
 
 
-def _finite(kept: Kept) -> bool:
-    """Whether all that is kept of a case is a number."""
-    return all(map(math.isfinite, kept.numbers.values())) and all(np.isfinite(x).all() for x in kept.signals.values())
-
-
 def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], reuse: Reuse | None) -> CaseResult:
     """Return the result of a case: that of an equal one of this unit or of another campaign, or a new one."""
     if reuse is not None:
         thing, prepared = runner.prepare(row)
         if thing is not None:
-            found = known.get(prepared.key)
-            if found is None and (kept := reuse.find(prepared.key)) is not None:
-                found = CaseResult(Outcome(), kept, prepared.key, reused=True)
-            if found is not None:
-                return found
+            if (found := known.get(prepared.key)) is not None:
+                content = (runner.folder.path / found.files[0]).read_bytes() if found.files else None
+                return runner.taken_over(row, found.kept, found.key, content)
+            if (kept := reuse.find(prepared.key)) is not None:
+                wanted = "record" in runner.plan.keep
+                content = reuse.record(prepared.key) if wanted else None
+                if content is not None or not wanted:
+                    return runner.taken_over(row, kept, prepared.key, content)
     result = runner.run(row)
     if reuse is not None and result.outcome.status == DONE:
-        known[result.key] = CaseResult(result.outcome, result.kept, result.key, reused=True)
+        known[result.key] = result
     return result
 
 

@@ -526,3 +526,26 @@ def test_a_base_without_a_place_on_a_logarithmic_range():
     plan.subject.parameters["x1"] = 0.0
     with pytest.raises(CampaignError, match=says("logarithmic range")):
         plan.points()
+
+
+def partly(x: float) -> dict[str, float]:
+    """Return results beyond the middle."""
+    if x < 0.5:
+        raise ValueError("x: too little")
+    return {"r": x, "orders.mesh.2": 2.0 * x}
+
+
+def test_conditions_on_results_that_a_whole_unit_lacks(tmp_path):
+    """Its cases have none: they fit no comparison, and names are those of all units."""
+    rows = [{"x": x} for x in (0.1, 0.2, 0.6, 0.7, 0.3, 0.4)]
+    subject = FunctionSubject(partly, {"x": 0.0})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, design="list", options={"rows": rows}, unit=2))
+    campaign.run(workers=0)
+    assert campaign.read(["x"], "r > 0.2")["x"].tolist() == [0.6, 0.7]
+    assert campaign.read(["x"], "orders.mesh.2 > 1.3")["x"].tolist() == [0.7]
+    assert campaign.read(["x", "r"], "x > 0.15 and not r > 0.65")["x"].tolist() == [0.2, 0.6, 0.3, 0.4]
+    assert campaign.read(where="r > 0.65")["index"].tolist() == [3]
+    assert campaign.failed()["x"].tolist() == [0.1, 0.2, 0.3, 0.4]
+    for ask in (lambda: campaign.read(["x"], "q > 1"), lambda: campaign.read(["q"])):
+        with pytest.raises(CampaignError, match=says("q", "orders.mesh.2")):
+            ask()

@@ -6,6 +6,8 @@ The seed is ``GEARMBS_SEED``, the number of faults ``GEARMBS_CASES``.
 from __future__ import annotations
 
 import random
+import runpy
+import sys
 
 import pytest
 
@@ -82,3 +84,15 @@ def test_the_trace_finds_an_order_that_is_wrong(tmp_path, monkeypatch):
         recorder.cut(chance)
         found += lies(recorder.root)
     assert found
+
+
+@pytest.mark.parametrize(("words", "code"), [(["--help"], 0), (["place", "many"], 2), ([], 2)])
+def test_the_command_says_what_it_takes(tmp_path, monkeypatch, capsys, words, code):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["campaign_faults", *words])
+    monkeypatch.delitem(sys.modules, "benchmarks.campaign_faults")
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("benchmarks.campaign_faults", run_name="__main__")
+    assert ended.value.code == code
+    assert "folder" in "".join(capsys.readouterr())
+    assert not list(tmp_path.iterdir())

@@ -65,12 +65,58 @@ def test_conditions_take_quantities_with_units(text, held):
         ("orders.line_of_action.2 > '1 m/s^2'", says("orders.line_of_action.2", "without", "write")),
         ("2 * operation.torque > '12 N m'", says("operation.torque", "numbers in SI", "alone")),
         ("status > 3", says("status", "texts", "numbers in SI")),
+        ("status == 1", says("status", "texts", "numbers in SI")),
+        ("1 != status", says("status", "texts", "numbers in SI")),
+        ("abs(operation.torque) == '50 N m'", says("operation.torque", "numbers in SI", "alone")),
     ],
 )
 def test_conditions_of_texts_and_numbers_are_refused(text, message):
     given = COLUMNS | {"status": np.array(["done"] * 3, dtype=object)}
     with pytest.raises(CampaignError, match=message):
         satisfied(text, given, lambda name: "N m" if name == "operation.torque" else "")
+
+
+ODD = {
+    "x": np.array([1, 2, 3]),
+    "1": np.array([0.0, 0.0, 0.0]),
+    "-2": np.array([9.0, 9.0, 9.0]),
+    "and": np.array([9.0, 9.0, 9.0]),
+    "time limit": np.array([5.0, 6.0, 7.0]),
+    "n": np.array([5_000_000_000, 10, -(2**63)]),
+    "seed": np.array([2**53, 2**53 + 1, 0]),
+    "good": np.array([True, False, True]),
+    "maybe": np.array([True, None, False], dtype=object),
+    "status": np.array(["done", None, "time limit"], dtype=object),
+    "none": np.array([None, None, None], dtype=object),
+}
+"""Columns with names and values that conditions could mistake."""
+
+
+@pytest.mark.parametrize(
+    ("text", "held"),
+    [
+        # numbers and words are never names
+        ("x > 1", [False, True, True]),
+        ("x > -2 and x < 3", [True, True, False]),
+        # nor are texts
+        ("status == 'time limit'", [False, False, True]),
+        ('time limit > 5 and status != "done"', [False, True, True]),
+        # products of whole numbers are beyond 64 bits; alone they are as exact as they are
+        ("n * n <= 2e19", [False, True, False]),
+        ("n * n * 10 > 2e19", [True, False, True]),
+        ("abs(n) > 0 and -n > 0", [False, False, True]),
+        ("4000000000 * 4000000000 > n", [True, True, True]),
+        ("seed == 9007199254740993", [False, True, False]),
+        # truth values are compared as such and as numbers, and what is missing with anything
+        ("good == True", [True, False, True]),
+        ("good == 1", [True, False, True]),
+        ("maybe == True", [True, False, False]),
+        ("none == 'done'", [False, False, False]),
+        ("none != 1", [True, True, True]),
+    ],
+)
+def test_conditions_take_numbers_and_texts_for_what_they_are(text, held):
+    assert satisfied(text, ODD).tolist() == held
 
 
 @pytest.mark.parametrize(

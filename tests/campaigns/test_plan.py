@@ -233,3 +233,15 @@ def test_errors_of_a_specimen_go_where_their_path_says():
     assert [fault["kind"] for fault in stage] == ["wear", "manufacturing grade"]
     assert list(other[0]) == ["kind", "seed"]
     assert stage[1]["seed"] != other[0]["seed"]
+
+
+@pytest.mark.parametrize("scale", ["log", "linear"])
+def test_ends_of_ranges_are_exact(scale):
+    """Neither is missed by rounding, nor is one between them beyond; a base outside of them stays where it is."""
+    for low, high in ((1.0, 100.0), (0.1, 0.7), (3.0, 7.3e5)):
+        factor = Factor("x1", low, high, scale=scale)
+        found = factor.columns(np.r_[0.0, np.nextafter(1.0, 0.0), 1.0, 0.5][:, None])["x1"]
+        assert (found[0], found[2]) == (low, high)
+        assert found.max() == high
+        outside = factor.columns(np.array([[factor.coordinate(2.0 * high, "1")]]))["x1"]
+        assert outside == pytest.approx(2.0 * high)

@@ -16,7 +16,9 @@ from gearmbs.campaigns import (
     Campaign,
     CampaignError,
     CampaignWarning,
+    Choice,
     Factor,
+    FunctionSubject,
     condition_map,
     fit_chaos,
     fit_surface,
@@ -127,6 +129,42 @@ def test_morris_of_a_linear_function_is_exact():
     assert list(table.index) == ["x2", "x1", "x3"]
     np.testing.assert_allclose(table.mu, [-3.0, 1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(table.sigma, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("factor", "effect"),
+    [
+        (Factor("x1", values=[0, 10]), 10.0),
+        (Factor("x1", values=[0.0, 1.0]), 1.0),
+        (Factor("x1", values=[0, 1, 2]), 2.0),
+        (Factor("x1", values=[1, 10, 100]), 99.0),
+        (Factor("x1", 1, 3, whole=True), 2.0),
+        (Factor("x1", 1.0, 3.0), 2.0),
+    ],
+)
+def test_morris_effects_are_those_of_the_steps_that_values_made(factor, effect):
+    """Of a linear function the change over the range, whatever values stand for the coordinates."""
+    plan = make_plan(function(), [factor, Factor("x2", 0.0, 2.0)], "morris", n=40)
+    points = plan.points()
+    columns = plan.columns(points)
+    table = morris_effects(columns["x1"] + 2.0 * columns["x2"], points, ["x1", "x2"], places=plan.places(points))
+    np.testing.assert_allclose(table.mu_star[["x1", "x2"]], [effect, 4.0], rtol=1e-12)
+    np.testing.assert_allclose(table.sigma, 0.0, atol=1e-12)
+
+
+def test_morris_effects_of_what_has_no_order_are_those_of_an_exchange():
+    """Of two alternatives the change; the range of an option counts where that is chosen."""
+    choice = Choice("x1", {"low": 0.0, "one": {"kind": "a", "size": (2, 5)}}, name="which")
+    plan = make_plan(function(), [choice, Factor("x2", values=["a", "b"])], "morris", n=60)
+    points = plan.points()
+    columns = plan.columns(points)
+    y = np.nan_to_num(columns["which.size"]) + 7.0 * (columns["x2"] == "b")
+    table = morris_effects(y, points, ["which", "size", "x2"], places=plan.places(points))
+    assert table.mu_star["x2"] == pytest.approx(7.0, rel=1e-12)
+    assert 2.0 <= table.mu_star["which"] <= 5.0
+    # 3 where the option is chosen, else nothing
+    chosen = table.mu_star["size"] / 3.0
+    assert chosen * 60 == pytest.approx(round(chosen * 60), abs=1e-9)
 
 
 def test_main_effects_and_interactions():
@@ -361,3 +399,32 @@ def test_bounds_of_a_few_levels():
     assert (found.sure_low <= truth).all()
     assert (truth <= found.sure_high).all()
     assert found.low[1] > 0.9
+
+
+def named(x: float) -> dict[str, float]:
+    """Return results whose names differ in what MATLAB does not take, and beyond what it takes."""
+    long = "a" * 70
+    return {"a.b": x, "a_b": 2.0 * x, f"{long}.1": 3.0 * x, f"{long}.2": 4.0 * x, "weg_ä": 5.0 * x}
+
+
+def test_columns_that_matlab_would_name_alike_are_told_apart(tmp_path):
+    subject = FunctionSubject(named, {"x": 0.0})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("x", 1.0, 2.0)], n=2))
+    campaign.run(workers=0)
+    with pytest.warns(CampaignWarning) as told:
+        (mat,) = campaign.export(tmp_path / "t.mat", "matlab")
+    assert len(told) == 2
+    assert "a_b_2" in str(told[0].message)
+    found, x = loadmat(mat), campaign.table["x"]
+    long = "a" * 63
+    for name, times in (("a_b", 1.0), ("a_b_2", 2.0), (long, 3.0), (f"{long[:61]}_2", 4.0), ("weg__", 5.0)):
+        np.testing.assert_allclose(found[name].ravel(), times * x)
+
+
+def test_columns_whose_names_matlab_tells_apart_keep_them(tmp_path):
+    campaign = small(tmp_path / "c", n=2)
+    campaign.run(workers=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", CampaignWarning)
+        (mat,) = campaign.export(tmp_path / "t.mat", "matlab")
+    assert {"y", "x1", "wave"} <= set(loadmat(mat))

@@ -10,8 +10,9 @@ from functools import partial
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, FunctionSubject, make_plan
+from gearmbs.campaigns import Campaign, CampaignError, CampaignWarning, Choice, Factor, FunctionSubject, make_plan
 from gearmbs.campaigns.folder import sealed, unsealed
 from gearmbs.campaigns.page import page_text
 from gearmbs.campaigns.work import work_unit
@@ -312,3 +313,66 @@ def test_nobody_at_work_is_no_remaining_time(tmp_path):
     status = campaign.status()
     assert status.eta is None
     assert f"unit 3: host {claim['host']}, process {claim['pid']}, for 36" in str(status)
+
+
+def recorded(x: float) -> xr.Dataset:
+    """Return a record, of which a number and the end of a signal may be none."""
+    hole = np.nan if x > 1.5 else 1.0
+    return xr.Dataset({"wave": ("t", [x, hole * x]), "curve": ("s", [x, 2.0 * x, x])}, attrs={"y": x * hole})
+
+
+def doubled(record: xr.Dataset) -> dict[str, float]:
+    """Return a number of a record."""
+    return {"double": 2.0 * record.attrs["y"]}
+
+
+def tail(x: float) -> dict:
+    """Return a signal that may end with no number."""
+    return {"y": x, "wave": [x, np.nan if x > 1.5 else x]}
+
+
+def listed(path, function, keep, **settings) -> Campaign:
+    """Return a campaign of four cases, of which two are equal, that is done."""
+    rows = [{"x": x} for x in (1.0, 2.0, 1.0, 3.0)]
+    subject = FunctionSubject(function, {"x": 0.0}, signals={"wave": (4, 1.0)})
+    plan = make_plan(subject, design="list", options={"rows": rows}, keep=keep, unit=3, **settings)
+    campaign = Campaign(path, plan)
+    campaign.run(workers=0)
+    return campaign
+
+
+def test_records_are_taken_over_with_what_is_kept(tmp_path):
+    first = listed(tmp_path / "first", recorded, ["numbers", "record", "signal:wave"])
+    same = listed(tmp_path / "same", recorded, ["numbers", "record"], reuse=[str(first.path)])
+    assert same.status().reused == 4
+    for k in range(4):
+        xr.testing.assert_identical(same.record(k), first.record(k))
+    assert digest(same)
+    # signals beyond those that are kept do no harm
+    assert "wave" not in same.open()
+    # of equal cases of one unit, too, if nothing is there to be taken
+    (first.path / "records").rename(tmp_path / "gone")
+    with pytest.warns(CampaignWarning, match="simulated"):
+        anew = listed(tmp_path / "anew", recorded, ["numbers", "record"], reuse=[str(first.path)])
+    assert anew.status().reused == 1
+    xr.testing.assert_identical(anew.record(2), same.record(2))
+
+
+def test_reuse_brings_no_numbers_that_are_not_kept(tmp_path):
+    more = ["numbers", f"{__name__}:doubled"]
+    first = listed(tmp_path / "first", recorded, more)
+    with pytest.raises(CampaignError, match=says("first", "doubled", "the same")):
+        listed(tmp_path / "second", recorded, ["numbers"], reuse=[str(first.path)])
+    third = listed(tmp_path / "third", recorded, more, reuse=[str(first.path)])
+    assert third.status().reused == 4
+    np.testing.assert_array_equal(third.table["double"], first.table["double"])
+
+
+@pytest.mark.parametrize("function", [recorded, tail])
+def test_reuse_counts_what_is_no_number(tmp_path, function):
+    """What ends a signal that is no number is not known of what is stored: such cases are simulated again."""
+    keep = ["numbers", "signal:wave"]
+    first = listed(tmp_path / "first", function, keep)
+    second = listed(tmp_path / "second", function, keep, reuse=[str(first.path)])
+    assert first.status().not_numbers == second.status().not_numbers == 2
+    np.testing.assert_array_equal(second.open().wave, first.open().wave)

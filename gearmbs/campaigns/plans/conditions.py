@@ -24,8 +24,7 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
-    # of whole numbers Python would write out all digits of 9**9**9
-    ast.Pow: lambda base, exponent: np.power(np.asarray(base, dtype=float), exponent),
+    ast.Pow: operator.pow,
     ast.USub: operator.neg,
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -72,8 +71,7 @@ def satisfied(
     try:
         result = np.asarray(_value(_in_units(tree, columns, names, unit_of, text), columns, text))
     except TypeError:
-        kinds = {True: "numbers", False: "texts"}
-        about = ", ".join(f"{name} has {kinds[_is_number(given[name])]}" for name in names_in(text, given))
+        about = ", ".join(f"{name} has {_kind(given[name]) or 'neither'}" for name in names_in(text, given))
         raise CampaignError(
             f"constraint {text!r}: compares or computes texts with numbers ({about}); write numbers in SI, or a "
             "quantity with its unit beside a column alone, as operation.torque > '100 N m'"
@@ -100,17 +98,49 @@ STAND_IN = "_column_"
 
 def _as_names(text: str, columns: Mapping[str, np.ndarray]) -> tuple[str, dict[str, np.ndarray]]:
     """Return a text with names that Python takes for those it does not, as orders.line_of_action.2, and the columns."""
-    found = dict(columns)
     odd = [name for name in columns if not all(part.isidentifier() and not iskeyword(part) for part in name.split("."))]
-    for k, name in enumerate(sorted(odd, key=len, reverse=True)):
-        text, count = re.subn(_alone(name), f"{STAND_IN}{k}", text)
-        if count:
-            found[f"{STAND_IN}{k}"] = columns[name]
-    return text, found
+    odd = sorted((name for name in odd if not _is_written_in_full(name)), key=len, reverse=True)
+    stand_ins = {name: f"{STAND_IN}{k}" for k, name in enumerate(odd)}
+    # a text in quotes is none of names, as in status == 'time limit'
+    pattern = "|".join([*map(_alone, odd), "'[^']*'", '"[^"]*"'])
+    written = re.sub(pattern, lambda match: stand_ins.get(match[0], match[0]), text)
+    return written, {**columns, **{stand_in: columns[name] for name, stand_in in stand_ins.items()}}
+
+
+def _is_written_in_full(name: str) -> bool:
+    """Whether the name of a column is a word of conditions or a number, as 1 or -0.5, which stays one in them."""
+    if iskeyword(name):
+        return True
+    try:
+        tree = ast.parse(name, mode="eval")
+    except SyntaxError:
+        return False
+    return not any(isinstance(node, ast.Name) for node in ast.walk(tree))
 
 
 def _is_number(values: Any) -> bool:
     return np.asarray(values).dtype.kind in "biuf"
+
+
+def _kind(values: Any) -> str:
+    """Return whether values are numbers, truth values among them, or texts; nothing where all are missing."""
+    if _is_number(values):
+        return "numbers"
+    first = next((v for v in np.ravel(values) if v is not None and v == v), None)
+    return "texts" if isinstance(first, str) else "numbers" if np.isscalar(first) else ""
+
+
+def _compared(op: ast.cmpop, left: Any, right: Any) -> Any:
+    """Return what a comparison gives; as the others, == and != are none of texts with numbers."""
+    if {_kind(left), _kind(right)} == {"texts", "numbers"}:
+        raise TypeError
+    return OPERATORS[type(op)](left, right)
+
+
+def _real(values: Any) -> Any:
+    """Return numbers to calculate with as floating point ones: products of whole ones would overflow."""
+    values = np.asarray(values)
+    return values.astype(float) if values.dtype.kind in "biu" else values
 
 
 def _in_units(
@@ -158,9 +188,10 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
             raise CampaignError(f"constraint {text!r}: no column {name!r}; columns are {known}{hint}")
         return columns[name]
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](sub(node.left), sub(node.right))
+        return OPERATORS[type(node.op)](_real(sub(node.left)), _real(sub(node.right)))
     if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](truth(node.operand) if isinstance(node.op, ast.Not) else sub(node.operand))
+        negated = truth(node.operand) if isinstance(node.op, ast.Not) else _real(sub(node.operand))
+        return OPERATORS[type(node.op)](negated)
     if isinstance(node, ast.BoolOp):
         result = truth(node.values[0])
         for part in node.values[1:]:
@@ -172,12 +203,12 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
             if type(op) not in OPERATORS:
                 break
             right = sub(part)
-            result = np.logical_and(result, OPERATORS[type(op)](left, right))
+            result = np.logical_and(result, _compared(op, left, right))
             left = right
         else:
             return result
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
-        return FUNCTIONS[node.func.id](*(sub(arg) for arg in node.args))
+        return FUNCTIONS[node.func.id](*(_real(sub(arg)) for arg in node.args))
     raise CampaignError(
         f"constraint {text!r}: {ast.unparse(node)!r} is not understood; it takes columns, numbers, + - * / **, "
         f"comparisons, and, or, not, and {', '.join(FUNCTIONS)}"

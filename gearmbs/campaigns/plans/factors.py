@@ -122,8 +122,19 @@ class Factor:
             drawn = low * ((high + 1.0) / low) ** x if self.scale == "log" else low + x * (high - low + 1.0)
             return {self.name: np.minimum(np.floor(drawn), high).astype(np.int64)}
         if self.scale == "log":
-            return {self.name: low * np.exp(x * math.log(high / low))}
-        return {self.name: low + x * (high - low)}
+            return {self.name: _within(low * np.exp(x * math.log(high / low)), x, low, high)}
+        return {self.name: _within(low + x * (high - low), x, low, high)}
+
+    def places(self, u: np.ndarray) -> np.ndarray:
+        """Return where the values lie in the range, 0 to 1, for coordinates u, (n, 1); NaN for those without order."""
+        values = self.columns(u)[self.name]
+        if values.dtype.kind not in "biuf":
+            return np.full(u.shape, np.nan)
+        ends = np.array(self.values or (self.low, self.high), dtype=float)
+        found, low, high = values.astype(float), ends.min(), ends.max()
+        if not self.values and self.scale == "log":
+            found, low, high = np.log(found), math.log(low), math.log(high)
+        return ((found - low) / (high - low or 1.0))[:, None]
 
     def coordinate(self, value: Any, unit: str) -> float:
         """Return where a value lies in the range, between 0 and 1."""
@@ -227,10 +238,22 @@ class Choice:
                 if isinstance(low, int) and isinstance(high, int):
                     found[f"{self.name}.{key}"][here] = np.minimum(np.floor(low + x * (high - low + 1)), high)
                 else:
-                    found[f"{self.name}.{key}"][here] = low + x * (high - low)
+                    found[f"{self.name}.{key}"][here] = _within(low + x * (high - low), x, low, high)
                 if place == 0:
                     severity[here] = x
         found["severity" if self.name == self.path else f"{self.name}.severity"] = severity
+        return found
+
+    def places(self, u: np.ndarray) -> np.ndarray:
+        """Return where the values lie in the ranges of what is chosen; NaN for the choice, which has no order."""
+        columns = self.columns(u)
+        found = u.copy()
+        found[:, 0] = np.nan
+        for name, keys in self.ranges.items():
+            here = columns[self.name] == name
+            for place, key in enumerate(keys, 1):
+                low, high = self.options[name][key]
+                found[here, place] = (columns[f"{self.name}.{key}"][here] - low) / (high - low or 1.0)
         return found
 
     def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
@@ -311,6 +334,10 @@ class Specimens:
     def columns(self, u: np.ndarray) -> Columns:
         """Return the specimens' numbers for coordinates u, shape (n, 1)."""
         return {self.name: np.minimum((u[:, 0] * self.draws).astype(np.int64), self.draws - 1)}
+
+    def places(self, u: np.ndarray) -> np.ndarray:
+        """Return NaN for coordinates u, shape (n, 1): specimens have no order."""
+        return np.full(u.shape, np.nan)
 
     def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
         """Set the specimen's errors in nested data."""
@@ -401,6 +428,12 @@ def check_kinds(values: Sequence[Any], where: str) -> None:
         for v in values:
             if v is not None and not (abs(v) < 2**63 if isinstance(v, int) else v == v):
                 raise CampaignError(f"{where}: {v!r} is no number, or a whole one beyond 64 bits")
+
+
+def _within(values: np.ndarray, u: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Return values of a range without what rounding adds to its ends; a base may lie outside of it."""
+    inside = np.where(u == 1.0, high, np.clip(values, low, high))
+    return np.where((u >= 0.0) & (u <= 1.0), inside, values)
 
 
 def _is_range(value: Any) -> bool:

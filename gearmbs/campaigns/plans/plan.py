@@ -260,6 +260,16 @@ class Plan:
                 found |= factor.columns(mine)
         return found
 
+    def places(self, u: np.ndarray) -> np.ndarray:
+        """Return where the values of points u lie in the ranges of their factors, (points, dimensions).
+
+        0 to 1; NaN for what has no order. Few values lie elsewhere than the coordinates that choose them. Crossed
+        choices, which take no coordinate of the choice itself, have none.
+        """
+        ends = np.cumsum([factor.width for factor in self.factors])
+        parts = zip(self.factors, np.split(u, ends[:-1], axis=1), strict=True)
+        return np.hstack([factor.places(mine) for factor, mine in parts])
+
     def allowed(self, columns: Columns) -> np.ndarray:
         """Return which rows satisfy all constraints."""
         good = np.ones(len(columns["point"]), dtype=bool)

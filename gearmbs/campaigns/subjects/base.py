@@ -8,6 +8,7 @@ it, so that further things to simulate need one class and one line of `KINDS`.
 from __future__ import annotations
 
 import importlib
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -58,6 +59,13 @@ class Kept:
 
     numbers: dict[str, float] = field(default_factory=dict)
     signals: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def finite(self) -> bool:
+        """Whether all of it is a number."""
+        return all(map(math.isfinite, self.numbers.values())) and all(
+            np.isfinite(x).all() for x in self.signals.values()
+        )
 
 
 @dataclass(frozen=True)
