@@ -341,6 +341,7 @@ def listed(path, function, keep, **settings) -> Campaign:
     return campaign
 
 
+@pytest.mark.slow
 def test_records_are_taken_over_with_what_is_kept(tmp_path):
     first = listed(tmp_path / "first", recorded, ["numbers", "record", "signal:wave"])
     same = listed(tmp_path / "same", recorded, ["numbers", "record"], reuse=[str(first.path)])
@@ -352,7 +353,7 @@ def test_records_are_taken_over_with_what_is_kept(tmp_path):
     assert "wave" not in same.open()
     # of equal cases of one unit, too, if nothing is there to be taken
     (first.path / "records").rename(tmp_path / "gone")
-    with pytest.warns(CampaignWarning, match="simulated"):
+    with pytest.warns(CampaignWarning, match=says("reuse", "damaged", "simulated")):
         anew = listed(tmp_path / "anew", recorded, ["numbers", "record"], reuse=[str(first.path)])
     assert anew.status().reused == 1
     xr.testing.assert_identical(anew.record(2), same.record(2))
@@ -368,6 +369,7 @@ def test_reuse_brings_no_numbers_that_are_not_kept(tmp_path):
     np.testing.assert_array_equal(third.table["double"], first.table["double"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", [recorded, tail])
 def test_reuse_counts_what_is_no_number(tmp_path, function):
     """What ends a signal that is no number is not known of what is stored: such cases are simulated again."""
