@@ -87,35 +87,13 @@ ROOM_TYPE = PlanRoom.numba_type
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _put_ints(room, k, items):
-    """Write array ``k`` of the plan; return whether there is room."""
+def _put(room, k, into, items):
+    """Write array ``k`` of the plan into the room of its type; return whether there is room."""
     if items.shape[0] > room.room[k]:
         return False
     room.words[2 * k + 1] = items.shape[0]
     for e in range(items.shape[0]):
-        room.ints[room.at[k] + e] = items[e]
-    return True
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _put_places(room, k, items):
-    """Write array ``k`` of the plan; return whether there is room."""
-    if items.shape[0] > room.room[k]:
-        return False
-    room.words[2 * k + 1] = items.shape[0]
-    for e in range(items.shape[0]):
-        room.places[room.at[k] + e] = items[e]
-    return True
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _put_numbers(room, k, items):
-    """Write array ``k`` of the plan; return whether there is room."""
-    if items.shape[0] > room.room[k]:
-        return False
-    room.words[2 * k + 1] = items.shape[0]
-    for e in range(items.shape[0]):
-        room.numbers[room.at[k] + e] = items[e]
+        into[room.at[k] + e] = items[e]
     return True
 
 
@@ -133,23 +111,28 @@ def _put_order(room, rank, n, ends, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_
     """
     none, nothing = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.uint32)
     if has_nodes(ends):
-        fits = _put_places(room, L_TO, l_pos) and _put_places(room, L_BY, l_col)
-        fits = fits and _put_places(room, U_TO, u_pos) and _put_places(room, U_BY, u_col)
+        fits = _put(room, L_TO, room.places, l_pos) and _put(room, L_BY, room.places, l_col)
+        fits = fits and _put(room, U_TO, room.places, u_pos) and _put(room, U_BY, room.places, u_col)
         for k in (A_TO, PIVOT_ORDER, OP_TO, OP_L, OP_U, DIV_TO, DIV_BY):
-            _put_places(room, k, nothing)
+            _put(room, k, room.places, nothing)
         for k in (PIVOT_PTR, OP_PTR, DIV_PTR):
-            _put_ints(room, k, none)
+            _put(room, k, room.ints, none)
         return fits
     (
         l_to, l_by, u_to, u_by, a_to, pivot_ptr, pivot_order, op_ptr, op_to, op_l, op_u, div_ptr, div_to, div_by, _, _,
     ) = operations_in_order(rank, n, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)  # fmt: skip
-    fits = _put_places(room, L_TO, l_to) and _put_places(room, L_BY, l_by)
-    fits = fits and _put_places(room, U_TO, u_to) and _put_places(room, U_BY, u_by) and _put_places(room, A_TO, a_to)
-    fits = fits and _put_ints(room, PIVOT_PTR, pivot_ptr) and _put_places(room, PIVOT_ORDER, pivot_order)
-    fits = fits and _put_ints(room, OP_PTR, op_ptr) and _put_places(room, OP_TO, op_to)
-    fits = fits and _put_places(room, OP_L, op_l) and _put_places(room, OP_U, op_u)
-    fits = fits and _put_ints(room, DIV_PTR, div_ptr) and _put_places(room, DIV_TO, div_to)
-    return fits and _put_places(room, DIV_BY, div_by)
+    fits = _put(room, L_TO, room.places, l_to) and _put(room, L_BY, room.places, l_by)
+    fits = (
+        fits
+        and _put(room, U_TO, room.places, u_to)
+        and _put(room, U_BY, room.places, u_by)
+        and _put(room, A_TO, room.places, a_to)
+    )
+    fits = fits and _put(room, PIVOT_PTR, room.ints, pivot_ptr) and _put(room, PIVOT_ORDER, room.places, pivot_order)
+    fits = fits and _put(room, OP_PTR, room.ints, op_ptr) and _put(room, OP_TO, room.places, op_to)
+    fits = fits and _put(room, OP_L, room.places, op_l) and _put(room, OP_U, room.places, op_u)
+    fits = fits and _put(room, DIV_PTR, room.ints, div_ptr) and _put(room, DIV_TO, room.places, div_to)
+    return fits and _put(room, DIV_BY, room.places, div_by)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -206,25 +189,25 @@ def write_plan(d, room, columns, rows_left, vals, drop, leaves, negligible):
     if size > room.lu.shape[0]:
         return NO_ROOM
     fits = _put_order(room, rank, n, ends, a_ptr, a_pos, u_by_col, u_pos, u_col, l_ptr, l_pos, l_col)
-    fits = fits and _put_ints(room, A_PTR, a_ptr) and _put_places(room, A_POS, a_pos)
-    fits = fits and _put_places(room, A_SRC, a_src) and _put_numbers(room, A_SCALE, a_scale)
-    fits = fits and _put_ints(room, U_PTR, u_by_col) and _put_places(room, U_POS, u_pos)
-    fits = fits and _put_places(room, U_COL, u_col) and _put_ints(room, L_PTR, l_ptr)
-    fits = fits and _put_places(room, L_POS, l_pos) and _put_places(room, L_COL, l_col)
-    fits = fits and _put_ints(room, NODE_END, ends)
+    fits = fits and _put(room, A_PTR, room.ints, a_ptr) and _put(room, A_POS, room.places, a_pos)
+    fits = fits and _put(room, A_SRC, room.places, a_src) and _put(room, A_SCALE, room.numbers, a_scale)
+    fits = fits and _put(room, U_PTR, room.ints, u_by_col) and _put(room, U_POS, room.places, u_pos)
+    fits = fits and _put(room, U_COL, room.places, u_col) and _put(room, L_PTR, room.ints, l_ptr)
+    fits = fits and _put(room, L_POS, room.places, l_pos) and _put(room, L_COL, room.places, l_col)
+    fits = fits and _put(room, NODE_END, room.ints, ends)
     if not fits:
         return NO_ROOM
-    _put_places(room, ROW_FROM, row_from)
-    _put_places(room, COL_TO, col_to)
-    _put_numbers(room, ROW_SCALE, by_row)
-    _put_numbers(room, COL_SCALE, by_col)
-    _put_numbers(room, KEPT, kept)
-    _put_places(room, LEFT_SRC, left)
-    _put_numbers(room, LEFT_LIMIT, limits)
+    _put(room, ROW_FROM, room.places, row_from)
+    _put(room, COL_TO, room.places, col_to)
+    _put(room, ROW_SCALE, room.numbers, by_row)
+    _put(room, COL_SCALE, room.numbers, by_col)
+    _put(room, KEPT, room.numbers, kept)
+    _put(room, LEFT_SRC, room.places, left)
+    _put(room, LEFT_LIMIT, room.numbers, limits)
     limit = np.full(entries if left.shape[0] > 0 else 0, np.inf)
     for e in range(left.shape[0]):
         limit[left[e]] = limits[e]
-    _put_numbers(room, LIMIT, limit)
+    _put(room, LIMIT, room.numbers, limit)
     # no pivots as a full block
     for k in (TAIL_AT, TAIL_SRC, TAIL_SCALE, BLOCK_COL, LANE_PTR, ACT_PTR, ACT_TO, ACT_BY, ACT_U):
         room.words[2 * k + 1] = 0
