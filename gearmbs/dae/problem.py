@@ -317,6 +317,8 @@ class DAEProblem:
         What has to live as long as the addresses in ``idata``.
     numbers : mapping of str to Number
         Inputs and other numbers that can be changed by their names, with their places in ``rdata``.
+    aliases : mapping of str to str
+        Further names of ``numbers``, and what each stands for.
     watched : ndarray of int64
         Places in the scratch array: what a step's last evaluation of the residual leaves there is handed to a
         ``consumer`` behind the unknowns. Default: none.
@@ -359,6 +361,7 @@ class DAEProblem:
     advice: Mapping[Any, str] = field(default_factory=dict)
     callbacks: Sequence[Any] = ()
     numbers: Mapping[str, Number] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
     counted: Counted | None = None
     watched: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 

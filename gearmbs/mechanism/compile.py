@@ -171,6 +171,7 @@ class _Compiler:
         for constant in m.parameters.values():
             self._spelt[constant.name.upper()] = constant.name
             self.builder.add_number(constant.name, constant.unit, PARAMETER, constant.start)
+        self.builder.aliases |= m.aliases
 
     def know(self, made: Input) -> None:
         """Add an input, which may be one that was not made by the mechanism, to the named numbers."""

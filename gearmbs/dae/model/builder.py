@@ -64,6 +64,8 @@ class TableBuilder:
         self.numbers: dict[str, Number] = {}
         """Inputs and parameters by name, with places among the tables `H_R_EXTRA` and `H_R_FUNCTION`; see
         `Model.numbers`."""
+        self.aliases: dict[str, str] = {}
+        """Further names of these."""
         self._ground_marker: int | None = None
         self.add_body(0.0, np.zeros((3, 3)))
 
@@ -348,6 +350,7 @@ class TableBuilder:
             shape_at=tuple(self.shape_at),
             names=names,
             numbers=MappingProxyType(dict(self.numbers)),
+            aliases=MappingProxyType({alias: name for alias, name in self.aliases.items() if name in self.numbers}),
         )
 
 

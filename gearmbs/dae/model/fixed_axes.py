@@ -191,6 +191,7 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
         hook=fx.axes_hook if counted else None,
         hook_interval=_hook_interval(omega, model, axes, (idata, rdata, size)) if counted else None,
         numbers=model.numbers_in(idata),
+        aliases=model.aliases,
         counted=counted_angles(system, idata),
     )
 

@@ -163,6 +163,8 @@ class Model:
         Of each elastic frame its body and the offset of its shapes; frames are numbered on from the bodies.
     numbers : mapping of str to Number
         What can be changed by its name; the tables of its places are ``H_R_EXTRA`` and ``H_R_FUNCTION``.
+    aliases : mapping of str to str
+        Further names of ``numbers``, and what each stands for.
     """
 
     gravity: np.ndarray
@@ -196,6 +198,7 @@ class Model:
     shape_at: tuple[int, ...] = ()
     names: Names = field(default_factory=Names)
     numbers: Mapping[str, Number] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
     lean: Mapping[int, Any] = field(default_factory=dict)
 
     @cached_property

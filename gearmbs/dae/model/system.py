@@ -217,6 +217,7 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
         solved_at_outputs=unknowns.plain_states(at, model.controlled_states),
         solved_if_needed=unknowns.loads(at),
         numbers=model.numbers_in(idata),
+        aliases=model.aliases,
         counted=counted_angles(system, idata),
     )
 

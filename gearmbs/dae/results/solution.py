@@ -386,17 +386,18 @@ class Solution(Shown):
         KeyError
             For a name that is not there.
         """
-        numbers = self.problem.numbers
-        if name not in numbers:
-            raise KeyError(f"input {name!r}; there are {', '.join(numbers) or 'none'}")
+        numbers, aliases = self.problem.numbers, self.problem.aliases
+        number = numbers.get(aliases.get(name, name))
+        if number is None:
+            raise KeyError(f"input {name!r}; there are {', '.join([*aliases, *numbers]) or 'none'}")
         table = self.problem.rdata.copy()
         if self.result.held is None:
-            return np.array([numbers[name].value(table, float(t)) for t in self.t])
+            return np.array([number.value(table, float(t)) for t in self.t])
         found = np.empty(self.t.size)
         cells, values = self.result.held
         for k, t in enumerate(self.t.tolist()):
             table[cells] = values[k]
-            found[k] = numbers[name].value(table, t)
+            found[k] = number.value(table, t)
         return found
 
     def _body(self, body) -> int:

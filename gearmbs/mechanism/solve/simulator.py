@@ -189,8 +189,8 @@ class Simulator(Told):
         self._records = records
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
-        numbers, aliases = dict(self._base.numbers), mechanism.aliases
-        self.numbers = MappingProxyType(numbers | {alias: numbers[name] for alias, name in aliases.items()})
+        numbers, aliases = self._base.numbers, self._base.aliases
+        self.numbers = MappingProxyType({**numbers} | {alias: numbers[name] for alias, name in aliases.items()})
         self._settings = Settings(numbers, aliases, {**mechanism.bodies, **mechanism.elements})
         self._simulated, self._took, self._since = 0.0, 0.0, 0.0
         vars(self)["t"] = 0.0
