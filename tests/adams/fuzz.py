@@ -72,16 +72,21 @@ _touched: list[str] = []
 _watching = False
 
 
+@cache
+def _own() -> tuple[str | Path, ...]:
+    """Return Python's own folders and those of kernels, which a deck may cause to be touched."""
+    found = [sys.prefix, sys.base_prefix, Path(gearmbs.__file__).parent, "/proc", "/dev/null", *folders("gearmbs")]
+    return (*found, *([os.environ["NUMBA_CACHE_DIR"]] if "NUMBA_CACHE_DIR" in os.environ else []))
+
+
 def _audit(event: str, arguments: tuple) -> None:
     """Note what is run, and which file is opened, while a deck is carried through.
 
-    Python's own files and the folder of kernels are excepted, and what the deck's folder holds may be read.
+    `_own` folders are excepted, and what the deck's folder holds may be read.
     """
     if not _watching or event not in TOUCHING or isinstance(arguments[0], int):
         return
-    own = [sys.prefix, sys.base_prefix, Path(gearmbs.__file__).parent, "/proc", "/dev/null"]
-    own += folders("gearmbs")
-    own += [os.environ["NUMBA_CACHE_DIR"]] if "NUMBA_CACHE_DIR" in os.environ else []
+    own = list(_own())
     if event == "open" and "w" not in str(arguments[1]):
         own.append(Path.cwd())
     place = Path(os.fsdecode(arguments[0])).absolute()
@@ -102,6 +107,8 @@ def watched() -> Iterator[None]:
     """
     global _watching
     _touched.clear()
+    # beforehand: to find the folders of kernels makes them, which is noted, too
+    _own()
     _watching = True
     try:
         yield

@@ -7,6 +7,7 @@ import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
 from gearmbs.adams.runner import run_deck
+from tests.says import says
 
 from .test_run import model, run
 
@@ -279,6 +280,21 @@ def test_beam_bends_like_timoshenko(shear):
     np.testing.assert_allclose(moved, [20 / 2e7, 0.6 / 18000 + 0.6 * slide, 0.2 / 6000 + 0.2 * slide], rtol=1e-3)
     np.testing.assert_allclose(turned, [0.01 / 1600, -0.2 / 4000, 0.6 / 12000], rtol=1e-3)
     assert result.request(2)[0, 5] == pytest.approx(-20.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "element",
+    [
+        "BEAM/1,I=20,J=10,LENGTH=1,IXX=2,IYY=1,IZZ=1,AREA=1,EMOD=1,GMOD=1",
+        f"FIELD/1,I=20,J=10,KMATRIX={','.join(['1'] * 36)}",
+    ],
+)
+def test_damping_that_drives_is_refused(element):
+    """A negative CRATIO feeds every vibration; zero damps none, and runs."""
+    body = BLOCK.replace("MARKER/20,PART=2", "MARKER/20,PART=2,QP=1,0,0") + element
+    with pytest.raises(DeckError, match=says("CRATIO", "-0.01", "negative")):
+        parse_deck(model(body + ",CRATIO=-0.01\n"))
+    assert parse_deck(model(body + ",CRATIO=0\n"))
 
 
 def test_single_component_forces():

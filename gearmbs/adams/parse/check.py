@@ -60,6 +60,10 @@ def check(deck: Deck) -> list[Diagnostic]:
             value = getattr(statement, name)
             if value is not None and not value > 0.0:
                 fail(statement, f"{specs_of(cls)[name].keyword} = {value}; it must be positive", name)
+        for name in arguments(cls, lambda spec: spec.unsigned):
+            value = getattr(statement, name)
+            if value is not None and value < 0.0:
+                fail(statement, f"{specs_of(cls)[name].keyword} = {value}; it must not be negative", name)
         _check_markers(deck, statement, fail)
     _remark_idle(deck)
     for part in deck.of(st.Part).values():

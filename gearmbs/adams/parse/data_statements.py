@@ -440,7 +440,7 @@ class FePart(Statement, keyword="FE_PART", switch="on"):
     coordinates: Vector = arg("COORDINATES", REALS, (), count=(1, 7000), dimension="angle", required=True)
     section: Vector = arg("SECTION", REALS, (), count=(1, 6000), required=True)
     material: int | None = arg("MATERIAL", ID, required=True)
-    cratiok: float = arg("CRATIOK", REAL, 0.0, dimension="time")
+    cratiok: float = arg("CRATIOK", REAL, 0.0, dimension="time", unsigned=True)
     cratiom: float = arg("CRATIOM", REAL, 0.0, instead="CRATIOK, or forces against the velocity at markers on nodes")
     preload: str | None = arg("PRELOAD", TEXT, instead="a GFORCE at its ends")
 

@@ -88,8 +88,8 @@ class Spec:
         Unit of the value, a key of the expression dimensions.
     aliases : tuple of str
         Short forms that ADAMS accepts although they are ambiguous prefixes.
-    required, positive : bool
-        Whether a statement needs it, and whether its value must be positive.
+    required, positive, unsigned : bool
+        Whether a statement needs it, and whether its value must be positive, or at least not negative.
     start : bool
         Whether it says how the first analysis starts.
     idle : str
@@ -106,6 +106,7 @@ class Spec:
     aliases: tuple[str, ...] = ()
     required: bool = False
     positive: bool = False
+    unsigned: bool = False
     start: bool = False
     idle: str = ""
     instead: str | None = None
