@@ -36,6 +36,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.checks import singular_passage
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.solve.analyses import frozen_friction, linear_modes
+from gearmbs.mechanism.solve.points import joint_coordinates
 from gearmbs.mechanism.solve.simulate import StopAt
 
 DEFAULT_TOLERANCE = 1e-8
@@ -398,7 +399,8 @@ def plant_of(session: Session, command: Linear, build: Callable[[Session], tuple
     labels = {str(n): v.name or v.label() for n, v in zip(ids, [*inputs, *outputs])}
     shown = [labels.get(name, f"DIFF_{name}" if name.isdigit() else name) for name in names]
     count = len(inputs)
-    return _plant.linear_plant(system, places[:count], places[count:], shown, deck.units.time)
+    joints = joint_coordinates(model.mechanism)
+    return _plant.linear_plant(system, places[:count], places[count:], shown, deck.units.time, joints)
 
 
 def _variables(deck: Deck, kind: type[st.Plant], number: int | None, command: Command) -> list[st.Variable]:

@@ -434,7 +434,8 @@ def test_a_slider_crank_that_is_let_go_is_linearised_with_its_acceleration():
     angle, torque, h = 0.9, 3.0, 1e-3
     m = slider_crank(angle)
     m.torque("push", m.bodies["crank"], torque)
-    plant = m.linearize([("torque", "main")], ["WZ(main.I)"])
+    with pytest.warns(UserWarning, match=says("crank", "3 N m", "balance")):
+        plant = m.linearize([("torque", "main")], ["WZ(main.I)"])
     ends = [_crank_acceleration(angle + k * h, 0.0, torque, 0.0) for k in (1, -1, 2, -2)]
     by_angle = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
     assert plant.A[1] == pytest.approx([by_angle, 0.0], rel=1e-8)

@@ -18,14 +18,24 @@ is what is left, with U2 = T^T M T_u and so on: T', T_u' of axes that turn, see 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
+from gearmbs.dae.analyses.coordinates import (
+    Chosen,
+    JointCoordinate,
+    Triple,
+    chosen,
+    departure,
+    in_coordinates,
+    put_back,
+)
 from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
 from gearmbs.dae.analyses.steady import Basis, GivenInputs, Linearised, turning_basis, weights
-from gearmbs.dae.analyses.turning import Turning, turning
+from gearmbs.dae.analyses.turning import Turning, leaves_rest, turning
 from gearmbs.dae.problem import ModelError
 
 DEPENDENT = 1e-10
@@ -104,7 +114,8 @@ class Reduced:
     ``basis`` has a column of changes of (R, theta, q_f) for each entry of x; ``stiffness_terms`` and ``damping_terms``
     are the sums of the absolute values of the terms each coefficient is made of, against which rounding is to be held.
     ``motion`` is T with its rates, in coordinates with small rotations in axes at rest where something is ``turning``,
-    and ``driven`` what inputs do.
+    and ``driven`` what inputs do. ``coordinates`` are x where the motion is not steady and joints were given, and
+    ``unbalanced`` tells which of them is pushed, of a mechanism at rest.
     """
 
     basis: np.ndarray
@@ -120,6 +131,8 @@ class Reduced:
     motion: Basis
     turning: bool
     driven: Driven | None = None
+    coordinates: Chosen | None = None
+    unbalanced: str = ""
 
     @property
     def axes(self) -> np.ndarray:
@@ -132,7 +145,12 @@ class Reduced:
         return self.motion.varying
 
 
-def reduce(instant: Instant, inputs: Inputs | None = None) -> Reduced:
+def reduce(
+    instant: Instant,
+    inputs: Inputs | None = None,
+    joints: Sequence[JointCoordinate] | None = None,
+    balance: bool = False,
+) -> Reduced:
     """Linearise an I3 problem about an instant and project it on the motions allowed by its constraints.
 
     Parameters
@@ -140,6 +158,11 @@ def reduce(instant: Instant, inputs: Inputs | None = None) -> Reduced:
     instant : Instant
     inputs : Inputs, optional
         Of a plant.
+    joints : sequence of JointCoordinate, optional
+        Where the motion is not steady, so that what follows depends on the coordinates, these are taken, as far as they
+        go; with inputs also at rest.
+    balance : bool
+        Whether what is at rest is to be looked at for what pushes it.
 
     Raises
     ------
@@ -149,8 +172,17 @@ def reduce(instant: Instant, inputs: Inputs | None = None) -> Reduced:
     lin = linearised(instant, inputs)
     free, anchors = _free(instant, lin.constraint)
     found = turning_basis(instant, free, anchors, lin, linearised)
+    place = _placed(lin, found, anchors)
+    small, coordinates, unbalanced = lin.transform is not None, None, ""
+    moves = small and not leaves_rest(instant)
+    if joints is not None and (found.along is not None or not (inputs is None or moves)):
+        coordinates = chosen(instant, found, small, joints)
+        found = in_coordinates(found, coordinates)
+        place = put_back(instant, small, place, found, coordinates) if place else None
+        if balance and leaves_rest(instant):
+            unbalanced = departure(instant, lin, found, anchors, coordinates, linearised)
     basis, first, second = found.now, found.first, found.second
-    place, pushed, into_states = _driven(lin, found, anchors)
+    pushed, into_states = _driven(lin, place)
     absolute = np.abs(basis)
     forces = (lin.stiffness, lin.damping, lin.state_force, lin.mass, *pushed)
     projected = [basis.T @ force for force in forces]
@@ -177,8 +209,10 @@ def reduce(instant: Instant, inputs: Inputs | None = None) -> Reduced:
         rates[1] @ basis,
         rates[2],
         found,
-        lin.transform is not None,
-        Driven(tuple(force), tuple(rates[4:]), place) if force else None,
+        small,
+        Driven(tuple(force), tuple(rates[4:]), place) if place else None,
+        coordinates,
+        unbalanced,
     )
     if first.any() or second.any():
         # x' = T z' + T' z and x'' = T z'' + 2 T' z' + T'' z
@@ -192,12 +226,10 @@ def reduce(instant: Instant, inputs: Inputs | None = None) -> Reduced:
     return reduced
 
 
-def _driven(
-    lin: Linearised, found: Basis, anchors: np.ndarray
-) -> tuple[tuple[np.ndarray, ...], list[np.ndarray], list[np.ndarray]]:
-    """Return T_u, T_u', T_u'', and by u, u', u'' the forces and the rates of states that belong to them."""
+def _placed(lin: Linearised, found: Basis, anchors: np.ndarray) -> Triple | None:
+    """Return T_u, T_u' and T_u'', None without inputs."""
     if lin.inputs is None:
-        return (), [], []
+        return None
     dependent = np.setdiff1d(np.arange(len(lin.mass)), anchors)
     now = np.zeros((len(lin.mass), lin.inputs.place.shape[1]))
     if lin.inputs.place.any():
@@ -207,6 +239,14 @@ def _driven(
     if found.along is not None:
         more = found.along.rates(now)
         first, second = first + more[0], second + more[1]
+    return now, first, second
+
+
+def _driven(lin: Linearised, place: Triple | None) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return by u, u' and u'' the forces and the rates of states that belong to inputs."""
+    if lin.inputs is None or place is None:
+        return [], []
+    now, first, second = place
     value, rate = lin.inputs.force
     pushed = [
         value + lin.stiffness @ now + lin.damping @ first + lin.mass @ second,
@@ -215,12 +255,18 @@ def _driven(
     ]
     value, rate = lin.inputs.state
     moved, sped = lin.state_position, lin.state_velocity
-    into_states = [value + moved @ now + sped @ first, rate + sped @ now, np.zeros_like(value)]
-    return (now, first, second), pushed, into_states
+    return pushed, [value + moved @ now + sped @ first, rate + sped @ now, np.zeros_like(value)]
 
 
 def warn_of_varying(reduced: Reduced, stacklevel: int) -> None:
-    """Warn of each chain of bodies whose linearised equations have coefficients that vary with time."""
+    """Warn of bodies whose linearised equations have coefficients that vary with time, or are going to."""
+    if reduced.unbalanced:
+        warnings.warn(
+            f"{reduced.unbalanced}: it is not in balance here and moves off, and its equations change on the way. The "
+            "eigenvalues are those of this instant, and depend on the coordinates, which are joints' own where they "
+            "can be; take the equilibrium (at='equilibrium'), or add the load that holds it",
+            stacklevel=stacklevel,
+        )
     for names in reduced.varying:
         shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
         warnings.warn(

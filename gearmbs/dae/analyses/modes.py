@@ -10,11 +10,13 @@ with as many x as degrees of freedom; its eigenvalues are the finite ones of the
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs.dae.analyses.coordinates import JointCoordinate
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.turning import angular_velocities, spinning_modes
 
@@ -122,16 +124,16 @@ class Modes:
         return f"Modes({parts}{span}, {'stable' if self.stable else 'unstable'})"
 
 
-def linear_modes(place: System | Instant) -> Modes:
+def linear_modes(place: System | Instant, joints: Sequence[JointCoordinate] = ()) -> Modes:
     """Return the linear modes of a system at its present pose and velocity, time functions frozen at ``system.t0``.
 
     Angles count from where they start; those of an instant, as of an equilibrium, keep the turns counted so far.
 
     At a position of equilibrium they are the small vibrations. Elsewhere they are the instantaneous eigenvalues
-    with the loads' own changes. What spins is described in axes that do not turn with it (see
-    `gearmbs.dae.analyses.turning`): of rotors alike about their axis the modes are those of the whirl, with gyroscopic
-    couples. Where joints turn with bodies, as hinges of a pendulum on a turning frame, so do the axes (see
-    `gearmbs.dae.analyses.steady`). Without degrees of freedom and states there are none.
+    with the loads' own changes, in coordinates of ``joints`` as far as these go. What spins is described in axes that
+    do not turn with it (see `gearmbs.dae.analyses.turning`): of rotors alike about their axis the modes are those of
+    the whirl, with gyroscopic couples. Where joints turn with bodies, as hinges of a pendulum on a turning frame, so do
+    the axes (see `gearmbs.dae.analyses.steady`). Without degrees of freedom and states there are none.
 
     Raises
     ------
@@ -153,7 +155,7 @@ def linear_modes(place: System | Instant) -> Modes:
         instant = Instant(place, "I3")
         instant.released = True
     instant.y = instant.settle(instant.y)
-    reduced = reduce(instant)
+    reduced = reduce(instant, joints=joints)
     warn_of_varying(reduced, stacklevel=4)
     _warn_of_turning_modes(instant, reduced)
     found = spectrum(reduced)

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, expm, hessenberg, schur, solve_sylvester
 
+from gearmbs.dae.analyses.coordinates import JointCoordinate
 from gearmbs.dae.analyses.eigenvalues import spectrum
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Driven, Reduced, reduce, warn_of_varying
@@ -542,8 +543,9 @@ def lowered(
 
 
 def linear_plant(
-    system: System, inputs: Sequence[int], outputs: Sequence[int], names: Sequence[str], time_unit: float = 1.0
-) -> LinearPlant:
+    system: System, inputs: Sequence[int], outputs: Sequence[int], names: Sequence[str], time_unit: float = 1.0,
+    joints: Sequence[JointCoordinate] = (),
+) -> LinearPlant:  # fmt: skip
     """Return the plant between states of a system at its present pose and velocity.
 
     Parameters
@@ -557,6 +559,8 @@ def linear_plant(
         Of all differential states.
     time_unit : float
         Of the plant, s.
+    joints : sequence of JointCoordinate
+        See `gearmbs.dae.analyses.linearisation.reduce`.
 
     Raises
     ------
@@ -566,7 +570,7 @@ def linear_plant(
     instant = Instant(system, "I3")
     instant.released = True
     instant.y = instant.settle(instant.y)
-    reduced = reduce(instant)
+    reduced = reduce(instant, joints=joints, balance=True)
     warn_of_varying(reduced, stacklevel=3)
     own = np.array([k for k in range(len(names)) if k not in (*inputs, *outputs)], dtype=int)
     u, y = np.array(inputs, dtype=int), np.array(outputs, dtype=int)

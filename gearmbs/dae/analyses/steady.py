@@ -32,6 +32,7 @@ from scipy.sparse.csgraph import connected_components
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.turning import leaves_rest, skew, spinning_modes
 from gearmbs.dae.equations.rotation import POSE_V, POSE_W
+from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.model.system import accelerations
 from gearmbs.dae.problem import ModelError
 
@@ -193,8 +194,8 @@ def turning_basis(
         return none
     if not velocity.any():
         owner = _owners(instant)
-        along = _along(instant, here, anchors, np.ones(len(owner), dtype=bool)) if leaves_rest(instant) else None
-        return none if along is None else replace(none, second=along.rates(basis)[1], along=along)
+        way = along(instant, here, anchors, np.ones(len(owner), dtype=bool)) if leaves_rest(instant) else None
+        return none if way is None else replace(none, second=way.rates(basis)[1], along=way)
     acceleration = instant.system.accelerations(instant.configuration(), instant.t)[0]
     owner = _owners(instant)
     label = _chains(here.constraint, owner, len(velocity))
@@ -206,7 +207,8 @@ def turning_basis(
         return none
     # what brakes a body hard is looked at before it has come to rest
     turned = np.linalg.norm(velocity[:, 3:], axis=1)
-    braked = np.linalg.norm(acceleration[:, 3:], axis=1)[turned > 0.0] / turned[turned > 0.0]
+    turns = turned > SLOW * largest
+    braked = np.linalg.norm(acceleration[:, 3:], axis=1)[turns] / turned[turns]
     step = LOOK / max(largest, float(braked.max(initial=0.0)))
     try:
         near = [(h, linearised(_later(instant, h))) for h in (-step, step)]
@@ -243,11 +245,11 @@ def turning_basis(
             varying.append([instant.system.body_names[b] for b in np.flatnonzero(axes.any(axis=1))])
     first = turn @ basis - basis @ back
     second = turn @ first - first @ back
-    along = _along(instant, here, anchors, changing[owner]) if changing.any() else None
-    if along is not None:
-        more = along.rates(basis)
+    way = along(instant, here, anchors, changing[owner]) if changing.any() else None
+    if way is not None:
+        more = way.rates(basis)
         first, second = first + more[0], second + more[1]
-    return Basis(basis, first, second, axes, varying, turn, along)
+    return Basis(basis, first, second, axes, varying, turn, way)
 
 
 def _best_axes(
@@ -273,31 +275,42 @@ SPREAD = 0.04
 """Angle, rad, by which bodies turn in h: what is left out of J'' is 1e-13 of it, and rounding, 1e-16/h^2, as much."""
 
 
-def _along(instant: Instant, here: Linearised, anchors: np.ndarray, rows: np.ndarray) -> Along | None:
+def along(instant: Instant, here: Linearised, anchors: np.ndarray, rows: np.ndarray) -> Along | None:
     """Return the rates of the constraints along the motion; None where modes of deformation are among the coordinates.
 
     J depends on positions and time alone, so that the path with the same velocities and accelerations has its rates.
     """
     if here.transform is None or instant.at["q_f"] < instant.at["lambda"]:
         return None
-    system, now, t = instant.system, instant.configuration(), instant.t
-    speeds, changes = now.velocities, accelerations(system, now, t)[0]
-    size = max(float(np.abs(speeds).max()), float(np.sqrt(np.abs(changes).max())), SLOWEST)
-    h = SPREAD / size
-    turning = system.model.counts.turning
-    moves = (6 * np.arange(now.bodies)[:, None] + np.arange(3)).ravel()
+    system = instant.system
+    bodies, turning = len(system.body_names), system.model.counts.turning
+    moves = (6 * np.arange(bodies)[:, None] + np.arange(3)).ravel()
     turns = (6 * turning[:, None] + np.arange(3, 6)).ravel()
 
-    def constraint(time: float) -> np.ndarray:
-        there = now.displaced(time * speeds + 0.5 * time**2 * changes)
-        return system.constraint_jacobian(there, t + time)[0].toarray()[:, np.concatenate([moves, turns])]
+    def constraint(there: Configuration, time: float) -> np.ndarray:
+        return system.constraint_jacobian(there, time)[0].toarray()[:, np.concatenate([moves, turns])]
 
-    ahead = [constraint(k * h) for k in range(1, 5)]
-    behind = [constraint(-k * h) for k in range(1, 5)]
-    middle = constraint(0.0)
+    return Along(here.constraint, *path_rates(instant, constraint), anchors, rows)
+
+
+def path_rates(
+    instant: Instant, rows: Callable[[Configuration, float], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return the first and second rates of a function of configuration and time along the motion."""
+    now, t = instant.configuration(), instant.t
+    speeds, changes = now.velocities, accelerations(instant.system, now, t)[0]
+    size = max(float(np.abs(speeds).max()), float(np.sqrt(np.abs(changes).max())), SLOWEST)
+    h = SPREAD / size
+
+    def at(time: float) -> np.ndarray:
+        return rows(now.displaced(time * speeds + 0.5 * time**2 * changes), t + time)
+
+    ahead = [at(k * h) for k in range(1, 5)]
+    behind = [at(-k * h) for k in range(1, 5)]
+    middle = at(0.0)
     first = sum(w * (a - b) for w, a, b in zip(STENCIL[0], ahead, behind, strict=True)) / h
     second = sum(w * (a + b - 2.0 * middle) for w, a, b in zip(STENCIL[1], ahead, behind, strict=True)) / h**2
-    return Along(here.constraint, first, second, anchors, rows)
+    return first, second
 
 
 @dataclass
@@ -350,10 +363,10 @@ class _Chain:
                 sizes = rows * np.abs(now * self.weight[:, None]).max(axis=0)
                 worst = max(worst, float((np.abs(moved) / np.maximum(sizes, 1e-300)).max()) / STILL)
             mass, damping, stiffness = self._reduced(there, now, across @ t1 @ undone, across @ t2 @ undone)
-            worst = max(worst, _largest(mass - mass0, inertia) / STILL)
+            worst = max(worst, largest(mass - mass0, inertia) / STILL)
             if forces:
-                worst = max(worst, _largest(damping - damping0, damped) / STILL)
-                worst = max(worst, _largest(stiffness - stiffness0, resisted) / STILL)
+                worst = max(worst, largest(damping - damping0, damped) / STILL)
+                worst = max(worst, largest(stiffness - stiffness0, resisted) / STILL)
         return worst
 
     @staticmethod
@@ -362,7 +375,8 @@ class _Chain:
         return t0.T @ mass, t0.T @ damping, t0.T @ (lin.stiffness @ t0 + lin.damping @ t1 + lin.mass @ t2)
 
 
-def _largest(change: np.ndarray, size: np.ndarray) -> float:
+def largest(change: np.ndarray, size: np.ndarray) -> float:
+    """Return the largest entry of a matrix over the products of the sizes of its row and its column."""
     return float(np.max(np.abs(change) / np.maximum(np.outer(size, size), 1e-300)))
 
 

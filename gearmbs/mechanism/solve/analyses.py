@@ -18,6 +18,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.parts.quantities import quantities
+from gearmbs.mechanism.solve.points import joint_coordinates
 from gearmbs.mechanism.solve.simulate import just_inside
 from gearmbs.progress import waiting
 
@@ -166,7 +167,7 @@ def linear_modes(mechanism: Mechanism, *, t: float = 0.0, at: StaticResult | str
             raise ModelError(f"at = {at!r}; choose 'initial', 'equilibrium' or give a StaticResult")
         system = mechanism.compile(t)
         if at == "initial":
-            return _modes.linear_modes(system)
+            return _modes.linear_modes(system, joint_coordinates(mechanism))
         at = _statics.static_equilibrium(system)
     return _modes.linear_modes(at.solution.instant())
 

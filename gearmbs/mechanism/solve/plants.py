@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import qr
 
+from gearmbs.dae.analyses.coordinates import chosen, spatial
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Inputs, Reduced, reduce, warn_of_varying
 from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, Realised, lowered, poles_of, realised
@@ -21,7 +21,7 @@ from gearmbs.mechanism.parts.bodies import Marker, markers_kept
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told
-from gearmbs.mechanism.solve.points import instant_at, point_of
+from gearmbs.mechanism.solve.points import instant_at, joint_coordinates, point_of
 from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
@@ -42,7 +42,9 @@ def linearize(
 ) -> LinearPlant:
     """Return the linear plant x' = A x + B u, y = C x + D u of a mechanism at one of its states.
 
-    Constraints are eliminated: the states are the independent displacements, their rates, and the states of elements.
+    Constraints are eliminated: the states are independent coordinates, their rates, and the states of elements. The
+    coordinates are angles and displacements of joints, by the name of a body where they are the same as one of its own,
+    then displacements and small rotations of bodies.
 
     Parameters
     ----------
@@ -88,7 +90,8 @@ def linearize(
     Warns
     -----
     UserWarning
-        If the coefficients vary with time along the motion: they are those of this instant.
+        If the coefficients vary with time along the motion, or are going to, of what is at rest and not in balance:
+        they are those of this instant.
 
     Examples
     --------
@@ -322,7 +325,7 @@ def _plant(
     pairs = [columns.of(one) for one in given]
     size = instant.y.size
     stacked = [np.array([pair[k] for pair in pairs]).reshape(-1, size).T for k in (0, 1)]
-    reduced = reduce(instant, Inputs(*stacked))
+    reduced = reduce(instant, Inputs(*stacked), joint_coordinates(mechanism), balance=True)
     warn_of_varying(reduced, stacklevel=5)
     kinds = instant.system.model.differential_states
     names = [name for name, differential in zip(instant.system.state_names, kinds, strict=True) if differential]
@@ -343,9 +346,12 @@ def _plant(
     labels = [one.name for one in told]
     a, b, c, d = lowered(found, asked, labels)
     n = len(reduced.mass)
-    scale, titles, units = _coordinates(instant, reduced)
     change = np.eye(len(a))
-    change[:n, :n] = change[n : 2 * n, n : 2 * n] = scale
+    coordinates = reduced.coordinates
+    if coordinates is None:
+        coordinates = chosen(instant, reduced.motion, reduced.turning, ())
+        change[:n, :n] = change[n : 2 * n, n : 2 * n] = coordinates.rows[0]
+    titles, units = coordinates.titles, coordinates.units
     back = np.linalg.inv(change)
     states = [*titles, *(f"{title}, rate" for title in titles), *(names[k] for k in own)]
     state_units = [*units, *(f"{unit}/s" for unit in units), *[""] * own.size]
@@ -379,15 +385,9 @@ def _value(instant: Instant, given: Given) -> float:
 
 def _spatial(instant: Instant, reduced: Reduced, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return displacements and small rotations in global components of all bodies, (bodies, 3, k), from coordinates."""
-    bodies, first = len(instant.system.body_names), instant.at["R"]
-    angle, mode = instant.at["theta"] - first, instant.at["q_f"] - first
-    moved = changes[:angle].reshape(bodies, 3, -1)
-    turned = np.zeros_like(moved)
-    rotating = instant.system.model.counts.turning
-    turned[rotating] = changes[angle:mode].reshape(rotating.size, 3, -1)
-    if not reduced.turning:
-        turned = np.einsum("bmc,bmk->bck", instant.axes(), turned)
-    return moved, turned
+    bodies = len(instant.system.body_names)
+    moved, turned = np.split(spatial(instant, reduced.turning, changes)[: 6 * bodies], 2)
+    return moved.reshape(bodies, 3, -1), turned.reshape(bodies, 3, -1)
 
 
 def _acceleration(instant: Instant, reduced: Reduced, found: Realised, asked: Acceleration) -> np.ndarray:
@@ -409,34 +409,3 @@ def _acceleration(instant: Instant, reduced: Reduced, found: Realised, asked: Ac
     shift = -arm @ turn[k]
     out = moved[k] - arm @ by_acceleration + alpha @ shift
     return out - skew(spin @ frame.arm) @ by_rate - spin @ arm @ by_rate + spin @ spin @ shift
-
-
-def _coordinates(instant: Instant, reduced: Reduced) -> tuple[np.ndarray, list[str], list[str]]:
-    """Return what the states of the plant are of q, (dof, dof), their names and units.
-
-    They are displacements of centres of mass and small rotations about global axes: those the others follow best.
-    """
-    n = reduced.basis.shape[1]
-    if not n:
-        return np.zeros((0, 0)), [], []
-    moved, turned = _spatial(instant, reduced, reduced.motion.now)
-    model = instant.system.model
-    modal = reduced.motion.now[instant.at["q_f"] - instant.at["R"] :]
-    arm = max(min(instant.system.length, 1.0), 1e-3)
-    bodies = instant.system.body_names
-    rows = np.concatenate([moved.reshape(-1, n), turned.reshape(-1, n), modal])
-    weight = np.concatenate([np.ones(3 * len(bodies)), np.full(3 * len(bodies), arm), arm / model.modal_sizes[:, 0]])
-    order = qr((weight[:, None] * rows).T, mode="r", pivoting=True)[1][:n]
-    along = reduced.motion.along
-    if along is not None:
-        # what varies with time depends on the coordinates: those of the modes
-        first, own = 3 * len(bodies), 3 * model.counts.turning[:, None] + np.arange(3)
-        order = np.concatenate([np.arange(first), first + own.ravel()])[along.anchors]
-    order = np.sort(order)
-    places = [(name, c) for name in bodies for c in "xyz"]
-    titles = [f"{name}: {c}" for name, c in places] + [f"{name}: rotation about {c}" for name, c in places]
-    units = ["m"] * len(places) + ["rad"] * len(places)
-    for name, count in zip(bodies, model.modes[1:], strict=True):
-        titles += [f"{name}: mode {k + 1}" for k in range(count)]
-        units += ["1"] * count
-    return rows[order], [titles[k] for k in order], [units[k] for k in order]

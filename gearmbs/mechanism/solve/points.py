@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.dae.analyses.coordinates import Frame, JointCoordinate
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.analyses.statics import static_equilibrium as _static_equilibrium
@@ -19,6 +20,7 @@ from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
+from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.simulate import prepared
 
@@ -26,6 +28,10 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
     from gearmbs.mechanism.mechanism import Mechanism
 
+ANGLES = ("revolute", "cylindrical", "planar", "screw")
+"""Kinds of joints that keep both axes z parallel and let I turn about them."""
+WAYS = ("translational", "cylindrical")
+"""Kinds of joints that let I move along z_J and nothing else but turn about it."""
 CHOICES = "choose 'initial', 'equilibrium', or give a StaticResult, a State or a Solution"
 
 
@@ -171,6 +177,30 @@ def _with_numbers(model: Model, numbers: Mapping[str, list[np.ndarray]], t: floa
         for place in number.places[len(known) :]:
             place.write(tables[place.table], t, number.value(first, t), number.slope(first))
     return replace(model, extra_r=tables[T.H_R_EXTRA], function_r=tables[T.H_R_FUNCTION])
+
+
+def joint_coordinates(mechanism: Mechanism) -> list[JointCoordinate]:
+    """Return what the joints of a mechanism leave free between rigid bodies."""
+    numbers = {id(body): k for k, body in enumerate(mechanism.bodies.values())}
+    numbers[id(mechanism.ground)] = -1
+    found = []
+    for joint in mechanism.joints.values():
+        sides = (joint.i, joint.j)
+        if any(isinstance(side.body, ModalBody) for side in sides):
+            continue
+        i, j = (
+            Frame(
+                numbers[id(side.body)],
+                side.position - (0.0 if side.body.is_ground else side.body.com),
+                side.orientation,
+            )
+            for side in sides
+        )
+        if joint.kind in ANGLES:
+            found.append(JointCoordinate(f"{joint.name}: angle", True, i, j))
+        if joint.kind in WAYS:
+            found.append(JointCoordinate(f"{joint.name}: displacement", False, i, j))
+    return found
 
 
 def instant_at(mechanism: Mechanism, point: Point) -> Instant:

@@ -1,0 +1,149 @@
+"""Plants where a mechanism is not in balance: in the coordinates of its joints, with a remark, against derivatives."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import gearmbs as gm
+from tests.says import says
+
+GRAVITY = 9.81
+CART, POLE, ARM, INERTIA = 2.0, 1.0, 0.5, 0.03
+
+
+def aslant(angle: float, arm: float = ARM) -> gm.Mechanism:
+    """Return a pendulum about y, held at an angle by nothing."""
+    m = gm.Mechanism("pendulum", gravity=(0, 0, -GRAVITY))
+    turned = Rotation.from_rotvec((0, angle, 0)).as_matrix()
+    rod = m.body("rod", POLE, (INERTIA,) * 3, position=turned @ (0, 0, -arm), orientation=turned)
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    return m
+
+
+@pytest.mark.parametrize("arm", [0.2, 0.5, 3.0])
+def test_a_pendulum_that_nothing_holds_is_linearised_in_its_angle(arm):
+    """(I + m l^2) phi'' + m g l sin phi = T, whichever coordinate of its body is the longest."""
+    angle, inertia = 1.0, INERTIA + POLE * arm**2
+    m = aslant(angle, arm)
+    with pytest.warns(UserWarning, match=says("rod", "balance", "equilibrium")) as told:
+        plant = m.linearize([("torque", "pin")], [("joint_angle", "pin")])
+    weight = POLE * GRAVITY * arm
+    assert f"{-weight * np.sin(angle):.4g} N m" in str(told[0].message)
+    assert plant.A == pytest.approx(np.array([[0, 1], [-weight * np.cos(angle) / inertia, 0]]), rel=1e-9, abs=1e-9)
+    assert plant.C == pytest.approx(np.array([[1.0, 0.0]]), abs=1e-12)
+    assert m.linear_modes().eigenvalues[0].imag == pytest.approx(np.sqrt(-plant.A[1, 0]), rel=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0, np.pi])
+def test_what_is_held_or_rests_is_not_remarked_on(angle):
+    m = aslant(angle)
+    m.torque("hold", m.bodies["rod"], POLE * GRAVITY * ARM * np.sin(angle), axis=(0, 1, 0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plant = m.linearize([("torque", "pin")], [("joint_angle", "pin")])
+        aslant(0.3).linearize([("torque", "pin")], [("joint_angle", "pin")], at="equilibrium")
+    assert plant.A[1, 0] == pytest.approx(-POLE * GRAVITY * ARM * np.cos(angle) / (INERTIA + POLE * ARM**2), rel=1e-9)
+
+
+def test_what_moves_off_and_stays_the_same_is_not_remarked_on():
+    """A disc with its mass beside its axis under a torque, and a mass that falls into a linear spring."""
+    m = gm.Mechanism("off")
+    disc = m.body("disc", 1.0, (0.1,) * 3, position=(0.2, 0, 0))
+    m.revolute("pin", disc, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.torque("drive", disc, 3.0)
+    block = m.body("block", 2.0, (0.1,) * 3, position=(0, 0, 1.0))
+    m.translational("guide", block, m.ground, at=(0, 0, 1.0), axis=(0, 0, 1))
+    m.load("spring", block.marker(name="s.I"), m.ground.marker(name="s.J"), fz="-20 - 800*(DZ(s.I) - 1)")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plant = m.linearize([("torque", "pin")], [("joint_angle", "pin")])
+    assert plant.states[:2] == ["disc: rotation about z", "block: z"]
+    assert plant.A[2:, :2] == pytest.approx(np.diag([0.0, -400.0]), abs=1e-9)
+
+
+def test_a_spring_that_is_not_linear_is_remarked_on():
+    """Of F = -k x^3 out of balance the stiffness is that of the place, 3 k x^2."""
+    m = gm.Mechanism("hard")
+    block = m.body("block", 2.0, (0.1,) * 3, position=(0, 0, 1.0))
+    m.translational("guide", block, m.ground, at=(0, 0, 1.0), axis=(0, 0, 1))
+    m.load("spring", block.marker(name="s.I"), m.ground.marker(name="s.J"), fz="-50*DZ(s.I)**3")
+    with pytest.warns(UserWarning, match=says("block: z", "-50 N", "balance")):
+        plant = m.linearize([("force", "guide")], [("joint_displacement", "guide")])
+    assert plant.A[1, 0] == pytest.approx(-75.0, rel=1e-9)
+
+
+def cart(angle: float, spin: float, speed: float, axes: np.ndarray) -> gm.Mechanism:
+    """Return a cart on a rail with a pole that hangs from it, all in axes of any direction."""
+    m = gm.Mechanism("cart and pole", gravity=axes @ (0, 0, -GRAVITY))
+    moving = axes @ (speed, 0, 0)
+    body = m.body("cart", CART, (0.1,) * 3, orientation=axes, velocity=moving)
+    m.translational("rail", body, m.ground, at=(0, 0, 0), axis=axes[:, 0])
+    turned, turning = axes @ Rotation.from_rotvec((0, angle, 0)).as_matrix(), axes @ (0, spin, 0)
+    arm = turned @ (0, 0, -ARM)
+    pole = m.body("pole", POLE, (INERTIA,) * 3, position=arm, orientation=turned, angular_velocity=turning,
+                  velocity=moving + np.cross(turning, arm))  # fmt: skip
+    m.revolute("hinge", pole, body, at=(0, 0, 0), axis=axes[:, 1])
+    return m
+
+
+def _accelerations(angle, spin, force, torque):
+    """(M + m) x'' - m l (sin phi)'' = F, (I + m l^2) phi'' - m l cos phi x'' + m g l sin phi = T."""
+    couple = -POLE * ARM * np.cos(angle)
+    matrix = np.array([[CART + POLE, couple], [couple, INERTIA + POLE * ARM**2]])
+    pushed = [force - POLE * ARM * np.sin(angle) * spin**2, torque - POLE * GRAVITY * ARM * np.sin(angle)]
+    return np.linalg.solve(matrix, np.array(pushed))
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+@pytest.mark.parametrize(
+    ("angle", "spin", "speed"), [(0.6, 0.0, 0.0), (2.0, 0.0, 0.0), (0.6, 2.0, 1.3), (0.0, 3.0, 0.0)]
+)
+def test_a_cart_and_pole_anywhere_and_in_any_axes(tilt, angle, spin, speed):
+    """The derivatives of x'' and phi'' by x, phi, their rates, F and T, by complex steps."""
+    m = cart(angle, spin, speed, Rotation.from_rotvec(tilt * np.array([1, 2, 3]) / np.sqrt(14.0)).as_matrix())
+    shown = [("joint_displacement", "rail"), ("joint_angle", "hinge"), ("joint_rate", "hinge")]
+    with pytest.warns(UserWarning, match=says("pole", "vary", "time") if spin else says("balance")):
+        plant = m.linearize([("force", "rail"), ("torque", "hinge")], shown)
+    h = 1e-30
+    by = [np.imag(_accelerations(*row)) / h for row in np.array([angle, spin, 0, 0]) + 1j * h * np.eye(4)]
+    exact = np.transpose([np.zeros(2), by[0], np.zeros(2), by[1], by[2], by[3]])
+    np.testing.assert_allclose(np.hstack([plant.A, plant.B])[2:], exact, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(plant.C, np.eye(4)[[0, 1, 3]], atol=1e-9)
+    assert plant.states[:2] == (
+        ["rail: displacement", "hinge: angle"] if tilt else ["cart: x", "pole: rotation about y"]
+    )
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+@pytest.mark.parametrize(("angle", "spin"), [(0.0, 0.0), (0.6, 0.0), (0.6, 2.0)])
+def test_a_pendulum_on_a_base_that_is_turned(tilt, angle, spin):
+    """(I + m l^2) phi'' + m g l sin phi = 0 of the absolute angle; the joint's own is less that of the base."""
+    axes = Rotation.from_rotvec(tilt * np.array([1, 2, 3]) / np.sqrt(14.0)).as_matrix()
+    m = gm.Mechanism("base", gravity=axes @ (0, 0, -GRAVITY))
+    base = m.body("base", CART, (0.1,) * 3, orientation=axes)
+    m.rotation("drive", m.revolute("main", base, m.ground, at=(0, 0, 0), axis=axes[:, 1]), 0.0)
+    turned, turning = axes @ Rotation.from_rotvec((0, angle, 0)).as_matrix(), axes @ (0, spin, 0)
+    arm = turned @ (0, 0, -ARM)
+    pole = m.body("pole", POLE, (INERTIA,) * 3, position=arm, orientation=turned, angular_velocity=turning,
+                  velocity=np.cross(turning, arm))  # fmt: skip
+    m.revolute("hinge", pole, base, at=(0, 0, 0), axis=axes[:, 1])
+    with pytest.warns(UserWarning, match=says("equations" if spin else "-2.77 N m")) if angle else nullcontext():
+        plant = m.linearize([("motion", "drive", "acceleration")], [("joint_angle", "hinge")])
+    rate = POLE * GRAVITY * ARM * np.cos(angle) / (INERTIA + POLE * ARM**2)
+    s = 3.0 + 4.0j
+    # the pole stays where it is
+    assert plant.transfer(s)[0, 0] == pytest.approx(-1.0 / s**2, rel=1e-9)
+    if tilt:
+        assert plant.states[0] == "hinge: angle"
+        assert plant.C[0] == pytest.approx([1, 0, 0, 0], abs=1e-9)
+        assert plant.A[1] == pytest.approx([-rate, 0, -rate, 0], rel=1e-8, abs=1e-9)
+        assert plant.B[1] == pytest.approx([-1.0], rel=1e-9)
+    else:
+        assert plant.states[0] == "pole: rotation about y"
+        assert plant.C[0] == pytest.approx([1, 0, -1, 0], abs=1e-9)
+        assert plant.A[1] == pytest.approx([-rate, 0, 0, 0], rel=1e-8, abs=1e-9)
