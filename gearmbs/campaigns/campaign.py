@@ -61,12 +61,19 @@ class Campaign:
 
     def __init__(self, path: str | Path, plan: Plan | None = None) -> None:
         _needed()
-        self.folder = Folder(path) if plan is None else make_folder(path, plan)
+        self._folder = Folder(path) if plan is None else make_folder(path, plan)
+
+    @property
+    def folder(self) -> Folder:
+        """What is in the folder, as it is now: others may have extended or packed it since it was opened."""
+        if self._folder.changed:
+            self._folder = Folder(self.path)
+        return self._folder
 
     @property
     def path(self) -> Path:
         """The folder."""
-        return self.folder.path
+        return self._folder.path
 
     @property
     def plan(self) -> Plan:
@@ -117,8 +124,6 @@ class Campaign:
         from gearmbs.studies.run.engine import here, processes
         from gearmbs.studies.run.parallel import available_cores
 
-        # others may have extended or packed it
-        self.folder = Folder(self.path)
         where: Any
         if workers is not None:
             workers = whole(workers, "workers", 0)
@@ -147,7 +152,6 @@ class Campaign:
         """
         from gearmbs.studies.run.engine import here
 
-        self.folder = Folder(self.path)
         if not 1 <= whole(part, "part", 0) <= whole(parts, "parts", 1):
             raise CampaignError(f"part {part} of {parts}: give a part from 1 to {parts}")
         mine = range(part - 1, self.folder.unit_count, parts)
@@ -224,7 +228,7 @@ class Campaign:
 
     def extend(self, n: int) -> Campaign:
         """Draw further points up to n, keep what is there; `run` then works on the new ones."""
-        self.folder = extend_folder(self.folder, n)
+        self._folder = extend_folder(self.folder, n)
         return self
 
     def pack(self, unit: int | None = None) -> Campaign:
@@ -246,7 +250,7 @@ class Campaign:
         """
         from gearmbs.campaigns.stored.packing import pack_folder
 
-        self.folder = pack_folder(self.folder, unit)
+        self._folder = pack_folder(self.folder, unit)
         return self
 
     @property

@@ -100,6 +100,7 @@ class Folder:
 
     def __init__(self, path: str | Path, tree: dict[str, Any] | None = None) -> None:
         self.path = local(path)
+        self._stamp = _stamp(self.path)
         self.tree = _plan_tree(self.path) if tree is None else tree
         self.store = self.path / self.tree.get("store", "")
         self.extents = [Extent(**e) for e in self.tree["extents"]]
@@ -111,6 +112,12 @@ class Folder:
             SignalSpec(s["name"], tuple(s["channels"]), s["samples"], s["rate"], s["units"])
             for s in self.tree["signals"]
         ]
+
+    @property
+    def changed(self) -> bool:
+        """Whether the plan's file is another one than was read, as after `extend` and `pack` by whomever."""
+        now = _stamp(self.path)
+        return now is not None and now != self._stamp
 
     @property
     def unit_count(self) -> int:
@@ -225,6 +232,10 @@ class Folder:
 
     def damaged(self, unit: int, what: str) -> CampaignError:
         """Return the error of a unit whose files are not what they were."""
+        if self.changed:
+            return CampaignError(
+                f"unit {unit}: {self.path} was extended, packed or put right since it was opened; open it again"
+            )
         return CampaignError(f"unit {unit} is damaged: {what}; gearmbs campaign run {self.path} does it again")
 
     def size(self, unit: int) -> int:
@@ -258,6 +269,15 @@ class Folder:
         extent = self._extent(unit)
         block, place = divmod(unit - extent.first_unit, UNITS_A_FILE)
         return _block_name(self.extents.index(extent), block), place
+
+
+def _stamp(path: Path) -> tuple[int, int] | None:
+    """Return by what a plan's file is known from others, None where it is not there."""
+    try:
+        about = (path / "plan.json").stat()
+    except OSError:
+        return None
+    return about.st_mtime_ns, about.st_ino
 
 
 @lru_cache(maxsize=2)

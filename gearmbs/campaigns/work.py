@@ -55,7 +55,7 @@ GUARD_AFTER = 2
 STARTING = 30.0
 """Seconds that a process of its own may take beyond the limit of its case, until it can begin."""
 
-_folders: dict[str, tuple[tuple[int, int], Folder]] = {}
+_folders: dict[str, Folder] = {}
 
 
 def refusal(error: BaseException) -> Refused | None:
@@ -274,11 +274,10 @@ def serve(path: str | Path, code: str) -> None:
 
 def open_folder(path: str | Path) -> Folder:
     """Return the folder of a campaign, read again only when its plan has changed."""
-    about = (Path(path) / "plan.json").stat()
-    key, stamp = str(path), (about.st_mtime_ns, about.st_ino)
-    if key not in _folders or _folders[key][0] != stamp:
-        _folders[key] = (stamp, Folder(path))
-    return _folders[key][1]
+    key = str(path)
+    if key not in _folders or _folders[key].changed:
+        _folders[key] = Folder(path)
+    return _folders[key]
 
 
 def work_unit(path: str, mix: bool, unit: int, _report: Callable[[float], None] | None = None) -> bool:

@@ -69,6 +69,22 @@ def test_records_are_found_after_packing(tmp_path):
     np.testing.assert_array_equal(campaign.pack(4).record(2).wave.values, wave)
 
 
+def test_a_handle_from_before_is_that_of_what_is_there_now(tmp_path):
+    """Packed or extended by another one: nothing is lost, and signals that were to be read are told apart from damage."""
+    before = done(tmp_path / "c")
+    content, data = read(before), before.open()
+    Campaign(tmp_path / "c").pack(4)
+    assert read(before) == content
+    assert before.folder.unit_count == 2
+    with pytest.raises(CampaignError, match=says("packed", "since", "open it again")):
+        data.wave.load()
+    other = Campaign(tmp_path / "c").extend(9)
+    assert before.status().cases == 9
+    assert (other.run(workers=0).done, len(before.table)) == (9, 9)
+    # nobody has changed it: what is open is read
+    assert before.open().wave.load().shape[0] == 9
+
+
 def test_what_cannot_be_packed_is_told(tmp_path):
     campaign = small(tmp_path / "c", n=8, unit=2)
     with pytest.raises(CampaignError, match=says("pack", "4 units", "run it")):
