@@ -10,13 +10,12 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.campaigns import cheap, resident, stored
+from benchmarks.campaigns import carry_out, cheap, resident, stored
 from gearmbs.campaigns import Campaign, Factor, FunctionSubject, make_plan
 from gearmbs.studies import Case
 
@@ -93,7 +92,4 @@ def worker(folder: Path, n: int = 5056) -> None:
 PARTS = {"planted": planted, "disk": disk, "worker": worker}
 
 if __name__ == "__main__":
-    place = Path(sys.argv[1])
-    place.mkdir(parents=True, exist_ok=True)
-    for name in sys.argv[2:] or PARTS:
-        PARTS[name](place)
+    carry_out(PARTS, "campaign_failures", __doc__)

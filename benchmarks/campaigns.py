@@ -8,6 +8,7 @@ driver) and ``kills``.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import random
@@ -348,8 +349,20 @@ PARTS = {
     "kills": kills,
 }
 
+
+
+def carry_out(parts: dict[str, Callable[[Path], None]], module: str, about: str | None) -> None:
+    """Carry out the parts that the command line asks for, all by default."""
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{module}", description=(about or "").partition(":")[0])
+    parser.add_argument("folder", type=Path, help="where the campaigns are made")
+    parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(parts)}; default all")
+    asked = parser.parse_args()
+    if unknown := [name for name in asked.parts if name not in parts]:
+        parser.error(f"part {unknown[0]!r} is unknown; choose of {', '.join(parts)}")
+    asked.folder.mkdir(parents=True, exist_ok=True)
+    for name in asked.parts or parts:
+        parts[name](asked.folder)
+
+
 if __name__ == "__main__":
-    place = Path(sys.argv[1])
-    place.mkdir(parents=True, exist_ok=True)
-    for name in sys.argv[2:] or PARTS:
-        PARTS[name](place)
+    carry_out(PARTS, "campaigns", __doc__)

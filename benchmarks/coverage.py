@@ -12,8 +12,8 @@ the theory on the same tables, plus 95 %, is the coverage with most of the chanc
 
 from __future__ import annotations
 
+import argparse
 import copy
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -66,7 +66,7 @@ def recovered(seed: int) -> dict[str, float]:
     return found
 
 
-def main(folder: str, tables: int = 200, workers: int = 2, first: int = 0) -> None:
+def main(folder: Path, tables: int = 200, workers: int = 2, first: int = 0) -> None:
     """Run the fits as a campaign and print the shares."""
     from scipy.stats import norm
 
@@ -95,4 +95,9 @@ def main(folder: str, tables: int = 200, workers: int = 2, first: int = 0) -> No
 
 
 if __name__ == "__main__":
-    main(str(Path(sys.argv[1])), *(int(a) for a in sys.argv[2:]))
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.coverage", description=(__doc__ or "").partition(":")[0])
+    parser.add_argument("folder", type=Path, help="of the campaign")
+    for name, default, about in (("tables", 200, "that are fitted"), ("workers", 2, "processes"), ("first", 0, "seed")):
+        parser.add_argument(name, type=int, nargs="?", default=default, help=f"{about} (%(default)s)")
+    asked = parser.parse_args()
+    main(asked.folder, asked.tables, asked.workers, asked.first)

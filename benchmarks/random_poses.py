@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 
 import numpy as np
@@ -120,7 +120,9 @@ def sweep(pair: GearPair, slices: int, count: int, seed: int = 2, lean: float = 
 
 def main() -> None:
     """Print what a million poses of each kind of wheels show: ``python -m benchmarks.random_poses [poses]``."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else POSES
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.random_poses", description=__doc__)
+    parser.add_argument("poses", type=int, nargs="?", default=POSES, help="of each kind (%(default)s)")
+    count = parser.parse_args().poses
     for kind in KINDS:
         start = time.process_time()
         found = sweep(*pair_of(kind), count)

@@ -86,13 +86,23 @@ def test_the_trace_finds_an_order_that_is_wrong(tmp_path, monkeypatch):
     assert found
 
 
-@pytest.mark.parametrize(("words", "code"), [(["--help"], 0), (["place", "many"], 2), ([], 2)])
-def test_the_command_says_what_it_takes(tmp_path, monkeypatch, capsys, words, code):
+COMMANDS = [
+    (module, words, code)
+    for module, wrong in (("campaign_faults", "many"), ("campaigns", "engine"), ("campaign_failures", "plant"))
+    for words, code in ((["--help"], 0), (["place", wrong], 2), ([], 2))
+]
+
+
+@pytest.mark.parametrize(("module", "words", "code"), COMMANDS)
+def test_the_commands_say_what_they_take(tmp_path, monkeypatch, capsys, module, words, code):
+    """And begin with nothing before they know what is wanted."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["campaign_faults", *words])
-    monkeypatch.delitem(sys.modules, "benchmarks.campaign_faults")
+    monkeypatch.setattr(sys, "argv", [module, *words])
+    monkeypatch.delitem(sys.modules, f"benchmarks.{module}", raising=False)
     with pytest.raises(SystemExit) as ended:
-        runpy.run_module("benchmarks.campaign_faults", run_name="__main__")
+        runpy.run_module(f"benchmarks.{module}", run_name="__main__")
     assert ended.value.code == code
-    assert "folder" in "".join(capsys.readouterr())
+    told = "".join(capsys.readouterr())
+    assert "folder" in told
+    assert len(words) < 2 or words[1] in told
     assert not list(tmp_path.iterdir())
