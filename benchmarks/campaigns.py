@@ -350,7 +350,6 @@ PARTS = {
 }
 
 
-
 def carry_out(parts: dict[str, Callable[[Path], None]], module: str, about: str | None) -> None:
     """Carry out the parts that the command line asks for, all by default."""
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{module}", description=(about or "").partition(":")[0])

@@ -95,7 +95,9 @@ def main(folder: Path, tables: int = 200, workers: int = 2, first: int = 0) -> N
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.coverage", description=(__doc__ or "").partition(":")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.coverage", description=(__doc__ or "").partition(":")[0]
+    )
     parser.add_argument("folder", type=Path, help="of the campaign")
     for name, default, about in (("tables", 200, "that are fitted"), ("workers", 2, "processes"), ("first", 0, "seed")):
         parser.add_argument(name, type=int, nargs="?", default=default, help=f"{about} (%(default)s)")

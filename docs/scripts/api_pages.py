@@ -138,7 +138,7 @@ MORE = {
         "gearmbs.campaigns.plans.designs": EVERYTHING,
         "gearmbs.campaigns.plans.factors": EVERYTHING,
         "gearmbs.campaigns.cluster": ["DaskRunner", "batch_cluster", "job_script"],
-        "gearmbs.campaigns.results": ["export"],
+        "gearmbs.campaigns.stored.exports": ["export"],
         "gearmbs.campaigns.sobol_bounds": EVERYTHING,
         "gearmbs.campaigns.surrogates": ["response_surface"],
         "gearmbs.campaigns.sensitivity": ["sensitivity", "campaign_chaos", "one_factor_studies"],

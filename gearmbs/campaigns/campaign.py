@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
 from gearmbs.campaigns.plans.plan import Plan
-from gearmbs.campaigns.settings import CampaignError, CampaignWarning, limit, whole
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning, limit, local, whole
 from gearmbs.campaigns.status import CampaignStatus, read_status
 from gearmbs.campaigns.stored.checks import check_folder, litter
 from gearmbs.progress import alone, bars, watched
@@ -61,6 +61,10 @@ class Campaign:
 
     def __init__(self, path: str | Path, plan: Plan | None = None) -> None:
         _needed()
+        if not (plan is None or isinstance(plan, Plan)):
+            raise CampaignError(
+                f"plan = {plan!r:.60}; give what make_plan or load_plan returns, or nothing to open a campaign"
+            )
         self._folder = Folder(path) if plan is None else make_folder(path, plan)
 
     @property
@@ -179,7 +183,9 @@ class Campaign:
         # drivers side by side begin at different ends, so that they rarely want the same unit
         offset = random.Random(os.getpid()).randrange(len(units)) if _driven(self.folder, units) else 0
         live = (
-            LivePage(lambda: self.folder, self.path / "page.html" if page is True else page) if page else nullcontext()
+            LivePage(lambda: self.folder, self.path / "page.html" if page is True else local(page))
+            if page
+            else nullcontext()
         )
         try:
             with live, _shown(progress, self.folder.path.name, self.status) as tell:
@@ -316,8 +322,8 @@ class Campaign:
         return response_surface(self, result, degree)
 
     def export(self, target: str | Path, format: str = "parquet", **settings: Any) -> list[Path]:
-        """Write the campaign as CSV, NetCDF, MATLAB or parquet; see `gearmbs.campaigns.results.export`."""
-        from gearmbs.campaigns.results import export
+        """Write the campaign as CSV, NetCDF, MATLAB or parquet; see `gearmbs.campaigns.stored.exports.export`."""
+        from gearmbs.campaigns.stored.exports import export
 
         return export(self, target, format, **settings)
 
@@ -355,13 +361,13 @@ class Campaign:
 
         return figure(self, kind, results, factors)
 
-    def report(self, path: str | Path, results: list[str] | None = None) -> Path:
+    def report(self, path: str | Path, results: str | Sequence[str] | None = None) -> Path:
         """Write one HTML page with plan, results, what decides them, and failures.
 
         Parameters
         ----------
         path : path-like
-        results : list of str, optional
+        results : str or sequence of str, optional
             Columns to look at; default those that vary most, each for what the others do not tell.
         """
         from gearmbs.campaigns.report import write_report

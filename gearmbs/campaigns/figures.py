@@ -11,7 +11,7 @@ import numpy as np
 from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
 from gearmbs.campaigns.results import factor_names, numeric_results, result_names
-from gearmbs.campaigns.settings import CampaignError, whole
+from gearmbs.campaigns.settings import CampaignError, texts, whole
 from gearmbs.schema.described import chosen
 
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ def figure(
     table = campaign.table
     table = table[table["status"] == "done"]
     known = result_names(campaign.folder, table)
-    wanted = [results] if isinstance(results, str) else list(results or varied_results(campaign, 3))
-    chosen_factors = [factors] if isinstance(factors, str) else list(factors or main_factors(campaign, table))
+    wanted = texts(results, "figure: results") if results else varied_results(campaign, 3)
+    chosen_factors = texts(factors, "figure: factors") if factors else main_factors(campaign, table)
     for name in wanted:
         chosen(known, name, "", CampaignError, "result")
     for name in chosen_factors:
@@ -85,7 +85,7 @@ def figure(
     from gearmbs.view.figures.style import look
 
     with look():
-        return draw(table, wanted, chosen_factors, campaign.units)
+        return draw(table, list(wanted), list(chosen_factors), campaign.units)
 
 
 def main_factors(campaign: Campaign, table: pd.DataFrame) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,9 @@ import numpy as np
 from gearmbs.campaigns.figures import varied_results
 from gearmbs.campaigns.results import factor_names, numeric_results, result_names
 from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, texts
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
+from gearmbs.campaigns.stored.exports import place
 from gearmbs.campaigns.surrogates import PolynomialChaos
 from gearmbs.files import write_whole
 from gearmbs.schema.described import chosen
@@ -37,20 +39,26 @@ SHOWN_RESULTS = 40
 """Rows of the table of all results."""
 
 
-def write_report(campaign: Campaign, path: str | Path, results: list[str] | None = None) -> Path:
+def write_report(campaign: Campaign, path: str | Path, results: str | Sequence[str] | None = None) -> Path:
     """Write the report of a campaign.
 
     Parameters
     ----------
     path : path-like
-    results : list of str, optional
+    results : str or sequence of str, optional
         Columns to look at; default those that vary most, each for what the others do not tell.
+
+    Raises
+    ------
+    CampaignError
+        If the path is a folder, or for an unknown column.
     """
+    path = place(path, ".html", campaign.path.stem)
     table = campaign.table
     known = result_names(campaign.folder, table)
-    for name in results or ():
+    results = varied_results(campaign, MOST_RESULTS) if results is None else list(texts(results, "report: results"))
+    for name in results:
         chosen(known, name, "report: ", CampaignError, "result")
-    results = varied_results(campaign, MOST_RESULTS) if results is None else results
     parts = [f"<h1>{html.escape(campaign.path.name)}</h1>", _plan(campaign)]
     if results:
         parts += ["<h2>What varies</h2>", _all_results(campaign, table, results)]

@@ -328,8 +328,7 @@ def _of_choice(choice: Choice) -> list[str]:
     ranges = list(choice.ranges.values())
     for k in range(choice.width - len(names)):
         keys = list(dict.fromkeys(found[k] for found in ranges if len(found) > k))
-        first = "severity" if choice.name == choice.path else f"{choice.name}.severity"
-        names.append(first if len(keys) > 1 and k == 0 else f"{choice.name}.{'/'.join(keys)}")
+        names.append(choice.severity if len(keys) > 1 and k == 0 else f"{choice.name}.{'/'.join(keys)}")
     return names
 
 

@@ -100,6 +100,8 @@ def local(path: str | Path) -> Path:
     ------
     CampaignError
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise CampaignError(f"path = {path!r}; give the path of a file or folder")
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", str(path)):
         raise CampaignError(
             f"{path}: an object store cannot hold a campaign, whose files are renamed in one piece; give a folder of a "

@@ -30,7 +30,7 @@ import gearmbs
 from gearmbs.campaigns.codes import OtherCode, admit, plan_modules
 from gearmbs.campaigns.folder import Folder, sealed
 from gearmbs.campaigns.limits import TimeLimitReached, later, limited
-from gearmbs.campaigns.plans.plan import TAKEN
+from gearmbs.campaigns.plans.plan import ALONG, TAKEN
 from gearmbs.campaigns.reuse import Reuse
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
@@ -401,7 +401,7 @@ def enter(
 
 def _taken(folder: Folder, row: dict[str, Any]) -> set[str]:
     """Return the names whose place no number may take: those of factors, of what is known of cases, of signals."""
-    return {*row, *TAKEN, *(spec.name for spec in folder.specs)}
+    return {*row, *TAKEN, *(spec.name + ending for spec in folder.specs for ending in ("", *ALONG))}
 
 
 def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], reuse: Reuse | None) -> CaseResult:

@@ -70,7 +70,7 @@ def test_records_are_found_after_packing(tmp_path):
 
 
 def test_a_handle_from_before_is_that_of_what_is_there_now(tmp_path):
-    """Packed or extended by another one: nothing is lost, and signals that were to be read are told apart from damage."""
+    """Packed or extended by another one: nothing is lost, and signals yet to be read are not taken for damaged."""
     before = done(tmp_path / "c")
     content, data = read(before), before.open()
     Campaign(tmp_path / "c").pack(4)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import gearmbs
-from gearmbs.campaigns.results import front_matter
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.stored.exports import front_matter
 
 ABOUT = "Simulated vibration of gearboxes with faults of teeth of known kind, size and tooth."
 

@@ -20,13 +20,15 @@ from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.datasets.splits import shared_groups, split_by_group, withhold
 from gearmbs.campaigns.folder import digest_of
 from gearmbs.campaigns.plans.factors import Choice, Specimens
-from gearmbs.campaigns.results import ROWS_A_FILE, remove_former
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.stored.exports import ROWS_A_FILE, check_card, place, remove_former
 from gearmbs.files import whole_file
 from gearmbs.signals.rotation.angular import interpolate
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from gearmbs.campaigns.plans.plan import Plan
 
 MESH_NUMBERS = ("normal_force.max", "normal_force.rms", "transmission_error.rms")
 """Of the mesh with the fault, what is kept as known."""
@@ -122,10 +124,15 @@ class _Source:
     start: float
 
 
+def _states(plan: Plan) -> Choice | None:
+    """Return the choice of the states."""
+    return next((f for f in plan.factors if isinstance(f, Choice) and f.name == "state"), None)
+
+
 def _source(campaign: Campaign) -> _Source:
     plan, specs, group = campaign.plan, campaign.folder.specs, campaign.plan.group
     places = [(spec.name, c) for spec in specs if spec.units == "m/s^2" for c in range(len(spec.channels))]
-    choice = next((f for f in plan.factors if isinstance(f, Choice) and f.name == "state"), None)
+    choice = _states(plan)
     if group is None or choice is None or not places:
         raise CampaignError(
             f"{campaign.path}: a data set needs Specimens, a choice named state, and signals of accelerations to keep"
@@ -233,18 +240,22 @@ def write_data_set(
     """
     import pandas as pd
 
-    out, layers = Path(out), layers or SensorLayers(seed=seed)
+    out, layers = place(out, None, title), layers or SensorLayers(seed=seed)
+    check_card(out)
     given = [campaigns] if isinstance(campaigns, Campaign) else list(campaigns)
     parts = [measured(campaign, layers, number) for number, campaign in enumerate(given)]
     # campaigns whose specimens are drawn alike have the same individuals, each of which is in one split
     alike: dict[str, list[pd.DataFrame]] = {}
     for campaign, part in zip(given, parts, strict=True):
         alike.setdefault(_individuals(campaign), []).append(part.rows)
+    sizes = [name for one in given if (choice := _states(one.plan)) is not None for name in choice.sized]
     groups, individuals = [], 0
     for tables in alike.values():
         group = pd.concat(tables, ignore_index=True)
         split = split_by_group(group["specimen"].to_numpy(), test=test, validation=validation, seed=seed)
-        group["split"] = withhold(split, group["severity"].to_numpy(), *withheld)
+        # states without a size have no severity, which stands as 0 in the rows
+        sized = group["state"].isin(sizes)
+        group["split"] = withhold(split, group["severity"].where(sized).to_numpy(), *withheld)
         group["specimen"] += individuals
         individuals = int(group["specimen"].max()) + 1
         groups.append(group)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 
@@ -27,10 +28,11 @@ def split_by_group(
         If there are too few groups, or no such parts.
     """
     groups = np.asarray(groups)
-    if not (0.0 <= test < 1.0 and 0.0 <= validation < 1.0):
+    parts = (test, validation)
+    if not all(isinstance(part, Real) and 0.0 <= float(part) < 1.0 for part in parts):
         raise CampaignError(f"split: test = {test!r}, validation = {validation!r}; give parts from 0 to below 1")
     names = np.unique(groups)
-    counts = [max(1, round(part * names.size)) if part > 0.0 else 0 for part in (test, validation)]
+    counts = [max(1, round(part * names.size)) if part > 0.0 else 0 for part in parts]
     if sum(counts) >= names.size:
         raise CampaignError(
             f"split: {names.size} groups are too few for test = {test:g} and validation = {validation:g}"
@@ -41,7 +43,17 @@ def split_by_group(
 
 
 def withhold(split: np.ndarray, severity: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Return a split in which training rows of a range of severities are "withheld": can a model interpolate?"""
+    """Return a split in which training rows of a range of severities are "withheld": can a model interpolate?
+
+    Rows without a severity, NaN, are in no range.
+
+    Raises
+    ------
+    CampaignError
+        If the range has no ends in this order.
+    """
+    if not (isinstance(low, Real) and isinstance(high, Real) and low <= high):
+        raise CampaignError(f"withhold: from {low!r} to {high!r}; give the lower end first")
     inside = (np.asarray(severity) >= low) & (np.asarray(severity) <= high)
     return np.where((split == "train") & inside, "withheld", split)
 

@@ -59,6 +59,8 @@ def satisfied(
     CampaignError
         For a text that is no comparison of the columns.
     """
+    if not isinstance(text, str):
+        raise CampaignError(f"constraint {text!r}: give a text, as 'operation.torque <= 100'")
     written, columns = _as_names(text, given)
     names = {stand_in: name for stand_in, values in columns.items() for name in given if given[name] is values}
     try:

@@ -199,6 +199,16 @@ class Choice:
         return (0 if self.crossed else 1) + max(len(names) for names in self.ranges.values())
 
     @property
+    def severity(self) -> str:
+        """Name of the column that says where in its range the first number of an option lies."""
+        return "severity" if self.name == self.path else f"{self.name}.severity"
+
+    @property
+    def sized(self) -> list[str]:
+        """Names of the options that have a range, and so a severity; it is 0 in the rows of the others."""
+        return [name for name, keys in self.ranges.items() if keys]
+
+    @property
     def count(self) -> int:
         """Values of a grid."""
         return len(self.options)
@@ -241,7 +251,7 @@ class Choice:
                     found[f"{self.name}.{key}"][here] = _within(low + x * (high - low), x, low, high)
                 if place == 0:
                     severity[here] = x
-        found["severity" if self.name == self.path else f"{self.name}.severity"] = severity
+        found[self.severity] = severity
         return found
 
     def places(self, u: np.ndarray) -> np.ndarray:

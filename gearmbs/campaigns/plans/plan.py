@@ -35,6 +35,9 @@ FORMAT = 2
 ABOUT = ("index", "unit", "point", "slot", "id", "status", "message", "advice")
 """Columns of a table that are neither factors nor results."""
 
+ALONG = ("_channel", "_time")
+"""What follows the name of an array of signals in those of its dimensions."""
+
 TAKEN = (*ABOUT, "case")
 """Names that no column of a plan may have: those, and that of the dimension along which results are read."""
 
@@ -499,7 +502,8 @@ def _consistent(plan: Plan) -> None:
     """Refuse settings that contradict each other."""
     names = [name for f in plan.factors for name in f.columns(np.full((1, f.width), 0.5), *_variant(f))]
     rows = plan.options["rows"] if plan.design == "list" else []
-    kept = [item.removeprefix("signal:") for item in plan.keep if item.startswith("signal:")]
+    signals = [item.removeprefix("signal:") for item in plan.keep if item.startswith("signal:")]
+    kept = [name + ending for name in signals for ending in ("", *ALONG)]
     taken = sorted({*names, *(name for row in rows for name in row)} & {*TAKEN, *kept})
     if taken:
         remedy = "rename the parameter" if rows else "give the factor another one, name='...'"

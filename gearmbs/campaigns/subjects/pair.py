@@ -159,26 +159,21 @@ class PairSubject(Subject):
         kept.numbers |= record_numbers(record)
         if "indicators" in keep:
             kept.numbers |= indicators(record)
-        for item in keep:
-            if item.startswith("signal:"):
-                name, values = _signal(record, item)
-                kept.signals[name] = values
+        for name, channels in _arrays(keep).items():
+            kept.signals[name] = _signal(record, name, channels)
         return kept
 
     def signals(self, keep: Sequence[str], things: Sequence[Case]) -> list[SignalSpec]:
         """Return the arrays of the signals, as long as the longest corner's."""
         specs = []
-        for item in keep:
-            if not item.startswith("signal:"):
-                continue
-            name, channels = _chosen(item, COMPONENTS)
+        for name, channels in _arrays(keep).items():
             slow = name == "acceleration"
             rates = {float(thing.signal_rate if slow else thing.output_rate) for thing in things}
             if len(rates) > 1:
                 several = ", ".join(f"{rate:g}" for rate in sorted(rates))
                 raise CampaignError(
-                    f"keep: {item!r} would have the sampling rates {several} Hz, since they follow the mesh frequency; "
-                    "give solver.signal_rate and solver.output_rate of the base case"
+                    f"keep: 'signal:{name}' would have the sampling rates {several} Hz, since they follow the mesh "
+                    "frequency; give solver.signal_rate and solver.output_rate of the base case"
                 )
             rate = rates.pop()
             longest = max(thing.operation.longest for thing in things)
@@ -213,7 +208,7 @@ def variables_for(keep: Sequence[str]) -> set[str] | None:
     if any(item == "record" or (item not in NEEDED and not item.startswith("signal:")) for item in keep):
         return None
     wanted = {name for item in keep if item in NEEDED for name in NEEDED[item]}
-    return wanted | {_chosen(item, COMPONENTS)[0] for item in keep if item.startswith("signal:")}
+    return wanted | _arrays(keep).keys()
 
 
 def canonical_case(case: Case) -> dict[str, Any]:
@@ -331,29 +326,32 @@ def indicators(record: Any) -> dict[str, float]:
     }
 
 
-def _chosen(item: str, components: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
-    """Return the array and the channels that ``signal:NAME`` means."""
-    name = item.removeprefix("signal:")
-    if name in components:
-        return "acceleration", (name,)
+def _arrays(keep: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the arrays that the entries ``signal:NAME`` mean, and the channels of each: several may share one."""
     channels = {
-        "acceleration": components,
+        "acceleration": COMPONENTS,
         "transmission_error": ("transmission_error",),
         "force_1": ("x", "y", "z"),
         "force_2": ("x", "y", "z"),
     }
-    return name, chosen({**dict.fromkeys(components), **channels}, name, "keep: ", CampaignError, "signal")
+    found: dict[str, tuple[str, ...]] = {}
+    for item in keep:
+        if item.startswith("signal:"):
+            name = item.removeprefix("signal:")
+            whole = chosen({**dict.fromkeys(COMPONENTS), **channels}, name, "keep: ", CampaignError, "signal")
+            array, asked = (name, whole) if whole else ("acceleration", (name,))
+            found[array] = tuple(dict.fromkeys((*found.get(array, ()), *asked)))
+    return found
 
 
-def _signal(record: Any, item: str) -> tuple[str, np.ndarray]:
-    """Return the name of the array and the values of a signal, shape (channels, samples)."""
-    name, channels = _chosen(item, tuple(str(c) for c in record.component.values))
+def _signal(record: Any, name: str, channels: Sequence[str]) -> np.ndarray:
+    """Return the values of a signal, shape (channels, samples)."""
     values = record[name]
     if name == "acceleration":
         values = values.sel(component=list(channels)).transpose("component", "signal_time")
     elif name.startswith("force"):
         values = values.transpose("xyz", "time")
-    return name, np.atleast_2d(values.values)
+    return np.atleast_2d(values.values)
 
 
 class ClaimsSubject(Subject):
