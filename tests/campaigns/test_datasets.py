@@ -436,6 +436,11 @@ def test_gearboxes_of_a_data_set_share_no_noise_and_no_drift(tmp_path):
     # the same campaign at the same place has the same
     write_data_set(both, tmp_path / "again", test=0.5, validation=0.0)
     assert read_data_set(tmp_path / "again").equals(read_data_set(tmp_path / "data"))
+    # the sound have no severity, and are not withheld
+    write_data_set(both[0], tmp_path / "small", test=0.5, validation=0.0, withheld=(0.0, 0.5))
+    small = read_data_set(tmp_path / "small")
+    assert set(small.state[small.split == "withheld"]) == {"faulty"}
+    assert set(small.state[small.split == "train"]) == {"faulty", "healthy"}
     # what computed it is told, and both plans are there
     names = {path.name for path in paths}
     assert {"plan-pair.json", "plan-pair-2.json"} <= names
