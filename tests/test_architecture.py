@@ -107,7 +107,7 @@ CIRCLES = {
      "mechanism.solve.plants", "mechanism.solve.points", "mechanism.solve.simulate", "mechanism.solve.simulator",
      "mechanism.solve.led", "mechanism.solve.accuracy"):
         "methods of Mechanism, and the functions that carry them out",
-    ("campaigns.campaign", "campaigns.figures", "campaigns.report", "campaigns.results", "campaigns.sensitivity",
+    ("campaigns.campaign", "campaigns.figures", "campaigns.report", "campaigns.sensitivity", "campaigns.stored.exports",
      "campaigns.surrogates"):
         "methods of Campaign, and the functions that carry them out",
 }  # fmt: skip
