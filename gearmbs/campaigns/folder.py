@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.plans.plan import FORMAT, Plan
+from gearmbs.campaigns.plans.plan import ALONG, FORMAT, TAKEN, Plan
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local, whole
 from gearmbs.campaigns.signals import Signals, write_store
 from gearmbs.campaigns.subjects.base import SignalSpec
@@ -225,6 +225,12 @@ class Folder:
         raise CampaignError(
             f'case {index}: no record is kept; it is not done yet, or the plan keeps none (keep "record")'
         )
+
+    def taken(self) -> set[str]:
+        """Return the names whose place no number may take: those of the plan's columns, of what is known of cases, of
+        signals and their axes. A number of such a name has ``result.`` before it."""
+        signals = {spec.name + ending for spec in self.specs for ending in ("", *ALONG)}
+        return {*self.cases(0)[0], *TAKEN, *signals}
 
     def stored_signals(self, spec: SignalSpec, slots: np.ndarray) -> Signals:
         """Return the signals of some slots, which are read when they are asked for."""

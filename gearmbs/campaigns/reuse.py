@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from gearmbs.campaigns.folder import Folder
 from gearmbs.campaigns.plans.plan import TAKEN
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning
-from gearmbs.campaigns.subjects.base import DONE, Kept
+from gearmbs.campaigns.subjects.base import DONE, Kept, SignalSpec
 
 _known: dict[tuple[str, ...], Reuse] = {}
 
@@ -25,6 +26,8 @@ class Reuse:
         Folders of campaigns that keep the same.
     keep : tuple of str
         What the new campaign keeps.
+    specs : sequence of SignalSpec
+        Its arrays of signals.
 
     Raises
     ------
@@ -33,8 +36,8 @@ class Reuse:
         no harm; of numbers nothing says which of the entries they come from.
     """
 
-    def __init__(self, paths: tuple[str, ...], keep: tuple[str, ...]) -> None:
-        self._keep = keep
+    def __init__(self, paths: tuple[str, ...], keep: tuple[str, ...], specs: Sequence[SignalSpec]) -> None:
+        self._specs = specs
         self._at: dict[str, tuple[Folder, int, int]] = {}
         self._tables: dict[tuple[Path, int], list[dict[str, Any]]] = {}
         for path in paths:
@@ -65,7 +68,7 @@ class Reuse:
             return None
         key = (str(folder.path), *plan.reuse)
         if key not in _known:
-            _known[key] = cls(plan.reuse, plan.keep)
+            _known[key] = cls(plan.reuse, plan.keep, folder.specs)
         return _known[key]
 
     def record(self, key: str) -> bytes | None:
@@ -89,15 +92,16 @@ class Reuse:
                 self._tables = {at: folder.unit_table(unit).to_pylist()}
             row = self._tables[at][k]
             planned = folder.cases(unit)[0]
-            taken = {*planned, *TAKEN, *(spec.name for spec in folder.specs)}
+            taken = folder.taken()
             numbers = {
                 # a name that a column of that plan had taken
                 n.removeprefix("result.") if n.removeprefix("result.") in taken else n: float(v)
                 for n, v in row.items()
                 if n not in {*planned, *TAKEN} and v is not None
             }
-            kept = Kept(numbers, _signals(folder, row["slot"], self._keep))
-            return None if _in_doubt(folder, unit, kept) else kept
+            signals = _signals(folder, row["slot"], self._specs)
+            kept = None if signals is None else Kept(numbers, signals)
+            return None if kept is None or _in_doubt(folder, unit, kept) else kept
         except CampaignError as error:
             warnings.warn(f"reuse: {folder.path}: {error}; the case is simulated", CampaignWarning, stacklevel=2)
             return None
@@ -115,12 +119,22 @@ def _in_doubt(folder: Folder, unit: int, kept: Kept) -> bool:
     return any(kept.signals[s.name].shape[1] < s.samples for s in folder.specs if s.name in kept.signals)
 
 
-def _signals(folder: Folder, slot: int, keep: tuple[str, ...]) -> dict[str, np.ndarray]:
+def _signals(folder: Folder, slot: int, specs: Sequence[SignalSpec]) -> dict[str, np.ndarray] | None:
+    """Return the signals of a slot for the arrays of another campaign, by their channels; None if they do not fit."""
+    stored = {spec.name: spec for spec in folder.specs}
     found = {}
-    for spec in folder.specs:
-        if f"signal:{spec.name}" not in keep:
-            continue
-        values = folder.stored_signals(spec, np.array([slot])).read((0, slice(None), slice(None)))
+    for spec in specs:
+        there = stored.get(spec.name)
+        if (
+            there is None
+            or (there.rate, there.units) != (spec.rate, spec.units)
+            or set(spec.channels) - {*there.channels}
+        ):
+            return None
+        values = folder.stored_signals(there, np.array([slot])).read((0, slice(None), slice(None)))
+        values = values[[there.channels.index(channel) for channel in spec.channels]]
         long = np.flatnonzero(np.isfinite(values).any(axis=0))
         found[spec.name] = values[:, : int(long[-1]) + 1 if long.size else 0]
+        if found[spec.name].shape[1] > spec.samples:
+            return None
     return found

@@ -30,7 +30,6 @@ import gearmbs
 from gearmbs.campaigns.codes import OtherCode, admit, plan_modules
 from gearmbs.campaigns.folder import Folder, sealed
 from gearmbs.campaigns.limits import TimeLimitReached, later, limited
-from gearmbs.campaigns.plans.plan import ALONG, TAKEN
 from gearmbs.campaigns.reuse import Reuse
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
@@ -135,7 +134,7 @@ class CaseRunner:
                 record = self.subject.run(thing, check, plan.keep)
                 kept = self.subject.reduce(thing, record, plan.keep)
             check_signals(self.folder.specs, kept.signals)
-            taken = _taken(self.folder, row)
+            taken = self.folder.taken()
             for name in kept.numbers:
                 if name in taken and f"result.{name}" in kept.numbers:
                     raise CampaignError(f"results: {name!r} is called 'result.{name}', as another one is; rename one")
@@ -399,11 +398,6 @@ def enter(
     write_whole(folder.ledger(unit), sealed(entry), durable=folder.path)
 
 
-def _taken(folder: Folder, row: dict[str, Any]) -> set[str]:
-    """Return the names whose place no number may take: those of factors, of what is known of cases, of signals."""
-    return {*row, *TAKEN, *(spec.name + ending for spec in folder.specs for ending in ("", *ALONG))}
-
-
 def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], reuse: Reuse | None) -> CaseResult:
     """Return the result of a case: that of an equal one of this unit or of another campaign, or a new one."""
     if reuse is not None:
@@ -437,7 +431,7 @@ def store(folder: Folder, unit: int, rows: list[dict[str, Any]], results: list[C
     for name in ("status", "message", "advice"):
         columns[name] = [getattr(r.outcome, name) for r in results]
     table = {name: pa.array(values) for name, values in columns.items()}
-    taken = _taken(folder, rows[0])
+    taken = folder.taken()
     for name in dict.fromkeys(key for r in results for key in r.kept.numbers):
         column = f"result.{name}" if name in taken else name
         table[column] = pa.array([r.kept.numbers.get(name) for r in results], type=pa.float64())

@@ -76,7 +76,7 @@ def test_a_handle_from_before_is_that_of_what_is_there_now(tmp_path):
     Campaign(tmp_path / "c").pack(4)
     assert read(before) == content
     assert before.folder.unit_count == 2
-    with pytest.raises(CampaignError, match=says("packed", "since", "open it again")):
+    with pytest.raises(CampaignError, match=says("packed", "since", "opened")):
         data.wave.load()
     other = Campaign(tmp_path / "c").extend(9)
     assert before.status().cases == 9

@@ -17,6 +17,7 @@ from gearmbs.campaigns.folder import sealed, unsealed
 from gearmbs.campaigns.page import page_text
 from gearmbs.campaigns.work import work_unit
 from gearmbs.files import write_whole
+from gearmbs.studies import Case
 from gearmbs.studies.run import claims
 from gearmbs.studies.run.engine import run_jobs, threads
 from tests.campaigns.models import PLACES
@@ -357,6 +358,48 @@ def test_records_are_taken_over_with_what_is_kept(tmp_path):
         anew = listed(tmp_path / "anew", recorded, ["numbers", "record"], reuse=[str(first.path)])
     assert anew.status().reused == 1
     xr.testing.assert_identical(anew.record(2), same.record(2))
+
+
+def louder(x: float) -> dict:
+    """Return a number and a signal."""
+    return {"y": x, "wave": x * np.arange(1.0, 5.0)}
+
+
+def test_signals_that_do_not_fit_are_not_taken_over(tmp_path):
+    """One that would be longer than planned, or of another rate, is simulated, and found wrong there."""
+
+    def made(name, size, **settings):
+        subject = FunctionSubject(louder, {"x": 0.0}, signals={"wave": size})
+        plan = make_plan(subject, [Factor("x", 1.0, 2.0)], n=2, keep=["numbers", "signal:wave"], **settings)
+        campaign = Campaign(tmp_path / name, plan)
+        return campaign, campaign.run(workers=0)
+
+    first, _ = made("first", (4, 1.0))
+    longer, status = made("longer", (6, 1.0), reuse=[str(first.path)])
+    assert status.reused == 2
+    np.testing.assert_array_equal(longer.open().wave[..., :4], first.open().wave)
+    _, status = made("rate", (4, 2.0), reuse=[str(first.path)])
+    assert (status.reused, status.failed) == (0, 0)
+    _, status = made("shorter", (3, 1.0), reuse=[str(first.path)])
+    assert (status.reused, status.failed) == (0, 2)
+
+
+@pytest.mark.slow
+def test_components_of_a_pair_are_taken_over(tmp_path):
+    """Their array has another name than the entry that keeps them."""
+    base = Case(operation={"duration": 0.06, "run_up": 0.02, "settling": 0.02})
+
+    def made(name, **settings):
+        factor = Factor("operation.torque", 80.0, 90.0)
+        keep = ["signal:tangential", "signal:line_of_action"]
+        campaign = Campaign(tmp_path / name, make_plan(base, [factor], n=2, keep=keep, **settings))
+        return campaign, campaign.run(workers=0)
+
+    first, _ = made("first")
+    second, status = made("second", reuse=[str(first.path)])
+    assert status.reused == 2
+    assert np.isfinite(second.open().acceleration).all()
+    np.testing.assert_array_equal(second.open().acceleration, first.open().acceleration)
 
 
 def test_reuse_brings_no_numbers_that_are_not_kept(tmp_path):
