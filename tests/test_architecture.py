@@ -80,7 +80,7 @@ EXCEPTIONS = {
     ("drivetrain", "dae"): "the table of integrators: names that a description may give",
     ("drivetrain", "dae.equations"): "the interface of force elements: torques about an axis hand their kernels to it",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
-    ("adams", "gears"): "pairs are written as the contact forces of a deck",
+    ("adams", "gears"): "pairs are written as the contact forces of a deck, and read from the gears of command files",
     ("adams", "flexible"): "FLEX_BODY is read from its modal neutral file",
     (
         "adams",

@@ -53,13 +53,16 @@ def add_gears(b: Builder, s: st.Gforce, pair: GearPair) -> None:
         If the deck does not say where the wheels are, or elsewhere than the pair has them.
     """
     deck = b.deck
-    here = _frame(deck, s.i or 0, b.units.length)[0]
     floating = deck.of(st.Marker).get(s.jfloat or 0)
     first, second = deck.of(st.Marker)[s.i or 0].part, floating.part if floating is not None else None
     if first is None or second is None:
         raise ValueError("a gear force needs two PARTs that turn, of I and of JFLOAT")
     owners = first, second
-    axes = [_axis(deck, part, b.units.length) for part in owners]
+    here = _frame(deck, s.i or 0, b.units.length)[0]
+    axes: list[Frame | None] = [_axis(deck, part, b.units.length) for part in owners]
+    if s.pair:
+        # of a command file: its markers are where the wheels are, z their axes
+        axes = [_frame(deck, ref or 0, b.units.length) for ref in (s.i, s.rm)]
     known = [axis for axis in axes if axis is not None]
     if not known:
         raise ValueError(f"neither PART/{first} nor PART/{second} turns about a JOINT; a wheel needs one")

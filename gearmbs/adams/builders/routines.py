@@ -331,6 +331,10 @@ def _found(use: _Use, known: Mapping[str, Any]) -> tuple[dict[str, Any], list[st
             known = {**known, **{f"{s.label()}.{part}".upper(): routine for part, routine in own.items()}}
     for part, names in wanted:
         routine = next((known[name] for name in names if name in known), None)
+        if routine is None and isinstance(s, st.Gforce) and s.pair:
+            from gearmbs.adams.write.contacts import pair_of
+
+            routine = pair_of(s.pair)
         if isinstance(s, st.Gforce) and is_pair(routine):
             return {"": routine}, []
         if routine is not None and not callable(routine):

@@ -43,22 +43,29 @@ NAMING = {row.naming for row in ROWS} | {"adams_id"}
 
 @dataclass(frozen=True)
 class Made:
-    """A statement: its head, its arguments, the name of its object and the line that made it."""
+    """A statement: its head, its arguments, the name of its object, the line that made it, comments with its pair."""
 
     head: str
     arguments: tuple[str, ...]
     name: str
     line: int
+    pair: tuple[str, ...] = ()
 
     def raw(self) -> RawStatement:
         """Return it as the reader of decks takes it."""
         text = ", ".join((self.head, *self.arguments))
-        return RawStatement(text, (0,), (self.line,), self.name or None)
+        pair = "".join(comment.partition(":")[2] for comment in self.pair)
+        return RawStatement(text, (0,), (self.line,), self.name or None, pair)
 
     def lines(self) -> list[str]:
         """Return it as it is written."""
         title = [f"!{f'adams_view_name={self.name!r}':>50}"] if self.name and "'" not in self.name else []
-        return [*title, self.head, *(line for one in self.arguments for line in wrapped(one))]
+        return [
+            *(f"! {comment}" for comment in self.pair),
+            *title,
+            self.head,
+            *(line for one in self.arguments for line in wrapped(one)),
+        ]
 
 
 class Deckmaker:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.view import frames
+from gearmbs.adams.view import frames, machinery
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.lexer import Command, ViewError
 from gearmbs.adams.view.model import BLOCKS, JOINTS, PARTS, PLACED, Database, Item
@@ -114,15 +114,16 @@ class Editor:
         if item.kind in PARTS:
             self.database.part = item
         if item.kind == "ude" and row.verb == "create":
-            self._block_of_controls(item, line)
+            self._parts_of_instance(item, line)
         if row.kind == "model":
             self._new_model(item, line)
         self.database.version += 1
 
-    def _block_of_controls(self, item: Item, line: int) -> None:
-        """Make the state variables, and the state, of a block of Controls, which commands may go on to name."""
-        definition = (self.values.text(item, "definition_name") or "").lower()
-        kind = ".".join(definition.split(".")[-2:])
+    def _parts_of_instance(self, item: Item, line: int) -> None:
+        """Make what commands may go on to name: state variables and state of a block of Controls, part of a wheel."""
+        kind = self.values.definition(item)
+        if kind == machinery.ELEMENT:
+            machinery.add_wheel(self.database, item, line)
         for ending in BLOCKS.get(kind, ()):
             self.database.add("state_variable", f"{item.path}.{item.name}{ending}", line)
         if kind.endswith("pid"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from gearmbs.adams.view import machinery
 from gearmbs.adams.view.deckmaker import Deckmaker, translated
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import BLOCKS, Item
@@ -115,8 +116,8 @@ def _block(m: Deckmaker, item: Item) -> None:
             raise ViewError(f"its {name} is missing")
         return number(float(found))
 
-    kind = definition_of(m, item).rpartition("_")[2]
-    inputs = [ending for ending in BLOCKS[definition_of(m, item)] if ending]
+    kind = m.values.definition(item).rpartition("_")[2]
+    inputs = [ending for ending in BLOCKS[m.values.definition(item)] if ending]
     if kind == "input":
         says("", value("_input"))
         return
@@ -141,7 +142,7 @@ def _block(m: Deckmaker, item: Item) -> None:
 
 
 def _nothing(m: Deckmaker, item: Item) -> None:
-    """Lists of inputs and outputs for a control program: the deck has them as PINPUT and POUTPUT."""
+    """Lists: of inputs and outputs, which the deck has as PINPUT and POUTPUT; of what a set of gears consists of."""
 
 
 DEFINITIONS: dict[str, Callable[[Deckmaker, Item], None]] = {
@@ -149,14 +150,12 @@ DEFINITIONS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "forces.torsion_spring": _spring(turning=True),
     "constraints.general_motion": _general_motion,
     "controls.controls_plant": _nothing,
+    machinery.SET: _nothing,
+    machinery.ELEMENT: machinery.make_wheel,
+    machinery.FORCE: machinery.make_force,
     **dict.fromkeys(BLOCKS, _block),
 }
 """By the last two parts of a definition's name."""
-
-
-def definition_of(m: Deckmaker, item: Item) -> str:
-    """Return the last two parts of the name of an instance's definition."""
-    return ".".join((m.values.text(item, "definition_name") or "").lower().split(".")[-2:])
 
 
 def make_instance(m: Deckmaker, item: Item) -> None:
@@ -168,7 +167,7 @@ def make_instance(m: Deckmaker, item: Item) -> None:
         If its definition is not known.
     """
     name = m.values.text(item, "definition_name") or ""
-    make = DEFINITIONS.get(definition_of(m, item))
+    make = DEFINITIONS.get(m.values.definition(item))
     if make is None:
         raise ViewError(
             f"instances of {name[:60]} are not modelled; write what it stands for: joints, forces, variables"

@@ -239,7 +239,7 @@ class Database:
         """
         key = name.lower()
         if key.startswith("."):
-            return self.items.get(key)
+            return self.items.get(key) or self._of_set(key)
         for owner in (self.part, self.model):
             if owner is not None and (found := self.items.get(f"{owner.path.lower()}.{key}")) is not None:
                 if not kinds or found.kind in kinds:
@@ -256,6 +256,15 @@ class Database:
             inside = self.model.path.lower() + "."
             found_all = [item for item in found_all if item.path.lower().startswith(inside)]
         return found_all[0] if len(found_all) == 1 else None
+
+    def _of_set(self, key: str) -> Item | None:
+        """Return what belongs to an instance by a name through a set that it is listed in, as View writes of gears."""
+        parts = key.split(".")
+        for k in range(2, len(parts) - 1):
+            through = self.items.get(".".join(parts[: k + 1]))
+            if through is not None and through.kind == "ude":
+                return self.items.get(".".join(parts[:k] + parts[k + 1 :]))
+        return None
 
     def full_name(self, name: str, kind: str, line: int) -> str:
         """Return the full name of an object that is to be made.

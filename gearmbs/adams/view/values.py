@@ -286,6 +286,10 @@ class Values:
         found = self.text(item, key)
         return default if found is None else found.lower()
 
+    def definition(self, item: Item) -> str:
+        """Return the last two parts of the name of an instance's definition, in small letters."""
+        return ".".join(self.word(item, "definition_name").split(".")[-2:])
+
     def refs(self, item: Item, key: str, kinds: tuple[str, ...] = ()) -> list[Item]:
         """Return the objects that an argument names.
 
