@@ -70,6 +70,13 @@ def test_two_shafts_and_a_mesh_move_as_two_masses_on_a_spring():
     turned = np.linalg.solve(dynamic, np.array([[1.0, driven[0]], [0.0, driven[1]]]))
     exact = np.array([s * turned[1], turned[0], lever @ turned])
     np.testing.assert_allclose(plant.transfer(s), exact, rtol=1e-6)
+    # slowly, too, where the square of the frequency is less than rounding of the flanks
+    slow = np.array([1e-6, 1e-3, 0.1])
+    turned = lever * inertia[::-1] / (lever**2 @ inertia[::-1])
+    np.testing.assert_allclose(plant.frequency_response(slow)[:, 1, 1], turned[0], rtol=1e-6)
+    polynomials = plant.transfer_function(("transmission_error", "stage"), "angle in")
+    ratio = np.polyval(polynomials.num, 2j * np.pi * slow) / np.polyval(polynomials.den, 2j * np.pi * slow)
+    np.testing.assert_allclose(ratio, turned[0], rtol=1e-6)
     # at rest a transmission error is what it says
     assert plant.dc_gain[2, 1] == pytest.approx(1.0, rel=1e-9)
     assert plant.output_units == ["rad/s", "rad", "m"]

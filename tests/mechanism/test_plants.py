@@ -538,3 +538,61 @@ def test_poles_are_the_eigenvalues_of_the_matrix():
     m.torsion_spring("spring", pin.i, pin.j, stiffness=2.0, damping=0.3)
     plant = m.linearize([("torque", "pin")], [("joint_angle", "pin"), ("state", "lag")])
     np.testing.assert_allclose(np.sort_complex(plant.poles), np.sort_complex(np.linalg.eigvals(plant.A)), rtol=1e-9)
+
+
+def stiff(ground: float = 0.0) -> tuple[gm.Mechanism, np.ndarray]:
+    """Return two discs on a stiff shaft, with a torque between them, and their inertias."""
+    inertia = np.array([0.02, 0.9])
+    m = gm.Mechanism("stiff")
+    axis = np.array([1.0, 2.0, 2.0]) / 3.0
+    bodies = [m.body(name, 1.0, (own,) * 3) for name, own in zip("ab", inertia, strict=True)]
+    pins = [m.revolute(f"pin {body.name}", body, m.ground, at=(0, 0, 0), axis=axis) for body in bodies]
+    ends = [body.marker(orientation=pins[0].i.orientation, name=f"{body.name} end") for body in bodies]
+    m.torsion_spring("shaft", *ends, stiffness=3e8, damping=2e3)
+    m.input("pull", "N m")
+    m.axis_torque("between", pins[0].i, pins[1].i, "pull")
+    m.axis_torque("drag", pins[1].i, pins[1].j, f'-{ground}*WZ("pin b.I", "pin b.J", "pin b.J")')
+    return m, inertia
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.03])
+def test_what_turns_freely_is_exact_at_all_frequencies(drag):
+    """J_1 p_1'' = T + k (p_2 - p_1) + .., at frequencies of which the square is less than rounding of k / J."""
+    m, (one, two) = stiff(drag)
+    shown = [
+        ("joint_angle", "pin a"),
+        ("joint_rate", "pin b"),
+        ("load", "shaft", "tz"),
+        ("angular_acceleration", "a", "x"),
+    ]
+    plant = m.linearize(["pull", ("torque", "pin a")], shown)
+    f = np.array([1e-5, 1e-4, 1e-3, 0.1, 30.0, 3000.0, 3e5])
+    s = 2j * np.pi * f
+    couple = 2e3 * s + 3e8
+    # p_1, p_2 and p_1 - p_2 by Cramer's rule, without differences of large numbers
+    whole = one * two * s**2 + one * drag * s + (one + two) * couple + drag * couple / s
+    twist = np.array([(one + two) + drag / s, two + drag / s]) / whole
+    first = np.array([two * s**2 + drag * s, two * s**2 + drag * s + couple]) / (whole * s**2)
+    second = np.array([np.full(s.size, -one), couple / s**2]) / whole
+    exact = np.array([first, s * second, -couple * twist * 2.0 / 3.0, s**2 * first / 3.0])
+    exact = exact.transpose(2, 0, 1)
+    answer = plant.frequency_response(f)
+    for found in (answer, np.array([plant.transfer(each) for each in s])):
+        np.testing.assert_allclose(found[:, :3], exact[:, :3], rtol=3e-7)
+        # what the shaft takes of the torque, and the torque
+        np.testing.assert_allclose(found[:, 3], exact[:, 3], rtol=3e-7, atol=1e-14 / one)
+    # beside a slow pole the polynomials have what rounding leaves
+    for j in range(0 if drag else 2):
+        for k in range(3):
+            polynomials = plant.transfer_function(j, k)
+            ratio = np.polyval(polynomials.num, s[2:]) / np.polyval(polynomials.den, s[2:])
+            np.testing.assert_allclose(ratio, exact[2:, k, j], rtol=2e-5)
+
+
+def test_a_torque_between_bodies_leaves_them_where_they_are_at_rest():
+    """p_1 = J_2 / (J_1 + J_2) T / k: no motion of both; against the ground both turn ever faster."""
+    m, (one, two) = stiff()
+    plant = m.linearize(["pull", ("torque", "pin a")], [("joint_angle", "pin a"), ("load", "shaft", "tz")])
+    exact = [[two / (one + two) / 3e8, np.inf], [-2.0 / 3.0, -2.0 / 3.0 * two / (one + two)]]
+    assert plant.dc_gain == pytest.approx(np.array(exact), rel=1e-9)
+    assert plant.frequency_response(0.0)[0] == pytest.approx(np.array(exact), rel=1e-9)

@@ -52,6 +52,8 @@ class Balanced:
         D, likewise.
     tolerance : float
         Size below which a product of ``static`` with a unit vector is rounding.
+    rows, columns : ndarray, shape (q,)
+        By which the equations of the states are divided, and by which the states are multiplied.
     """
 
     scale: np.ndarray
@@ -62,6 +64,8 @@ class Balanced:
     static: np.ndarray
     first: np.ndarray
     tolerance: float
+    rows: np.ndarray
+    columns: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,7 @@ def balance(reduced: Reduced) -> Balanced:
     first[n:, n:] = np.diag(1.0 / (rows * columns))
     terms = scale[:, None] * reduced.damping_terms * scale
     tolerance = max(ROUNDING * np.sqrt(n + q), (SLOWEST / usual) ** 2)
-    return Balanced(scale, mass, damping, stiffness, terms, static, first, tolerance)
+    return Balanced(scale, mass, damping, stiffness, terms, static, first, tolerance, rows, columns)
 
 
 def _resisted(terms: np.ndarray, inertia: np.ndarray) -> np.ndarray:

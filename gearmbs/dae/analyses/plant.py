@@ -22,12 +22,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, expm, hessenberg, schur, solve_sylvester
+from scipy.linalg import cho_factor, cho_solve, expm, hessenberg, matrix_balance, schur, solve_sylvester
 
 from gearmbs.dae.analyses.coordinates import JointCoordinate
 from gearmbs.dae.analyses.eigenvalues import spectrum
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Driven, Reduced, reduce, warn_of_varying
+from gearmbs.dae.analyses.response import Response, response_of
 from gearmbs.dae.problem import ModelError, SingularModelError
 from gearmbs.units import to_si
 from gearmbs.wording import did_you_mean
@@ -88,6 +89,8 @@ class LinearPlant:
     point : OperatingPoint or None
     own_poles : ndarray or None
         Eigenvalues of A as the linearisation has them, in which motions that nothing resists are zeros.
+    own_response : Response or None
+        Where there are such motions, what answers at a frequency in place of the matrices.
     """
 
     A: np.ndarray
@@ -103,6 +106,7 @@ class LinearPlant:
     output_units: list[str] = field(default_factory=list)
     point: OperatingPoint | None = None
     own_poles: np.ndarray | None = None
+    own_response: Response | None = None
 
     def __post_init__(self) -> None:
         for names, units in (
@@ -151,6 +155,8 @@ class LinearPlant:
         if s == 0.0:
             # a shaft that turns freely is an integrator, seen or not: what rounding leaves of it is no number
             return self.dc_gain.astype(complex)
+        if self.own_response is not None:
+            return self.own_response.at(s)
         return self.C @ np.linalg.solve(s * np.eye(n) - self.A, self.B.astype(complex)) + self.D
 
     def frequency_response(self, f: np.ndarray) -> np.ndarray:
@@ -164,7 +170,8 @@ class LinearPlant:
         Returns
         -------
         ndarray of complex, shape (m, outputs, inputs)
-            Amplitude and phase lead of each output over each input; infinite at a pole.
+            Amplitude and phase lead of each output over each input; infinite at a pole. Motions that nothing resists
+            are those of the equations, however low the frequency: A has rounding in place of their zeros.
         """
         # A = Q H Q^T once: each frequency is then a solution with a matrix that has one diagonal below its main one
         points = 2j * np.pi * self.time_unit * np.atleast_1d(_read(f, "frequency", "f"))
@@ -172,8 +179,14 @@ class LinearPlant:
         out += self.D
         if not len(self.A) or not out.size:
             return out
-        reduced, turned = hessenberg(self.A, calc_q=True)
-        left, right = self.C @ turned, turned.T @ self.B.astype(complex)
+        if self.own_response is not None:
+            for k, s in enumerate(points):
+                out[k] = self.dc_gain if s == 0.0 else self.own_response.at(s)
+            return out
+        # displacements and rates in units in which they are alike: turned as they are, half of the digits are lost
+        alike, (size, _) = matrix_balance(self.A, permute=False, separate=True)
+        reduced, turned = hessenberg(alike, calc_q=True)
+        left, right = self.C * size @ turned, turned.T @ (self.B / size[:, None]).astype(complex)
         for row, s in zip(out, points, strict=True):
             if s == 0.0:
                 row[:] = self.dc_gain
@@ -197,7 +210,9 @@ class LinearPlant:
         Returns
         -------
         scipy.signal.TransferFunction
-            Poles that the output does not show are in numerator and denominator, as far as rounding leaves them.
+            Poles that the output does not show are in numerator and denominator, as far as rounding leaves them; those
+            at zero exactly. Coefficients are known to rounding of the largest: where poles differ by many powers of ten
+            only :meth:`frequency_response` is right at all of them.
 
         Raises
         ------
@@ -219,7 +234,17 @@ class LinearPlant:
                 break
             row, zeros = row @ self.A, zeros + 1
         numerator = numerator[min(zeros, numerator.size - 1) :]
+        if self.own_response is not None:
+            # the last ones are zero where the output grows less towards rest than there are poles at 0
+            power = int(self.own_response.towards_rest(self._slowest)[0][k, j])
+            numerator[max(numerator.size - max(int(np.sum(poles == 0.0)) - power, 0), 0) :] = 0.0
         return TransferFunction(numerator, denominator)
+
+    @property
+    def _slowest(self) -> float:
+        """The magnitude of the slowest pole that is not zero, 1 if all are."""
+        sizes = np.abs(self.poles)
+        return float(sizes[sizes > 0.0].min(initial=np.inf)) if (sizes > 0.0).any() else 1.0
 
     @property
     def dc_gain(self) -> np.ndarray:
@@ -229,6 +254,9 @@ class LinearPlant:
         """
         if not len(self.A):
             return self.D.copy()
+        if self.own_response is not None:
+            power, left = self.own_response.towards_rest(self._slowest)
+            return np.where(power > 0, np.inf, np.where(power == 0, left, 0.0))
         size = float(np.abs(self.poles).max())
         schur_form, vectors, standing = schur(self.A.astype(complex), sort=lambda s: abs(s) <= STANDING * size)
         b, c = vectors.conj().T @ self.B, self.C @ vectors
@@ -575,7 +603,8 @@ def linear_plant(
     own = np.array([k for k in range(len(names)) if k not in (*inputs, *outputs)], dtype=int)
     u, y = np.array(inputs, dtype=int), np.array(outputs, dtype=int)
     asked = [Asked(names[k], "") for k in u]
-    a, b, c, d = lowered(realised(reduced, own, y, u), asked, [names[k] for k in y])
+    found = realised(reduced, own, y, u)
+    a, b, c, d = lowered(found, asked, [names[k] for k in y])
     n = len(reduced.mass)
     # rates by another unit of time; the outputs are rates, too
     scale = np.concatenate([np.ones(n), np.full(n, time_unit), np.ones(own.size)])
@@ -585,7 +614,13 @@ def linear_plant(
     states = [f"x{k + 1} ({body})" for k, body in enumerate(moving)]
     states += [f"v{k + 1} ({body})" for k, body in enumerate(moving)] + [names[k] for k in own]
     poles = time_unit * poles_of(reduced, own)
-    return LinearPlant(a, b, c, d, states, [names[k] for k in u], [names[k] for k in y], time_unit, own_poles=poles)
+    answer = response_of(reduced, own, u, found.outputs, found.chains, [0] * u.size)
+    if answer is not None:
+        answer = replace(answer, time_unit=time_unit)
+    return LinearPlant(
+        a, b, c, d, states, [names[k] for k in u], [names[k] for k in y], time_unit, own_poles=poles,
+        own_response=answer,
+    )  # fmt: skip
 
 
 def _moving(instant: Instant, reduced: Reduced) -> list[str]:

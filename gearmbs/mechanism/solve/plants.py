@@ -13,6 +13,7 @@ from gearmbs.dae.analyses.coordinates import chosen, spatial
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Inputs, Reduced, reduce, warn_of_varying
 from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, Realised, lowered, poles_of, realised
+from gearmbs.dae.analyses.response import response_of
 from gearmbs.dae.analyses.turning import skew, turning
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
@@ -374,6 +375,7 @@ def _plant(
         change @ a @ back, change @ b, c @ back, d, states, [one.name for one in given], labels, 1.0, state_units,
         [one.unit for one in given], [one.unit for one in told], point,
         poles_of(reduced, own, len(a) - 2 * n - own.size),
+        response_of(reduced, own, np.zeros(0, dtype=int), found.outputs, found.chains, [one.level for one in given]),
     )  # fmt: skip
 
 
