@@ -44,6 +44,8 @@ from .parts import Sensor as Sensor
 from .parts import SpeedSensor as SpeedSensor
 from .parts import TorqueSensor as TorqueSensor
 from .parts import Wheel as Wheel
+from .planetary import PlanetaryStage as PlanetaryStage
+from .planetary import rolling_pins as rolling_pins
 from .shaft import Shaft as Shaft
 from .torque_element import ShaftTorque as ShaftTorque
 from .torsional import TorsionalModel as TorsionalModel

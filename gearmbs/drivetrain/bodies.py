@@ -10,6 +10,7 @@ import numpy as np
 from gearmbs.drivetrain.connections import Bearing
 from gearmbs.drivetrain.housing import MODES, Housing, Mount
 from gearmbs.drivetrain.part import errors_named, require
+from gearmbs.drivetrain.planetary import carried
 from gearmbs.drivetrain.shaft import ALL, Shaft
 from gearmbs.flexible import Disc, FiniteElementModel, Interface, ModalModel, Seat, reduce_model
 from gearmbs.flexible import Shaft as SectionedShaft
@@ -41,6 +42,9 @@ def modal_models(train: Drivetrain) -> dict[str, ModalModel]:
 def shaft_seats(train: Drivetrain, shaft: Shaft) -> dict[str, float]:
     """Return the stations (m) at which parts hold or load a shaft, by the names of the parts there."""
     at = [(w.name, train.station(w)) for w in train.wheels if w.shaft == shaft.name]
+    for stage in train.planetary_stages:
+        members = [member for member, on in stage.holders.items() if on == shaft.name]
+        at += [(f"{stage.name} {member}", stage.station(train, member)) for member in members]
     at += [(b.name, train.station(b)) for b in train.bearings if b.shaft == shaft.name]
     for bearing in train.bearings:
         if train.carrier(bearing) == shaft.name:
@@ -61,13 +65,10 @@ def shaft_seats(train: Drivetrain, shaft: Shaft) -> dict[str, float]:
 
 def shaft_model(train: Drivetrain, shaft: Shaft) -> ModalModel:
     """Return a shaft with its wheels as a body with modes."""
-    discs = []
-    for wheel in train.wheels:
-        if wheel.shaft == shaft.name:
-            across, _, polar = wheel.gear.inertia
-            discs.append(
-                Disc(train.station(wheel), mass=wheel.gear.mass, polar=polar, diametral=across, name=wheel.name)
-            )
+    discs = [
+        Disc(one.station, mass=one.mass, polar=one.inertia[2], diametral=one.inertia[0], name=one.name)
+        for one in carried(train, shaft.name)
+    ]
     with errors_named(shaft.label):
         whole = SectionedShaft(
             shaft.pieces, discs, dict(shaft_seats(train, shaft)), shaft.material, shaft.elements, name=shaft.name

@@ -12,11 +12,12 @@ import numpy as np
 from gearmbs.drivetrain.connections import Bearing, Coupling
 from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.housing import Housing
-from gearmbs.drivetrain.kinematics import walk
+from gearmbs.drivetrain.kinematics import joined
 from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
+from gearmbs.drivetrain.planetary import add_stage, carried, check_stage
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
 from gearmbs.gears.spec import COUNTED_TWICE
@@ -49,6 +50,8 @@ def check(train: Drivetrain) -> None:
         raise DrivetrainError(f"{train.name}: there are no shafts; give at least one")
     _names(train)
     _stations(train)
+    for stage in train.planetary_stages:
+        check_stage(train, stage)
     _ = train.speeds
     _driven(train)
     pairs = train.pairs
@@ -119,11 +122,7 @@ def _stations(train: Drivetrain) -> None:
 
 def _driven(train: Drivetrain) -> None:
     """Every load must be on a train with a drive, and every mesh."""
-    reached: set[str] = set()
-    for drive in train.drives:
-        reached.add(drive.shaft)
-        for link, _ in walk(train, drive.shaft):
-            reached |= {link.first, link.second}
+    reached = joined(train, [drive.shaft for drive in train.drives])
     for load in train.loads:
         carried = load.shaft in reached or (load.nominal(0.0) == 0.0 and load.on in reached)
         require(
@@ -136,6 +135,11 @@ def _driven(train: Drivetrain) -> None:
         require(
             driver.shaft in reached,
             f"{mesh.label}: nothing turns it: shaft '{driver.shaft}' is joined to no drive; give one",
+        )
+    for stage in train.planetary_stages:
+        require(
+            reached.issuperset(stage.turning(train).values()),
+            f"{stage.label}: nothing turns it: its shafts are joined to no drive; give one",
         )
 
 
@@ -301,6 +305,8 @@ def build(train: Drivetrain) -> Mechanism:
             coupling.add(Attached(m, i, j, train.speeds[two.name], train.run_up, train.running))
     for mesh in train.meshes:
         m.gear_contact(mesh.name, builder.wheels[mesh.driver], builder.wheels[mesh.driven], train.pairs[mesh.name])
+    for stage in train.planetary_stages:
+        add_stage(m, train, layout, stage)
     ends: tuple[Any, ...] = (*train.drives, *train.loads)
     for part in ends:
         with errors_named(part.label):
@@ -353,9 +359,7 @@ class _Builder:
         train = self.train
         mass, centre, polar, across = shaft.body()
         pieces = [(mass, centre, np.diag([across, across, polar]))]
-        for wheel in train.wheels:
-            if wheel.shaft == shaft.name:
-                pieces.append((wheel.gear.mass, train.station(wheel), np.diag(wheel.gear.inertia)))
+        pieces += [(one.mass, one.station, np.diag(one.inertia)) for one in carried(train, shaft.name)]
         total = sum(p[0] for p in pieces)
         middle = sum(p[0] * p[1] for p in pieces) / total
         inertia = sum(p[2] + p[0] * (p[1] - middle) ** 2 * np.diag([1.0, 1.0, 0.0]) for p in pieces)

@@ -25,6 +25,15 @@ In TOML files or nested tables each kind of part is a table of named tables::
     kind = "broken tooth"
     lost = 0.5
 
+    [planetary_stages.low]
+    sun = "high"
+    carrier = "low"
+    ring = "ground"
+    teeth = [24, 30, 84]
+    module = "2 mm"
+    planets = 3
+    pins = { radial = "5e8 N/m" }
+
     [bearings.a]
     kind = "elastic"
     shaft = "input"
@@ -62,6 +71,15 @@ from gearmbs.drivetrain.loads import LOADS, Load
 from gearmbs.drivetrain.on_shafts import unfolded, with_parts_of_shafts
 from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, parts_html, require
 from gearmbs.drivetrain.parts import SENSORS, GearMesh, Sensor, Wheel
+from gearmbs.drivetrain.planetary import (
+    SET_KEYS,
+    STAGE_KEYS,
+    Meshing,
+    PlanetaryStage,
+    meshings,
+    planetary_set,
+    stage_pairs,
+)
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
@@ -83,7 +101,7 @@ P = TypeVar("P", bound=Part)
 
 KINDS: dict[str, type[Part]] = {
     "shafts": Shaft, "wheels": Wheel, "meshes": GearMesh, "bearings": Bearing, "couplings": Coupling,
-    "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor,
+    "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor, "planetary_stages": PlanetaryStage,
 }  # fmt: skip
 """What each group holds."""
 
@@ -99,7 +117,7 @@ class Drivetrain:
     Parameters
     ----------
     name : str
-    shafts, wheels, meshes, bearings, couplings, housings, drives, loads, sensors : sequence
+    shafts, wheels, meshes, bearings, couplings, housings, drives, loads, sensors, planetary_stages : sequence
         The parts.
     gravity : sequence of 3 floats
         m/s^2, global components.
@@ -146,6 +164,7 @@ class Drivetrain:
     drives: Sequence[Drive] = ()
     loads: Sequence[Load] = ()
     sensors: Sequence[Sensor] = ()
+    planetary_stages: Sequence[PlanetaryStage] = ()
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     run_up: float = 0.05
     running: bool = False
@@ -214,6 +233,26 @@ class Drivetrain:
         one = self.part(mesh, GearMesh) if isinstance(mesh, str) else mesh
         return self.part(one.driver, Wheel, one.label), self.part(one.driven, Wheel, one.label)
 
+    @cached_property
+    def meshings(self) -> tuple[Meshing, ...]:
+        """All pairs of wheels in mesh, those of planetary stages among them; see `gearmbs.drivetrain.planetary`."""
+        return meshings(self)
+
+    @property
+    def planets(self) -> dict[str, PlanetaryStage]:
+        """The bodies of all planets, by name, with their stage."""
+        stages = self.planetary_stages
+        return {stage.planet(k): stage for stage in stages for k in range(1, stage.gears.planets + 1)}
+
+    @property
+    def pins(self) -> dict[str, tuple[PlanetaryStage, float]]:
+        """Stage and angle on the carrier (rad) of the pin of each planet, by the pin's name."""
+        return {
+            stage.pin(k): (stage, float(angle))
+            for stage in self.planetary_stages
+            for k, angle in enumerate(stage.gears.angles or (), start=1)
+        }
+
     def station(self, part: Any, default: Literal["left", "middle", "right"] = "middle") -> float:
         """Return the station of a part on its shaft, m."""
         if part.station is not None:
@@ -247,13 +286,23 @@ class Drivetrain:
 
     @cached_property
     def pairs(self) -> dict[str, Any]:
-        """The pair of each mesh, by name, with its drive flank and torque."""
+        """The pair of each mesh, by name, with its drive flank and torque; those of planetary stages, too."""
         out = {}
         for mesh in self.meshes:
             driver, driven = self.wheels_of(mesh)
             sense = self.power.rotation(mesh.name)
             out[mesh.name] = mesh.make(driver.gear, driven.gear, sense, self.power.on_driven(mesh.name))
-        return out
+        return out | stage_pairs(self)
+
+    @cached_property
+    def turning(self) -> dict[str, float]:
+        """Operating speed of each shaft and planet about its axis, rad/s."""
+        planets = {name: stage.speeds(self)["planet"] for name, stage in self.planets.items()}
+        return {**self.speeds, **planets}
+
+    def against_carrier(self, meshing: Meshing, end: int = 0) -> float:
+        """Return the speed of the driver (0) or the driven wheel (1) of a mesh against what carries the axes, rad/s."""
+        return self.turning.get(meshing.bodies[end], 0.0) - self.turning.get(meshing.carrier, 0.0)
 
     @cached_property
     def modal_models(self) -> dict[str, ModalModel]:
@@ -307,7 +356,7 @@ class Drivetrain:
         """Contact law of each mesh in words, by name; tells without the springs, which may need compiled contacts."""
         from gearmbs.drivetrain.torsional import mesh_law
 
-        return {mesh.name: mesh_law(self, mesh.name) for mesh in self.meshes}
+        return {mesh.group: mesh_law(self, mesh.name) for mesh in reversed(self.meshings)}
 
     @cached_property
     def mesh_dynamics(self) -> dict[str, MeshDynamics]:
@@ -390,6 +439,7 @@ class Drivetrain:
         """Angular frequency of interest, the fastest mesh or else shaft, rad/s: for ``simulate(rate_scale=...)``."""
         teeth: list[tuple[str, GearSpec]] = [(w.shaft, w.gear) for w in self.wheels]
         fastest = [abs(self.speeds[shaft]) * gear.teeth for shaft, gear in teeth]
+        fastest += [abs(self.against_carrier(m)) * m.gears[0].teeth for m in self.meshings if m.stage]
         return max([1.0, *(fastest or map(abs, self.speeds.values()))])
 
     def _repr_html_(self) -> str:
@@ -457,7 +507,7 @@ class RunSettings(Described):
         """Return the rate of the record, Hz."""
         if self.rate is not None:
             return float(self.rate)
-        fastest = max((train.kinematics.mesh_frequency(m.name) for m in train.meshes), default=0.0)
+        fastest = max((train.kinematics.mesh_frequency(m.name) for m in train.meshings), default=0.0)
         return max(12800.0, 100.0 * math.ceil(20.0 * fastest / 100.0))
 
 
@@ -541,6 +591,8 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None, folder: 
         return _wheel(where, name, settings)
     if group == "meshes":
         return _mesh(where, name, settings, fault)
+    if group == "planetary_stages":
+        return _stage(where, name, settings, fault)
     if group == "housings":
         return _housing(where, name, settings, folder)
     if group == "shafts":
@@ -587,6 +639,14 @@ def _mesh(where: str, name: str, settings: dict[str, Any], fault: FaultReader | 
         with errors_named(f"{where}.faults"):
             settings["faults"] = tuple(fault(table) for table in settings["faults"])
     return _of_kind(where, GearMesh, name, {**own, "settings": settings})
+
+
+def _stage(where: str, name: str, settings: dict[str, Any], fault: FaultReader | None) -> PlanetaryStage:
+    own: dict[str, Any] = {key: settings.pop(key) for key in STAGE_KEYS if key in settings}
+    check_keys(settings, [*STAGE_KEYS, *SET_KEYS], where, DrivetrainError, shown=repr)
+    with errors_named(where):
+        gears = planetary_set({"name": name, **settings}, fault, place=where)
+    return _of_kind(where, PlanetaryStage, name, {**own, "gears": gears})
 
 
 def _housing(where: str, name: str, settings: dict[str, Any], folder: Path) -> Housing:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,6 +14,15 @@ from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.loads import RPM, Drag, Load, TableLoad
 from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh
+from gearmbs.drivetrain.planetary import (
+    Meshing,
+    PlanetaryStage,
+    balanced_torques,
+    differentials,
+    held_ratio,
+    member_torques,
+    with_differentials,
+)
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.units import Quantity, to_si
 
@@ -55,13 +64,54 @@ class KinematicTable:
         return self.speeds[first] / self.speeds[second]
 
     def mesh_frequency(self, mesh: str) -> float:
-        """Return the mesh frequency of a mesh, Hz."""
-        driver, _ = self.train.wheels_of(mesh)
-        return driver.gear.teeth * self.shaft_frequency(driver.shaft)
+        """Return the mesh frequency of a mesh, Hz; of a planetary stage that of the sun's, against the carrier."""
+        one = self._meshing(mesh)
+        return one.gears[0].teeth * abs(self.train.against_carrier(one)) / HZ
+
+    def _meshing(self, mesh: str) -> Meshing:
+        """Return the mesh of a name; of a stage, or its side, that of planet 1."""
+        for one in self.train.meshings:
+            if mesh in (one.name, one.group, one.stage):
+                return one
+        known = ", ".join(dict.fromkeys(one.group for one in self.train.meshings))
+        raise DrivetrainError(f"{self.train.name}: there is no mesh '{mesh}'; known ones are {known or 'none'}")
+
+    def _modulations(self, mesh: str) -> list[tuple[str, float]]:
+        """Return what modulates a mesh, with its turns a second: both shafts; of a stage all turns between members."""
+        one = self._meshing(mesh)
+        if not one.stage:
+            return [(shaft, self.shaft_frequency(shaft)) for shaft in one.bodies]
+        turns = self._stage_frequencies(self.train.part(one.stage, PlanetaryStage))
+        names = {"carrier": "ring_fault", "sun": "sun_fault", "planet": "planet_fault"}
+        planets = self.train.part(one.stage, PlanetaryStage).gears.planets
+        return [
+            (f"{member} of {one.stage}", turns[line] / (1 if member == "planet" else planets))
+            for member, line in names.items()
+        ]
+
+    def _stage_frequencies(self, stage: PlanetaryStage) -> dict[str, float]:
+        """Return `PlanetarySet.frequencies` of a stage at its operating speeds, Hz."""
+        speeds = stage.speeds(self.train)
+        return stage.gears.frequencies(sun=speeds["sun"], carrier=speeds["carrier"])
+
+    def _stage_lines(self, stage: PlanetaryStage) -> Iterator[tuple[str, str, str, float]]:
+        """Yield the lines of a planetary stage: kind, of, name, frequency."""
+        turns = self._stage_frequencies(stage)
+        yield "mesh", stage.name, "GMF", turns["mesh"]
+        if stage.gears.planet_at_ring is not None:
+            yield "mesh", f"{stage.name} ring", "GMF", turns["mesh_ring"]
+        for side in ("sun", "ring"):
+            yield "mesh", f"{stage.name} {side}", "hunting tooth", self.hunting_frequency(f"{stage.name} {side}")
+        for line in ("planet_pass", "sun_fault", "planet_fault", "ring_fault"):
+            yield "planetary stage", stage.name, line.replace("_", " "), turns[line]
+        rolling = getattr(stage.on_pins, "rolling", None)
+        if rolling is not None:
+            for name, multiple in rolling.multiples.items():
+                yield "bearing", f"{stage.name} pins", name, multiple * turns["planet"]
 
     def hunting_frequency(self, mesh: str) -> float:
         """Return how often a second the same two teeth of a mesh meet, Hz."""
-        one, two = (wheel.gear.teeth for wheel in self.train.wheels_of(mesh))
+        one, two = (gear.teeth for gear in self._meshing(mesh).gears)
         return self.mesh_frequency(mesh) * math.gcd(one, two) / (one * two)
 
     def sidebands(self, mesh: str, harmonics: int = 3, order: int = 2) -> pd.DataFrame:
@@ -70,9 +120,9 @@ class KinematicTable:
 
         gmf = self.mesh_frequency(mesh)
         rows = [
-            (h, wheel.shaft, k, h * gmf + k * self.shaft_frequency(wheel.shaft))
+            (h, name, k, h * gmf + k * turns)
             for h in range(1, harmonics + 1)
-            for wheel in self.train.wheels_of(mesh)
+            for name, turns in self._modulations(mesh)
             for k in range(-order, order + 1)
             if k
         ]
@@ -94,15 +144,15 @@ class KinematicTable:
         """Return the time after which all teeth of all meshes stand as before, s; infinite without meshes."""
         from fractions import Fraction
 
-        turning = [s for s, w in self.speeds.items() if w != 0.0 and any(x.shaft == s for x in self.train.wheels)]
+        meshing = {body for one in self.train.meshings for body in (*one.bodies, one.carrier)}
+        meshing |= {wheel.shaft for wheel in self.train.wheels}
+        turning = [abs(w) for body, w in self.train.turning.items() if w != 0.0 and body in meshing]
         if not turning:
             return math.inf
-        first = turning[0]
         turns = 1
-        for shaft in turning:
-            share = Fraction(abs(self.ratio(shaft, first))).limit_denominator(10**7)
-            turns = math.lcm(turns, share.denominator)
-        return turns / self.shaft_frequency(first)
+        for speed in turning:
+            turns = math.lcm(turns, Fraction(speed / turning[0]).limit_denominator(10**7).denominator)
+        return turns / (turning[0] / HZ)
 
     @cached_property
     def lines(self) -> pd.DataFrame:
@@ -115,6 +165,8 @@ class KinematicTable:
         for mesh in self.train.meshes:
             rows.append(("mesh", mesh.name, "GMF", self.mesh_frequency(mesh.name)))
             rows.append(("mesh", mesh.name, "hunting tooth", self.hunting_frequency(mesh.name)))
+        for stage in self.train.planetary_stages:
+            rows += self._stage_lines(stage)
         for bearing in self.train.bearings:
             if bearing.rolling is not None:
                 for name, frequency in self.bearing_frequencies(bearing.name).items():
@@ -137,7 +189,7 @@ class KinematicTable:
             Hz.
         harmonics : int, optional
             Highest harmonic of all lines; default: of meshes, bearings and pumps as many as reach the frequency, of
-            shafts and hunting teeth, whose harmonics lie close everywhere, three.
+            shafts, hunting teeth and what passes in planetary stages, whose harmonics lie close everywhere, three.
         order : int
             Sidebands on either side of each mesh harmonic.
 
@@ -153,7 +205,7 @@ class KinematicTable:
         if harmonics is None:
             for row in self.lines.itertuples():
                 line = float(row.frequency)  # type: ignore[arg-type]
-                if row.kind == "shaft" or row.name == "hunting tooth" or line <= 0.0:
+                if row.kind in ("shaft", "planetary stage") or row.name == "hunting tooth" or line <= 0.0:
                     continue
                 # the harmonics on either side; sidebands reach as far as their order
                 for h in {max(1, math.floor(frequency / line)), max(1, math.ceil(frequency / line))}:
@@ -187,17 +239,16 @@ class KinematicTable:
         """Return the sidebands of one mesh harmonic, Hz, by name."""
         gmf = harmonic * self.mesh_frequency(mesh)
         return {
-            f"{harmonic} x GMF of {mesh} {k:+d} x {wheel.shaft}": gmf + k * self.shaft_frequency(wheel.shaft)
-            for wheel in self.train.wheels_of(mesh)
+            f"{harmonic} x GMF of {mesh} {k:+d} x {name}": gmf + k * turns
+            for name, turns in self._modulations(mesh)
             for k in range(-order, order + 1)
             if k
         }
 
     def for_analysis(self, mesh: str | GearMesh) -> dict[str, object]:
         """Return ``speed`` (rad/s) and ``teeth`` of a mesh, as `gearmbs.signals.make_signal` takes them."""
-        name = mesh if isinstance(mesh, str) else mesh.name
-        driver, driven = self.train.wheels_of(name)
-        return {"speed": abs(self.speeds[driver.shaft]), "teeth": (driver.gear.teeth, driven.gear.teeth)}
+        one = self._meshing(mesh if isinstance(mesh, str) else mesh.name)
+        return {"speed": abs(self.train.against_carrier(one)), "teeth": tuple(gear.teeth for gear in one.gears)}
 
     def for_bearings(self, shaft: str | None = None) -> dict[str, Any]:
         """Return ``bearing``, ``speed`` (rad/s) and ``shafts`` as `gearmbs.signals.diagnose_bearing` takes them.
@@ -256,7 +307,7 @@ BALANCED = 0.99
 
 
 class Link(NamedTuple):
-    """A mesh or coupling between two shafts: the second turns ``ratio`` times as fast as the first."""
+    """A mesh, coupling or stage with a held member between two shafts: the second turns ``ratio`` times as fast."""
 
     name: str
     first: str
@@ -279,6 +330,10 @@ def links(train: Drivetrain) -> list[Link]:
         driver, driven = train.wheels_of(mesh)
         sign = driver.gear.sign * driven.gear.sign
         out.append(Link(mesh.name, driver.shaft, driven.shaft, -sign * driver.gear.teeth / driven.gear.teeth))
+    for stage in train.planetary_stages:
+        found = held_ratio(train, stage)
+        if found is not None:
+            out.append(Link(stage.name, *found))
     return out
 
 
@@ -299,6 +354,19 @@ def walk(train: Drivetrain, start: str) -> Iterator[tuple[Link, bool]]:
                 met.add(link.second)
                 waiting.append(link.second)
             yield link, new
+
+
+def joined(train: Drivetrain, starts: Iterable[str]) -> set[str]:
+    """Return the shafts that links and planetary stages join to some."""
+    reached, size = set(starts), -1
+    groups = [set(stage.turning(train).values()) for stage in train.planetary_stages]
+    groups += [{link.first, link.second} for link in links(train)]
+    while len(reached) > size:
+        size = len(reached)
+        for group in groups:
+            if group & reached:
+                reached |= group
+    return reached
 
 
 def operating_speeds(train: Drivetrain) -> dict[str, float]:
@@ -335,6 +403,7 @@ def operating_speeds(train: Drivetrain) -> dict[str, float]:
                 other = prescribed.setdefault(link.second, drive.label)
                 require(other == drive.label, f"{drive.label} and {other} both prescribe the speed of one train; "
                         "make one of them a motor")  # fmt: skip
+    speeds = with_differentials(train, links(train), speeds)
     return {shaft.name: speeds.get(shaft.name, 0.0) for shaft in train.shafts}
 
 
@@ -367,6 +436,8 @@ class PowerFlow:
         Of each mesh, the driver's shaft.
     drive : dict of str to float
         Torque of the drive of each train about its shaft, N m, by the drive's name.
+    members : dict of str to dict of str to float
+        Of each planetary stage, the torques of its planets on sun, carrier and ring about the axis, N m.
     """
 
     torques: dict[str, tuple[float, float]]
@@ -374,6 +445,7 @@ class PowerFlow:
     senses: dict[str, int]
     drivers: dict[str, str]
     drive: dict[str, float]
+    members: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def rotation(self, mesh: str) -> int:
         """Return the ``rotation`` of a mesh's pair: the driver's sense, or its opposite if the driven wheel pushes."""
@@ -420,9 +492,16 @@ def power_flow(train: Drivetrain) -> PowerFlow:
         for drive in train.drives:
             if drive.shaft == root:
                 driven_by.setdefault(drive.name, -rest[root])
+    members: dict[str, dict[str, float]] = {}
+    if differentials(train):
+        torques, members, driven_by = balanced_torques(train, links(train), applied)
+        for link in links(train):
+            drives = torques[link.name][1] * speeds[link.second] >= 0.0
+            pushing[link.name] = link.first if drives else link.second
+    members |= member_torques(train, torques)
     drivers = {mesh.name: train.wheels_of(mesh)[0].shaft for mesh in train.meshes}
     senses = {name: -1 if speeds[shaft] < 0.0 else 1 for name, shaft in drivers.items()}
-    return PowerFlow(torques, pushing, senses, drivers, driven_by)
+    return PowerFlow(torques, pushing, senses, drivers, driven_by, members)
 
 
 def warn_of_weak_drives(train: Drivetrain, stacklevel: int = 3) -> None:

@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh
+from gearmbs.drivetrain.planetary import PlanetaryStage, assemble_stage
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
 
@@ -46,9 +48,10 @@ class Layout:
     ----------
     seats : dict of str to Seat
     angles : dict of str to float
-        Of shafts about their axes, rad.
+        Of shafts and planets about their axes, rad.
     wheels : dict of str to float
-        Assembly angle of each wheel against its shaft, rad.
+        Assembly angle of each wheel against its shaft, rad; of the ring of a planetary stage, too, and of the second
+        wheel of each planet.
     directions : dict of str to float
         Of each mesh, from the driver's A_0, rad.
     """
@@ -70,7 +73,7 @@ class Tie(NamedTuple):
 
 
 def ties(train: Drivetrain) -> list[Tie]:
-    """Return what places shafts by each other: couplings, bearings on shafts, then meshes."""
+    """Return what places shafts by each other: couplings, bearings on shafts, planetary stages, then meshes."""
     out = []
     for coupling in train.couplings:
         one, two = (train.part(name, Shaft, coupling.label) for name in (coupling.first, coupling.second))
@@ -82,6 +85,9 @@ def ties(train: Drivetrain) -> list[Tie]:
             carrier = train.part(bearing.on, Shaft)
             place = 0.5 * carrier.length if bearing.on_station is None else bearing.on_station
             out.append(Tie(bearing.name, carrier.name, bearing.shaft, None, (place, station)))
+    for stage in train.planetary_stages:
+        at = [(on, stage.station(train, member)) for member, on in stage.turning(train).items()]
+        out += [Tie(stage.name, one, two, None, (a, b)) for (one, a), (two, b) in pairwise(at)]
     for mesh in train.meshes:
         driver, driven = train.wheels_of(mesh)
         out.append(Tie(mesh.name, driver.shaft, driven.shaft, mesh, (train.station(driver), train.station(driven))))
@@ -163,6 +169,11 @@ def _place_coaxial(train: Drivetrain, tie: Tie, forward: bool, here: str, there:
         f"{train.parts[tie.name].label}: shafts '{tie.first}' and '{tie.second}' are not coaxial: their axes are "
         f"{MM * across:.4g} mm apart; change their places or the meshes between them",
     )
+    require(
+        abs(along) <= CLOSED or not isinstance(train.parts[tie.name], PlanetaryStage),
+        f"{train.parts[tie.name].label}: its members on '{tie.first}' and '{tie.second}' are {MM * abs(along):.4g} mm "
+        "apart along the axis; change their stations or the places of the shafts",
+    )
 
 
 def _direction_between(train: Drivetrain, tie: Tie, out: dict[str, Seat]) -> float:
@@ -230,6 +241,8 @@ def assembled(train: Drivetrain) -> Layout:
             angles.setdefault(there, angles[here])
             continue
         _turn(train, tie, forward, new, pairs[tie.name], directions[tie.name], angles, wheels)
+    for stage in train.planetary_stages:
+        assemble_stage(train, stage, angles, wheels)
     return Layout(places, angles, {n: 0.0 if a is None else a for n, a in wheels.items()}, directions)
 
 

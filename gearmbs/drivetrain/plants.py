@@ -14,6 +14,7 @@ from gearmbs.drivetrain.loads import Load, TorqueLoad
 from gearmbs.drivetrain.part import DrivetrainError
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor
 from gearmbs.drivetrain.shaft import Shaft
+from gearmbs.gears.mesh import FlankFriction
 from gearmbs.mechanism.parts.functions import constant
 from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.solve.analyses import static_equilibrium
@@ -43,7 +44,10 @@ def resting(train: Drivetrain) -> Drivetrain:
     ]  # fmt: skip
     # flanks that rest on each other would stick
     meshes = [replace(mesh, settings={**mesh.settings, "friction": False}) for mesh in train.meshes]
-    return train.of_same_bodies(drives=drives, loads=loads, meshes=meshes, running=False)
+    stages = [
+        replace(stage, gears=replace(stage.gears, friction=FlankFriction.none())) for stage in train.planetary_stages
+    ]
+    return train.of_same_bodies(drives=drives, loads=loads, meshes=meshes, planetary_stages=stages, running=False)
 
 
 def _own_input(part: Drive | Load) -> Input | None:

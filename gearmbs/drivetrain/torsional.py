@@ -2,7 +2,9 @@
 
 M theta'' + C theta' + K theta = T, one angle a shaft. A coupling of stiffness k between shafts i and j adds k to the
 diagonal and -k beside it; a mesh of stiffness k along the line of action adds k g g^T with g = (r_b1, s r_b2) in the
-angles of its shafts, where s is 1 for external and -1 for internal pairs.
+angles of its shafts, where s is 1 for external and -1 for internal pairs. A mesh of a planetary stage counts angles
+from the carrier, whose lever is therefore -(r_b1 + s r_b2); planets have angles of their own, and the carrier's inertia
+has their masses at its radius.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ import scipy.linalg
 
 from gearmbs.drivetrain.drives import SpeedDrive
 from gearmbs.drivetrain.part import errors_named, require
+from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, carried
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 from gearmbs.kernels.jit import njit
@@ -33,12 +37,13 @@ CYCLE_POINTS = 50
 
 @dataclass(frozen=True)
 class TorsionalSpring:
-    """A spring between two shafts: k (g . theta), with g from its two levers.
+    """A spring between shafts: k (g . theta), with g from its levers.
 
     Attributes
     ----------
     name : str
     shafts : tuple of int
+        Two; of a mesh of a planetary stage also the carrier, and of what is held none.
     levers : tuple of float
         1 and -1 of a coupling; base radii of a mesh, m.
     stiffness, damping : float
@@ -52,8 +57,8 @@ class TorsionalSpring:
     """
 
     name: str
-    shafts: tuple[int, int]
-    levers: tuple[float, float]
+    shafts: tuple[int, ...]
+    levers: tuple[float, ...]
     stiffness: float
     damping: float = 0.0
     backlash: float = 0.0
@@ -75,7 +80,7 @@ class TorsionalModel:
     Attributes
     ----------
     names : tuple of str
-        Shafts.
+        Shafts, then planets.
     inertias : ndarray, shape (n,)
         kg m^2.
     springs : tuple of TorsionalSpring
@@ -203,7 +208,7 @@ class TorsionalModel:
         numbers = np.zeros((len(self.springs), 5))
         for k, spring in enumerate(self.springs):
             # a clutch is free on both sides, a mesh on one
-            share = 0.5 if spring.levers[1] == -1.0 else 0.0
+            share = 0.5 if spring.levers[1:] == (-1.0,) else 0.0
             high, low = share * spring.backlash, (share - 1.0) * spring.backlash
             numbers[k] = (spring.stiffness, spring.damping, spring.sense, high, low)
         fastest = max(1.0, *self.modes()[0])
@@ -220,6 +225,12 @@ class TorsionalModel:
 
     def _rolling(self, shaft: int, known: dict[int, float]) -> float:
         """Return the speed of a shaft with which no spring between it and the prescribed shafts is stretched."""
+        if any(len(spring.shafts) != 2 for spring in self.springs):
+            free = [k for k in range(len(self.names)) if k not in known]
+            rows = np.array([spring.row(len(self.names)) for spring in self.springs])
+            drive = rows[:, list(known)] @ np.array(list(known.values()))
+            found = dict(zip(free, np.linalg.lstsq(rows[:, free], -drive, rcond=None)[0]))
+            return float({**known, **found}[shaft])
         speeds = dict(known)
         for _ in self.springs:
             for spring in self.springs:
@@ -251,7 +262,7 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
     UserWarning
         Of tilted wheels without load, whose stiffness is taken as that of parallel ones.
     """
-    names = tuple(shaft.name for shaft in train.shafts)
+    names = tuple(train.turning)
     inertias = _inertias(train, names)
     springs = []
     for coupling in train.couplings:
@@ -265,8 +276,7 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
                 getattr(coupling, "dead_band", 0.0), train.power.torques[coupling.name][1],
             )
         )  # fmt: skip
-    for mesh in train.meshes:
-        springs.append(train.mesh_springs[mesh.name])
+    springs += [train.mesh_springs[mesh.name] for mesh in train.meshings]
     ground = np.zeros(len(names))
     for drive in train.drives:
         ground[names.index(drive.shaft)] += drive.damping()
@@ -306,17 +316,20 @@ class MeshDynamics(NamedTuple):
 
 
 def mesh_dynamics(train: Drivetrain) -> dict[str, MeshDynamics]:
-    """Return law, stiffness, damping and reduced mass of each mesh, by name."""
-    names = tuple(shaft.name for shaft in train.shafts)
+    """Return law, stiffness, damping and reduced mass of each mesh, by name; of stages by "sun" and "ring"."""
+    names = tuple(train.turning)
     inertias = _inertias(train, names)
     held = {drive.shaft for drive in train.drives if isinstance(drive, SpeedDrive)}
     out = {}
-    for mesh in train.meshes:
+    for mesh in train.meshings:
+        if mesh.group in out:
+            # planets of a stage are alike
+            continue
         spring = train.mesh_springs[mesh.name]
         softness = [arm**2 / inertias[k] for k, arm in zip(spring.shafts, spring.levers) if names[k] not in held]
         mass = 1.0 / sum(softness) if softness else 0.0
         law = mesh_law(train, mesh.name)
-        out[mesh.name] = MeshDynamics(law, float(spring.stiffness), float(spring.damping), float(mass))
+        out[mesh.group] = MeshDynamics(law, float(spring.stiffness), float(spring.damping), float(mass))
     return out
 
 
@@ -346,27 +359,45 @@ def warn_of_overdamped_meshes(train: Drivetrain, stacklevel: int = 3) -> None:
 
 
 def _inertias(train: Drivetrain, names: tuple[str, ...]) -> np.ndarray:
-    """Return the moments of inertia of all shafts with their wheels about their axes, kg m^2."""
-    inertias = np.array([shaft.body()[2] for shaft in train.shafts])
-    for wheel in train.wheels:
-        inertias[names.index(wheel.shaft)] += wheel.gear.inertia[2]
+    """Return the moments of inertia of all shafts with their wheels, and of planets, about their axes, kg m^2."""
+    inertias = np.zeros(len(names))
+    for shaft in train.shafts:
+        inertias[names.index(shaft.name)] += shaft.body()[2] + sum(c.inertia[2] for c in carried(train, shaft.name))
+    for planet, stage in train.planets.items():
+        mass, moments = stage.weights["planet"]
+        inertias[names.index(planet)] += moments[2]
+        if stage.carrier in names:
+            carrier = names.index(stage.carrier)
+            inertias[carrier] += mass * float(stage.gears.carrier_radius) ** 2
+            if train.part(stage.carrier, Shaft).modes is not None:
+                inertias[carrier] += stage.weights["carrier"][1][2] / stage.gears.planets
     return inertias
 
 
 def mesh_springs(train: Drivetrain) -> dict[str, TorsionalSpring]:
     """Return the spring of each mesh, by name; see `torsional_model`."""
-    names = tuple(shaft.name for shaft in train.shafts)
-    return {mesh.name: _mesh_spring(train, mesh.name, names) for mesh in train.meshes}
+    names = tuple(train.turning)
+    return {mesh.name: _mesh_spring(train, mesh, names) for mesh in train.meshings}
 
 
-def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> TorsionalSpring:
-    driver, driven = train.wheels_of(mesh)
-    pair = train.pairs[mesh]
+def _carried_force(train: Drivetrain, mesh: Meshing) -> float:
+    """Return the force along the transverse line of action at the operating point, N; planets share a stage's."""
+    geometry = train.pairs[mesh.name].geometry
+    if not mesh.stage:
+        return train.power.on_driven(mesh.name) / geometry.driven.base_radius
+    stage = train.part(mesh.stage, PlanetaryStage)
+    member = mesh.group.removeprefix(f"{mesh.stage} ")
+    wheel = geometry.driver if member == "sun" else geometry.driven
+    return abs(train.power.members[mesh.stage][member]) / (stage.gears.planets * wheel.base_radius)
+
+
+def _mesh_spring(train: Drivetrain, mesh: Meshing, names: tuple[str, ...]) -> TorsionalSpring:
+    pair = train.pairs[mesh.name]
     geometry, law = pair.geometry, pair.contact_model
-    force = train.power.on_driven(mesh) / geometry.driven.base_radius
+    force = _carried_force(train, mesh)
     share = max(1.0, geometry.contact_ratio)
     # a helical flank has its normal out of the transverse plane, in gap and in force, and a longer line of contact
-    transverse = math.cos(driver.gear.base_helix_angle)
+    transverse = math.cos(geometry.driver.base_helix_angle)
     # at no load laws with an exponent have no stiffness; a linear one has it always
     face = law.face_share(geometry)
     one = law.tangent_stiffness(force / share, 1, face) if force > 0.0 else face * law.law.stiffness
@@ -381,12 +412,15 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
     damping = float(transverse * law.tangent_damping(force / share, face) * geometry.contact_ratio)
     # an ideal mesh is one spring, however its wheels stand
     if geometry.misalignment and not isinstance(pair, IdealMesh):
-        tilted = _tilted_stiffness(train, mesh, stiffness, force)
+        tilted = _tilted_stiffness(train, mesh.name, stiffness, force)
         stiffness, damping = tilted, damping * tilted / stiffness
+    one, two = geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius
+    levers = {mesh.bodies[0]: one, mesh.bodies[1]: two, mesh.carrier: -(one + two)}
+    levers = {body: lever for body, lever in levers.items() if body in names}
     return TorsionalSpring(
-        mesh,
-        (names.index(driver.shaft), names.index(driven.shaft)),
-        (geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius),
+        mesh.name,
+        tuple(names.index(body) for body in levers),
+        tuple(levers.values()),
         stiffness,
         damping,
         max(0.0, geometry.normal_backlash),

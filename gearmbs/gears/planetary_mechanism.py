@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
 from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism import Mechanism, ramp, step
-from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting, State
 from gearmbs.units import Quantity, to_si
 
@@ -135,7 +135,7 @@ def planetary_mechanism(
         frequencies = gears.frequencies(**known)
         m.rate_scale = 2.0 * np.pi * max(frequencies["mesh"], frequencies["mesh_ring"]) or None
     start = gears.start_angles()
-    masses = _masses(gears, masses or {})
+    masses = set_masses(gears, masses or {})
     turns = {"sun": 0.0, "carrier": 0.0, "ring": start["ring"]}
     for member in MEMBERS:
         mass, inertia = masses[member]
@@ -156,7 +156,8 @@ def planetary_mechanism(
         if member in loads:
             load = loads[member] if over == 0 else step(0.0, 0.0, over, loads[member])
             m.torque(f"{member} load", body, load, axis=Z)
-    _planets(m, gears, start, masses["planet"], turning, pins, rim)
+    members = Members(m.bodies["sun"], m.bodies["carrier"], m.bodies["ring"])
+    add_planets(m, gears, members, start, masses["planet"], turning, pins, rim)
     return m
 
 
@@ -200,7 +201,7 @@ def _check_loads(loads: Mapping[str, float], held: str | None, speeds: Mapping, 
             )
 
 
-def _masses(gears: PlanetarySet, given: Mapping[str, tuple[float, Any]]) -> dict[str, tuple[float, Any]]:
+def set_masses(gears: PlanetarySet, given: Mapping[str, tuple[float, Any]]) -> dict[str, tuple[float, Any]]:
     """Masses and moments of inertia of all members; the carrier's default is a disc as far as the planets' axes."""
     unknown = set(given) - {*MEMBERS, "planet"}
     if unknown:
@@ -224,10 +225,12 @@ def _masses(gears: PlanetarySet, given: Mapping[str, tuple[float, Any]]) -> dict
     return own
 
 
-def _support(m: Mechanism, name: str, i: Any, j: Any, support: Support, at: np.ndarray | None = None) -> None:
+def _support(
+    m: Mechanism, name: str, i: Any, j: Any, support: Support, at: np.ndarray | None = None, axes: Any = None
+) -> None:
     """Carry ``i`` by springs against ``j`` at a point; in its plane unless it has an axial stiffness."""
-    place = i.position if at is None else at
-    on_i, on_j = i.marker(name=f"{name}.I"), j.marker_at(place, np.eye(3), name=f"{name}.J")
+    place, axes = i.position if at is None else at, np.eye(3) if axes is None else axes
+    on_i, on_j = i.marker(name=f"{name}.I"), j.marker_at(place, axes, name=f"{name}.J")
     if support.axial == 0.0:
         m.joint("planar", f"{name} plane", on_i, on_j)
     k = (support.radial, support.radial, support.axial)
@@ -236,7 +239,7 @@ def _support(m: Mechanism, name: str, i: Any, j: Any, support: Support, at: np.n
         # about its axis the member stands as it is: springs count from there
         m.bushing(
             name,
-            i.marker_at(i.position, np.eye(3), name=f"{name}.K"),
+            i.marker_at(i.position, axes, name=f"{name}.K"),
             on_j,
             stiffness=k,
             torsional_stiffness=kt,
@@ -245,54 +248,100 @@ def _support(m: Mechanism, name: str, i: Any, j: Any, support: Support, at: np.n
         )
 
 
-def _planets(
+class Members(NamedTuple):
+    """What the planets of a set mesh with and turn on, in a mechanism.
+
+    Attributes
+    ----------
+    sun : Body or Marker
+        Wheel frame of the sun.
+    carrier : Body
+    ring : Body or Marker
+        Wheel frame of the ring.
+    origin : ndarray, shape (3,)
+        Point of the axis at mid-face, global components, m.
+    axes : ndarray, shape (3, 3)
+        Columns: a frame that does not turn, z along the axis.
+    angle : float
+        Of the carrier from that frame at the start, rad.
+    prefix : str
+        Before the names of bodies, pins and meshes.
+    """
+
+    sun: Body | Marker
+    carrier: Body
+    ring: Body | Marker
+    origin: np.ndarray = np.zeros(3)
+    axes: np.ndarray = np.eye(3)
+    angle: float = 0.0
+    prefix: str = ""
+
+
+def add_planets(
     m: Mechanism,
     gears: PlanetarySet,
-    start: dict,
+    members: Members,
+    start: Mapping[str, Any],
     weight: tuple,
-    turning: dict[str, float],
-    pins: Support | PinBearing | None,
-    rim: ElasticRim | None,
+    turning: Mapping[str, float],
+    pins: Support | PinBearing | None = None,
+    rim: ElasticRim | None = None,
 ) -> None:
-    """Add planets, their pins and their meshes."""
-    carrier, spin = m.bodies["carrier"], turning["carrier"]
+    """Add the planets of a set, their pins and their meshes to a mechanism that has its other members.
+
+    Parameters
+    ----------
+    m : Mechanism
+    gears : PlanetarySet
+    members : Members
+    start : mapping
+        As of `PlanetarySet.start_angles`, from the carrier's angle.
+    weight : tuple
+        Mass (kg) and moments of inertia (kg m^2) of a planet.
+    turning : mapping of str to float
+        Speeds of "carrier" and "planet" at the start, rad/s.
+    pins, rim
+        As of `planetary_mechanism`.
+    """
+    carrier, spin, axes, before = members.carrier, turning["carrier"], members.axes, members.prefix
     to_sun, to_ring = gears.meshes("sun"), gears.meshes("ring")
     wheels: list[Any] = []
     for k in range(gears.planets):
-        psi = float(gears.angles[k])  # type: ignore[index]
+        psi = float(gears.angles[k]) + members.angle  # type: ignore[index]
         radial, tangential = gears.pin_errors.get(k, (0.0, 0.0))
         c, s = math.cos(psi), math.sin(psi)
-        place = (gears.carrier_radius + radial) * np.array([c, s, 0.0]) + tangential * np.array([-s, c, 0.0])
-        name = f"planet {k + 1}"
+        arm = (gears.carrier_radius + radial) * np.array([c, s, 0.0]) + tangential * np.array([-s, c, 0.0])
+        place = members.origin + axes @ arm
+        name = f"{before}planet {k + 1}"
         planet = m.body(
             name,
             *weight,
             position=place,
-            orientation=turn_z(start["planets"][k]),
-            velocity=(-spin * place[1], spin * place[0], 0.0),
-            angular_velocity=(0.0, 0.0, turning["planet"]),
+            orientation=axes @ turn_z(members.angle + start["planets"][k]),
+            velocity=axes @ np.array([-spin * arm[1], spin * arm[0], 0.0]),
+            angular_velocity=turning["planet"] * axes[:, 2],
         )
         if pins is None:
-            m.revolute(f"{name} pin", planet, carrier, at=place, axis=Z)
+            m.revolute(f"{name} pin", planet, carrier, at=place, axis=axes[:, 2])
         elif isinstance(pins, Support):
-            _support(m, f"{name} pin", planet, carrier, pins, place)
+            _support(m, f"{name} pin", planet, carrier, pins, place, axes)
         else:
             # the bearing's rings keep their plane as a spring without axial stiffness does
-            pin = carrier.marker_at(place, np.eye(3), name=f"{name} pin.I")
-            bore = planet.marker_at(place, np.eye(3), name=f"{name} pin.J")
+            pin = carrier.marker_at(place, axes, name=f"{name} pin.I")
+            bore = planet.marker_at(place, axes, name=f"{name} pin.J")
             m.joint("planar", f"{name} pin plane", bore, pin)
             m.add(pins(f"{name} pin", pin, bore))
-        m.gear_contact(f"sun-{name}", m.bodies["sun"], planet, to_sun[k])
+        m.gear_contact(f"{before}sun-planet {k + 1}", members.sun, planet, to_sun[k])
         wheel: Any = planet
         if gears.planet_at_ring is not None:
             wheel = planet.marker((0.0, 0.0, 0.0), turn_z(start["steps"][k]), name=f"{name} step")
         if rim is None:
-            m.gear_contact(f"{name}-ring", wheel, m.bodies["ring"], to_ring[k])
+            m.gear_contact(f"{name}-ring", wheel, members.ring, to_ring[k])
         else:
             wheels.append(wheel if isinstance(wheel, Marker) else wheel.marker(name=f"{name}.wheel"))
     if rim is not None:
-        ring = m.bodies["ring"].marker(name="ring.wheel")
-        m.add(ring_meshes("ring meshes", wheels, ring, to_ring, rim, gears.ring))
+        ring = members.ring if isinstance(members.ring, Marker) else members.ring.marker(name="ring.wheel")
+        m.add(ring_meshes(f"{before}ring meshes", wheels, ring, to_ring, rim, gears.ring))
 
 
 WORK = 340

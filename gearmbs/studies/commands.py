@@ -317,7 +317,7 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         write_whole(report, train_report(train, data))
         train_scene(train).save_html(scene)
         written = [target, report, scene]
-        if "mesh_rms" in data and train.meshes and holds_speed(data):
+        if "mesh_rms" in data and train.meshings and holds_speed(data):
             written += save_figure(train_spectrum(train, data), target.with_suffix(""))
         for mesh in data.mesh.values:
             if "mesh_track" in data:

@@ -62,6 +62,7 @@ def part_kinds(train: Drivetrain) -> dict[str, str]:
     groups = {"mesh": train.meshes, "shaft": train.shafts, "bearing": train.bearings, "coupling": train.couplings,
               "housing": train.housings, "load": (*train.drives, *train.loads)}  # fmt: skip
     out = {part.name: kind for kind, parts in groups.items() for part in parts}
+    out |= {mesh.name: "mesh" for mesh in train.meshings} | dict.fromkeys(train.pins, "bearing")
     return out | {mount.name: "mount" for housing in train.housings for mount in housing.mounts}
 
 
@@ -105,10 +106,12 @@ def named_modes(train: Drivetrain, modes: Modes | None = None) -> xr.Dataset:
 
 
 def _name(train: Drivetrain, parts: Any, kinds: list[str], row: int) -> str:
-    """Return what a mode is called: its largest part, mounts of a housing taken together."""
+    """Return what a mode is called: its largest part; mounts of a housing, and planets of a stage, taken together."""
+    groups = {mesh.name: mesh.group for mesh in train.meshings}
+    groups |= {pin: f"{stage.name} pins" for pin, (stage, _) in train.pins.items()}
     shares: dict[tuple[str, str], float] = {}
     for name, kind, share in zip(parts.names, kinds, parts.energy[row]):
-        owner = _housing_of(train, name) if kind == "mount" else name
+        owner = _housing_of(train, name) if kind == "mount" else groups.get(name, name)
         shares[kind, owner] = shares.get((kind, owner), 0.0) + float(share)
     if not shares or not max(shares.values()) > 0.0:
         return RIGID
@@ -160,7 +163,11 @@ def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Datas
     for k, order in zip(diagram["critical_mode"].values, diagram["critical_order"].values):
         one = named.sel(mode=int(k))
         part = orders[float(order)].split(" x ", 1)[1]
-        share = one["kinetic"].sel(body=part) if isinstance(train.parts[part], Shaft) else one["energy"].sel(part=part)
+        if isinstance(train.parts[part], Shaft):
+            share = one["kinetic"].sel(body=part)
+        else:
+            # all planets of a stage, as if they meshed in the phase that moves the mode most
+            share = one["energy"].sel(part=[m.name for m in train.meshings if part in (m.name, m.stage)]).sum()
         ratio = float(one["damping_ratio"])
         # the force that a mesh carries turns with its wheels, and may make a share that is all but none negative
         gains.append(max(float(share), 0.0) / (2.0 * ratio) if ratio > 0.0 else np.inf)
@@ -175,7 +182,8 @@ def ranked_crossings(diagram: xr.Dataset) -> pd.DataFrame:
     """Return the crossings of a drivetrain's Campbell diagram, those first that their excitation moves most.
 
     The gain of a mesh is the amplitude of its deflection over that of the harmonic of the transmission error, at the
-    crossing and by this mode alone: the mesh's share of the energy over twice the damping ratio. Of a shaft, where
+    crossing and by this mode alone: the mesh's share of the energy over twice the damping ratio. Of a planetary stage
+    it is that of all its planets, an upper bound, which phases of its meshes may lower to nothing. Of a shaft, where
     nothing meshes, it is its share of the kinetic energy over the same.
 
     Parameters

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -11,11 +10,11 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.dae import Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.drivetrain.parts import contact_law
-from gearmbs.gears import ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.drivetrain.planetary import SET_KEYS, pin_bearing, planetary_set
+from gearmbs.drivetrain.planetary import rolling_pins as rolling_pins
+from gearmbs.gears import ElasticRim, PlanetarySet, Support, planetary_mechanism
 from gearmbs.gears.planetary_mechanism import PinBearing
 from gearmbs.mechanism import Mechanism
 from gearmbs.schema.described import Described, check_keys, read_toml
@@ -29,6 +28,8 @@ MEMBERS = ("sun", "carrier", "ring")
 OVERSAMPLING = 4
 Time = Annotated[Quantity, Measure("time", 0)]
 SECTIONS = ("planetary", "contact", "friction", "operation", "support", "pins", "rim", "fault")
+SECTIONS_OF_SET = {"contact": "contact", "friction": "friction", "fault": "faults"}
+"""Sections of a file that are keys of the set."""
 
 
 @dataclass(frozen=True)
@@ -109,69 +110,19 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
     if "planetary" not in data:
         raise ValueError("section [planetary] is missing; give teeth and module")
     table = dict(data["planetary"])
-    simple = list(inspect.signature(planetary).parameters)[:-1]
-    others = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "faults")]
-    known = [key for key in (*simple, *others) if key not in ("contact", "friction")]
+    known = [key for key in SET_KEYS if key not in ("contact", "friction", "faults")]
     check_keys(table, known, "", ValueError, form="unknown key planetary.{}")
-    for name in ("teeth", "module"):
-        if name not in table:
-            raise ValueError(f"planetary.{name} is missing")
-    if "pin_errors" in table:
-        # a planet's number, from 1, and how far its pin is off
-        table["pin_errors"] = {
-            int(k) - 1: tuple(to_si(v, "length", f"planetary.pin_errors.{k}") for v in pair)
-            for k, pair in table["pin_errors"].items()
-        }
-    for name in ("ideal", "teeth", "profile_shifts"):
-        if name in table:
-            table[name] = tuple(table[name])
-    if "contact" in data:
-        table["contact"] = contact_law(data["contact"], "law")
-    if "friction" in data:
-        table["friction"] = FlankFriction(**data["friction"])
-    places = []
-    for one in data.get("fault", []):
-        one = dict(one)
-        where = str(one.pop("at", ""))
-        places.append((where, tooth_fault(one)))
-    gears = planetary(faults=places, **table)
+    sections = {key: data[section] for section, key in SECTIONS_OF_SET.items() if section in data}
+    gears = planetary_set({**table, **sections}, tooth_fault, contact="law")
     operation = dict(data.get("operation", {}))
     known = [item.name for item in fields(PlanetaryRun) if item.name not in ("gears", "supports", "pins", "rim")]
     check_keys(operation, known, "", ValueError, form="unknown key operation.{}")
     if operation.get("held") in ("none", ""):
         operation["held"] = None
     supports = {name: Support(**values) for name, values in data.get("support", {}).items()}
-    pins = _pins(dict(data["pins"])) if "pins" in data else None
+    pins = pin_bearing(data["pins"]) if "pins" in data else None
     rim = ElasticRim(**data["rim"]) if "rim" in data else None
     return PlanetaryRun(gears, supports=supports, pins=pins, rim=rim, **operation)
-
-
-def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
-    """Return what puts rolling bearings between pins and planets, for `planetary_mechanism` and `PlanetaryRun`.
-
-    Parameters
-    ----------
-    bearing : Bearing or str
-        A `gearmbs.bearings.Bearing` or its designation. The inner ring is on the pin.
-    **settings
-        Of `gearmbs.bearings.RollingBearing`: defects, damping, ...
-
-    Raises
-    ------
-    BearingError
-        If the designation is unknown.
-    """
-    kind = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
-
-    def make(name: str, pin: Any, bore: Any) -> RollingBearing:
-        return RollingBearing(name, pin, bore, bearing=kind, **settings)
-
-    return make
-
-
-def _pins(table: dict[str, Any]) -> Support | PinBearing:
-    rolling = table.pop("rolling", None)
-    return Support(**table) if rolling is None else rolling_pins(rolling, **table)
 
 
 def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = None) -> xr.Dataset:

@@ -17,6 +17,7 @@ import xarray as xr
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Accelerometer, Drivetrain, Housing, Laser, Shaft, SpeedSensor, TorqueSensor
 from gearmbs.drivetrain.kinematics import RPM
+from gearmbs.drivetrain.planetary import Meshing
 from gearmbs.mechanism import Mechanism
 
 CONTACT = {
@@ -40,15 +41,17 @@ class TrainColumns(NamedTuple):
     t : ndarray, shape (m,)
     contact : ndarray, shape (m, meshes, 5)
         The quantities of `CONTACT`.
-    bearing_force : ndarray, shape (m, bearings, 3)
-        Force of the seat on the shaft, global components, N.
+    bearing_force : ndarray, shape (m, bearings + pins, 3)
+        Force of the seat on the shaft, global components, N; of pins that on the planet, outwards, in the sense of
+        rotation about z, and along the axis.
     sensors : ndarray, shape (m, sensors)
-    turned : ndarray, shape (m, shafts)
+    turned : ndarray, shape (m, shafts + planets)
         Angles about the shafts' axes, rad; within one turn until they are joined.
-    speed : ndarray, shape (m, shafts)
+    speed : ndarray, shape (m, shafts + planets)
         rad/s.
     twisted : ndarray, shape (m, wheels)
-        Angles of wheels against their shafts that bend and twist, which turn on the mean; zero on rigid ones, rad.
+        Angles of wheels, and of members of planetary stages, `on_shafts`, against their shafts that bend and twist,
+        which turn on the mean; zero on rigid ones, rad.
     """
 
     t: np.ndarray
@@ -58,6 +61,23 @@ class TrainColumns(NamedTuple):
     turned: np.ndarray
     speed: np.ndarray
     twisted: np.ndarray
+
+
+def on_shafts(train: Drivetrain) -> dict[str, str]:
+    """Return the shaft of each wheel and of each member of a planetary stage that is on one, by name."""
+    out = {wheel.name: wheel.shaft for wheel in train.wheels}
+    for stage in train.planetary_stages:
+        out |= {f"{stage.name} {member}": shaft for member, shaft in stage.turning(train).items()}
+    return out
+
+
+def driver_angle(train: Drivetrain, known: TrainColumns, mesh: Meshing, of_speed: bool = False) -> np.ndarray:
+    """Return the angle (rad) or speed (rad/s) of the driver of a mesh against what carries the axes, shape (m,)."""
+    names, columns = list(train.turning), known.speed if of_speed else known.turned
+    found = [
+        columns[:, names.index(b)] if b in names else np.zeros(known.t.size) for b in (mesh.bodies[0], mesh.carrier)
+    ]
+    return found[0] - found[1]
 
 
 def counted_turns(t: np.ndarray, turned: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -97,6 +117,8 @@ class TrainRecorder:
         self.train, self.mechanism, self.begin = train, mechanism, begin
         self._parts: list[TrainColumns] = []
         self._axes = {name: seat.axes for name, seat in train.layout.seats.items()}
+        for planet, stage in train.planets.items():
+            self._axes[planet] = self._axes[next(iter(stage.turning(train).values()))]
 
     def take(self, part: Solution) -> None:
         """Take the next steps of a run; before the record's beginning only the last ones."""
@@ -116,35 +138,54 @@ class TrainRecorder:
     def columns(self, part: Solution) -> TrainColumns:
         """Return what is recorded of one part of a solution."""
         train, m = self.train, part.t.size
-        contact = np.empty((m, len(train.meshes), len(CONTACT)))
-        for k, mesh in enumerate(train.meshes):
+        contact = np.empty((m, len(train.meshings), len(CONTACT)))
+        for k, mesh in enumerate(train.meshings):
             told = part.contact(mesh.name)
             if "deflection" in told:
                 told = _of_an_ideal_mesh(told)
             contact[:, k] = np.stack([told[name] for name in CONTACT], axis=1)
-        force = np.empty((m, len(train.bearings), 3))
+        force = np.empty((m, len(train.bearings) + len(train.pins), 3))
         for k, bearing in enumerate(train.bearings):
             is_joint = bearing.name in self.mechanism.joints
             force[:, k] = (part.reaction(bearing.name) if is_joint else part.load(bearing.name))[0]
-        turned, speed = np.empty((m, len(train.shafts))), np.empty((m, len(train.shafts)))
-        for k, shaft in enumerate(train.shafts):
-            axes = self._axes[shaft.name]
-            x = part.orientation(shaft.name)[:, :, 0] @ axes[:, :2]
+        turned, speed = np.empty((m, len(train.turning))), np.empty((m, len(train.turning)))
+        for k, body in enumerate(train.turning):
+            axes = self._axes[body]
+            x = part.orientation(body)[:, :, 0] @ axes[:, :2]
             turned[:, k] = np.arctan2(x[:, 1], x[:, 0])
-            speed[:, k] = part.angular_velocity(shaft.name) @ axes[:, 2]
-        twisted = np.zeros((m, len(train.wheels)))
-        for k, wheel in enumerate(train.wheels):
-            if train.part(wheel.shaft, Shaft).modes is not None:
-                twisted[:, k] = part.deflection(wheel.name)[1][:, 2]
+            speed[:, k] = part.angular_velocity(body) @ axes[:, 2]
+        twisted = np.zeros((m, len(on_shafts(train))))
+        for k, (wheel, shaft) in enumerate(on_shafts(train).items()):
+            if train.part(shaft, Shaft).modes is not None:
+                twisted[:, k] = part.deflection(wheel)[1][:, 2]
+        bodies = list(train.turning)
+        for k, (pin, (stage, angle)) in enumerate(train.pins.items(), start=len(train.bearings)):
+            held = np.zeros(m)
+            at = angle + (turned[:, bodies.index(stage.carrier)] if stage.carrier in bodies else held)
+            force[:, k] = self._on_planet(part, pin, self._axes[stage.planet(1)], at)
         sensors = np.empty((m, len(train.sensors)))
         for k, sensor in enumerate(train.sensors):
             sensors[:, k] = self._sensed(sensor, part, speed)
         return TrainColumns(part.t.copy(), contact, force, sensors, turned, speed, twisted)
 
+    def _on_planet(self, part: Solution, pin: str, axes: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """Return the force of a pin on its planet: outwards, in the sense of rotation, along the axis."""
+        held, element = self.mechanism.joints.get(pin), self.mechanism.elements.get(pin)
+        if held is None and element is None:
+            # springs without stiffness
+            return np.zeros((part.t.size, 3))
+        force = (part.load(pin) if held is None else part.reaction(pin))[0] @ axes
+        between = held or element
+        assert between is not None
+        # a rolling bearing's first ring is on the pin
+        force *= 1.0 if between.i.body.name == pin.removesuffix(" pin") else -1.0
+        c, s = np.cos(angle), np.sin(angle)
+        return np.column_stack([c * force[:, 0] + s * force[:, 1], c * force[:, 1] - s * force[:, 0], force[:, 2]])
+
     def _sensed(self, sensor: object, part: Solution, speed: np.ndarray) -> np.ndarray:
         train = self.train
         if isinstance(sensor, SpeedSensor):
-            return speed[:, [s.name for s in train.shafts].index(sensor.shaft)]
+            return speed[:, list(train.turning).index(sensor.shaft)]
         if self._deforms(sensor):
             return part.output(sensor.name)  # type: ignore[attr-defined]
         if isinstance(sensor, Laser):
@@ -217,15 +258,16 @@ class HeldSpeed(NamedTuple):
 
     Attributes
     ----------
-    shaft : str
+    driver : str
+        What messages call it.
     nominal, mean : float
-        Speeds about the shaft's axis, rad/s.
+        Speeds about its axis, of a planetary stage against the carrier, rad/s.
     change : float
         Of the speed from the beginning to the end of the record, rad/s: twice the difference of the means of both
         halves, weighted by a Hann window so that oscillations hardly count.
     """
 
-    shaft: str
+    driver: str
     nominal: float
     mean: float
     change: float
@@ -248,17 +290,25 @@ class HeldSpeed(NamedTuple):
         return 0.25 * math.pi * abs(self.change / self.mean) * cycles > SMEAR
 
 
+def _turns_as(mesh: Meshing) -> str:
+    """Return what messages call the driver of a mesh."""
+    return f"shaft '{mesh.bodies[0]}'" if not mesh.stage else f"'{mesh.bodies[0]}' against carrier '{mesh.carrier}'"
+
+
 def held_speeds(train: Drivetrain, record: xr.Dataset) -> dict[str, HeldSpeed]:
     """Return how the driver of each mesh turns over a record, by mesh."""
     out = {}
-    for mesh in train.meshes:
-        driver, _ = train.wheels_of(mesh)
-        speed = record["speed"].sel(shaft=driver.shaft).values
+    for mesh in train.meshings:
+        speed = np.zeros(record.sizes["time"])
+        for body, sign in ((mesh.bodies[0], 1.0), (mesh.carrier, -1.0)):
+            if body in train.turning:
+                speed = speed + sign * record["speed"].sel(shaft=body).values
         weight = np.hanning(speed.size // 2 + 2)[1:-1]
         first = float(weight @ speed[: weight.size] / weight.sum())
         last = float(weight @ speed[-weight.size :] / weight.sum())
         mean = float(speed.mean())
-        out[mesh.name] = HeldSpeed(driver.shaft, train.speeds[driver.shaft], mean, 2.0 * (last - first))
+        nominal = train.against_carrier(mesh)
+        out[mesh.name] = HeldSpeed(_turns_as(mesh), nominal, mean, 2.0 * (last - first))
     return out
 
 
@@ -294,7 +344,7 @@ def remarks(held: dict[str, HeldSpeed]) -> list[str]:
     out = []
     for mesh, one in held.items():
         mean, nominal = one.mean * RPM, one.nominal * RPM
-        both = f"shaft '{one.shaft}' turns at {mean:.5g} rpm in the mean, nominal are {nominal:.5g} rpm"
+        both = f"{one.driver} turns at {mean:.5g} rpm in the mean, nominal are {nominal:.5g} rpm"
         if not one.is_steady:
             change = abs(one.change) * RPM
             out.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import xarray as xr
 
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
 from gearmbs.drivetrain.kinematics import RPM
+from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
 from gearmbs.gears.geometry import turn_z
 from gearmbs.signals import spectrum
 from gearmbs.signals.analysis.report import markdown_table
@@ -35,7 +36,7 @@ def train_report(train: Drivetrain, record: xr.Dataset) -> str:
     What the drivetrain has none of has no section.
     """
     sections = [_frequencies, _bearings, _sensors, _cost]
-    if train.meshes:
+    if train.meshings:
         sections = [_frequencies, _meshes, _bearings, _sensors, _levels, _cost]
     lines = [f"# {train.name}", ""]
     for section in sections:
@@ -59,15 +60,33 @@ def _meshes(train: Drivetrain, record: xr.Dataset) -> list[str]:
     header = ["mesh", "torque on the driven wheel, N m", "torque over base radius, N", "mean normal force, N",
               "both flanks, % of time", "no contact, %", "transmission error p-p, um"]  # fmt: skip
     rows = []
-    for mesh in train.meshes:
+    for mesh in train.meshings:
         one = record.sel(mesh=mesh.name)
-        torque = train.power.on_driven(mesh.name)
         radius = train.pairs[mesh.name].geometry.driven.base_radius
+        torque = radius * train.mesh_springs[mesh.name].preload
         force, error = float(one["normal_force"].mean()), 1e6 * np.ptp(one["transmission_error"].values)
         rows.append(
             [mesh.name, *(f"{v:.5g}" for v in (torque, torque / radius, force)), *flank_shares(one), f"{error:.4g}"]
         )
-    return ["## Meshes", "", markdown_table(header, rows), "", _laws(train)]
+    return ["## Meshes", "", markdown_table(header, rows), "", _laws(train), *_shares(train, record)]
+
+
+def _shares(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    """Return how the planets of each stage share its load: of each the mean force over that of all, times all."""
+    rows = []
+    for stage in train.planetary_stages:
+        members = train.power.members[stage.name]
+        for side in ("sun", "ring"):
+            names = [one.name for one in train.meshings if one.group == f"{stage.name} {side}"]
+            mean = record["normal_force"].sel(mesh=names).mean("time").values
+            shares = mean * mean.size / mean.sum() if mean.sum() > 0.0 else mean
+            told = ", ".join(f"{share:.4g}" for share in shares)
+            rows.append([stage.name, side, f"{members[side]:.5g}", told, f"{shares.max():.4g}"])
+    if not rows:
+        return []
+    header = ["planetary stage", "meshes with", "torque of the planets on it, N m", "shares of planets 1, 2, ...",
+              "largest"]  # fmt: skip
+    return ["", "Shares of the load, 1 of equal planets:", "", markdown_table(header, rows)]
 
 
 def _laws(train: Drivetrain) -> str:
@@ -84,11 +103,11 @@ def _laws(train: Drivetrain) -> str:
 
 def _bearings(train: Drivetrain, record: xr.Dataset) -> list[str]:
     rows = []
-    for bearing in train.bearings:
-        force = record["bearing_force"].sel(bearing=bearing.name).values
+    for bearing in record.bearing.values:
+        force = record["bearing_force"].sel(bearing=bearing).values
         mean = ", ".join(f"{v:.4g}" for v in force.mean(axis=0))
         rms = ", ".join(f"{v:.4g}" for v in force.std(axis=0))
-        rows.append([bearing.name, mean, rms, f"{np.linalg.norm(force, axis=1).max():.5g}"])
+        rows.append([bearing, mean, rms, f"{np.linalg.norm(force, axis=1).max():.5g}"])
     header = ["bearing", "mean x, y, z, N", "RMS about the mean x, y, z, N", "largest, N"]
     return ["## Bearings", "", markdown_table(header, rows)]
 
@@ -108,12 +127,17 @@ def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
         return _highest(train, record)
     lines = ["## Mesh harmonics, RMS", ""]
     harmonics = record.harmonic.values
-    for mesh in train.meshes:
+    for mesh in _one_a_group(train):
         levels = record["mesh_rms"].sel(mesh=mesh.name)
         rows = [[signal, *(f"{v:.4g}" for v in levels.sel(signal=signal).values)] for signal in record.signal.values]
         table = markdown_table(["signal", *(f"{h} x" for h in harmonics)], rows)
-        lines += [f"### {mesh.name}, {_at(levels)}", "", table, ""]
+        lines += [f"### {mesh.group}, {_at(levels)}", "", table, ""]
     return lines
+
+
+def _one_a_group(train: Drivetrain) -> list[Meshing]:
+    """Return the meshes whose harmonics are told: planets of a stage mesh at one frequency."""
+    return list({mesh.group: mesh for mesh in reversed(train.meshings)}.values())[::-1]
 
 
 def _at(levels: xr.DataArray) -> str:
@@ -129,7 +153,7 @@ def _highest(train: Drivetrain, record: xr.Dataset) -> list[str]:
     lines = ["## Mesh harmonics along the run-up: highest RMS, at the speed of the drive, at the mesh frequency", ""]
     tracks = record["mesh_track"]
     speed = tracks["track_speed"].values * RPM
-    for mesh in train.meshes:
+    for mesh in _one_a_group(train):
         rows = []
         for signal in tracks.signal.values:
             for h in tracks.harmonic.values:
@@ -139,7 +163,7 @@ def _highest(train: Drivetrain, record: xr.Dataset) -> list[str]:
                     at = h * float(row["track_frequency"].values[k])
                     rows.append([signal, h, f"{row.values[k]:.4g}", f"{speed[k]:.5g}", f"{at:.5g}"])
         table = markdown_table(["signal", "harmonic", "RMS", "rpm", "Hz"], rows)
-        lines += [f"### {mesh.name}", "", table, ""]
+        lines += [f"### {mesh.group}", "", table, ""]
     return lines
 
 
@@ -163,9 +187,16 @@ def train_shapes(train: Drivetrain) -> dict[str, Mesh]:
     for mesh in train.meshes:
         for name, solid in zip((mesh.driver, mesh.driven), pair_solids(train.pairs[mesh.name], tolerance), strict=True):
             wheels.setdefault(name, solid)
-    out = {}
+    out: dict[str, Mesh] = {}
+    members: dict[str, list[Mesh]] = {shaft.name: [] for shaft in train.shafts}
+    for stage in train.planetary_stages:
+        for name, on, shape in _stage_shapes(train, stage, tolerance):
+            if on in members:
+                members[on].append(shape)
+            elif on == name:
+                out[name] = shape
     for shaft in train.shafts:
-        pieces, z = [], 0.0
+        pieces, z = members[shaft.name], 0.0
         for length, radius in shaft.cylinders:
             pieces.append(cylinder(radius, length, 48).placed(np.array([0.0, 0.0, z + 0.5 * length]), np.eye(3)))
             z += length
@@ -177,15 +208,44 @@ def train_shapes(train: Drivetrain) -> dict[str, Mesh]:
     return out
 
 
+def _stage_shapes(train: Drivetrain, stage: PlanetaryStage, tolerance: float) -> Iterator[tuple[str, str, Mesh]]:
+    """Yield names and meshes of the members of a planetary stage, and what they are on, in the frames of that."""
+    from gearmbs.view.scenes import carrier_mesh
+    from gearmbs.view.solid import pair_solids
+
+    sun, _ = pair_solids(train.pairs[f"{stage.name} sun-planet 1"], tolerance)
+    planet, ring = pair_solids(train.pairs[f"{stage.planet(1)}-ring"], tolerance)
+    for member, mesh in (("sun", sun), ("carrier", carrier_mesh(stage.gears)), ("ring", ring)):
+        name, on = f"{stage.name} {member}", getattr(stage, member)
+        place = np.zeros(3)
+        if member in stage.turning(train):
+            place[2] = stage.station(train, member)
+        yield name, on, mesh.placed(place, turn_z(train.layout.wheels.get(name) or 0.0))
+    for k in range(1, stage.gears.planets + 1):
+        yield stage.planet(k), stage.planet(k), planet
+
+
 def train_scene(train: Drivetrain) -> Scene:
     """Return the 3-D view of a drivetrain at its start: shafts with their wheels, housings as boxes, joints.
 
     Housings are seen through.
     """
     from gearmbs.view import mechanism_scene
+    from gearmbs.view.scene import Part
+    from gearmbs.view.scenes import PART_COLOURS, TOLERANCE
+    from gearmbs.view.solid import pair_solids
 
     housings = [housing.name for housing in train.housings]
-    return mechanism_scene(train.build(), shapes=train_shapes(train), through=housings, title=train.name)
+    mechanism = train.build()
+    scene = mechanism_scene(mechanism, shapes=train_shapes(train), through=housings, title=train.name)
+    for stage in train.planetary_stages:
+        # the solids of a ring that is held are on no body of their own
+        marker = mechanism.elements[f"{stage.planet(1)}-ring"].j
+        if "ring" not in stage.turning(train):
+            _, ring = pair_solids(train.pairs[f"{stage.planet(1)}-ring"], TOLERANCE)
+            place, axes = marker.global_position()[None], marker.global_orientation()[None]
+            scene.parts.append(Part(f"{stage.name} ring", ring, PART_COLOURS["ring"], place, axes))
+    return scene
 
 
 # The spectrum of a drivetrain's record with the lines of its kinematic table.
@@ -227,11 +287,11 @@ def train_spectrum(
     if not holds_speed(record):
         raise DrivetrainError(f"record: lines move, draw a spectrogram; {record.attrs['remarks']}")
     sensors = sorted(train.sensors, key=lambda sensor: not isinstance(sensor, Accelerometer))
-    name = channel or (sensors[0].name if sensors else f"force of {train.meshes[0].name}")
+    name = channel or (sensors[0].name if sensors else f"force of {train.meshings[0].name}")
     signal = train_signal(record, name)
     held = held_speed(record)
     found = spectrum(signal)
-    turning = [f for mesh in train.meshes if (f := held * train.kinematics.mesh_frequency(mesh.name)) > 0.0]
+    turning = [f for mesh in train.meshings if (f := held * train.kinematics.mesh_frequency(mesh.name)) > 0.0]
     highest = float(found["frequency"][-1])
     top = maximum or min(highest, 1.08 * HARMONICS * max(turning, default=highest))
     few = train.kinematics.lines_by_part(HARMONICS, SIDEBANDS)
@@ -256,9 +316,11 @@ def mesh_orders(train: Drivetrain, harmonics: int = 2) -> dict[str, float]:
     if harmonics < 1:
         raise ValueError(f"harmonics is {harmonics}; give 1 or more")
     turns = train.kinematics.shaft_frequency(train.drives[0].shaft)
+    # both sides of plain planets mesh at one frequency
+    names = [mesh.name for mesh in train.meshes] + [stage.name for stage in train.planetary_stages]
     return {
-        f"{h} x {mesh.name}": h * train.kinematics.mesh_frequency(mesh.name) / turns
-        for mesh in train.meshes
+        f"{h} x {name}": h * train.kinematics.mesh_frequency(name) / turns
+        for name in names
         for h in range(1, harmonics + 1)
     }
 

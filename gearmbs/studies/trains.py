@@ -17,13 +17,14 @@ from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
 from gearmbs.drivetrain.drivetrain import Description, read_description
+from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.files import json_value
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.analysis.bands import MIN_PERIODS, harmonic_amplitudes
-from gearmbs.signals.files.simulated import holds_speed, placed_lines, with_speed_of
+from gearmbs.signals.files.simulated import holds_speed, mesh_of_record, placed_lines, with_speed_of
 from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
@@ -36,7 +37,9 @@ from gearmbs.studies.train_record import (
     TrainColumns,
     TrainRecorder,
     by_angle,
+    driver_angle,
     held_speeds,
+    on_shafts,
     speed_attributes,
     warn_of_speeds,
 )
@@ -171,21 +174,21 @@ def check_record(train: Drivetrain, run: RunSettings) -> None:
     DrivetrainError
     """
     rate = run.output_rate(train)
-    for mesh in train.meshes:
+    for mesh in train.meshings:
         frequency = train.kinematics.mesh_frequency(mesh.name)
         if frequency == 0.0:
             continue
         if run.harmonics * frequency * 1.05 >= rate / 2:
             raise DrivetrainError(
-                f"run.rate is {rate:g} Hz: {run.harmonics} harmonics of {mesh.label} reach "
+                f"run.rate is {rate:g} Hz: {run.harmonics} harmonics of mesh '{mesh.name}' reach "
                 f"{run.harmonics * frequency:.6g} Hz; give more than {2.1 * run.harmonics * frequency:.6g} Hz, or "
                 "fewer harmonics"
             )
         least = (MIN_PERIODS + 1) / frequency
         if run.duration < least:
             raise DrivetrainError(
-                f"run.duration is {run.duration:g} s: {mesh.label} has {frequency:.4g} mesh cycles a second; give at "
-                f"least {least:.3g} s"
+                f"run.duration is {run.duration:g} s: mesh '{mesh.name}' has {frequency:.4g} mesh cycles a second; "
+                f"give at least {least:.3g} s"
             )
 
 
@@ -199,21 +202,41 @@ def raw_record(train: Drivetrain, known: TrainColumns, solution: Solution) -> xr
 
 def transmission_error(train: Drivetrain, turned: np.ndarray, twisted: np.ndarray) -> np.ndarray:
     """Return the lag of the driven wheel along the line of action, from the touching start, shape (m, meshes), m."""
-    names = [shaft.name for shaft in train.shafts]
-    wheels = [wheel.name for wheel in train.wheels]
-    out = np.empty((turned.shape[0], len(train.meshes)))
-    for k, mesh in enumerate(train.meshes):
-        driver, driven = train.wheels_of(mesh)
+    names, twists = list(train.turning), _twists(train, twisted)
+    out = np.empty((turned.shape[0], len(train.meshings)))
+    still = np.zeros(turned.shape[0])
+    for k, mesh in enumerate(train.meshings):
         pair = train.pairs[mesh.name]
-        ratio = pair.geometry.sign * driver.gear.teeth / driven.gear.teeth
-        sense = pair.rotation * pair.geometry.driven.base_radius
-        one, two = (turned[:, names.index(w.shaft)] + twisted[:, wheels.index(w.name)] for w in (driver, driven))
+        ratio = pair.geometry.sign * mesh.gears[0].teeth / mesh.gears[1].teeth
+        sense = pair.rotation * pair.geometry.sign * pair.geometry.driven.base_radius
+        bodies = (*mesh.bodies, mesh.carrier)
+        one, two, carrier = ((turned[:, names.index(b)] if b in names else still) + twists(mesh, b) for b in bodies)
+        first, second, third = (train.layout.angles.get(b, 0.0) for b in bodies)
+        if mesh.stage:
+            one, two, first, second = one - carrier, two - carrier, first - third, second - third
         lag = sense * (one * ratio + two)
-        start = sense * (train.layout.angles[driver.shaft] * ratio + train.layout.angles[driven.shaft])
+        start = sense * (first * ratio + second)
         # full turns, counted from wherever the record begins, are no lag
         pitch = abs(pair.geometry.driver.base_pitch)
         out[:, k] = lag - start - pitch * np.round((lag[0] - start) / pitch)
     return out
+
+
+def _twists(train: Drivetrain, twisted: np.ndarray) -> Callable[[Meshing, str], Any]:
+    """Return what tells the angle of the wheel of a mesh on a body against that, rad: shafts that bend also twist."""
+    wheels = {name: twisted[:, k] for k, name in enumerate(on_shafts(train))}
+
+    def twist(mesh: Meshing, body: str) -> Any:
+        if mesh.stage:
+            part = train.part(mesh.stage, PlanetaryStage)
+            member = next((m for m, on in part.holders.items() if on == body), None)
+            return wheels.get(f"{mesh.stage} {member}", 0.0)
+        if not body:
+            return 0.0
+        driver, driven = train.wheels_of(mesh.name)
+        return wheels[(driver if driver.shaft == body else driven).name]
+
+    return twist
 
 
 def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution: Solution) -> xr.Dataset:
@@ -228,7 +251,7 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
     # compiled code takes no arrays that are read only
     inside = even["time"].values < stop - 0.5 / rate
     t, values = even["time"].values[inside], even.values[inside]
-    meshes, bearings = len(train.meshes), len(train.bearings)
+    meshes, bearings = len(train.meshings), len(train.bearings) + len(train.pins)
     contact = np.empty((t.size, meshes, len(CONTACT)))
     latest = np.clip(np.searchsorted(known.t, t, side="right") - 1, 0, m - 1)
     for k in range(meshes):
@@ -260,12 +283,17 @@ def _interpolated(t: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
     return out
 
 
+def _bearing_names(train: Drivetrain) -> list[str]:
+    """Return the names of all bearings, the pins of planets behind the others."""
+    return [*(bearing.name for bearing in train.bearings), *train.pins]
+
+
 def _signals(train: Drivetrain, record: xr.Dataset) -> tuple[list[str], np.ndarray]:
     """Return names and values, shape (m, signals), of all that mesh harmonics are told of."""
-    names = [f"force of {m.name}" for m in train.meshes]
+    names = [f"force of {m.name}" for m in train.meshings]
     columns = [record["normal_force"].values]
-    for k, bearing in enumerate(train.bearings):
-        names += [f"{bearing.name} {axis}" for axis in "xyz"]
+    for k, bearing in enumerate(_bearing_names(train)):
+        names += [f"{bearing} {axis}" for axis in "xyz"]
         columns.append(record["bearing_force"].values[:, k])
     names += [s.name for s in train.sensors]
     columns.append(record["measured"].values)
@@ -288,16 +316,16 @@ def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: 
     t = record["time"].values
     moments = np.linspace(t[0], t[-1], TRACK_MOMENTS + 2)[1:-1]
     orders = np.arange(1, run.harmonics + 1)
-    rms = np.full((len(names), len(train.meshes), run.harmonics, moments.size), np.nan)
-    frequency = np.zeros((len(train.meshes), moments.size))
-    shafts = [shaft.name for shaft in train.shafts]
-    for k, mesh in enumerate(train.meshes):
-        driver, _ = train.wheels_of(mesh)
-        column = shafts.index(driver.shaft)
+    rms = np.full((len(names), len(train.meshings), run.harmonics, moments.size), np.nan)
+    frequency = np.zeros((len(train.meshings), moments.size))
+    shafts = list(train.turning)
+    for k, mesh in enumerate(train.meshings):
+        teeth, turned = mesh.gears[0].teeth, driver_angle(train, known, mesh)
         # the angle in mesh cycles: an order is then a harmonic of the mesh
-        angle = xr.DataArray(driver.gear.teeth * np.abs(np.interp(t, known.t, known.turned[:, column])), dims="time",
+        angle = xr.DataArray(teeth * np.abs(np.interp(t, known.t, turned)), dims="time",
                              coords={"time": t}, attrs={"units": "rad"})  # fmt: skip
-        frequency[k] = driver.gear.teeth * np.abs(np.interp(moments, known.t, known.speed[:, column])) / (2.0 * np.pi)
+        speed = driver_angle(train, known, mesh, of_speed=True)
+        frequency[k] = teeth * np.abs(np.interp(moments, known.t, speed)) / (2.0 * np.pi)
         signal = make_signal(signals, float(run.output_rate(train)), units="1", channels=names, t0=float(t[0]))
         try:
             found = order_track(signal, orders=orders.tolist(), phase=angle, scaling="rms", revolutions=TRACK_CYCLES)
@@ -310,7 +338,7 @@ def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: 
                 rms[n, k, h, inside] = np.interp(moments[inside], at, found.values[:, h, n])
     return xr.DataArray(
         rms, dims=("signal", "mesh", "harmonic", "moment"),
-        coords={"signal": names, "mesh": [m.name for m in train.meshes], "harmonic": orders,
+        coords={"signal": names, "mesh": [m.name for m in train.meshings], "harmonic": orders,
                 "track_time": ("moment", moments, {"units": "s"}),
                 "track_speed": ("moment", np.abs(np.interp(moments, known.t, known.speed[:, shafts.index(
                     train.drives[0].shaft)])), {"units": "rad/s"}),
@@ -325,27 +353,31 @@ def _harmonics(
 ) -> xr.DataArray:  # fmt: skip
     """Return the RMS of each signal at the harmonics of each mesh, at the mean speed of the record."""
     names, signals = _signals(train, record)
-    shafts = [shaft.name for shaft in train.shafts]
-    rms = np.full((len(names), len(train.meshes), run.harmonics), np.nan)
-    frequency = np.zeros(len(train.meshes))
-    for k, mesh in enumerate(train.meshes):
-        driver, _ = train.wheels_of(mesh)
-        turned = np.interp([start, stop], known.t, known.turned[:, shafts.index(driver.shaft)])
-        frequency[k] = driver.gear.teeth * abs(turned[1] - turned[0]) / (2.0 * np.pi * (stop - start))
+    rms = np.full((len(names), len(train.meshings), run.harmonics), np.nan)
+    frequency = np.zeros(len(train.meshings))
+    groups: dict[str, int] = {}
+    for k, mesh in enumerate(train.meshings):
+        if (same := groups.setdefault(mesh.group, k)) != k:
+            # all planets of a stage mesh at one frequency
+            rms[:, k], frequency[k] = rms[:, same], frequency[same]
+            continue
+        teeth, whole = mesh.gears[0].teeth, driver_angle(train, known, mesh)
+        turned = np.interp([start, stop], known.t, whole)
+        frequency[k] = teeth * abs(turned[1] - turned[0]) / (2.0 * np.pi * (stop - start))
         orders = np.arange(1, run.harmonics + 1)
         if not held[mesh.name].is_steady:
             continue
         if frequency[k] * (stop - start) >= MIN_PERIODS and orders[-1] * frequency[k] < 0.5 * rate:
             seen, samples, fundamental = signals, rate, float(frequency[k])
             if held[mesh.name].smears(fundamental * (stop - start) * orders[-1]):
-                angle = np.interp(record["time"].values, known.t, known.turned[:, shafts.index(driver.shaft)])
-                seen, samples, fundamental = by_angle(signals, driver.gear.teeth * np.abs(angle - angle[0]) / TURN)
+                angle = np.interp(record["time"].values, known.t, whole)
+                seen, samples, fundamental = by_angle(signals, teeth * np.abs(angle - angle[0]) / TURN)
             rms[:, k] = np.abs(harmonic_amplitudes(seen, samples, fundamental, orders)).T / np.sqrt(2.0)
     return xr.DataArray(
         rms, dims=("signal", "mesh", "harmonic"),
-        coords={"signal": names, "mesh": [m.name for m in train.meshes], "harmonic": np.arange(1, run.harmonics + 1),
+        coords={"signal": names, "mesh": [m.name for m in train.meshings], "harmonic": np.arange(1, run.harmonics + 1),
                 "mesh_frequency": ("mesh", frequency, {"units": "Hz"}),
-                "nominal_frequency": ("mesh", [train.kinematics.mesh_frequency(m.name) for m in train.meshes],
+                "nominal_frequency": ("mesh", [train.kinematics.mesh_frequency(m.name) for m in train.meshings],
                                       {"units": "Hz"})},
         attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
     )  # fmt: skip
@@ -367,11 +399,11 @@ def _dataset(
     data["speed"] = (("time", "shaft"), speed, {"units": "rad/s", "long_name": "speed about the shaft's axis"})
     coords = {
         "time": ("time", t, {"units": "s"}),
-        "mesh": [m.name for m in train.meshes],
-        "bearing": [b.name for b in train.bearings],
+        "mesh": [m.name for m in train.meshings],
+        "bearing": _bearing_names(train),
         "xyz": ["x", "y", "z"],
         "sensor": [s.name for s in train.sensors],
-        "shaft": [s.name for s in train.shafts],
+        "shaft": list(train.turning),
         "sensor_units": ("sensor", [s.unit for s in train.sensors]),
     }
     return xr.Dataset(data, coords=coords)
@@ -384,20 +416,25 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
         "train_json": json.dumps(described({name: part for name, part in train.parts.items()})),
         "gearmbs_version": gearmbs.__version__,
     }
-    if train.meshes:
+    if train.meshings:
         out["mesh_laws"] = json.dumps({
             name: {"law": m.law, "stiffness": m.stiffness, "damping": m.damping, "damping_ratio": m.damping_ratio,
                    "frequency": m.frequency}
             for name, m in train.mesh_dynamics.items()
         })  # fmt: skip
+        planets = {
+            m.name: (m.bodies[0], m.carrier, [gear.teeth for gear in m.gears]) for m in train.meshings if m.stage
+        }
+        if planets:
+            out["planet_meshes"] = json.dumps(planets)
         out["known_lines"] = json.dumps(train.kinematics.known_lines())
-        given = train.kinematics.for_analysis(train.meshes[0])
+        given = train.kinematics.for_analysis(train.meshings[0].name)
         out |= {"mesh_speed": given["speed"], "mesh_speed_units": "rad/s", "mesh_teeth": list(given["teeth"])}  # type: ignore[call-overload]
     if run is not None:
         out |= {f"run_{f.name}": v for f in fields(run) if (v := getattr(run, f.name)) is not None}
         out["run_rate"] = run.output_rate(train)
     out.update({f"solver_{key}": value for key, value in solution.stats.as_dict().items()})
-    cycles = float(solution.t[-1]) * sum(train.kinematics.mesh_frequency(m.name) for m in train.meshes)
+    cycles = float(solution.t[-1]) * sum(train.kinematics.mesh_frequency(m.name) for m in train.meshings)
     if cycles > 0.0 and "solver_wall_time" in out:
         out["solver_time_per_mesh_cycle"] = out["solver_wall_time"] / cycles
     return out
@@ -454,12 +491,10 @@ def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> x
     mesh = mesh or (meshes[0] if meshes else None)
     if mesh not in meshes:
         raise DrivetrainError(f"record: there is no mesh '{mesh}'; known are {', '.join(meshes)}")
-    parts = json.loads(record.attrs["train_json"])
-    wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
     lines = {"known_lines": placed_lines(record)} if holds_speed(record) else {}
     signal = make_signal(
         values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],
-        t0=float(record.time.values[0]), teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
+        t0=float(record.time.values[0]), teeth=mesh_of_record(record, mesh).teeth,
         attrs={"source": record.attrs["title"], **lines},
     )  # fmt: skip
-    return with_speed_of(signal, record, wheels[0]["shaft"])
+    return with_speed_of(signal, record, mesh)

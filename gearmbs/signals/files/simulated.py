@@ -9,7 +9,7 @@ import contextlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -96,15 +96,40 @@ def _numbering(record: xr.Dataset) -> dict[str, tuple[float, ...]]:
     return {} if found is None else {"teeth_in_mesh": tuple(float(x) for x in np.ravel(found))}
 
 
-def first_driver(record: xr.Dataset) -> str:
-    """Return the shaft that drives the first mesh of a drivetrain's record."""
+class MeshOfRecord(NamedTuple):
+    """What turns in a mesh of a drivetrain's record: its driver, and where it is planets that mesh their carrier."""
+
+    driver: str
+    carrier: str
+    teeth: tuple[int, int]
+
+
+def mesh_of_record(record: xr.Dataset, mesh: str | None = None) -> MeshOfRecord:
+    """Return what turns in a mesh, by default the first, of a drivetrain's record."""
+    mesh = str(record.mesh.values[0]) if mesh is None else mesh
+    planets = json.loads(record.attrs.get("planet_meshes", "{}"))
+    if mesh in planets:
+        driver, carrier, teeth = planets[mesh]
+        return MeshOfRecord(driver, carrier, tuple(teeth))  # type: ignore[arg-type]
     parts = json.loads(record.attrs["train_json"])
-    return parts[parts[str(record.mesh.values[0])]["driver"]]["shaft"]
+    wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
+    one, two = (abs(int(wheel["gear"]["teeth"])) for wheel in wheels)
+    return MeshOfRecord(wheels[0]["shaft"], "", (one, two))
+
+
+def driver_speed(record: xr.Dataset, mesh: str | None = None) -> np.ndarray:
+    """Return the speed of the driver of a mesh over time, of planets that mesh against their carrier, rad/s."""
+    turning, found = set(map(str, record.shaft.values)), mesh_of_record(record, mesh)
+    zero = np.zeros(record.sizes["time"])
+    one, carrier = (
+        record["speed"].sel(shaft=body).values if body in turning else zero for body in (found.driver, found.carrier)
+    )
+    return one - carrier if found.carrier else one
 
 
 def held_speed(record: xr.Dataset) -> float:
     """Return the mean speed of a record over the nominal one: lines of a spectrum are where that puts them."""
-    return float(np.abs(record["speed"].sel(shaft=first_driver(record)).mean())) / float(record.attrs["mesh_speed"])
+    return abs(float(driver_speed(record).mean())) / float(record.attrs["mesh_speed"])
 
 
 def holds_speed(record: xr.Dataset) -> bool:
@@ -112,13 +137,13 @@ def holds_speed(record: xr.Dataset) -> bool:
     return "mesh_track" not in record and bool(record.attrs.get("speed_is_steady", 1))
 
 
-def with_speed_of(signal: xr.DataArray, record: xr.Dataset, shaft: str) -> xr.DataArray:
-    """Return a signal with the speed of a shaft that a drivetrain's record holds.
+def with_speed_of(signal: xr.DataArray, record: xr.Dataset, mesh: str | None = None) -> xr.DataArray:
+    """Return a signal with the speed of the driver of a mesh, by default the first, that a drivetrain's record holds.
 
     Where it is steady that is its mean, else the coordinate ``speed`` (rad/s) over time; a shaft that turns back, or
     rests throughout, has none.
     """
-    values = record["speed"].sel(shaft=shaft).values
+    values = driver_speed(record, mesh)
     if holds_speed(record):
         return with_metadata(signal, speed=float(np.abs(values).mean()))
     turning = values if values.mean() > 0.0 else -values
@@ -171,7 +196,7 @@ def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: An
         teeth=settings.get("teeth") or tuple(int(z) for z in np.ravel(attributes["mesh_teeth"])),
         attrs=attrs,
     )
-    return signal if settings.get("speed") else with_speed_of(signal, record, first_driver(record))
+    return signal if settings.get("speed") else with_speed_of(signal, record)
 
 
 def ring_signal(record: xr.Dataset) -> xr.DataArray:

@@ -190,11 +190,13 @@ def mesh_period(train: Drivetrain) -> float:
 
     With faults of single teeth it is that after which all shafts have made whole turns.
     """
-    frequencies = [abs(train.kinematics.mesh_frequency(mesh.name)) for mesh in train.meshes]
+    frequencies = [abs(train.kinematics.mesh_frequency(mesh.name)) for mesh in train.meshings]
     turning = [f for f in frequencies if f > 0.0]
     if not turning:
         raise DrivetrainError(f"drivetrain '{train.name}': no mesh turns; give the period")
-    if any(mesh.settings.get("faults") for mesh in train.meshes):
+    faulty = [mesh.settings.get("faults") for mesh in train.meshes]
+    # unequal planets, and shafts on bearings that are not round, come back with the carrier
+    if any(faulty) or train.planetary_stages:
         return train.kinematics.common_period()
     shares = [Fraction(f / turning[0]).limit_denominator(10**7) for f in turning]
     return math.lcm(*(share.denominator for share in shares)) / turning[0]

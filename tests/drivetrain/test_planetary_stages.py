@@ -1,0 +1,527 @@
+"""Planetary stages inside drivetrains, against the set alone, closed laws and mechanisms made by hand."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearmbs.adams import write_deck
+from gearmbs.drivetrain import (
+    Drivetrain,
+    DrivetrainError,
+    ElasticBearing,
+    ElasticClutch,
+    GearMesh,
+    Housing,
+    IdealBearing,
+    PlanetaryStage,
+    RunSettings,
+    Shaft,
+    SpeedDrive,
+    SpeedSensor,
+    TorqueLoad,
+    Wheel,
+)
+from gearmbs.drivetrain.drivetrain import read_description
+from gearmbs.drivetrain.plants import resting
+from gearmbs.flexible import box_model
+from gearmbs.gears import GearPair, GearSpec, IdealMesh, Support, planetary, planetary_mechanism
+from gearmbs.mechanism import linear_modes
+from gearmbs.mechanism.solve.analyses import static_equilibrium
+from gearmbs.studies import (
+    load_train,
+    mode_table,
+    named_modes,
+    run_train,
+    train_campbell,
+    train_modes,
+    train_report,
+    train_scene,
+    train_signal,
+)
+from tests.says import says
+
+TEETH = (24, 30, 84)
+IDEAL = {"ideal": (4e8, 5e8)}
+PINS = Support(radial="5e8 N/m", damping="1e-6 s")
+MEMBERS = ("sun", "carrier", "ring")
+Z_RATIO = TEETH[2] / TEETH[0]
+
+
+def gears(**changes):
+    return planetary(TEETH, "1.5 mm", **{"planets": 3, **changes})
+
+
+def light(name, **others):
+    """A shaft that weighs nothing beside the members on it."""
+    return Shaft(name=name, length="10 mm", diameter="10 mm", mass=1e-9, inertia=1e-15, **others)
+
+
+def alone(held="ring", drive="sun", load="carrier", speed="600 rpm", torque="50 N m", on="ground", set_of=None, **more):
+    """A train of nothing but a stage; its shafts are called as the members on them."""
+    names = [member for member in MEMBERS if member != held]
+    parts = {
+        "shafts": [light(name) for name in names],
+        "bearings": [IdealBearing(name=f"{name} seat", shaft=name, on="ground") for name in names],
+        "drives": [SpeedDrive(name="motor", shaft=drive, speed=speed)],
+        "loads": [TorqueLoad(name="brake", shaft=load, torque=torque)],
+        **{key: more.pop(key) for key in ("housings", "drives", "loads", "sensors", "run_up") if key in more},
+    }
+    holders = {member: on if member == held else member for member in MEMBERS}
+    stage = PlanetaryStage(name="set", gears=set_of or gears(**IDEAL), **holders, **more)
+    return Drivetrain("alone", planetary_stages=[stage], **parts)
+
+
+def two_stages(set_of=None, pins=PINS, mesh=None, **changes):
+    """A parallel stage before a planetary one, whose carrier turns the output in two bearings."""
+    first, second = ({"bore_radius": "10 mm"} for _ in range(2))
+    given = {
+        "shafts": [Shaft(name=n, length="100 mm", diameter="20 mm") for n in ("in", "mid", "out")],
+        "wheels": [
+            Wheel(name="z1", shaft="in", station="20 mm", gear=GearSpec(20, "2 mm", **first)),
+            Wheel(name="z2", shaft="mid", station="20 mm", gear=GearSpec(50, "2 mm", **second)),
+        ],
+        "meshes": [mesh or GearMesh(name="first", driver="z1", driven="z2", settings={"backlash": "50 um"})],
+        "bearings": [IdealBearing(name="a", shaft="in"), IdealBearing(name="b", shaft="mid"),
+                     IdealBearing(name="c", shaft="out")],
+        "planetary_stages": [PlanetaryStage(name="second", sun="mid", sun_station="80 mm", carrier="out", ring="ground",
+                                            pins=pins, gears=set_of or gears())],
+        "drives": [SpeedDrive(name="motor", shaft="in", speed="3000 rpm")],
+        "loads": [TorqueLoad(name="brake", shaft="out", torque="60 N m")],
+        "run_up": 0.01,
+    }  # fmt: skip
+    return Drivetrain("two stages", **{**given, **changes})
+
+
+def unloaded(train):
+    """All but: forces that turn with the teeth have a stiffness of their own."""
+    return train.changed("brake", torque=1e-6)
+
+
+# Speeds, torques and lines.
+
+
+@pytest.mark.parametrize(
+    ("held", "drive", "load", "ratio"),
+    [
+        ("ring", "sun", "carrier", 1 / (1 + Z_RATIO)),
+        ("ring", "carrier", "sun", 1 + Z_RATIO),
+        ("carrier", "sun", "ring", -1 / Z_RATIO),
+        ("carrier", "ring", "sun", -Z_RATIO),
+        ("sun", "ring", "carrier", Z_RATIO / (1 + Z_RATIO)),
+        ("sun", "carrier", "ring", (1 + Z_RATIO) / Z_RATIO),
+    ],
+)
+def test_speeds_and_torques_are_those_of_willis_whichever_member_is_held(held, drive, load, ratio):
+    train = alone(held, drive, load)
+    assert train.kinematics.ratio(load, drive) == pytest.approx(ratio, rel=1e-12)
+    power = train.power.drive["motor"] * train.speeds[drive]
+    assert power == pytest.approx(50.0 * abs(train.speeds[load]), rel=1e-12)
+    torques = train.power.members["set"]
+    assert sum(torques.values()) == pytest.approx(0.0, abs=1e-9)
+    assert torques["ring"] / torques["sun"] == pytest.approx(Z_RATIO, rel=1e-12)
+    assert abs(torques[load]) == pytest.approx(50.0, rel=1e-12)
+    # whichever turns, the planets hold the member back that drives
+    assert train.pairs["set sun-planet 1"].rotation == (-1 if torques["sun"] > 0.0 else 1)
+
+
+def test_two_drives_of_a_stage_without_a_held_member_add():
+    drives = [SpeedDrive(name="one", shaft="sun", speed=100.0), SpeedDrive(name="two", shaft="ring", speed=20.0)]
+    train = alone(held=None, drives=drives)
+    assert train.speeds["carrier"] == pytest.approx((100.0 + Z_RATIO * 20.0) / (1 + Z_RATIO), rel=1e-12)
+    power = train.power.drive["one"] * 100.0 + train.power.drive["two"] * 20.0
+    assert power == pytest.approx(50.0 * train.speeds["carrier"], rel=1e-12)
+    assert train.power.drive["two"] / train.power.drive["one"] == pytest.approx(Z_RATIO, rel=1e-12)
+
+
+def branched(**changes):
+    """The drive splits: to the sun, and through two wheels to the ring; the carrier is the output."""
+    wheel, other = GearSpec(30, "2 mm", bore_radius="5 mm"), GearSpec(120, "2 mm", bore_radius="5 mm")
+    shafts = [light("sun"), light("carrier"), light("ring"), light("side")]
+    shafts = [replace(shaft, length=0.2, diameter=0.001, radius=None) for shaft in shafts]
+    stations = {"sun_station": "20 mm", "carrier_station": "20 mm", "ring_station": "20 mm"}
+    stage = PlanetaryStage(name="set", gears=gears(), sun="sun", carrier="carrier", ring="ring", **stations)
+    return Drivetrain(
+        "branched",
+        shafts=shafts,
+        wheels=[
+            Wheel(name="w1", shaft="sun", station="100 mm", gear=wheel), Wheel(name="w2", shaft="side", gear=other),
+            Wheel(name="w3", shaft="side", station="150 mm", gear=wheel),
+            Wheel(name="w4", shaft="ring", station="150 mm", gear=other),
+        ],
+        meshes=[GearMesh(name="m1", driver="w1", driven="w2"), GearMesh(name="m2", driver="w3", driven="w4")],
+        bearings=[IdealBearing(name=f"b {shaft.name}", shaft=shaft.name) for shaft in shafts],
+        planetary_stages=[stage],
+        drives=[SpeedDrive(name="motor", shaft=changes.get("drive", "sun"), speed=changes.get("speed", 160.0))],
+        loads=[TorqueLoad(name="brake", shaft=changes.get("load", "carrier"), torque=40.0)],
+    )  # fmt: skip
+
+
+def test_power_that_branches_into_a_stage_is_followed_from_either_end():
+    train = branched()
+    expected = (160.0 + Z_RATIO * 10.0) / (1 + Z_RATIO)
+    assert train.speeds["carrier"] == pytest.approx(expected, rel=1e-12)
+    other = branched(drive="carrier", speed=expected, load="sun")
+    assert other.speeds["sun"] == pytest.approx(160.0, rel=1e-12)
+    assert train.power.drive["motor"] * 160.0 == pytest.approx(40.0 * expected, rel=1e-12)
+    through = train.power.torques["m2"][1] * train.speeds["ring"]
+    assert through == pytest.approx(-train.power.members["set"]["ring"] * train.speeds["ring"], rel=1e-12)
+    assert train.power.torques["m1"][0] * 160.0 == pytest.approx(-through, rel=1e-12)
+
+
+def test_lines_are_those_of_the_set_and_its_neighbours():
+    table = two_stages(pins="6203").kinematics
+    mid, carrier = 20.0, 20.0 * 24 / 108
+    found = {(row.of, row.name): row.frequency for row in table.lines.itertuples()}
+    mesh = 24 * (mid - carrier)
+    planet = mesh / 30
+    for (of, name), expected in {
+        ("second", "GMF"): mesh, ("first", "GMF"): 1000.0, ("second", "planet pass"): 3 * carrier,
+        ("second", "sun fault"): 3 * (mid - carrier), ("second", "planet fault"): planet,
+        ("second", "ring fault"): 3 * carrier, ("second sun", "hunting tooth"): mesh / 120,
+        ("second ring", "hunting tooth"): mesh / 420,
+    }.items():  # fmt: skip
+        assert found[of, name] == pytest.approx(expected, rel=1e-12), (of, name)
+    pins = two_stages(pins="6203").planetary_stages[0].on_pins.rolling
+    assert found["second pins", "BPFO"] == pytest.approx(pins.multiples["BPFO"] * planet, rel=1e-12)
+    assert table.nearest(2 * mesh)[0] == "2 x GMF of second"
+    assert table.nearest(mesh + planet)[0] == "1 x GMF of second +1 x planet of second"
+    # all wheels stand as before after whole turns of shafts and planets
+    turns = table.common_period() * np.array([*table.train.turning.values()]) / (2 * math.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)
+
+
+# The mechanism.
+
+
+@pytest.mark.parametrize("held", ["ring", "carrier", None])
+@pytest.mark.parametrize("pins", [None, PINS])
+def test_modes_of_a_train_of_one_stage_are_those_of_the_set_alone(held, pins):
+    drive = "sun" if held != "sun" else "ring"
+    drives = [] if held else [SpeedDrive(name="second", shaft="ring", speed=10.0)]
+    train = alone(held, drive, "ring" if held == "carrier" else "carrier", pins=pins,
+                  drives=[SpeedDrive(name="motor", shaft=drive, speed=60.0), *drives])  # fmt: skip
+    train = unloaded(train)
+    speeds = {drive: 0.0} if held else {drive: 0.0, "ring": 0.0}
+    whole = planetary_mechanism(gears(**IDEAL), held=held, speeds=speeds, pins=pins)
+    expected, found = linear_modes(whole, t=1.0).frequencies, train_modes(train).frequencies
+    top = expected.max()
+    np.testing.assert_allclose(np.sort(found[found > 1e-4 * top]), np.sort(expected[expected > 1e-4 * top]), rtol=1e-7)
+
+
+def at_rest(train):
+    """Return forces of all contacts at rest under the loads."""
+    still = resting(train)
+    found = static_equilibrium(still.build(), t=2 * still.run_up).solution
+    return {one.name: float(found.diagnostics(one.name)["normal_force"][-1]) for one in train.meshings}
+
+
+def test_forces_at_rest_are_those_of_the_set_alone_in_true_contact():
+    errors = {1: (0.0, 2e-6), 2: (1e-6, -1e-6)}
+    set_of = gears(pin_errors=errors, backlash_sun="20 um", backlash_ring="20 um")
+    found = at_rest(alone(set_of=set_of, pins=PINS, run_up=0.005))
+    whole = planetary_mechanism(set_of, speeds={"sun": 0.0}, torques={"carrier": -50.0}, pins=PINS, run_up="5 ms")
+    rest = static_equilibrium(whole, t=0.01).solution
+    for k in (1, 2, 3):
+        for name in (f"sun-planet {k}", f"planet {k}-ring"):
+            expected = float(rest.diagnostics(name)["normal_force"][-1])
+            assert found[f"set {name}"] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+def test_planets_share_equally_and_by_statics_with_a_pin_error():
+    radius, alpha = float(gears().carrier_radius), math.radians(20.0)
+    force = 50.0 / radius / 3.0
+    equal = at_rest(alone(pins=PINS))
+    np.testing.assert_allclose(list(equal.values()), force / (2 * math.cos(alpha)), rtol=1e-6)
+    # a planet yields by its pin and by both meshes, which it divides; an error of its pin is as much less way
+    error = 1.5e-6
+    soft = 1 / PINS.radial + (1 / IDEAL["ideal"][0] + 1 / IDEAL["ideal"][1]) / (2 * math.cos(alpha)) ** 2
+    found = at_rest(alone(set_of=gears(**IDEAL, pin_errors={1: (0.0, error)}), pins=PINS))
+    # the carrier is driven: a pin that is ahead of it carries less
+    expected = [force + error / (3 * soft), force - 2 * error / (3 * soft), force + error / (3 * soft)]
+    for side in ("sun-planet {}", "planet {}-ring"):
+        shares = [found["set " + side.format(k)] * 2 * math.cos(alpha) for k in (1, 2, 3)]
+        np.testing.assert_allclose(shares, expected, rtol=1e-4)
+
+
+def test_a_parallel_and_a_planetary_stage_are_as_a_mechanism_made_by_hand():
+    settings = {"stiffness": 3e8, "damping_ratio": 0.0}
+    mesh = GearMesh(name="first", driver="z1", driven="z2", settings=settings, pair=IdealMesh)
+    train = unloaded(two_stages(set_of=gears(**IDEAL), mesh=mesh))
+    wheel, pinion = train.parts["z2"].gear, train.parts["z1"].gear
+    bare = gears(**IDEAL, rotation=-1)
+    turning = {name: shaft.body()[2] for name, shaft in ((s.name, s) for s in train.shafts)}
+    own = {"sun": bare.sun.inertia[2] + turning["mid"] + wheel.inertia[2]}
+    own["carrier"] = train.planetary_stages[0].weights["carrier"][1][2] + turning["out"]
+    m = planetary_mechanism(bare, pins=PINS, masses={name: (1.0, moment) for name, moment in own.items()})
+    pair = GearPair(pinion, wheel)
+    place = (-pair.centre_distance, 0.0, 0.0)
+    axis = m.body("z1", 1.0, (1.0, 1.0, turning["in"] + pinion.inertia[2]), position=place)
+    m.rotation("drive", m.revolute("z1 seat", axis, m.ground, at=place, axis=(0, 0, 1)), 0.0)
+    m.gear_contact("first", axis, m.bodies["sun"], IdealMesh(pair, 3e8))
+    expected, found = linear_modes(m, t=1.0).frequencies, train_modes(train).frequencies
+    top = expected.max()
+    np.testing.assert_allclose(np.sort(found[found > 1e-4 * top]), np.sort(expected[expected > 1e-4 * top]), rtol=1e-6)
+
+
+def test_the_torsional_chain_has_the_modes_of_planets_on_ideal_pins():
+    train = unloaded(two_stages(set_of=gears(**IDEAL), pins=None))
+    train = train.changed("first", pair=IdealMesh, settings={"stiffness": 3e8, "damping_ratio": 0.0})
+    chain, modes = train.torsional(), train_modes(train)
+    assert chain.names == ("in", "mid", "out", "second planet 1", "second planet 2", "second planet 3")
+    found = chain.frequencies()
+    expected = np.sort(modes.frequencies[modes.oscillating])
+    np.testing.assert_allclose(found[found > 0.0], expected[-found[found > 0.0].size :], rtol=1e-5)
+    t, angles, speeds = chain.simulate(2e-3, {"out": -60.0}, {"in": (100.0, 0.0, 0.0)})
+    assert speeds[0] == pytest.approx([train.turning[n] * 100.0 / train.speeds["in"] for n in chain.names], rel=1e-9)
+    assert np.all(np.isfinite(angles))
+    assert t[-1] == pytest.approx(2e-3)
+
+
+def test_a_carrier_on_a_shaft_that_bends_becomes_that_on_a_rigid_one():
+    bearings = [ElasticBearing(name=n, shaft="out", station=z, stiffness=(2e8, 2e8, 1e8))
+                for n, z in (("c", "10 mm"), ("d", "90 mm"))]  # fmt: skip
+    rigid = two_stages(set_of=gears(**IDEAL))
+    rigid = replace(rigid, bearings=[*rigid.bearings[:2], *bearings])
+
+    def with_stiffness(factor):
+        shaft = rigid.parts["out"]
+        return rigid.with_parts(replace(shaft, modes=4, youngs_modulus=2.1e11 * factor))
+
+    limit = train_modes(rigid)
+    expected = np.sort(limit.frequencies[limit.oscillating])[:6]
+    errors = []
+    for factor in (1.0, 1e3):
+        modes = train_modes(with_stiffness(factor))
+        errors.append(np.abs(np.sort(modes.frequencies[modes.oscillating])[:6] / expected - 1.0).max())
+    assert errors[0] > 0.01
+    assert errors[1] < 2e-3
+
+
+@pytest.mark.slow
+def test_energy_is_closed_and_the_record_holds_what_the_stage_does():
+    train = two_stages(gears(pin_errors={1: (0.0, 5e-6)}, backlash_sun="50 um", backlash_ring="50 um"),
+                       sensors=[SpeedSensor(name="speed", shaft="out")])  # fmt: skip
+    solution = train.build().simulate(0.03, every_step=True, tol=1e-9, rate_scale=train.rate_scale)
+    assert solution.energy_balance().relative_imbalance < 1e-5
+    record = run_train(train, RunSettings(settling=0.02, duration=0.1, tolerance=1e-6))
+    # mean forces carry the load, planet by planet in proportion to their pins
+    stage, radius = train.planetary_stages[0], float(train.planetary_stages[0].gears.carrier_radius)
+    pins = record.bearing_force.sel(bearing=[stage.pin(k) for k in (1, 2, 3)]).mean("time").values
+    assert pins[:, 1].sum() * radius == pytest.approx(60.0, rel=1e-2)
+    assert pins[1, 1] > 2 * pins[0, 1]
+    sun = record.normal_force.sel(mesh=[f"second sun-planet {k}" for k in (1, 2, 3)]).mean("time").values
+    base = stage.gears.sun.base_radius
+    assert sun.sum() * base == pytest.approx(60.0 * 24 / 108, rel=1e-2)
+    # both meshes push a planet on
+    np.testing.assert_allclose(pins[:, 1], 2 * math.cos(math.radians(20.0)) * sun, rtol=0.03)
+    assert record.speed.sel(shaft="second planet 1").mean() == pytest.approx(train.turning["second planet 1"], rel=1e-3)
+    signal = train_signal(record, "speed", mesh="second planet 3-ring")
+    frequency = signal.attrs["teeth"][0] * signal.attrs["speed"] / (2 * math.pi)
+    assert frequency == pytest.approx(train.kinematics.mesh_frequency("second"), rel=1e-3)
+    assert float(record.mesh_frequency.sel(mesh="second planet 3-ring")) == pytest.approx(frequency, rel=1e-3)
+    report = train_report(train, record)
+    assert "| second | sun |" in report
+    assert "second planet 2 pin" in report
+    assert report.count("### ") == 3
+
+
+@pytest.mark.slow
+def test_transmission_errors_of_planets_on_ideal_pins_are_how_far_the_teeth_yield():
+    train = alone(set_of=gears(), speed="3000 rpm", load="carrier", torque="50 N m", run_up=0.005)
+    record = run_train(train, RunSettings(settling=0.02, duration=0.03, tolerance=1e-7))
+    for mesh in train.meshings:
+        one = record.sel(mesh=mesh.name)
+        assert float(one.transmission_error.mean()) == pytest.approx(float(one.penetration_drive.mean()), rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_train_that_runs_already_turns_as_it_must_with_rolling_pins():
+    train = replace(two_stages(gears(), pins="6203"), running=True)
+    solution = train.build().simulate(2e-3, rate=20000, tol=1e-7, rate_scale=train.rate_scale)
+    for body, speed in train.turning.items():
+        found = solution.angular_velocity(body)[:, 2]
+        np.testing.assert_allclose(found, speed, rtol=0.05)
+
+
+def test_modes_are_named_by_the_stage_and_its_pins():
+    train = two_stages()
+    named = named_modes(train)
+    assert {"mesh 'second sun'", "bearing 'second pins'"} <= set(named.name.values.tolist())
+    assert mode_table(named)["other"].abs().max() < 1e-4
+    diagram = train_campbell(train, ["0 rpm", "3000 rpm"], maximum=12e3)
+    assert "1 x second" in diagram.order_name.values
+    assert np.all(np.isfinite(diagram.critical_gain))
+
+
+@pytest.mark.slow
+def test_the_view_shows_planets_carrier_and_a_held_ring():
+    scene = train_scene(two_stages())
+    names = [part.name for part in scene.parts]
+    assert {"second planet 1", "second ring", "mid", "out"} <= set(names)
+    ring = next(part for part in scene.parts if part.name == "second ring")
+    assert np.ptp(ring.mesh.vertices, axis=0)[0] > 2 * gears().ring.root_radius
+
+
+def test_a_deck_has_the_planets_and_their_meshes(tmp_path):
+    contact = {"contact": {"kind": "impact"}}
+    train = two_stages(gears(contact=None), pins=None).changed("first", settings=contact)
+    stage = train.planetary_stages[0]
+    from gearmbs.gears import ContactLaw
+
+    train = train.with_parts(replace(stage, gears=gears(contact=ContactLaw.impact())))
+    write_deck(train.build(), tmp_path / "train.adm")
+    text = (tmp_path / "train.adm").read_text()
+    assert "second planet 3" in text
+
+
+# Files, and what is refused.
+
+FILE = """
+gravity = [0.0, -9.81, 0.0]
+[shafts.in]
+length = "100 mm"
+bearings.a = { station = "50 mm" }
+[shafts.out]
+length = "100 mm"
+bearings.c = { station = "50 mm" }
+[planetary_stages.low]
+sun = "in"
+carrier = "out"
+ring = "ground"
+teeth = [24, 30, 84]
+module = "1.5 mm"
+planets = 3
+backlash_sun = "50 um"
+pins = { radial = "5e8 N/m", damping = "1e-6 s" }
+pin_errors = { 2 = ["0 um", "5 um"] }
+friction = { static = 0.1, dynamic = 0.05 }
+[[planetary_stages.low.faults]]
+at = "planet 1 sun side"
+kind = "broken tooth"
+tooth = 3
+[drives.motor]
+shaft = "in"
+speed = "1500 rpm"
+[loads.brake]
+shaft = "out"
+torque = "60 N m"
+"""
+
+
+def test_a_file_describes_a_stage_as_python_does(tmp_path):
+    path = tmp_path / "train.toml"
+    path.write_text(FILE)
+    stage = load_train(path).train.planetary_stages[0]
+    assert stage.gears.pin_errors[1] == pytest.approx((0.0, 5e-6))
+    assert stage.on_pins == PINS
+    assert stage.gears.backlash_sun == pytest.approx(50e-6)
+    where, fault = stage.gears.faults[0]
+    assert (where, fault.tooth) == ("planet 1 sun side", 3)
+    assert stage.gears.friction.dynamic == 0.05
+    assert len(load_train(path).train.build().elements) > 6
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('module = "1.5 mm"\n', "", ("planetary_stages.low", "module", "missing")),
+        ("planets = 3", "planet = 3", ("planetary_stages.low", "planet", "planets")),
+        ('sun = "in"\n', "", ("planetary_stages.low", "sun", "missing")),
+        ("planets = 3", "planets = 5", ("planetary_stages.low", "5", "nearest")),
+        ('radial = "5e8 N/m"', 'radial = "-5 N/m"', ("pins", "radial", "0 or more")),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_named(tmp_path, old, new, words):
+    path = tmp_path / "train.toml"
+    path.write_text(FILE.replace(old, new))
+    with pytest.raises(DrivetrainError, match=says("train.toml", *words)):
+        load_train(path)
+
+
+def test_faults_need_a_reader_of_theirs(tmp_path):
+    path = tmp_path / "train.toml"
+    path.write_text(FILE)
+    with pytest.raises(DrivetrainError, match=says("planetary_stages.low", "faults", "gearmbs run")):
+        read_description(path)
+
+
+def case(**others):
+    return Housing(name="case", mass="20 kg", inertia=(1.0, 1.0, 1.0), **others)
+
+
+def test_a_ring_may_be_on_a_rigid_housing_and_not_on_finite_elements():
+    train = alone(on="case", housings=[case()])
+    assert train.build().elements["set planet 1-ring"].j.body.name == "case"
+    from gearmbs.drivetrain import Mount
+
+    feet = [Mount(name=f"foot {k}", at=at, stiffness=(1e7,) * 3, radius="20 mm")
+            for k, at in enumerate(((0, 0, 0), (0.2, 0, 0), (0.1, 0, 0.2)))]  # fmt: skip
+    walls = Housing(name="case", model=box_model((0.2, 0.2, 0.2), "40 mm", divisions=(1, 1, 1)), mounts=feet)
+    with pytest.raises(DrivetrainError, match=says("'set'", "ring", "'case'", "finite elements")):
+        alone(on="case", housings=[walls])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sun": "ground"}, ("sun", "ring", "held")),
+        ({"carrier": "in"}, ("carrier", "'in'", "own")),
+        ({"sun": "motor"}, ("sun", "'motor'", "drive")),
+        ({"ring": "case"}, ("ring", "'case'", "no part")),
+        ({"sun_station": "300 mm"}, ("sun_station", "300", "'in'")),
+        ({"ring_station": "3 mm"}, ("ring_station", "no shaft")),
+    ],
+)
+def test_members_that_cannot_be_are_refused(tmp_path, changes, words):
+    path = tmp_path / "train.toml"
+    path.write_text(FILE)
+    train = load_train(path).train
+    stage = train.planetary_stages[0]
+    assert train.with_parts(replace(stage, sun_station="30 mm")).layout.seats["in"].origin[2] == pytest.approx(0.0)
+    with pytest.raises(DrivetrainError, match=says("'low'", *words)):
+        train.with_parts(replace(stage, **changes))
+
+
+def test_members_that_are_placed_apart_are_refused():
+    train = two_stages()
+    for place, words in (((0.0, 0.0, 0.0), "along"), ((0.1, 0.0, 0.03), "coaxial")):
+        with pytest.raises(DrivetrainError, match=says("'second'", "'mid'", "'out'", words)):
+            replace(train, shafts=[
+                train.shafts[0],
+                replace(train.shafts[1], position=(0.0, 0.0, 0.0)),
+                replace(train.shafts[2], position=place),
+            ])  # fmt: skip
+    fits = replace(train, shafts=[train.shafts[0], replace(train.shafts[1], position=(0.0, 0.0, 0.0)),
+                                  replace(train.shafts[2], position=(0.0, 0.0, 0.03))])  # fmt: skip
+    assert fits.layout.seats["out"].origin[2] == pytest.approx(0.03)
+
+
+def test_a_stage_that_no_member_holds_needs_two_speeds_that_agree():
+    with pytest.raises(DrivetrainError, match=says("'set'", "drive", "two")):
+        alone(held=None)
+    speeds = {"sun": 100.0, "ring": 20.0, "carrier": (100.0 + Z_RATIO * 20.0) / (1 + Z_RATIO)}
+
+    def driven(**others):
+        drives = [SpeedDrive(name=f"on {n}", shaft=n, speed=w) for n, w in {**speeds, **others}.items()]
+        return alone(held=None, drives=drives)
+
+    assert driven().speeds["carrier"] == pytest.approx(speeds["carrier"])
+    with pytest.raises(DrivetrainError, match=says("'set'", "30", "teeth")):
+        driven(carrier=30.0)
+
+
+def test_a_stage_that_nothing_drives_is_refused():
+    with pytest.raises(DrivetrainError, match=says("'set'", "drive")):
+        alone(drives=[], loads=[])
+
+
+def test_a_clutch_leads_into_a_stage():
+    train = two_stages()
+    clutch = ElasticClutch(name="clutch", first="motor shaft", second="in", stiffness=1e4)
+    shaft = Shaft(name="motor shaft", length="50 mm")
+    coupled = replace(train, shafts=[*train.shafts, shaft], couplings=[clutch],
+                      bearings=[*train.bearings, IdealBearing(name="m", shaft="motor shaft")],
+                      drives=[SpeedDrive(name="motor", shaft="motor shaft", speed="3000 rpm")])  # fmt: skip
+    assert coupled.power.torques["clutch"][1] == pytest.approx(60.0 / (2.5 * 4.5), rel=1e-12)
