@@ -3,14 +3,12 @@
 The order makes it safe to be killed at any moment: signals, then the table, then the ledger, each under its final name
 only when whole. Without the ledger the unit is done again, with the same bits.
 
-What goes wrong is of three kinds. What a case does itself is recorded as its outcome. What the surroundings of a worker
-do, a module that is missing, other code, a file server that has lost a file, makes the worker refuse the unit, which
-goes back. A disk that is full ends the run.
+What goes wrong is of three kinds. What a case does itself is recorded as its outcome. What is due to a worker itself,
+see `gearmbs.campaigns.surroundings`, makes it refuse the unit, which goes back. A full disk ends the run.
 """
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import pickle
@@ -27,23 +25,18 @@ from pathlib import Path
 from typing import Any
 
 import gearmbs
-from gearmbs.campaigns.codes import OtherCode, admit, plan_modules
+from gearmbs.campaigns.codes import admit, plan_modules
 from gearmbs.campaigns.folder import Folder, sealed
 from gearmbs.campaigns.limits import TimeLimitReached, later, limited
 from gearmbs.campaigns.reuse import Reuse
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
-from gearmbs.campaigns.subjects.base import DIED, DONE, FAILED, MEMORY, TIME, Kept, NotImportable, Outcome
+from gearmbs.campaigns.subjects.base import DIED, DONE, FAILED, MEMORY, TIME, Kept, Outcome
+from gearmbs.campaigns.surroundings import DISK, MOST_TRIED, Lacking, carries_out, refusal
 from gearmbs.files import whole_file, write_whole
 from gearmbs.studies.run.claims import Claim, Claimed, claimed
 from gearmbs.studies.run.code import CodeChanged, running_code
 from gearmbs.studies.run.engine import Refused
-
-DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO}
-"""Errors of the disk and not of the case: they end the run, and the case is done again."""
-
-OWN = {getattr(errno, n) for n in "ENOENT EEXIST EISDIR ENOTDIR EINVAL ENAMETOOLONG EDOM ERANGE".split()}
-"""Errors of the operating system that are the case's: it asked for what is not there, or for what cannot be."""
 
 DEATHS = 2
 """A case whose own process has died so often is recorded as the cause."""
@@ -55,17 +48,6 @@ STARTING = 30.0
 """Seconds that a process of its own may take beyond the limit of its case, until it can begin."""
 
 _folders: dict[str, Folder] = {}
-
-
-def refusal(error: BaseException) -> Refused | None:
-    """Return the refusal of a worker whose surroundings an error comes from; None for an error of the case."""
-    lasting = isinstance(error, (ImportError, NotImportable, CodeChanged, OtherCode))
-    odd = isinstance(error, OSError) and error.errno is not None and error.errno not in OWN
-    if not (lasting or odd):
-        return refusal(error.__cause__) if error.__cause__ is not None else None
-    return Refused(
-        f"host {socket.gethostname()}, process {os.getpid()} cannot work: {type(error).__name__}: {error}", lasting
-    )
 
 
 @dataclass
@@ -182,6 +164,15 @@ class CaseRunner:
         place = self._place(kind, row)
         result.files.append(str(write_dataset(place, record, durable=self.folder.path).relative_to(self.folder.path)))
 
+    def ended(self, row: dict[str, Any], outcome: Outcome) -> CaseResult:
+        """Return the result of a case of which nothing but how it ended is known."""
+        try:
+            _, result = self.prepare(row)
+        except Refused:
+            result = CaseResult(outcome)
+        result.outcome = outcome
+        return result
+
     def close(self) -> None:
         """Let go of what the runner holds."""
 
@@ -211,7 +202,8 @@ class GuardedRunner(CaseRunner):
                     and not select.select([child.stdout], [], [], 2.0 * later(longest) + STARTING)[0]
                 ):
                     self._end()
-                    return self._ended(row, TIME, f"more than {longest:g} s by the clock", "Raise wall_limit.")
+                    told = f"more than {longest:g} s by the clock"
+                    return self.ended(row, Outcome(TIME, told, "Raise wall_limit."))
                 kind, value = pickle.load(child.stdout)
             except (EOFError, OSError, pickle.UnpicklingError):
                 code = child.wait()
@@ -222,12 +214,7 @@ class GuardedRunner(CaseRunner):
                 raise value
             return value
         told = f"the process of this case died {DEATHS} times ({cause})"
-        return self._ended(row, DIED, told, "It may need more memory than there is.")
-
-    def _ended(self, row: dict[str, Any], *outcome: str) -> CaseResult:
-        _, result = self.prepare(row)
-        result.outcome = Outcome(*outcome)
-        return result
+        return self.ended(row, Outcome(DIED, told, "It may need more memory than there is."))
 
     def _end(self) -> None:
         assert self._child is not None
@@ -340,15 +327,25 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
     runner = (GuardedRunner if guarded else CaseRunner)(folder, code)
     reuse = Reuse.of(folder)
     results: list[CaseResult] = []
+    lacking: list[Lacking] = []
     known: dict[str, CaseResult] = {}
     stop = folder.plan.on_failure == "stop"
     try:
         for row in rows:
-            result = _one(runner, row, known, reuse)
+            try:
+                result = _one(runner, row, known, reuse)
+            except Lacking as error:
+                lacking.append(error)
+                result = runner.ended(row, error.outcome)
+            results.append(result)
+            # where it is all of them, nothing is to be gained by the others
+            if lacking and (stop or len(lacking) == len(results) == MOST_TRIED):
+                _look(runner, unit, rows, results, lacking[0])
             if stop and result.outcome.status != DONE:
                 case = f"case {row['index']}: {result.outcome.message}"
                 raise CampaignError(f"stopped at the first failure, as the plan wants: {case}")
-            results.append(result)
+        if lacking:
+            _look(runner, unit, rows, results, lacking[0])
     finally:
         runner.close()
     digests = store(folder, unit, rows, results)
@@ -364,6 +361,21 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
     }
     enter(folder, unit, rows, results, digests, about)
     return True
+
+
+def _look(
+    runner: CaseRunner, unit: int, rows: list[dict[str, Any]], results: list[CaseResult], lacking: Lacking
+) -> None:
+    """Look whether it is this worker that lacks something, and not some of the cases.
+
+    Raises
+    ------
+    Lacking
+        If it carries out no case.
+    """
+    done = (row for row, found in zip(rows, results) if found.outcome.status == DONE and not found.reused)
+    if not carries_out(runner.folder, unit, lambda row: runner.run(row).outcome, next(done, None)):
+        raise lacking
 
 
 def enter(

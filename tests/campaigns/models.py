@@ -55,6 +55,13 @@ def moody(x1: float, x2: float, x3: float, mood: str = "good") -> dict:
     return ishigami(x1, x2, x3)
 
 
+def needy(x1: float, x2: float, x3: float) -> dict:
+    """Return the same; beyond a bound only with a module that nobody has."""
+    if x1 > 3.0:
+        import a_module_that_nobody_has  # noqa: F401
+    return ishigami(x1, x2, x3)
+
+
 def picky(x1: float, x2: float, x3: float) -> dict:
     """Return the same for half of the values of the first."""
     if x1 > 0.0:

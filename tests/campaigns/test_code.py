@@ -10,9 +10,10 @@ import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError, Factor, FunctionSubject, make_plan
 from gearmbs.campaigns.codes import code_counts
-from gearmbs.campaigns.work import refusal
+from gearmbs.campaigns.surroundings import refusal
 from gearmbs.studies.run import code
 from gearmbs.studies.run.code import Code, CodeChanged, code_of, running_code, what_counts
+from tests.campaigns.models import PLACES
 from tests.says import says
 
 SOURCE = '''
@@ -180,6 +181,62 @@ def test_what_is_the_surroundings_and_what_is_the_case():
         assert refusal(around) is not None
     for error in (ValueError("x"), FileNotFoundError(2, "No such file"), OSError("unable to open"), MemoryError()):
         assert refusal(error) is None
+
+
+def needing(path, values, **settings) -> Campaign:
+    """Return a campaign of cases of which those beyond 3 need a module that nobody has."""
+    rows = [{"x1": float(x)} for x in values]
+    subject = FunctionSubject("tests.campaigns.models:needy", PLACES)
+    return Campaign(path, make_plan(subject, design="list", options={"rows": rows}, **settings))
+
+
+@pytest.mark.parametrize("unit", [1, 3, 16])
+def test_a_case_that_lacks_a_module_does_not_end_the_run(tmp_path, unit):
+    """The first one, one among others, and two that have a unit for themselves: the others are done."""
+    campaign = needing(tmp_path / "c", [4, 1, 2, 1, 5, 1, 7, 8, 9, 2], unit=unit)
+    status = campaign.run(workers=0)
+    assert (status.done, status.failed) == (10, 5)
+    failed = campaign.failed()
+    assert failed.x1.tolist() == [4, 5, 7, 8, 9]
+    assert failed.message.str.contains("a_module_that_nobody_has").all()
+    assert failed.advice.str.contains("retry").all()
+    assert campaign.table.id.str.len().eq(64).all()
+
+
+def test_a_worker_that_lacks_a_module_for_all_refuses(tmp_path, monkeypatch):
+    """Nothing is recorded of cases, of which none can be carried out; nor of a worker that breaks in the middle."""
+    campaign = needing(tmp_path / "c", [4.0] * 20, unit=10)
+    with pytest.raises(CampaignError, match=says("a_module_that_nobody_has", "host")):
+        campaign.run(workers=0)
+    assert campaign.status().done == 0
+    breaking = needing(tmp_path / "d", range(3), unit=3)
+
+    def broken(*_args, **_kwargs):
+        raise ImportError("libodd.so: cannot open shared object file")
+
+    run = FunctionSubject.run
+    monkeypatch.setattr(
+        FunctionSubject, "run", lambda self, thing, *a: (run if thing["x1"] < 1.0 else broken)(self, thing, *a)
+    )
+    assert breaking.run(workers=0).failed == 2
+    calls = iter(range(100))
+    monkeypatch.setattr(FunctionSubject, "run", lambda self, *a: (run if next(calls) < 2 else broken)(self, *a))
+    with pytest.raises(CampaignError, match=says("libodd.so", "host")):
+        needing(tmp_path / "e", range(3), unit=3).run(workers=0)
+
+
+def test_the_first_failure_may_be_a_module(tmp_path):
+    with pytest.raises(CampaignError, match=says("stopped", "case 1", "a_module_that_nobody_has")):
+        needing(tmp_path / "c", [1, 4, 1], on_failure="stop").run(workers=0)
+    with pytest.raises(CampaignError, match=says("host", "a_module_that_nobody_has")):
+        needing(tmp_path / "d", [4, 4, 4], on_failure="stop").run(workers=0)
+
+
+@pytest.mark.slow
+def test_cases_that_lack_a_module_in_processes_of_their_own(tmp_path):
+    campaign = needing(tmp_path / "c", [4, 1, 5, 1, 1, 6], unit=1, wall_limit=60.0)
+    status = campaign.run(workers=2)
+    assert (status.done, status.failed) == (6, 3)
 
 
 def test_differences_are_told():
