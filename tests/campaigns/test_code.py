@@ -13,7 +13,7 @@ from gearmbs.campaigns.codes import code_counts
 from gearmbs.campaigns.surroundings import refusal
 from gearmbs.studies.run import code
 from gearmbs.studies.run.code import Code, CodeChanged, code_of, running_code, what_counts
-from tests.campaigns.models import PLACES
+from tests.campaigns.models import PLACES, needy
 from tests.says import says
 
 SOURCE = '''
@@ -186,7 +186,7 @@ def test_what_is_the_surroundings_and_what_is_the_case():
 def needing(path, values, **settings) -> Campaign:
     """Return a campaign of cases of which those beyond 3 need a module that nobody has."""
     rows = [{"x1": float(x)} for x in values]
-    subject = FunctionSubject("tests.campaigns.models:needy", PLACES)
+    subject = FunctionSubject(needy, PLACES)
     return Campaign(path, make_plan(subject, design="list", options={"rows": rows}, **settings))
 
 
