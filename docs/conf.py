@@ -71,13 +71,11 @@ nb_execution_show_tb = True
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
 
-autosummary_generate = True
-autosummary_ignore_module_all = False
+autosummary_generate = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
-templates_path = ["_templates"]
 
 html_theme = "furo"
 html_title = f"gearmbs {release}"

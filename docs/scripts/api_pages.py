@@ -122,7 +122,7 @@ MORE = {
         "gearmbs.dae.equations.loads.forces": ["impact", "friction_over_speed"],
     },
     "gearmbs.studies": {
-        "gearmbs.studies.case.case": [
+        "gearmbs.studies.case.sections": [
             "Gears",
             "Shafts",
             "Operation",
@@ -169,6 +169,15 @@ MORE = {
 """Names worth a page that their package does not export; names that do not exist are an error."""
 
 
+OBJECTS = "objects"
+"""Folder of the pages of objects, in that of the pages of packages."""
+
+NOT_SHOWN = (
+    "model_config", "model_fields", "model_computed_fields", "model_post_init", "__init__", "__new__",
+)  # fmt: skip
+"""Members of classes that say nothing of them."""
+
+
 def entries(package: str) -> list[str]:
     """Return the full names of the objects of a package that get a page."""
     module = importlib.import_module(package)
@@ -202,13 +211,23 @@ def _documented(value: object) -> bool:
 
 
 def write(folder: Path) -> None:
-    """Write one page per package; files whose text is the same are left alone."""
-    folder.mkdir(exist_ok=True)
+    """Write one page per package and per object; files whose text is the same are left alone.
+
+    Pages of objects stand in no table of contents: a sidebar of all of them, in each of them, would be most of the
+    site. Tables of packages, the search and cross-references lead there, and each leads back.
+    """
+    objects = folder / OBJECTS
+    objects.mkdir(parents=True, exist_ok=True)
+    wanted = set()
     for package, title in PACKAGES.items():
         about = (importlib.import_module(package).__doc__ or "").strip()
         lines = [title, "=" * len(title), "", f"Module ``{package}``.", "", about, ""]
-        lines += [".. autosummary::", "   :toctree: objects", "   :nosignatures:", ""]
-        lines += [f"   {name}" for name in entries(package)]
+        lines += [".. autosummary::", "   :nosignatures:", ""]
+        page = package.rpartition(".")[2]
+        for name in entries(package):
+            lines.append(f"   {name}")
+            wanted.add(objects / f"{name}.rst")
+            _write(objects / f"{name}.rst", _object_page(name, page, title))
         if package in CONSTANTS or any(home in DESCRIBED for home in (package, *MORE.get(package, {}))):
             lines += ["", "Constants", "---------"]
         for name in constants(package):
@@ -216,7 +235,23 @@ def write(folder: Path) -> None:
         for home in (package, *MORE.get(package, {})):
             for name, text in DESCRIBED.get(home, {}).items():
                 lines += ["", f".. py:data:: {home}.{name}", "", f"   {text}"]
-        _write(folder / f"{package.rpartition('.')[2]}.rst", "\n".join(lines) + "\n")
+        _write(folder / f"{page}.rst", "\n".join(lines) + "\n")
+    for path in {*objects.glob("*.rst")} - wanted:
+        path.unlink()
+
+
+def _object_page(name: str, page: str, title: str) -> str:
+    """Return the page of an object, by its full name, that leads back to that of its package."""
+    module, _, own = name.rpartition(".")
+    value = getattr(importlib.import_module(module), own)
+    kind = "function"
+    if inspect.isclass(value):
+        kind = "exception" if issubclass(value, BaseException) else "class"
+    lines = [":orphan:", "", own, "=" * len(own), "", f":doc:`{title} </_generated/{page}>`", ""]
+    lines += [f".. currentmodule:: {module}", "", f".. auto{kind}:: {own}"]
+    if kind == "class":
+        lines += ["   :members:", f"   :exclude-members: {', '.join(NOT_SHOWN)}"]
+    return "\n".join(lines) + "\n"
 
 
 def _write(path: Path, text: str) -> None:
