@@ -13,7 +13,7 @@ from gearmbs.progress import waiting
 from gearmbs.wording import any_of
 
 WRITERS: dict[str, dict[str, str]] = {
-    "Case": {".toml": "gearmbs.studies.case.case:write_case"},
+    "Case": {".toml": "gearmbs.studies.case.texts:write_case"},
     "GearSpec": {
         ".dxf": "gearmbs.view:write_dxf",
         ".step": "gearmbs.view:write_step",

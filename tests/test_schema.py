@@ -29,7 +29,7 @@ from gearmbs.schema.described import (
 )
 from gearmbs.schema.quantities import Measure, OneOf, OverTime, counts
 from gearmbs.studies import Case, CaseError
-from gearmbs.studies.case.case import Contact, FrictionSettings, Gears, Operation, Shafts, Solver
+from gearmbs.studies.case.sections import Contact, FrictionSettings, Gears, Operation, Shafts, Solver
 from gearmbs.units import Given, Quantity
 from tests.generators import cases, seed
 from tests.says import says

@@ -406,7 +406,7 @@ def _in_si(item: Free | str, cases: Mapping[str, Case]) -> Free:
 
 def _field(path: str, cases: Mapping[str, Case]) -> tuple[float, str]:
     """Return the value and the SI unit of a number of a case, whose name may stand before the path."""
-    from gearmbs.studies.case.case import units_of_fields
+    from gearmbs.studies.case.sections import units_of_fields
 
     owner, _, place = path.rpartition(":")
     if owner and owner not in cases:

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gearmbs._display import html_table
-from gearmbs.studies.case.case import readable
 from gearmbs.studies.case.section import Section
+from gearmbs.studies.case.texts import readable
 from gearmbs.view import mesh_view
 from gearmbs.view.figures.style import BLUE, ORANGE, VERMILLION, look, new_figure
 

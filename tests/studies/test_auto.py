@@ -194,7 +194,7 @@ def test_the_period_is_that_of_flanks_that_differ(teeth, faults, period):
 
 @pytest.mark.slow
 def test_what_was_not_looked_at_is_not_said_to_differ(monkeypatch):
-    monkeypatch.setattr("gearmbs.studies.case.case.LONGEST", 0.02)
+    monkeypatch.setattr("gearmbs.studies.case.sections.LONGEST", 0.02)
     short = {"run_up": "10 ms", "settling": "10 ms", **AUTO}
     case = Case(operation=short, solver={"integrator": "IDA", "tolerance": 1e-6})
     record = run_case(case, variables=["transmission_error"])
@@ -216,7 +216,7 @@ def test_records_of_slow_wheels_name_the_duration_they_need(speed, period, need)
 
 @pytest.mark.slow
 def test_a_period_longer_than_the_longest_record_is_told(monkeypatch):
-    monkeypatch.setattr("gearmbs.studies.case.case.LONGEST", 0.06)
+    monkeypatch.setattr("gearmbs.studies.case.sections.LONGEST", 0.06)
     faults = [{"kind": "chipped corner", "wheel": wheel} for wheel in EITHER]
     record = run_case(
         Case(gears={"teeth": (20, 31)}, operation=AUTO, fault={"teeth": faults}), variables=["transmission_error"]

@@ -9,7 +9,8 @@ import pytest
 
 from gearmbs.studies import Case, CaseError, load_case, make_case, paper_cases
 from gearmbs.studies.case import case as case_module
-from gearmbs.studies.case.case import CaseWarning, Gears, Operation
+from gearmbs.studies.case.section import CaseWarning
+from gearmbs.studies.case.sections import Gears, Operation
 from tests.generators import cases, seed
 from tests.says import says
 

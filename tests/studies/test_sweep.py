@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from gearmbs.studies import Case, CaseError, SimulationFailed, load_case, sweep
-from gearmbs.studies.case.case import case_toml
+from gearmbs.studies.case.texts import case_toml
 from gearmbs.studies.run import recorder, simulation
 from tests.says import says
 from tests.view.looking import assert_readable

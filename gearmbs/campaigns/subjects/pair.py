@@ -22,7 +22,8 @@ from gearmbs.campaigns.subjects.base import (
 )
 from gearmbs.schema.described import chosen
 from gearmbs.signals import COMPONENTS
-from gearmbs.studies.case.case import Case, make_case, units_of_fields
+from gearmbs.studies.case.case import Case, make_case
+from gearmbs.studies.case.sections import units_of_fields
 from gearmbs.units import to_si
 
 FIRST_ORDERS = 3

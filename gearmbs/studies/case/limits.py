@@ -14,7 +14,8 @@ import numpy as np
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.signals.analysis.bands import ATTENUATION_DB, HALF_WIDTH, MIN_PERIODS, TRANSITION
 from gearmbs.signals.filters import bandpass_taps, decimation_taps
-from gearmbs.studies.case.case import AUTO, LONGEST, Case, CaseError
+from gearmbs.studies.case.case import Case, CaseError
+from gearmbs.studies.case.sections import AUTO, LONGEST
 
 HARMONICS = 3
 EDGE = 0.01

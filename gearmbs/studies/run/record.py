@@ -18,9 +18,10 @@ from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.conversion import COMPONENTS, component_values
 from gearmbs.signals.filters import apply_zero_phase, decimation_taps
 from gearmbs.signals.resampling import monotone_cubic
-from gearmbs.studies.case.case import Case, CaseError, units_of_fields
+from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.drive import drive_angle
 from gearmbs.studies.case.limits import edge, remarks
+from gearmbs.studies.case.sections import units_of_fields
 from gearmbs.studies.run.levels import LEVELS, as_levels, mesh_levels, tracked_levels
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of
 

@@ -15,8 +15,9 @@ from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.gears.contact_element import contact_kernels
 from gearmbs.mechanism.solve.simulate import simulate
-from gearmbs.studies.case.case import Case, CaseError, Operation, Solver
+from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record, edge, slip
+from gearmbs.studies.case.sections import Operation, Solver
 from gearmbs.studies.run import rig
 from gearmbs.studies.run.periodic import PeriodicRecorder, reach, signal_stop
 from gearmbs.studies.run.record import (

@@ -15,8 +15,9 @@ from gearmbs._display import Shown, html_table
 from gearmbs.files import python_scalar
 from gearmbs.schema.quantities import SHOWN
 from gearmbs.signals.files.simulated import record_signal
-from gearmbs.studies.case.case import Case, CaseError, readable
+from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.section import Section, measures_of
+from gearmbs.studies.case.texts import readable
 from gearmbs.studies.presets.paper_cases import DEFAULT_COMPONENT
 from gearmbs.studies.run.levels import told_way
 from gearmbs.studies.run.parallel import run_cases

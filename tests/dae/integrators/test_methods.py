@@ -102,7 +102,7 @@ def test_messages_and_documentation_know_it():
 
 
 def test_cases_and_the_command_line_take_the_table():
-    from gearmbs.studies.case.case import Solver
+    from gearmbs.studies.case.sections import Solver
 
     assert get_args(Solver.model_fields["integrator"].annotation) == tuple(INTEGRATORS)
     assert Solver().integrator == DEFAULT
@@ -149,7 +149,7 @@ def test_no_other_module_lists_integrators(known):
 def test_formulations_are_those_of_cases_decks_and_equations():
     from gearmbs.adams.parse.statements import Integrator as Statement
     from gearmbs.dae.equations import unknowns
-    from gearmbs.studies.case.case import Solver
+    from gearmbs.studies.case.sections import Solver
 
     names = tuple(FORMULATIONS)
     assert get_args(Solver.model_fields["formulation"].annotation) == names
