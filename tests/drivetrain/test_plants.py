@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
@@ -21,7 +23,7 @@ from gearmbs.drivetrain import (
     Wheel,
 )
 from gearmbs.drivetrain.drives import Drive
-from gearmbs.gears import GearSpec
+from gearmbs.gears import GearSpec, IdealMesh
 from gearmbs.mechanism import ModelError, make_input
 from gearmbs.studies import train_modes
 from tests.says import says
@@ -110,12 +112,26 @@ def test_a_drivetrain_that_runs_is_linearised_where_it_is():
     train = stage("speed")
     m = train.build()
     solution = m.simulate(0.2, rate=20000, tol=1e-7, rate_scale=train.rate_scale)
-    plant = train.linearize([("motion", "motor", "rate")], ["tacho", ("speed", "in")], at=solution)
+    with pytest.warns(UserWarning, match=says("'stage'", "157.1 rad/s", "phase")):
+        plant = train.linearize([("motion", "motor", "rate")], ["tacho", ("speed", "in")], at=solution)
     assert plant.point.outputs == pytest.approx([solution.angular_velocity("out")[-1, 2], 50.0 * np.pi], rel=1e-6)
     # slowly the driven shaft follows by the ratio, the other way round
     low = plant.frequency_response(1.0)[0]
     assert low[1, 0] == pytest.approx(1.0, abs=1e-9)
     assert low[0, 0] == pytest.approx(-1.0 / 3.0, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("curve", [None, [1.0, 1.1, 1.2, 1.1]])
+def test_teeth_that_run_are_told_and_a_mean_stiffness_is_steady(curve):
+    """Of a stiffness that is constant the train turns freely: two poles at zero, exactly; else it has a phase."""
+    train = stage().changed("stage", pair=IdealMesh, settings={"stiffness": "4e8 N/m", "stiffness_curve": curve})
+    solution = train.build().simulate(0.02, rate=2000)
+    with pytest.warns(UserWarning, match=says("'stage'", "phase")) if curve else warnings.catch_warnings():
+        if not curve:
+            warnings.simplefilter("error")
+        plant = train.linearize([("torque", "in")], ["tacho"], at=solution)
+    assert (np.sum(np.abs(plant.poles) < 1e-9) == 2) == (curve is None)
 
 
 def test_names_that_are_none_are_told():

@@ -493,6 +493,14 @@ def pair_of(element: Any) -> Any:
     return getattr(element, "pair", None) or getattr(getattr(element, "mesh", None), "pair", None)
 
 
+def has_phase(element: Any) -> bool:
+    """Return whether an element is a mesh whose force depends on where teeth are in their cycle."""
+    mesh = getattr(element, "mesh", None)
+    if getattr(mesh, "pair", None) is not None:
+        return mesh.stiffness_curve is not None or mesh.error is not None
+    return bool(getattr(element, "pair", None) or getattr(element, "pairs", None))
+
+
 def levers(element: Any) -> tuple[float, float, float]:
     """Return r_b1 and s r_b2 of a mesh, s = 1 for external and -1 for internal pairs, and its base pitch."""
     pair = pair_of(element)
@@ -514,4 +522,4 @@ def _first_call(text: str, beginnings: Collection[str]) -> tuple[int, int, str] 
     return None
 
 
-__all__ = ["LEVELS", "Acceleration", "Given", "PlantNames", "Told"]
+__all__ = ["LEVELS", "Acceleration", "Given", "PlantNames", "Told", "has_phase"]

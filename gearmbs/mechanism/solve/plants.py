@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,7 @@ from gearmbs.mechanism.checks import warn_of_stiff_seats
 from gearmbs.mechanism.parts.bodies import Marker, markers_kept
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
-from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told
+from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told, has_phase
 from gearmbs.mechanism.solve.points import instant_at, joint_coordinates, point_of
 from gearmbs.progress import waiting
 
@@ -33,6 +34,8 @@ INPUT_STEP = 1e-3
 what is not 1e-12 of its fifth derivative is left out."""
 DIFFERENCE = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0))
 """Central differences of fourth order: places in steps, and their weights."""
+TURNS = 1e-6
+"""Speed of a wheel, rad/s, up to which it rests: a mesh cycle takes a week."""
 TOLD = "plant output {}"
 """Name of the state whose rate is an output."""
 
@@ -92,7 +95,7 @@ def linearize(
     -----
     UserWarning
         If the coefficients vary with time along the motion, or are going to, of what is at rest and not in balance:
-        they are those of this instant.
+        they are those of this instant. So they are of teeth that run.
 
     Examples
     --------
@@ -328,6 +331,7 @@ def _plant(
     stacked = [np.array([pair[k] for pair in pairs]).reshape(-1, size).T for k in (0, 1)]
     reduced = reduce(instant, Inputs(*stacked), joint_coordinates(mechanism), balance=True)
     warn_of_varying(reduced, stacklevel=5)
+    _warn_of_running_teeth(mechanism, instant)
     kinds = instant.system.model.differential_states
     names = [name for name, differential in zip(instant.system.state_names, kinds, strict=True) if differential]
     outputs = [names.index(TOLD.format(k)) for k in range(len(told))]
@@ -377,6 +381,25 @@ def _plant(
         poles_of(reduced, own, len(a) - 2 * n - own.size),
         response_of(reduced, own, np.zeros(0, dtype=int), found.outputs, found.chains, [one.level for one in given]),
     )  # fmt: skip
+
+
+def _warn_of_running_teeth(mechanism: Mechanism, instant: Instant) -> None:
+    """Warn of meshes whose stiffness is another one at each phase, and whose wheels turn."""
+    running = []
+    for name, element in mechanism.elements.items():
+        if has_phase(element):
+            frames = [_frame(instant, marker) for marker in element.markers]
+            spins = [abs(instant.pose()[one.body, POSE_W:] @ one.axes[:, 2]) for one in frames if one.body >= 0]
+            if max(spins, default=0.0) > TURNS:
+                running.append(f"{name!r} (at {max(spins):.4g} rad/s)")
+    if running:
+        warnings.warn(
+            f"teeth run in {', '.join(running)}, at another stiffness in each phase of the mesh: A is that of this "
+            "instant, and shafts that turn freely have poles of some rad/s and of either sign in place of zeros. Take "
+            "the mesh at rest under its load (at='equilibrium', of a drivetrain at='loaded'), or an IdealMesh of its "
+            "mean stiffness, or compare several instants",
+            stacklevel=5,
+        )
 
 
 def _value(instant: Instant, given: Given) -> float:
