@@ -310,6 +310,8 @@ class State:
         FileNotFoundError
             If there is none.
         """
+        if Path(path).is_dir():
+            raise ModelError(f"{path}: it is a folder; give the file in it that State.save wrote")
         if Path(path).is_file() and not zipfile.is_zipfile(path):
             raise ModelError(
                 f"{path}: not a whole file of a state, as State.save writes it (it is no .npz, or cut off)"

@@ -32,8 +32,24 @@ STILL = 1e-8
 MOVED = 1e-7
 """Way (m) or turn (rad) by which a body has moved: locked ones stray within the tolerance of constraints, 1e-10."""
 
+LONGEST = 80
+"""Characters of a value that a message shows."""
+
 NAMED = 3
 """Bodies and joints named in the remark at most."""
+
+
+def check_mechanism(given: Any) -> None:
+    """Raise a ModelError if something is no Mechanism, with what makes one of it."""
+    if hasattr(given, "bodies") and hasattr(given, "compile"):
+        return
+    remedy = "give a Mechanism"
+    if hasattr(given, "build"):
+        remedy = "give what its build() returns"
+    elif hasattr(given, "gears") and hasattr(given, "operation"):
+        remedy = "give what gearmbs.studies.case_mechanism makes of it"
+    told = repr(given).split("\n")[0]
+    raise ModelError(f"mechanism is {told if len(told) <= LONGEST else f'a {type(given).__name__}'}; {remedy}")
 
 
 def locked_bodies(mechanism: Mechanism, system: System) -> list[str]:

@@ -25,8 +25,22 @@ RESERVED = ("TIME", "PI", "DTOR", "RTOD")
 """Names that mean something else in expressions."""
 
 
+class NoNumber:
+    """What has a name that expressions calculate with, and no value that Python could."""
+
+    name: str
+
+    def _calculate(self, *_: Any) -> Any:
+        raise ModelError(
+            f"{self.name!r} has a value in the equations alone; calculate in an expression, such as '2*{self.name}'"
+        )
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = _calculate
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = __float__ = _calculate
+
+
 @dataclass(frozen=True)
-class Input(TimeFunction):
+class Input(NoNumber, TimeFunction):
     """A function of time whose value is set from outside, see `gearmbs.mechanism.Mechanism.input`.
 
     Attributes
@@ -64,7 +78,7 @@ class Input(TimeFunction):
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(NoNumber):
     """A number with a name that expressions use, see `gearmbs.mechanism.Mechanism.parameter`."""
 
     name: str
@@ -194,18 +208,21 @@ def checked_name(name: Any, what: str) -> None:
     if name != name.strip() or not name.isprintable():
         raise ModelError(f"{what} {name!r}: a blank at an end, or a line break, would not be seen; leave it out")
     if what != "output" and _calculates(name):
-        plain = re.sub(r"\W+", "_", name).strip("_")
+        plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
         if not plain or _calculates(plain):
             plain = f"u_{plain}"
-        raise ModelError(f"{what} {name!r}: expressions take that for a calculation; call it {plain!r}")
+        raise ModelError(f"{what} {name!r}: expressions take that for a calculation, or nothing; call it {plain!r}")
 
 
 def _calculates(name: str) -> bool:
-    """Whether a name, where it stands in an expression without quotation marks, is a number or a calculation."""
+    """Whether a name, where it stands in an expression without quotation marks, is a number or a calculation.
+
+    Or neither, and begins as a number, as 2x. Others that are neither need the marks, as several words do.
+    """
     try:
         return not isinstance(parse(name), Name)
     except ExpressionError:
-        return False
+        return name[0].isdigit() and " " not in name
 
 
 def checked_unit(unit: Any, field: str) -> str:

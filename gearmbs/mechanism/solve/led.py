@@ -11,9 +11,11 @@ import numpy as np
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.parts.quantities import quantities
-from gearmbs.mechanism.solve.simulator import Simulator
+from gearmbs.mechanism.solve.simulator import REFUSED, RESOLVED, Simulator
+from gearmbs.progress import time_bar
 
 if TYPE_CHECKING:
+    from gearmbs.dae.state import State
     from gearmbs.mechanism.mechanism import Mechanism
 
 REMEDY = "give a number, (times, values), (times, values, 1) for lines between them, or (function, sample_time)"
@@ -37,8 +39,9 @@ class Table:
 
 
 def simulate_led(
-    mechanism: Mechanism, t_eval: np.ndarray, inputs: Mapping[str, Any], *, advice: Any = None, **options: Any
-) -> Solution:
+    mechanism: Mechanism, t_eval: np.ndarray, inputs: Mapping[str, Any], *, advice: Any = None, progress: Any = None,
+    initial: State | None = None, **options: Any,
+) -> Solution:  # fmt: skip
     """Return the solution of a run whose inputs are given, at some times; see `gearmbs.mechanism.simulate`.
 
     Raises
@@ -49,7 +52,11 @@ def simulate_led(
     """
     if not isinstance(inputs, Mapping):
         raise ModelError(f"inputs: {inputs!r}; give a mapping from names to values")
-    sim = Simulator(mechanism, float(t_eval[-1]), t_start=float(t_eval[0]), advice=advice, **options)
+    for option in REFUSED:
+        if option in options:
+            raise ModelError(f"inputs: a run with inputs has no {option}; leave it away, or give rate or t_eval")
+    start = float(t_eval[0]) if initial is None else 0.0
+    sim = Simulator(mechanism, float(t_eval[-1]), t_start=start, advice=advice, initial=initial, **options)
     tables = [table for name, given in inputs.items() if (table := _begin(sim, name, given)) is not None]
     for table in tables:
         value = float(np.interp(sim.t, table.times, table.values))
@@ -64,16 +71,23 @@ def simulate_led(
     sim.take_effect()
     stops = np.unique(np.concatenate([t_eval, *(table.times for table in tables)]))
     stops = stops[(stops > sim.t) & (stops <= t_eval[-1])].tolist()
-    wanted = set(t_eval.tolist())
+    wanted, apart, begun = set(t_eval.tolist()), RESOLVED * sim.t_end, sim.t
+    bar = time_bar(progress, mechanism.name, sim.t, sim.t_end)
     try:
-        for t in stops:
-            for table in tables:
-                table.set(sim, t)
-            sim.advance(t, record=t in wanted)
+        with bar as report:
+            for t in stops:
+                # times of several tables that are to be the same may differ by rounding
+                if t - sim.t > apart:
+                    for table in tables:
+                        table.set(sim, t)
+                sim.advance(t, record=t in wanted)
+                if report is not None:
+                    report(t)
     except ModelError:
         if not sim.failed:
             raise
-    return sim.solution()
+    # outputs may begin after the state that it starts in
+    return sim.solution(int(begun not in wanted and sim.t > begun))
 
 
 def _begin(sim: Simulator, name: str, given: Any) -> Table | None:
@@ -115,6 +129,12 @@ def _table(sim: Simulator, name: str, times: Any, values: Any, hold: int = 0) ->
     late = np.flatnonzero(np.diff(t) <= 0.0)
     if late.size:
         raise ModelError(f"{label}: its times must increase; {t[late[0] + 1]:g} s follows {t[late[0]]:g} s")
+    close = np.flatnonzero(np.diff(t) < RESOLVED * sim.t_end)
+    if close.size:
+        raise ModelError(
+            f"{label}: {t[close[0]]:g} s is followed {t[close[0] + 1] - t[close[0]]:.2g} s later; up to "
+            f"{sim.t_end:g} s times are not told apart by less than {RESOLVED * sim.t_end:.2g} s; leave one of them out"
+        )
     if t[0] > sim.t:
         raise ModelError(f"{label}: its first time is {t[0]:g} s, the run starts at {sim.t:g} s; begin it there")
     return Table(number.name, t, u, int(hold))

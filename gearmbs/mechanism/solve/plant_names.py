@@ -495,7 +495,7 @@ def pair_of(element: Any) -> Any:
 
 def has_phase(element: Any) -> bool:
     """Return whether an element is a mesh whose force depends on where teeth are in their cycle."""
-    mesh = getattr(element, "mesh", None)
+    mesh: Any = getattr(element, "mesh", None)
     if getattr(mesh, "pair", None) is not None:
         return mesh.stiffness_curve is not None or mesh.error is not None
     return bool(getattr(element, "pair", None) or getattr(element, "pairs", None))

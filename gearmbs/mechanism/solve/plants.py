@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import warnings
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from gearmbs.dae.analyses.response import response_of
 from gearmbs.dae.analyses.turning import skew, turning
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.checks import warn_of_stiff_seats
+from gearmbs.mechanism.checks import check_mechanism, warn_of_stiff_seats
 from gearmbs.mechanism.parts.bodies import Marker, markers_kept
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
@@ -107,6 +108,7 @@ def linearize(
     >>> round(float(plant.dc_gain[0, 0]), 6)  # 1 / (m g l)
     0.203874
     """
+    check_mechanism(mechanism)
     warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     for what, asked in (("inputs", inputs), ("outputs", outputs)):
         if isinstance(asked, str):
@@ -115,6 +117,9 @@ def linearize(
     point = point_of(mechanism, at, t)
     with markers_kept((mechanism.ground, *mechanism.bodies.values())):
         given = [one for item in inputs for one in names.inputs(item)]
+        for name, count in Counter(one.name for one in given).items():
+            if count > 1:
+                raise ModelError(f"inputs: {name!r} is there {count} times; give it once")
         whole, told = _with_outputs(mechanism, names, outputs)
         instant = instant_at(whole, point)
         held = _held(instant, told)

@@ -25,6 +25,7 @@ from gearmbs.dae.results.watched import Stream, Watch
 from gearmbs.dae.state import History, State
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
+    check_mechanism,
     locking_remark,
     moves_after_all,
     refuse_overlaps,
@@ -265,17 +266,19 @@ def simulate(
         raise ModelError("watch: what it names is handed to a consumer; give consumer=, too")
     if consumer is not None and not every_step:
         raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
+    check_mechanism(mechanism)
     t_start = start_time(quantity(t_start, "time", "t_start"), initial)
-    t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
+    t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step, initial is not None)
     tol, rate_scale = chosen_accuracy(mechanism, (float(t_eval[0]), float(t_eval[-1])), tol, rate_scale)
     if inputs:
         from gearmbs.mechanism.solve.led import simulate_led
 
         if every_step or stops or consumer is not None:
             raise ModelError("inputs: a run with inputs has no every_step, consumer or stops; give rate or t_eval")
+        checked(integrator, tol, options)
         return simulate_led(
             mechanism, t_eval, inputs, integrator=integrator, formulation=formulation, tol=tol, rate_scale=rate_scale,
-            lump=lump, initial=initial, advice=advice, **options,
+            lump=lump, initial=initial, advice=advice, progress=progress, **options,
         )  # fmt: skip
     name = checked(integrator, tol, options)
     check_stops(stops)
@@ -445,14 +448,23 @@ def _prepared(
 
 
 def _output_times(
-    start: float, end: float, rate: float | None, given: np.ndarray | None, every_step: bool
+    start: float, end: float, rate: float | None, given: np.ndarray | None, every_step: bool, held: bool
 ) -> np.ndarray:
     """Return the output times; see `simulate`."""
     if every_step and (rate is not None or given is not None):
         raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
     if given is not None:
         # a column of a table is taken apart from it, for the kernels
-        return np.ascontiguousarray(quantities(given, "time", "t_eval"))
+        times = np.ascontiguousarray(quantities(given, "time", "t_eval"))
+        if times.ndim != 1 or not times.size or not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+            raise ModelError("t_eval: give finite times in a row, each later than the one before")
+        if held and times[0] < start:
+            raise ModelError(
+                f"t_eval: it begins at {times[0]:.9g} s, the initial state is at {start:.9g} s; begin there or later"
+            )
+        if held and times[-1] == start:
+            raise ModelError(f"t_eval: it ends at {start:.9g} s, where the initial state is; go on to a later time")
+        return times
     if not np.isfinite(end) or end <= start:
         raise ModelError(f"t_end = {end} s; it must be later than the start {start} s")
     if rate is None:

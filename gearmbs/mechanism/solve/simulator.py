@@ -23,6 +23,7 @@ from gearmbs.dae.problem import DAEProblem, ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State, equations_of
+from gearmbs.mechanism.checks import check_mechanism
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
@@ -48,8 +49,8 @@ from gearmbs.wording import any_of
 NOTHING = nullcontext()
 """Null context, used when the mechanism has no functions of Python."""
 RESOLVED = 1e-12
-"""Least sample time of a controller, as part of the end of the run: some thousand times what tells two times apart
-there, 2e-16 of it, so that samples lie where they are meant."""
+"""Least sample time of a controller, and time between inputs that are set, as part of the end of the run: some thousand
+times what tells two times apart there, 2e-16 of it, so that they lie where they are meant."""
 new_point = tuple.__new__
 """Makes a point of its parts in half the time that its class takes."""
 OWN = {
@@ -144,9 +145,7 @@ class Simulator(Told):
         advice: Mapping[Status, str] | None = None,
         **options: Any,
     ) -> None:
-        if not isinstance(mechanism, Mechanism):
-            remedy = "give what its build() returns" if hasattr(mechanism, "build") else "give a Mechanism"
-            raise ModelError(f"mechanism is {mechanism!r}; {remedy}")
+        check_mechanism(mechanism)
         for what, given in (("lump", lump), ("records", records)):
             if not isinstance(given, bool | np.bool_ | None):
                 raise ModelError(f"{what} = {given!r}; give True or False")
@@ -262,6 +261,11 @@ class Simulator(Told):
             warn_of_unmet(self._unmet)
             self._unmet = []
         settings = self._settings
+        if (settings.waiting or settings.led) and 0.0 < t - self.t < RESOLVED * self.t_end:
+            raise ModelError(
+                f"t = {t:.9g} s lies {t - self.t:.2g} s after the present time, at which something was set; up to "
+                f"t_end = {self.t_end:.6g} s times are told apart by {RESOLVED * self.t_end:.2g} s: go on by more"
+            )
         while self.t < t:
             end = self._sample(t) if self._controls else t
             if settings.waiting or settings.led:

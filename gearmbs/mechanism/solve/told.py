@@ -151,8 +151,8 @@ class Told(OwnAttributes):
         self._counted[joint] = len(self._points) - 1, last
         return last
 
-    def solution(self) -> Solution:
-        """Return the motion and forces over all points so far, from the start on.
+    def solution(self, first: int = 0) -> Solution:
+        """Return the motion and forces over all points so far, from the start on or from the one with a number.
 
         Raises
         ------
@@ -160,7 +160,7 @@ class Told(OwnAttributes):
             If no records are kept.
         """
         self._check_records("solution")
-        return self._over(0)
+        return self._over(first)
 
     def _check_records(self, what: str) -> None:
         if not self._records:
