@@ -129,3 +129,31 @@ def test_every_front_has_a_stub():
     """Whatever calls ``late`` reads one, and a package that exports names does so by it."""
     inits = {path for path in STUBS[0].parent.rglob("__init__.py") if "__all__" in path.read_text()}
     assert inits == {stub.with_suffix(".py") for stub in STUBS}
+
+
+UNUSED = {
+    "scipy.linalg",
+    "scipy.signal",
+    "scipy.sparse",
+    "sksundae",
+    "matplotlib",
+    "pint",
+    "dask",
+    "numpy.f2py",
+    "gearmbs.bearings.bearing",
+    "gearmbs.flexible.shaft",
+}
+"""Modules that no run of a rigid pair on joints has a use for."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("call", "unused"),
+    [("simulate_case", UNUSED | {"xarray", "pandas"}), ("run_case", UNUSED)],
+)
+def test_a_run_imports_only_what_it_uses(call, unused):
+    code = f"from gearmbs.studies import make_case, {call}; import sys; "
+    code += f"{call}(make_case({{'operation': {{'duration': '0.06 s', 'settling': '0 s'}}}})); "
+    code += f"print({unused!r} & {{*sys.modules}})"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    assert subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/") == "set()\n"

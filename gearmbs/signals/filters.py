@@ -218,15 +218,15 @@ def apply_zero_phase(values: np.ndarray, taps: np.ndarray, edges: Edges, step: i
             f"signal: has {n} samples, the filter needs at least {need} (edges={edges!r}); "
             "give a longer record or a wider transition band"
         )
-    columns = []
-    for column in values.T:
+    length = n - taps.size + 1 if edges == "trim" else n
+    result = np.empty(((length + step - 1) // step, values.shape[1]))
+    for channel, column in enumerate(values.T):
         source = np.ascontiguousarray(column, dtype=float)
         if edges == "extend":
             source = np.concatenate(
                 (2 * source[0] - source[half:0:-1], source, 2 * source[-1] - source[-2 : -half - 2 : -1])
             )
-        columns.append(_valid(source, taps, step))
-    result = columns[0][:, None] if len(columns) == 1 else np.stack(columns, axis=1)
+        result[:, channel] = _valid(source, taps, step)
     return result, half if edges == "trim" else 0
 
 

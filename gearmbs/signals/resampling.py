@@ -82,7 +82,7 @@ def even_signal(
         raise SignalError("t: the times do not increase; sort them and drop repeated ones")
     samples = EvenSamples(rate, start, stop, fine_rate=fine_rate)
     samples.take(t, values.reshape(t.size, -1))
-    even = np.ascontiguousarray(samples.finish())
+    even = np.ascontiguousarray(samples.finish()[0])
     t0 = float(samples.t[0])
     return make_signal(even, rate, units=units, channels=channels, t0=t0, speed=speed, teeth=teeth)
 
@@ -98,7 +98,7 @@ class EvenSamples:
         As for `even_signal`.
     smooth, linear, held : int
         So many of the last columns go through no filter: they are samples of the monotone cubic, of straight lines, or
-        the last values before.
+        the last values before, which are numbers of something: whole, and small.
 
     Attributes
     ----------
@@ -128,21 +128,23 @@ class EvenSamples:
         self._low: int | None = None
         self._next = 0
         self._t, self._columns = np.empty(0), np.empty((0, 0))
-        self._even = np.empty((0, 0))
+        self._even, self._held = np.empty((0, 0)), np.empty((0, held), np.int16)
 
     def take(self, t: np.ndarray, columns: np.ndarray) -> None:
         """Take values, (m, columns), at increasing times behind those taken before; make what they decide."""
         if self._low is None:
             self._low = self._next = max(self._first - MARGIN, int(np.ceil(t[0] * self.rate - 1e-6)))
             # each column on end, as the kernel takes it
-            self._even = np.empty((columns.shape[1], self.t.size)).T
+            held = self._held.shape[1]
+            self._even = np.empty((columns.shape[1] - held, self.t.size)).T
+            self._held = np.empty((held, self.t.size), np.int16).T
             self._t, self._columns = t, columns
         else:
             self._t, self._columns = np.concatenate([self._t, t]), np.concatenate([self._columns, columns])
         self._go_on(self._last + MARGIN, is_last=False)
 
-    def finish(self) -> np.ndarray:
-        """Return all samples, shape (n, columns), each column on end in memory.
+    def finish(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return all samples, those that are not held and those that are, each column on end in memory.
 
         Raises
         ------
@@ -159,13 +161,14 @@ class EvenSamples:
                 f"start, stop: {start:g} to {stop:g} s is not within the times {self._low / self.rate:g} to {t[-1]:g} s"
             )
         self._go_on(high, is_last=True)
-        return self._even
+        return self._even, self._held
 
     def known(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return times and columns of the samples made so far, and of the values behind them."""
         made = min(max(self._next - self._first, 0), self.t.size)
         behind = int(np.searchsorted(self._t, self.t[made - 1], side="right")) if made else 0
-        return [(self.t[:made], self._even[:made]), (self._t[behind:], self._columns[behind:])]
+        samples = np.column_stack([self._even[:made], self._held[:made]])
+        return [(self.t[:made], samples), (self._t[behind:], self._columns[behind:])]
 
     def _go_on(self, high: int, *, is_last: bool) -> None:
         """Make samples in blocks up to number ``high``, or as far as the slopes of the cubic are known."""
@@ -211,7 +214,7 @@ class EvenSamples:
         for c in range(linear, held):
             even[rows, c] = np.interp(at, t, columns[:, c])
         if held < columns.shape[1]:
-            even[rows, held:] = columns[np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 1), held:]
+            self._held[rows] = columns[np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 1), held:]
 
 
 def _fine_factor(rate: float, fine_rate: float) -> int:

@@ -42,16 +42,17 @@ def test_samples_of_values_that_come_in_pieces_are_those_of_all_at_once():
         samples.take(t[k : k + 700], values[k : k + 700])
         waiting.append(samples.known()[1][0].size)
     made = samples.known()[0][1].copy()
-    found = samples.finish()
+    found, held = samples.finish()
     whole = even_signal(t, values[:, :2], RATE, start=0.01, stop=0.29)
     np.testing.assert_array_equal(samples.t, whole["time"].values)
     np.testing.assert_array_equal(found[:, :2], whole.values)
     np.testing.assert_array_equal(found[:, 2], monotone_cubic(t, tone, samples.t))
     np.testing.assert_array_equal(found[:, 3], np.interp(samples.t, t, tone))
-    np.testing.assert_array_equal(found[:, 4], values[np.searchsorted(t, samples.t, side="right") - 1, 4])
+    np.testing.assert_array_equal(held[:, 0], values[np.searchsorted(t, samples.t, side="right") - 1, 4])
     # what is waited for does not grow with the record
     assert max(waiting[len(waiting) // 2 :]) <= max(waiting[: len(waiting) // 2]) < t.size // 2
-    np.testing.assert_array_equal(made, found[: len(made)])
+    np.testing.assert_array_equal(made, np.column_stack([found, held])[: len(made)])
+    assert np.issubdtype(held.dtype, np.integer)
 
 
 @pytest.mark.parametrize("also", [[], [lambda t: np.sin(2000 * np.pi * t)]], ids=["all", "beside others"])

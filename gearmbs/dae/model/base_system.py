@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy
 
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R
+from gearmbs.dae.model.columns import Columns
 from gearmbs.dae.model.evaluator import Assembler
 from gearmbs.dae.model.model import Configuration, Model
 
@@ -119,7 +119,7 @@ class BaseSystem:
         """Return Phi_q in spatial displacements, Phi, and Phi_q v + Phi_t at a configuration."""
         return self.assembler.constraints(self._configuration(configuration), t, self.state_start)
 
-    def constraint_jacobians(self, poses: np.ndarray, times: np.ndarray) -> list[scipy.sparse.csc_array]:
+    def constraint_jacobians(self, poses: np.ndarray, times: np.ndarray) -> list[Columns]:
         """Return Phi_q in spatial displacements at each of some poses, (times, bodies, 18), of rigid bodies."""
         places = [Configuration(pose) for pose in poses]
         return self.assembler.constraint_jacobians(places, times, self.state_start)
@@ -145,13 +145,11 @@ class BaseSystem:
         self.model = self.model.with_rows(kept)
         self.assembler = Assembler(self.model)
 
-    def dropped_rates(
-        self, configuration: Configuration, t: float
-    ) -> tuple[scipy.sparse.csc_array, np.ndarray, list[str]]:
+    def dropped_rates(self, configuration: Configuration, t: float) -> tuple[Columns, np.ndarray, list[str]]:
         """Return Phi_q, Phi_q v + Phi_t and the names of the rows dropped as redundant, at a configuration."""
         phi_q, _, rate = self._of_whole.constraints(configuration, t, self.state_start)
         return (
-            scipy.sparse.csc_array(phi_q[self._dropped]),
+            phi_q.chosen(self._dropped),
             rate[self._dropped],
             [self.whole.names.rows[i] for i in self._dropped],
         )

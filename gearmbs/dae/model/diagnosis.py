@@ -14,6 +14,7 @@ from gearmbs.dae.problem import AssemblyError, ModelError
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.base_system import BaseSystem
+    from gearmbs.dae.model.columns import Columns
     from gearmbs.dae.model.model import Configuration, Model
 
 LARGEST_LOCK = 600
@@ -93,7 +94,7 @@ def body_of(model: Model, coordinate: int) -> str:
     return model.names.bodies[owners[coordinate - 6 * bodies]]
 
 
-def is_massless(model: Model, matrix: scipy.sparse.csc_array) -> bool:
+def is_massless(model: Model, matrix: Columns) -> bool:
     """Return whether some motion allowed by the constraints has no inertia."""
     inertia = model.bodies[1:, T.BODY_INERTIA :].reshape(-1, 3, 3)
     if np.all(model.bodies[1:, T.BODY_MASS] > 0.0) and np.all(np.linalg.eigvalsh(inertia)[:, 0] > 0.0):
@@ -101,12 +102,12 @@ def is_massless(model: Model, matrix: scipy.sparse.csc_array) -> bool:
     return free_massless_body(model, matrix) is not None
 
 
-def free_massless_body(model: Model, matrix: scipy.sparse.csc_array) -> str | None:
+def free_massless_body(model: Model, columns: Columns) -> str | None:
     """Return a body that the constraints let move without any inertia, None when there is none."""
     from scipy.linalg import null_space
 
     base = model.counts.spatial
-    matrix = _by_own_inertia(matrix, base)
+    matrix = _by_own_inertia(columns.sparse(), base)
     if base > DENSE_COORDINATES:
         return _free_massless_body_of_many(model, matrix)
     constraint = matrix[base:, :base].toarray()
@@ -159,7 +160,7 @@ def _free_massless_body_of_many(model: Model, matrix: scipy.sparse.csc_array) ->
     return body_of(model, int(np.argmax(np.abs(motion[:base]))))
 
 
-def singular_message(model: Model, matrix: scipy.sparse.csc_array) -> str:
+def singular_message(model: Model, matrix: Columns) -> str:
     """Say why the accelerations are not determined."""
     name = free_massless_body(model, matrix)
     if name is not None:
@@ -213,7 +214,8 @@ def conflict(system: BaseSystem, configuration: Configuration, t: float) -> str 
 
 def _violated(system: BaseSystem, configuration: Configuration, t: float) -> tuple[str, float] | None:
     """Return the name and rate of the redundant row most violated, None when none is."""
-    jacobian, rate, names = system.dropped_rates(configuration, t)
+    rows, rate, names = system.dropped_rates(configuration, t)
+    jacobian = rows.sparse()
     velocities = configuration.velocities
     speeds = np.abs(velocities)
     moving = jacobian @ velocities

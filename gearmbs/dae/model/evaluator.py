@@ -7,7 +7,6 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import scipy
 from numba import float64, int64
 
 from gearmbs.dae.equations import accelerations as index1
@@ -30,6 +29,7 @@ from gearmbs.dae.equations.unknowns import COUNT, I3, NUMBERS, PLACES, compresse
 from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
+from gearmbs.dae.model.columns import Columns
 from gearmbs.dae.model.records import (
     FARTHEST,
     RECORDS_TYPE,
@@ -319,7 +319,7 @@ POSE_PLACES = 6
 class Assembled(NamedTuple):
     """The acceleration system of a model at a configuration, with the unknowns and tables it was made from."""
 
-    matrix: scipy.sparse.csc_array
+    matrix: Columns
     rhs: np.ndarray
     phi: np.ndarray
     loads: np.ndarray
@@ -385,20 +385,20 @@ class Assembler:
         n = indptr.size - 1
         vals = np.zeros(indices.size)
         records = assemble(np.array([t]), y[None, :], slots, idata, rdata, size, vals)
-        matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(n, n))
+        matrix = Columns(vals, indices, indptr, (n, n))
         return Assembled(matrix, records.solution[0], records.phi[0], records.loads[0], y, idata, rdata, work)
 
     def constraints(
         self, configuration: Configuration, t: float, states: np.ndarray
-    ) -> tuple[scipy.sparse.csc_array, np.ndarray, np.ndarray]:
+    ) -> tuple[Columns, np.ndarray, np.ndarray]:
         """Return Phi_q in spatial displacements and modal coordinates, Phi, and Phi_q v + Phi_t."""
         found = self.at(configuration, t, None, states)
         base = int(found.idata[T.H_COORDINATES])
-        return scipy.sparse.csc_array(found.matrix[base:, :base]), found.phi[0::3].copy(), found.phi[1::3].copy()
+        return found.matrix.below(base, base), found.phi[0::3].copy(), found.phi[1::3].copy()
 
     def constraint_jacobians(
         self, configurations: Sequence[Configuration], times: np.ndarray, states: np.ndarray
-    ) -> list[scipy.sparse.csc_array]:
+    ) -> list[Columns]:
         """Return Phi_q at each of some configurations."""
         return [
             self.constraints(configuration, float(t), states)[0]
@@ -490,7 +490,7 @@ def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, re
     indptr, indices, slots = matrix_pattern
     vals, n = np.zeros(indices.size), indptr.size - 1
     one = assemble(t, y, slots, idata, rdata, work_size, vals)
-    matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(n, n)).toarray()
+    matrix = Columns(vals, indices, indptr, (n, n)).toarray()
     # rows and columns to one size first, or masses and constraints would be told apart by their units
     scale = 1.0 / np.sqrt(np.maximum(np.abs(matrix).max(axis=1), 1e-300))
     scaled = scale[:, None] * matrix * scale

@@ -17,6 +17,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints.terms import ROTATION
 from gearmbs.dae.equations.loads.time_functions import CONSTANT
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
+from gearmbs.dae.model.columns import DENSE_SYSTEM, Columns
 from gearmbs.dae.model.evaluator import POSE_PLACES, Assembler
 from gearmbs.dae.model.model import Model, frozen
 from gearmbs.dae.problem import AssemblyError, SingularModelError
@@ -45,8 +46,6 @@ VISIBLE = 1e-3
 VISIBLE_TURN = np.radians(0.1)
 DENSE_ROWS = 400
 """Rows up to which redundancy is looked for by a dense factorisation."""
-DENSE_SYSTEM = 250
-"""Rows and coordinates up to which a dense elimination takes less time than to put a sparse matrix together."""
 SURE = 1e-12
 """Squared distance of a row from the others, all of length 1, above which it is independent beyond rounding."""
 DOUBTFUL = (1e-6, 1e-3)
@@ -118,7 +117,7 @@ class InitialReport:
 
 
 def independent_rows(
-    jacobian: scipy.sparse.csc_array, weights: np.ndarray, least: float = LEAST, order: np.ndarray | None = None
+    jacobian: Columns, weights: np.ndarray, least: float = LEAST, order: np.ndarray | None = None
 ) -> np.ndarray:
     """Return the indices of a largest set of independent rows of the constraint Jacobian, in order.
 
@@ -131,7 +130,7 @@ def independent_rows(
     if m == 0:
         return np.zeros(0, dtype=np.int64)
     if m > DENSE_ROWS:
-        scaled = scipy.sparse.csr_array(jacobian @ scipy.sparse.diags_array(1.0 / np.sqrt(weights)))[order]
+        scaled = scipy.sparse.csr_array(jacobian.sparse() @ scipy.sparse.diags_array(1.0 / np.sqrt(weights)))[order]
         norms = np.sqrt(np.asarray((scaled.multiply(scaled)).sum(axis=1)).ravel())
         norms[norms == 0.0] = 1.0
         kept = _sparse_rows(scipy.sparse.csc_array(scipy.sparse.diags_array(1.0 / norms) @ scaled), least)
@@ -146,11 +145,25 @@ def independent_rows(
 def _dense_rows(dense: np.ndarray, least: float) -> np.ndarray:
     """Independent rows of a matrix whose rows have length 1, earlier ones preferred."""
     m = len(dense)
+    if least <= LEAST and _are_sure(dense):
+        return np.arange(m)
     r_diagonal = np.abs(np.diag(scipy.linalg.qr(dense.T, mode="r", pivoting=True)[0]))
     rank = int(np.sum(r_diagonal > RANK_TOLERANCE * max(1.0, r_diagonal[0])))
     if rank == m and least <= LEAST:
         return np.arange(m)
     return _greedy_rows(dense, rank, least)
+
+
+def _are_sure(dense: np.ndarray) -> bool:
+    """Return whether each row is farther from the others than rounding can hide: R R^T - SURE 1 is positive definite.
+
+    The least singular value, squared, is then above `SURE`, and none of a QR decomposition's diagonal below its root.
+    """
+    try:
+        np.linalg.cholesky(dense @ dense.T - SURE * np.eye(len(dense)))
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _pivots(gram: scipy.sparse.csc_array, order: str) -> np.ndarray | None:
@@ -221,7 +234,7 @@ def _greedy_rows(dense: np.ndarray, rank: int, least: float = LEAST) -> np.ndarr
     return np.array(kept, dtype=np.int64)
 
 
-def least_correction(jacobian: scipy.sparse.csc_array, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
+def least_correction(jacobian: Columns, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
     """Solve min |x|_W subject to jacobian x = -violation."""
     m, n = jacobian.shape
     rhs = np.concatenate([np.zeros(n), -violation])
@@ -231,7 +244,8 @@ def least_correction(jacobian: scipy.sparse.csc_array, weights: np.ndarray, viol
             full[np.arange(n), np.arange(n)] = weights
             full[n:, :n], full[:n, n:] = dense, dense.T
             return np.linalg.solve(full, rhs)[:n]
-        kkt = scipy.sparse.block_array([[scipy.sparse.diags_array(weights), jacobian.T], [jacobian, None]])
+        rows = jacobian.sparse()
+        kkt = scipy.sparse.block_array([[scipy.sparse.diags_array(weights), rows.T], [rows, None]])
         return scipy.sparse.linalg.splu(scipy.sparse.csc_array(kkt)).solve(rhs)[:n]
     except (RuntimeError, np.linalg.LinAlgError) as error:
         raise AssemblyError(
@@ -244,7 +258,7 @@ class _Constrained(NamedTuple):
     """A configuration with the constraints there: Phi_q in spatial displacements, and Phi."""
 
     configuration: Configuration
-    jacobian: scipy.sparse.csc_array
+    jacobian: Columns
     phi: np.ndarray
 
 
@@ -369,7 +383,7 @@ def _closed(
             raise _not_finite(system, phi, t)
         if size <= POSITION_TOLERANCE * max(1.0, length):
             return here, iteration
-        step = least_correction(scipy.sparse.csc_array(jacobian[kept]), weights, phi[kept])
+        step = least_correction(jacobian.chosen(kept), weights, phi[kept])
         turn = np.abs(configuration.parts(step)[0][:, 3:]).max(initial=0.0)
         here = _constrained(system, configuration.displaced(step * min(1.0, 0.5 / max(turn, 1e-300))), t)
     if size > 1e-9 * max(1.0, length):
@@ -438,14 +452,8 @@ class Turn:
         return abs(self.angle) > 0.5 * np.pi
 
 
-def _entries(matrix: scipy.sparse.csc_array, row: int, columns: np.ndarray) -> np.ndarray:
-    """Return the entries of a row in some columns; scipy's own way takes a hundred times as long."""
-    ends = zip(matrix.indptr[columns], matrix.indptr[columns + 1], strict=True)
-    return np.array([matrix.data[a:b][matrix.indices[a:b] == row].sum() for a, b in ends])
-
-
 def prescribed_turns(
-    system: BaseSystem, configuration: Configuration, jacobian: scipy.sparse.csc_array, phi: np.ndarray
+    system: BaseSystem, configuration: Configuration, jacobian: Columns, phi: np.ndarray
 ) -> list[Turn]:
     """Return the prescribed rotations at a configuration whose constraint Jacobian and Phi are given."""
     model = system.model
@@ -461,7 +469,7 @@ def prescribed_turns(
         # one of the bodies moves: its rotation about the axis changes the sine by the cosine
         body, sense = (body_i, 1.0) if body_i > 0 else (body_j, -1.0)
         columns = POSE_PLACES * (body - 1) + 3 + np.arange(3)
-        cosine = sense * float(_entries(jacobian, row, columns) @ j[:, 2])
+        cosine = sense * float(jacobian.entries(row, columns) @ j[:, 2])
         angle = float(np.arctan2(i[:, 0] @ j[:, 1], i[:, 0] @ j[:, 0]))
         found.append(Turn(row, angle, float(np.arctan2(-phi[row], cosine))))
     return found

@@ -59,10 +59,7 @@ def accelerations(
     for attempt in range(MAX_LOAD_ITERATIONS if _coupled(system.model) else 1):
         found = system.assembler.at(configuration, t, inner, system.state_start)
         diagnosis.check_finite(system, found.rhs, found.loads, t)
-        try:
-            solution = scipy.sparse.linalg.splu(found.matrix).solve(found.rhs)
-        except RuntimeError:
-            solution = np.full(found.rhs.size, np.nan)
+        solution = found.matrix.solved(found.rhs)
         if not np.all(np.isfinite(solution)) or (attempt == 0 and diagnosis.is_massless(system.model, found.matrix)):
             raise SingularModelError(diagnosis.singular_message(system.model, found.matrix))
         y, idata = found.y, found.idata

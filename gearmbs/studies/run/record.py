@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import platform
+import sys
 from collections.abc import Collection
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -187,7 +188,8 @@ def _even_times(case: Case, known: Measured, start: float, stop: float, *, even:
 
 
 def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
-    """Return the dataset of variables over time, whichever of `SERIES` there are."""
+    """Return the dataset of variables over time, whichever of `SERIES` there are; numbers of teeth are integers."""
+    import pandas as pd
     import xarray as xr
 
     units = {**SMOOTH, **COUNTS, "transmission_error": "m"}
@@ -202,8 +204,10 @@ def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
             data[name] = (("time", "xyz"), values[name], {"units": "N", "long_name": text})
         else:
             text = long_names.get(name, name.replace("_", " "))
-            data[name] = ("time", values[name], {"units": units[name], "long_name": text})
-    coords: dict[str, Any] = {"time": ("time", t, {"units": "s"})}
+            series = values[name].astype(np.int16, copy=False) if name in COUNTS else values[name]
+            data[name] = ("time", series, {"units": units[name], "long_name": text})
+    # the times as they are, not a copy of them
+    coords: dict[str, Any] = {"time": ("time", pd.Index(t, copy=False), {"units": "s"})}
     if any(name in data for name in FORCES):
         coords["xyz"] = ["x", "y", "z"]
     return xr.Dataset(data, coords=coords)
@@ -222,8 +226,9 @@ def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) ->
     force = force[first:last]
     values = component_values(force[:, :-1], angle, sense=pair.rotation)
     values[:, -1] = force[:, -1]
+    values /= mass
     return make_signal(
-        values / mass,
+        values,
         rate,
         units="m/s^2",
         channels=COMPONENTS,
@@ -271,7 +276,11 @@ def _turning(case: Case, t: np.ndarray) -> dict[str, Any]:
 # What a record says of itself: every parameter of its case, its bearings, the versions, and what the run cost.
 
 
-_version = functools.cache(version)
+@functools.cache
+def _version(package: str) -> str:
+    """Return the version of an installed package: its own word, where it has been imported, takes no file to parse."""
+    own = getattr(sys.modules.get(package), "__version__", None)
+    return version(package) if own is None else own
 
 
 def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:

@@ -100,22 +100,24 @@ def _taken(part: Solution, turned: _Turned) -> np.ndarray:
     return np.column_stack([*forces, size, turned.error(part), *(told[name] for name in CONTACT)])
 
 
-def _joined(parts: Sequence[Taken]) -> Taken:
+def _joined(parts: Sequence[Taken]) -> Measured:
     """Return times and columns of some parts as one."""
-    t, columns = zip(*parts, strict=True)
-    return np.concatenate(t), np.concatenate(columns)
+    t, found = zip(*parts, strict=True)
+    columns = np.concatenate(found)
+    return _named(np.concatenate(t), columns[:, : -len(COUNTS)], columns[:, -len(COUNTS) :])
 
 
-def _named(t: np.ndarray, columns: np.ndarray) -> Measured:
-    """Return columns of `_taken` by their names."""
-    contact = {name: columns[:, FORCES + 1 + k] for k, name in enumerate(CONTACT)}
+def _named(t: np.ndarray, columns: np.ndarray, counts: np.ndarray) -> Measured:
+    """Return columns of `_taken`, the last of them apart, by their names."""
+    contact = {name: columns[:, FORCES + 1 + k] for k, name in enumerate(SMOOTH)}
+    contact |= {name: counts[:, k] for k, name in enumerate(COUNTS)}
     return Measured(t, columns[:, :FORCES], columns[:, FORCES], contact)
 
 
 def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> Measured:
     """Return what a record is made from at the output times ``rows`` of a solution, default all."""
     turned = _Turned(case)
-    return _named(*_joined([(part.t.copy(), _taken(part, turned)) for part in solution.parts(rows)]))
+    return _joined([(part.t.copy(), _taken(part, turned)) for part in solution.parts(rows)])
 
 
 def rows_of_record(case: Case, t: np.ndarray, begin: float | None = None) -> np.ndarray:
@@ -212,13 +214,13 @@ class Recorder:
     def measured(self) -> Measured:
         """Return what the record is made from: samples, or all steps inside the span of its filters and some before."""
         if self._samples is not None:
-            return _named(self._samples.t, self._samples.finish())
-        return _named(*_joined(self._parts))
+            return _named(self._samples.t, *self._samples.finish())
+        return _joined(self._parts)
 
     def tail(self, after: float) -> Measured:
         """Return what was taken after a time, and a little before."""
         first = next((k for k, (t, _) in enumerate(self._parts) if t[-1] > after), 0)
-        return _named(*_joined(self._parts[first:]))
+        return _joined(self._parts[first:])
 
     def everything(self) -> Measured:
         """Return what was taken from the start on, for a run that failed: samples where steps are not kept."""
@@ -227,7 +229,7 @@ class Recorder:
         for t, columns in self._parts if self._samples is None else self._samples.known():
             first = int(np.searchsorted(t, early.t[-1], side="right"))
             parts.append((t[first:], columns[first:]))
-        return _named(*_joined(parts))
+        return _joined(parts)
 
     def _solution_over(self, wanted: np.ndarray | None = None) -> Solution:
         """Return the solution over the steps whose unknowns were kept, or over some of them, by increasing numbers."""

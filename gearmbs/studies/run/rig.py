@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.bearings import Bearing, BearingError, RollingBearing, add_bearing
-from gearmbs.bearings.kinds import require
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.studies.case.drive import drive_angle, load_torque
@@ -17,6 +15,7 @@ from gearmbs.units import Quantity, to_si
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearmbs.bearings import Bearing
     from gearmbs.dae.results.solution import Solution
     from gearmbs.flexible import ElasticMaterial
     from gearmbs.flexible.material import Damping
@@ -168,6 +167,8 @@ def bearing_rig(
     >>> sorted(rig.bodies)
     ['housing', 'spindle']
     """
+    from gearmbs.bearings import BearingError, add_bearing
+
     speed = to_si(speed, "angular speed", "speed")
     radial, axial = to_si(radial_load, "force", "radial_load"), to_si(axial_load, "force", "axial_load")
     run_up, mass = to_si(run_up, "time", "run_up"), to_si(housing_mass, "mass", "housing_mass")
@@ -234,6 +235,9 @@ def rolling_rig(
     Mechanism
         Bearings are named "bearing 1 a", "bearing 1 b", "bearing 2 a", "bearing 2 b".
     """
+    from gearmbs.bearings import RollingBearing
+    from gearmbs.bearings.kinds import require
+
     names = [f"{name} {end}" for name in BEARINGS for end in ENDS]
     for given in each or {}:
         require(given in names, f"each: there is no {given!r}; choose among {', '.join(names)}")

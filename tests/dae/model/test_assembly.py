@@ -16,7 +16,7 @@ def scaled_jacobian(mechanism: Mechanism) -> csc_array:
     """Rows of length 1."""
     system = mechanism.compile()
     jacobian, _, _ = system.constraint_jacobian(system.pose, 0.0)
-    scaled = csc_array(jacobian @ diags_array(1.0 / np.sqrt(system.coordinate_weights())))
+    scaled = csc_array(jacobian.sparse() @ diags_array(1.0 / np.sqrt(system.coordinate_weights())))
     norms = np.sqrt(np.asarray(scaled.multiply(scaled).sum(axis=1)).ravel())
     return csc_array(diags_array(1.0 / norms) @ scaled)
 
