@@ -22,6 +22,9 @@ from benchmarks.markdown import number, table
 SPAN = 0.2
 """Simulated time of each run, s."""
 STAGES = (1, 2, 5, 10)
+TURNING = (1, 10, 20, 30)
+"""Stages whose shafts are integrated by their angles alone."""
+ALONE = ", angles alone"
 
 
 def stages_in_line(count: int) -> Any:
@@ -62,6 +65,11 @@ def models() -> dict[str, tuple[Any, float, int, int]]:
     for name, train in trains.items():
         m = train.build()
         out[name] = (m, train.rate_scale, len(train.meshes), len(m.bodies))
+    for n in TURNING:
+        train = stages_in_line(n)
+        m = train.build()
+        m.lump = True
+        out[f"{n} stage{'s' if n > 1 else ''} in line{ALONE}"] = (m, train.rate_scale, n, len(m.bodies))
     return out
 
 
@@ -92,9 +100,9 @@ def measure(repeats: int, span: float = SPAN, report: Callable[[str], None] = pr
     ]  # fmt: skip
 
 
-def exponent(rows: list[dict[str, Any]]) -> float:
+def exponent(rows: list[dict[str, Any]], ending: str) -> float:
     """Return the exponent with which processor time grows with the number of stages in line."""
-    line = [row for row in rows if "in line" in row["model"]]
+    line = [row for row in rows if row["model"].endswith(ending)]
     return float(np.polyfit(np.log([row["meshes"] for row in line]), np.log([row["seconds"] for row in line]), 1)[0])
 
 
@@ -113,7 +121,9 @@ def render(rows: list[dict[str, Any]], span: float = SPAN) -> str:
         "us a step and body", "ms a mesh cycle",
     ]  # fmt: skip
     return (
-        table(header, cells) + f"\nStages in line: processor time grows with the power {exponent(rows):.2f} of them.\n"
+        table(header, cells)
+        + f"\nStages in line: processor time grows with the power {exponent(rows, 'in line'):.2f} of them, with angles "
+        + f"alone {exponent(rows, ALONE):.2f}.\n"
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
-from gearmbs.dae.model.fixed_axes import Axis, fixed_axis_problem, starting_values
+from gearmbs.dae.model.fixed_axes import ON_AXIS, Axis, fixed_axis_problem, starting_values
 from gearmbs.dae.model.members import TURN_COLUMNS, TURN_I, TURN_J, TURN_ROOT, TURN_ROWS, TURN_SIDE
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.joints import Joint, Row
@@ -38,8 +38,8 @@ Hinge = tuple[Joint, Joint | None]
 def hinges(bodies: Mapping[str, Body], joints: Collection[Joint], rows: Collection[str]) -> dict[str, Hinge] | None:
     """Return the hinge of each body, by its name, or None if some body moves in another way.
 
-    Each body must have one revolute joint on the ground with all its rows, and at most a rotation of that joint; no
-    other row may be kept.
+    Each body must have one revolute joint on the ground with all its rows, and at most a rotation about its axis, of
+    that joint or between markers of its own; no other row may be kept.
 
     Parameters
     ----------
@@ -64,13 +64,24 @@ def hinges(bodies: Mapping[str, Body], joints: Collection[Joint], rows: Collecti
             found[moving[0].name] = (joint, None)
         else:
             return None
-    by_markers = {(id(joint.i), id(joint.j)): name for name, (joint, _) in found.items()}
     for motion in motions:
-        name = by_markers.pop((id(motion.i), id(motion.j)), None)
-        if name is None:
+        name = motion.j.body.name if motion.i.body.is_ground else motion.i.body.name
+        hinge = found.get(name)
+        if hinge is None or hinge[1] is not None or not _turns_about(motion, hinge[0]):
             return None
-        found[name] = (found[name][0], motion)
+        found[name] = (hinge[0], motion)
     return found if len(found) == len(bodies) else None
+
+
+def _turns_about(motion: Joint, joint: Joint) -> bool:
+    """Return whether a rotation is one of I about z_J of a joint: between the same bodies, with axes along its own.
+
+    A rotation exerts a moment and no force, so that its markers may be anywhere.
+    """
+    pairs = ((motion.i, joint.i), (motion.j, joint.j))
+    return all(
+        a.body is b.body and np.abs(a.orientation[:, 2] - b.orientation[:, 2]).max() <= ON_AXIS for a, b in pairs
+    )
 
 
 def axes_of(system: System, found: dict[str, Hinge]) -> list[Axis]:
@@ -99,13 +110,13 @@ def turn_table(whole: System, system: System, found: dict[str, Hinge], starts: n
         row[TURN_ROWS : TURN_ROWS + len(places)] = places
         if motion is not None:
             row[TURN_ROWS + 5] = at[f"{motion.name}: {motion.rows[0].label}"]
-            row[TURN_ROOT] = _root(system, joint, start)
+            row[TURN_ROOT] = _root(system, motion, start)
     return table
 
 
-def _root(system: System, joint: Joint, start: float) -> int:
+def _root(system: System, motion: Joint, start: float) -> int:
     """Return 1 if x_I starts where the motion has turned x_J to, -1 if it is opposite to it."""
-    i, j = (_axes(system, marker) for marker in (joint.i, joint.j))
+    i, j = (_axes(system, marker) for marker in (motion.i, motion.j))
     return 1 if i[:, 0] @ (j[:, 0] * np.cos(start) + j[:, 1] * np.sin(start)) > 0.0 else -1
 
 
@@ -164,7 +175,7 @@ def lumped(mechanism: Mechanism, t0: float = 0.0) -> Lumped | None:
     """Return a mechanism with the bodies that fixed joints connect as one, or None if that leaves no less to integrate.
 
     What is left is less, too, where each body can only turn about a fixed axis: in one revolute joint on the ground,
-    driven by a rotation of it or not, see `gearmbs.dae.equations.fixed_axes`.
+    driven by a rotation about it or not, see `gearmbs.dae.equations.fixed_axes`.
 
     All bodies are assembled first, so that errors, remarks and redundant rows are those of the whole mechanism. A fixed
     joint stays as it is

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.model.members import TURN_ROOT
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.lumping import lumped
+from gearmbs.mechanism.parts.functions import as_function
+from gearmbs.mechanism.parts.joints import Joint, Row, Term
 from gearmbs.studies import Case, simulate_case
 from tests.mechanism.test_lumping import TIGHT, agree, exact_reactions
 from tests.mechanism.test_own_forces import maxwell
@@ -269,6 +272,37 @@ def test_a_driven_bodies_only_mechanism_has_nothing_to_integrate():
     m.rotation("drive", m.revolute("pin", bob, m.ground, at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0)), "TIME**2")
     assert not is_reduced(m)
     agree(m.simulate(0.5, lump=True, **TIGHT), m.simulate(0.5, **TIGHT), 1e-8)
+
+
+def driven_elsewhere(apart: float, tilt: float = 0.0) -> Mechanism:
+    """The rotor, its hub driven between markers of their own, further along the axis: x axes apart, z axes tilted."""
+    m = rotor()
+    pin, place = m.joints["pin"], np.array([0.15, 0.05, 0.02]) + 0.3 * SKEW
+    ends = []
+    for marker, turn in ((pin.i, apart), (pin.j, 0.0)):
+        body = marker.body
+        axes = marker.global_orientation() @ Rotation.from_euler("zx", [turn, tilt]).as_matrix()
+        ends.append(body.marker(body.orientation.T @ (place - body.position), body.orientation.T @ axes))
+    function = as_function("0.2 + 3*TIME + 0.1*SIN(7*TIME)", "rad", "drive")
+    row = Row("angle", (Term(terms.ROTATION, *ends),), None, function)
+    m.joints["drive"] = Joint("drive", "rotation", *ends, [row])
+    return m
+
+
+@pytest.mark.parametrize("apart", [0.2, np.pi + 0.2])
+def test_a_motion_between_markers_of_its_own(apart):
+    """Where they are along the axis makes no difference, as a rotation exerts a moment alone."""
+    assert reduced(driven_elsewhere(apart))[1].turn[0, TURN_ROOT] == (1 if apart < 1.0 else -1)
+    lump, full = (driven_elsewhere(apart).simulate(0.5, lump=on, **TIGHT) for on in (True, False))
+    assert lump.problem.n == 2
+    agree(lump, full, 1e-6)
+    exact_reactions(lump, 7)
+
+
+def test_a_motion_about_another_axis_keeps_six_coordinates():
+    assert not is_reduced(driven_elsewhere(0.2, tilt=1e-3))
+    lump, full = (driven_elsewhere(0.2, tilt=1e-3).simulate(0.2, lump=on, **TIGHT) for on in (True, False))
+    agree(lump, full, 1e-6)
 
 
 @pytest.mark.parametrize("level", ["displacement", "velocity", "acceleration"])
