@@ -198,7 +198,7 @@ class Orbit:
     near : ndarray, shape (m, m)
         The monodromy matrix of a motion near it, by which it was found.
     own : bool
-        Whether that is its own.
+        Whether that is its own, looked through for jumps of the equations.
     error : float
         By how much the start is off at most, as part of the orbit's own size: Newton's next correction.
     defect : float
@@ -242,15 +242,20 @@ class Orbit:
         return abs(self.largest) < 1.0
 
 
-def monodromy_of(problem: DAEProblem, result: DAEResult, directions: Directions) -> np.ndarray:
-    """Return how independent unknowns at the end of a run change with those at its start, shape (m, m)."""
+def monodromy_of(
+    problem: DAEProblem, result: DAEResult, directions: Directions, jumps: bool = True
+) -> np.ndarray:
+    """Return how independent unknowns at the end of a run change with those at its start, shape (m, m).
+
+    Where the equations jump it is not known, and refused; without ``jumps`` what they add is missing.
+    """
     none = np.zeros(0, dtype=np.int64), np.zeros(0)
     columns = zip(directions.places, directions.basis.T, strict=True)
     starts = [Direction(problem.names[i], column, *none) for i, column in columns]
     end = replace(result, t=result.t[-1:], y=result.y[-1:], yp=result.yp[-1:])
     longest = float(result.t[-1] - result.t[0]) / LEAST_STEPS
     try:
-        followed = follow(problem, end, starts, longest)
+        followed = follow(problem, end, starts, longest, jumps)
     except ModelError as error:
         raise NoOrbit(f"how disturbances go on is not known: {error}") from None
     return np.ascontiguousarray(followed.s[:, -1, directions.places].T)
@@ -488,28 +493,31 @@ class Search:
             else:
                 return None
             if found.defect > FAST * orbit.defect:
-                found = self.with_matrix(found, found.monodromy, True)
+                found = self.with_matrix(found, self.near(found.problem, found.result, found.directions))
             orbit = found
 
     def tried(self, problem: DAEProblem, matrix: np.ndarray | None) -> Orbit:
         """Return a motion over a period as an orbit, with a matrix that is known or its own."""
         result = self.integrate(problem)
         start = replace(problem, y0=result.y[0].copy(), yp0=result.yp[0].copy())
-        own = matrix is None
         # the tangent space is another one at each start
         directions = directions_at(start, self.directions.places)
         if matrix is None:
-            matrix = monodromy_of(start, result, directions)
+            matrix = self.near(start, result, directions)
         gone = (result.t - result.t[0])[:, None] / self.period * self.advance[self.tested]
         apart = (result.y[:, self.tested] - gone) * self.weight
         size = 0.5 * float(np.ptp(apart, axis=0).max(initial=0.0)) + np.finfo(float).tiny
-        known = self.advance, result, directions, matrix, own
+        known = self.advance, result, directions, matrix, False
         orbit = Orbit(start, self.period, *known, 0.0, 0.0, size, self.periods)
-        return self.with_matrix(replace(orbit, defect=self.size_of(self.missing(orbit))), matrix, own)
+        return self.with_matrix(replace(orbit, defect=self.size_of(self.missing(orbit))), matrix)
 
-    def with_matrix(self, orbit: Orbit, matrix: np.ndarray, own: bool) -> Orbit:
-        """Return a motion with another matrix, its own or not, and what is left to correct by it."""
-        orbit = replace(orbit, near=matrix, own=own)
+    def near(self, problem: DAEProblem, result: DAEResult, directions: Directions) -> np.ndarray:
+        """Return the matrix that Newton's steps take. Jumps are looked for in the orbit alone."""
+        return monodromy_of(problem, result, directions, jumps=False)
+
+    def with_matrix(self, orbit: Orbit, matrix: np.ndarray) -> Orbit:
+        """Return a motion with another matrix, and what is left to correct by it."""
+        orbit = replace(orbit, near=matrix)
         return replace(orbit, error=self.size_of(self.step(orbit)) / orbit.size)
 
     def size_of(self, change: np.ndarray) -> float:

@@ -63,6 +63,7 @@ class Track(Struct):
     seen: int  # outputs written
     has_hook: bool
     nonlinear_rates: bool
+    jumps: bool  # are looked for
     growth_limit: float
     gamma: float  # of the matrix that is factored
     times: Vector

@@ -269,7 +269,8 @@ def follow_run(
                     tr.y[1, i] = tr.y[0, i]
                     for p in range(count):
                         tr.s[count + p, i] = tr.s[p, i]
-        look_for_jumps(functions, tr, plan, factors, k, yp[m], idata, rdata, work)
+        if tr.jumps:
+            look_for_jumps(functions, tr, plan, factors, k, yp[m], idata, rdata, work)
         tr.n_past = min(past + 1, HISTORY)
         _write_outputs(tr, k, outputs, s_out, sp_out)
         if tr.has_hook and flags[m] & END_OF_STEP != 0:
@@ -359,7 +360,13 @@ def points_of(sol: DenseOutput, longest: float = np.inf) -> tuple[np.ndarray, np
     return np.array(times), np.array(orders, dtype=np.int64), np.array(flags, dtype=np.int64)
 
 
-def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction], longest: float = np.inf) -> Followed:
+def follow(
+    problem: DAEProblem,
+    result: DAEResult,
+    directions: list[Direction],
+    longest: float = np.inf,
+    jumps: bool = True,
+) -> Followed:
     """Return the sensitivities of a run at its outputs.
 
     Parameters
@@ -372,6 +379,9 @@ def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction], 
         The parameters.
     longest : float
         Longest step that the run was allowed, s.
+    jumps : bool
+        Whether jumps are looked for, which takes as long as all the rest with few directions. Without, what they add
+        is missing in silence: for matrices whose worth shows by itself, as Newton's.
 
     Raises
     ------
@@ -386,7 +396,7 @@ def follow(problem: DAEProblem, result: DAEResult, directions: list[Direction], 
     # where the run starts afresh the equations may have jumped already
     before_jump = np.append(flags[1:] & AFRESH != 0, False)
     looked = np.where(before_jump, np.nextafter(times, -np.inf), times)
-    tr = _track(problem, directions)
+    tr = _track(problem, directions, jumps)
     tr.times[0] = sol.t_min
     tr.y[0] = problem.y0
     for p, direction in enumerate(directions):
@@ -445,7 +455,7 @@ def _plan_at(problem, tr, args, at, y, yp, idata, rdata, work):
     return plan, factors
 
 
-def _track(problem: DAEProblem, directions: list[Direction]) -> Track:
+def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Track:
     """Return the track of a run before its first point."""
     n, count = problem.n, len(directions)
     first = np.cumsum([0, *(d.places.size for d in directions)]).astype(np.int64)
@@ -455,6 +465,7 @@ def _track(problem: DAEProblem, directions: list[Direction]) -> Track:
         n_past=1,
         has_hook=problem.hook is not None,
         nonlinear_rates=problem.nonlinear_rates,
+        jumps=jumps,
         growth_limit=GROWTH_LIMIT,
         gamma=0.0,
         times=np.zeros(HISTORY),
