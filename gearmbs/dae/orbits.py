@@ -226,6 +226,10 @@ class Orbit:
         """How the independent unknowns at the end change with those at the start, shape (m, m)."""
         return self.near if self.own else monodromy_of(self.problem, self.result, self.directions)
 
+    def looked_through(self) -> Orbit:
+        """Return it with its own matrix; raise NoOrbit if its equations jump, so that this is not known."""
+        return replace(self, near=self.monodromy, own=True)
+
     @cached_property
     def multipliers(self) -> np.ndarray:
         """Floquet multipliers, the eigenvalues of the monodromy matrix, the largest first, shape (m,), complex."""
@@ -242,9 +246,7 @@ class Orbit:
         return abs(self.largest) < 1.0
 
 
-def monodromy_of(
-    problem: DAEProblem, result: DAEResult, directions: Directions, jumps: bool = True
-) -> np.ndarray:
+def monodromy_of(problem: DAEProblem, result: DAEResult, directions: Directions, jumps: bool = True) -> np.ndarray:
     """Return how independent unknowns at the end of a run change with those at its start, shape (m, m).
 
     Where the equations jump it is not known, and refused; without ``jumps`` what they add is missing.
@@ -334,7 +336,7 @@ def find_orbit(
     """
     search = Search(problem, float(period), advance, tol, method, most, closed)
     search.follow(settle)
-    return search.found()
+    return search.found().looked_through()
 
 
 def attracting_orbit(
@@ -366,7 +368,7 @@ def attracting_orbit(
         first = orbit.largest
         if abs(first) < 1.0:
             search.approach(orbit)
-            return replace(orbit, near=orbit.monodromy, own=True, periods=search.periods)
+            return replace(orbit.looked_through(), periods=search.periods)
         if not (first.real < -1.0 and first.imag == 0.0) or doubling == DOUBLINGS:
             break
         search.double()

@@ -131,6 +131,20 @@ def test_what_differs_between_the_ends_of_a_period_is_seen():
         assert steady_motion(oscillator(force), TAU).stable
 
 
+@pytest.mark.parametrize("attracting", [True, False])
+def test_where_equations_jump_at_a_state_multipliers_are_not_known(attracting):
+    """The jump is looked for in the orbit that was found; one with a width, and one out of reach, have multipliers."""
+    settings = {"tol": 1e-8, "attracting": attracting}
+    force = "3*COS(6*TIME)-2*VX(I,J)-40*DX(I,J)"
+    with pytest.raises(NoOrbit, match=says("equations jump", "STEP")):
+        steady_motion(oscillator(f"{force}+IF(DX(I,J): -1,0,1)"), TAU / 6.0, **settings)
+    wide = steady_motion(oscillator(f"{force}+STEP(DX(I,J),-0.01,-1,0.01,1)"), TAU / 6.0, **settings)
+    assert wide.stable
+    # a linear oscillator leaves exp(-c T / 2m) of a disturbance
+    away = steady_motion(oscillator(f"{force}+IF(DX(I,J)-0.5: 0,0,1)"), TAU / 6.0, **settings)
+    np.testing.assert_allclose(np.abs(away.multipliers), np.exp(-TAU / 6.0), rtol=1e-5)
+
+
 def test_stability_is_that_of_the_orbit_and_not_of_motions_near_it():
     # a second mass whose stiffness follows the first: Mathieu's equation, unstable by a parametric resonance
     m = oscillator("COS(TIME)-VX(I,J)-4*DX(I,J)")
