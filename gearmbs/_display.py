@@ -36,7 +36,7 @@ REPORTS = ("AnalysisReport", "VibrationReport", "ComparisonReport", "BearingRepo
 TABLES = {
     "GearSpec": "gearmbs.gears.mesh:wheel_html",
     "Mechanism": "gearmbs.mechanism.solve.measures:mechanism_html",
-    "Solution": "gearmbs.dae.results.solution:solution_html",
+    "Solution": "gearmbs.dae.results.dataset:solution_html",
     "Case": "gearmbs.studies.show:case_html",
     **dict.fromkeys(
         (*REPORTS, "MeasuredTransmissionError"),

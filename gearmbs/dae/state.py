@@ -20,6 +20,8 @@ from gearmbs.files import whole_file
 from gearmbs.kernels.bound import NAMES
 from gearmbs.wording import did_you_mean
 
+LONGEST = 60
+"""Characters of a value that a message shows."""
 FORMAT = 3
 """Number of the format of files; others are refused."""
 
@@ -350,3 +352,13 @@ class State:
 
 
 __all__ = ["History", "Memory", "State"]
+
+
+def check_state(label: str, state: Any) -> None:
+    """Raise a ModelError if something is no State."""
+    if not isinstance(state, State):
+        told = repr(state)
+        # a mechanism tells itself in many lines
+        told = told if len(told) < LONGEST and "\n" not in told else f"a {type(state).__name__}"
+        remedy = "take its state_at(t)" if hasattr(state, "state_at") else "read a file with gearmbs.State.load"
+        raise ModelError(f"{label}: {told} is no State; {remedy}")

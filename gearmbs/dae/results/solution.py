@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from gearmbs._display import Shown, html_table
+from gearmbs._display import Shown
 from gearmbs._lazy import former_name
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model import evaluator as outputs
@@ -25,6 +25,7 @@ from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.frames import Evaluated
+from gearmbs.dae.results.measured import Measured
 from gearmbs.dae.state import State
 from gearmbs.progress import waiting
 from gearmbs.units import to_si
@@ -33,30 +34,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.dae.model.members import Members
-
-
-# A solution as a table for notebooks.
-
-
-def solution_html(solution: Solution) -> str:
-    """Return how a run ended, what it cost and what it is about."""
-    system, stats = solution.system, solution.stats
-    mechanism = getattr(system, "mechanism", None)
-    name = mechanism.name if mechanism is not None else "mechanism"
-    span = (
-        f"{solution.t[0]:.6g} to {solution.t[-1]:.6g} s, {solution.t.size} outputs" if solution.t.size else "no outputs"
-    )
-    joints = list(dict.fromkeys(row.rsplit(": ", 1)[0] for row in system.row_names))
-    rows = [
-        ("status", solution.status.name.replace("_", " ").lower()),
-        ("time", span),
-        ("steps", f"{stats.steps}, {stats.residuals} residuals, {stats.jacobians} Jacobians"),
-        ("solver time", f"{stats.wall_time:.3g} s"),
-        ("bodies", ", ".join(system.body_names)),
-        ("joints", ", ".join(joints) or "none"),
-        ("forces", ", ".join(system.force_names) or "none"),
-    ]
-    return html_table(f"Solution of {name}", ("", ""), rows, solution.message)
 
 
 PART_SIZE = 2048
@@ -92,7 +69,7 @@ def _sum_of_rows(records: np.ndarray, rows: list[int]) -> np.ndarray:
     return total
 
 
-class Solution(Shown):
+class Solution(Measured, Shown):
     """Motion and forces of a mechanism over the output times.
 
     Attributes
@@ -510,71 +487,6 @@ class Solution(Shown):
             known = ", ".join(names) or "none in this mechanism"
             raise KeyError(f"force element {name!r}; the force elements are {known}") from None
 
-    def _diagnostics_by_name(self) -> Iterator[tuple[str, str, np.ndarray]]:
-        """Yield name, unit and values (m, elements) of each diagnostic; zero for elements without it."""
-        found: dict[tuple[str, str], np.ndarray] = {}
-        for k, diagnostics in enumerate(self.system.model.diagnostics):
-            for c, d in enumerate(diagnostics):
-                table = found.setdefault((d.name, d.unit), np.zeros((self.t.size, len(self.system.force_names))))
-                table[:, k] = self._loads[:, k, 6 + c]
-        for (name, unit), values in found.items():
-            shared = sum(other == name for other, _ in found) > 1
-            yield f"{name} ({unit})" if shared else name, unit, values
-
-    # --- measurements -------------------------------------------------------------------------------
-
-    def _measures(self):
-        mechanism = self.system.mechanism
-        if mechanism is None:
-            raise ValueError("the solution does not know its mechanism, so nothing can be asked of it by name")
-        return mechanism.measures(self)
-
-    def joint_angle(self, joint) -> np.ndarray:
-        """Return the rotation of a joint's I about z_J with full turns counted, shape (m,), rad; by joint or name."""
-        return self._measures().angle(joint)
-
-    def joint_displacement(self, joint) -> np.ndarray:
-        """Return the way of a joint's I from J along z_J, shape (m,), m; by joint or name."""
-        return self._measures().displacement(joint)
-
-    def marker_position(self, marker) -> np.ndarray:
-        """Return the origin of a marker, shape (m, 3), m, global; by marker or name, or of a body's own frame."""
-        return self._measures().place(marker)
-
-    def marker_velocity(self, marker) -> np.ndarray:
-        """Return the velocity of a marker's origin, shape (m, 3), m/s, global; arguments as of `marker_position`."""
-        return self._measures().velocity(marker)
-
-    def deflection(self, marker) -> tuple[np.ndarray, np.ndarray]:
-        """Return displacement (m) and rotation (rad) by deformation at a marker of a modal body, each (m, 3).
-
-        In the body's axes, against the undeformed body about the same centre of mass; by marker or name. Markers may
-        have been added after the run, so that any node can be asked for: ``body.marker(model.place(17))``.
-        """
-        return self._measures().deflection(marker)
-
-    def state(self, state) -> np.ndarray:
-        """Return a user-defined state of the mechanism, shape (m,); by state or name."""
-        return self._measures().state(state)
-
-    def evaluate(self, expression: str) -> np.ndarray:
-        """Return an expression in the ADAMS function language over time, shape (m,), SI.
-
-        As ``"DM(tip, anchor)"`` or ``"AZ(i, j)*RTOD"``; accelerations (ACCX, WDTZ ..) can be asked for, too. Markers
-        may have been added to the bodies after the run.
-        """
-        return self._measures().expression(expression)
-
-    def output(self, name: str) -> Any:
-        """Return an output of the mechanism by its name over time, see `gearmbs.mechanism.Mechanism.output`.
-
-        Raises
-        ------
-        KeyError
-            For a name that is not there.
-        """
-        return self._measures().output(name)
-
     def state_at(self, t: float) -> State:
         """Return the state at a time, s, to start another run from; it has no history of the integrator.
 
@@ -644,68 +556,6 @@ class Solution(Shown):
     @waiting("gathering results")
     def to_dataset(self) -> xr.Dataset:
         """Return everything as an :class:`xarray.Dataset` with units in the attributes."""
-        import xarray as xr
+        from gearmbs.dae.results.dataset import dataset
 
-        xyz = ["x", "y", "z"]
-        joints = list(self.system.model.rows_of_joint)
-        reactions = [self.reaction(j) for j in joints]
-
-        def var(dims, data, unit, title):
-            return (dims, data, {"units": unit, "long_name": title})
-
-        body = ("time", "body", "xyz")
-        data = {
-            "position": var(body, self._pose[:, :, POSE_R:POSE_A], "m", "position of the centre of mass"),
-            "orientation": var(
-                ("time", "body", "xyz", "axis"),
-                self._pose[:, :, POSE_A:POSE_V].reshape(self.t.size, -1, 3, 3),
-                "1",
-                "rotation matrix, columns are the body's axes",
-            ),
-            "velocity": var(body, self._pose[:, :, POSE_V:POSE_W], "m/s", "velocity of the centre of mass"),
-            "angular_velocity": var(body, self._pose[:, :, POSE_W:POSE_COLUMNS], "rad/s", "angular velocity"),
-            "acceleration": var(body, self._acc[:, :, 0:3], "m/s^2", "acceleration of the centre of mass"),
-            "angular_acceleration": var(body, self._acc[:, :, 3:6], "rad/s^2", "angular acceleration"),
-        }
-        if joints:
-            joint = ("time", "joint", "xyz")
-            data["reaction_force"] = var(joint, np.stack([r[0] for r in reactions], 1), "N", "joint force on I's body")
-            data["reaction_moment"] = var(
-                joint, np.stack([r[1] for r in reactions], 1), "N m", "joint moment on I's body about marker I"
-            )
-            data["constraint_violation"] = var(
-                ("time",), self.constraint_violation, "1", "largest |Phi| before projection"
-            )
-        if sum(self.system.model.modes):
-            q_f, v_f, _ = self._records.modal
-            data["modal_coordinate"] = var(("time", "mode"), q_f, "1", "modal coordinate")
-            data["modal_velocity"] = var(("time", "mode"), v_f, "1/s", "rate of the modal coordinate")
-        if self.system.state_names and self.system.mechanism is not None:
-            values = np.stack([self.state(name) for name in self.system.state_names], 1)
-            data["states"] = var(("time", "state"), values, "-", "user-defined state")
-        if self.system.force_names:
-            element = ("time", "element", "xyz")
-            data["load_force"] = var(element, self._loads[:, :, 0:3], "N", "applied force on I's body")
-            data["load_torque"] = var(element, self._loads[:, :, 3:6], "N m", "applied torque on I's body at marker I")
-            for name, unit, values in self._diagnostics_by_name():
-                data[name] = var(("time", "element"), values, unit, name.replace("_", " "))
-        coords = {
-            "time": ("time", self.t, {"units": "s"}),
-            "body": self.system.body_names,
-            "xyz": xyz,
-            "axis": xyz,
-            "joint": joints,
-            "state": self.system.state_names,
-            "element": self.system.force_names,
-            "mode": [
-                f"{name} {k + 1}"
-                for name, n in zip(self.system.body_names, self.system.model.modes[1:])
-                for k in range(n)
-            ],
-        }
-        used = {d for v in data.values() for d in v[0]}
-        out = xr.Dataset(data, coords={k: v for k, v in coords.items() if k in used})
-        out.attrs["status"] = self.status.name
-        out.attrs["message"] = self.message
-        out.attrs.update({f"solver_{k}": v for k, v in self.stats.as_dict().items()})
-        return out
+        return dataset(self)

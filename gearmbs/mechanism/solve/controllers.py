@@ -10,8 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.problem import ModelError
-from gearmbs.dae.state import Memory
+from gearmbs.dae.problem import ModelError, Number
+from gearmbs.dae.state import Memory, State
+from gearmbs.mechanism.parts.quantities import quantity
+
+RESOLVED = 1e-12
+"""Least sample time of a controller, and time between inputs that are set, as part of the end of the run: some thousand
+times what tells two times apart there, 2e-16 of it, so that they lie where they are meant."""
 
 
 def warn_of_unmet(names: Iterable[str], stacklevel: int = 3) -> None:
@@ -100,3 +105,85 @@ class Control:
         self.count = max(0, int((t - self.start) / self.period) - 1)
         while self.next < t:
             self.count += 1
+
+
+class Sampled:
+    """The part of a `gearmbs.Simulator` that lets functions set its inputs."""
+
+    t: float
+    t_end: float
+    number: Callable[[str], Number]
+    set: Callable[..., None]
+    _controls: list[Control]
+    _unmet: list[str]
+    _origin: State | None
+
+    def control(self, name: str, function: Callable[[float, Any], Any], sample_time: float) -> None:
+        """Let a function give an input its value at sample times, which is held in between.
+
+        Parameters
+        ----------
+        name : str
+            An input or a parameter.
+        function : callable
+            ``function(t, simulator)`` returns the value. It is called at the present time and a sample time after the
+            other, where the simulation then stands: :meth:`get` tells of that instant. With methods ``state()``, which
+            returns numbers, and ``restore(numbers)``, which takes them as an array, what it remembers is in states of
+            the simulator; else it is its own.
+        sample_time : float
+            s.
+
+        Raises
+        ------
+        ModelError
+            For a name that is not there or has a controller, the position of a motion, and a sample time that is not
+            positive.
+
+        Warns
+        -----
+        UserWarning
+            If the state gone on from has a memory that the function cannot take.
+        """
+        self.number(name)
+        if not callable(function):
+            raise ModelError(f"control: {function!r} for {name!r} cannot be called; give a function of t and simulator")
+        check_takes(name, function)
+        if name in (control.name for control in self._controls):
+            raise ModelError(f"control: {name!r} has a controller already; let one function do what both are to")
+        period = quantity(sample_time, "time", "control: sample_time")
+        if not (np.isfinite(period) and period > 0.0):
+            raise ModelError(f"control: sample_time = {period} s for {name!r}; it must be positive")
+        if period < RESOLVED * self.t_end:
+            raise ModelError(
+                f"control: sample_time = {period:g} s for {name!r}: times up to t_end = {self.t_end:g} s are not told "
+                f"apart by it; give {RESOLVED * self.t_end:.2g} s or more"
+            )
+        positions = [row for row, order in self.number(name).prescribes if order == 0]
+        if positions:
+            raise ModelError(
+                f"control: {name!r} is the position of {positions[0]!r}, which cannot jump from sample to sample; let "
+                "it be the speed of the motion (level='velocity') and control that"
+            )
+        made = Control(name, function, self.t, period)
+        if self._origin is not None and self._origin.t == self.t and name in self._origin.controllers:
+            made.go_back(self.t, self._origin.controllers[name])
+        self._unmet = [other for other in self._unmet if other != name]
+        self._controls.append(made)
+
+    def _sample(self, t: float) -> float:
+        """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""
+        own = self.__dict__
+        for control in self._controls:
+            if control.next <= self.t:
+                # past the look at names, as in `_stand_at`
+                own["_inside"] = control.name
+                try:
+                    value = control.function(self.t, self)
+                finally:
+                    own["_inside"] = ""
+                try:
+                    self.set(control.name, value)
+                except ModelError as error:
+                    raise ModelError(f"control: what the controller returns at t = {self.t:.6g} s: {error}") from None
+                control.count += 1
+        return min([t, *(control.next for control in self._controls)])

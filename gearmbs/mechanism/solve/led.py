@@ -11,7 +11,8 @@ import numpy as np
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.parts.quantities import quantities
-from gearmbs.mechanism.solve.simulator import REFUSED, RESOLVED, Simulator
+from gearmbs.mechanism.solve.controllers import RESOLVED
+from gearmbs.mechanism.solve.simulator import REFUSED, Simulator
 from gearmbs.progress import time_bar
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from gearmbs.dae.problem import EVENTS_SIG, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.watched import Stream, Watch
-from gearmbs.dae.state import History, State
+from gearmbs.dae.state import History, State, check_state
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.checks import (
     check_mechanism,
@@ -130,8 +130,6 @@ def stop_options(stops: Sequence[StopAt]) -> dict[str, Any]:
     return {"event_direction": [stop.direction for stop in stops], "event_action": [STOP] * len(stops)}
 
 
-LONGEST = 60
-"""Characters of a value that a message shows."""
 LOOSEST = 1e-3
 """Tolerance of runs whose states others go on from: a looser one leaves constraints visibly open."""
 
@@ -357,16 +355,6 @@ def with_brief_changes(system: System, start: float, end: float, options: Mappin
     """
     found = brief_changes(system.model, start, end)
     return {"breakpoints": [*options.get("breakpoints", ()), *found]} if found else {}
-
-
-def check_state(label: str, state: Any) -> None:
-    """Raise a ModelError if something is no State."""
-    if not isinstance(state, State):
-        told = repr(state)
-        # a mechanism tells itself in many lines
-        told = told if len(told) < LONGEST and "\n" not in told else f"a {type(state).__name__}"
-        remedy = "take its state_at(t)" if hasattr(state, "state_at") else "read a file with gearmbs.State.load"
-        raise ModelError(f"{label}: {told} is no State; {remedy}")
 
 
 def start_time(t_start: float, initial: State | None) -> float:

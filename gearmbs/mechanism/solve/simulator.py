@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
-from operator import itemgetter
 from time import perf_counter
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -22,18 +20,18 @@ from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.problem import DAEProblem, ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
-from gearmbs.dae.state import State, equations_of
+from gearmbs.dae.state import State
 from gearmbs.mechanism.checks import check_mechanism
 from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
-from gearmbs.mechanism.solve.controllers import Control, check_takes, warn_of_unmet
+from gearmbs.mechanism.solve.controllers import RESOLVED, Control, Sampled, warn_of_unmet
+from gearmbs.mechanism.solve.restored import Restored
 from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.mechanism.solve.simulate import (
     ADVICE,
     StopAt,
-    check_state,
     check_stops,
     checked,
     just_inside,
@@ -43,14 +41,11 @@ from gearmbs.mechanism.solve.simulate import (
     with_brief_changes,
     with_stops,
 )
-from gearmbs.mechanism.solve.told import Point, Told
+from gearmbs.mechanism.solve.told import Point
 from gearmbs.wording import any_of
 
 NOTHING = nullcontext()
 """Null context, used when the mechanism has no functions of Python."""
-RESOLVED = 1e-12
-"""Least sample time of a controller, and time between inputs that are set, as part of the end of the run: some thousand
-times what tells two times apart there, 2e-16 of it, so that they lie where they are meant."""
 new_point = tuple.__new__
 """Makes a point of its parts in half the time that its class takes."""
 OWN = {
@@ -71,7 +66,7 @@ class Begun(NamedTuple):
     cells: np.ndarray
 
 
-class Simulator(Told):
+class Simulator(Sampled, Restored):
     """A simulation that goes from one communication point to the next.
 
     The run behind it is that of `gearmbs.mechanism.simulate` with the same arguments: its steps pass the points, where
@@ -433,76 +428,6 @@ class Simulator(Told):
         """Return what :meth:`set` changes under a name; raise a ModelError if there is nothing."""
         return self._settings.number(name)
 
-    def control(self, name: str, function: Callable[[float, Simulator], Any], sample_time: float) -> None:
-        """Let a function give an input its value at sample times, which is held in between.
-
-        Parameters
-        ----------
-        name : str
-            An input or a parameter.
-        function : callable
-            ``function(t, simulator)`` returns the value. It is called at the present time and a sample time after the
-            other, where the simulation then stands: :meth:`get` tells of that instant. With methods ``state()``, which
-            returns numbers, and ``restore(numbers)``, which takes them as an array, what it remembers is in states of
-            the simulator; else it is its own.
-        sample_time : float
-            s.
-
-        Raises
-        ------
-        ModelError
-            For a name that is not there or has a controller, the position of a motion, and a sample time that is not
-            positive.
-
-        Warns
-        -----
-        UserWarning
-            If the state gone on from has a memory that the function cannot take.
-        """
-        self.number(name)
-        if not callable(function):
-            raise ModelError(f"control: {function!r} for {name!r} cannot be called; give a function of t and simulator")
-        check_takes(name, function)
-        if name in (control.name for control in self._controls):
-            raise ModelError(f"control: {name!r} has a controller already; let one function do what both are to")
-        period = quantity(sample_time, "time", "control: sample_time")
-        if not (np.isfinite(period) and period > 0.0):
-            raise ModelError(f"control: sample_time = {period} s for {name!r}; it must be positive")
-        if period < RESOLVED * self.t_end:
-            raise ModelError(
-                f"control: sample_time = {period:g} s for {name!r}: times up to t_end = {self.t_end:g} s are not told "
-                f"apart by it; give {RESOLVED * self.t_end:.2g} s or more"
-            )
-        positions = [row for row, order in self.number(name).prescribes if order == 0]
-        if positions:
-            raise ModelError(
-                f"control: {name!r} is the position of {positions[0]!r}, which cannot jump from sample to sample; let "
-                "it be the speed of the motion (level='velocity') and control that"
-            )
-        made = Control(name, function, self.t, period)
-        if self._origin is not None and self._origin.t == self.t and name in self._origin.controllers:
-            made.go_back(self.t, self._origin.controllers[name])
-        self._unmet = [other for other in self._unmet if other != name]
-        self._controls.append(made)
-
-    def _sample(self, t: float) -> float:
-        """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""
-        own = self.__dict__
-        for control in self._controls:
-            if control.next <= self.t:
-                # past the look at names, as in `_stand_at`
-                own["_inside"] = control.name
-                try:
-                    value = control.function(self.t, self)
-                finally:
-                    own["_inside"] = ""
-                try:
-                    self.set(control.name, value)
-                except ModelError as error:
-                    raise ModelError(f"control: what the controller returns at t = {self.t:.6g} s: {error}") from None
-                control.count += 1
-        return min([t, *(control.next for control in self._controls)])
-
     def _apply(self, end: float) -> None:
         """Let what has been set take effect at the present time; lines that were set end at ``end``."""
         own = self.__dict__
@@ -547,110 +472,6 @@ class Simulator(Told):
             self._problem, self._origin = first
             self._points = points
             self._point = point
-
-    # --- state --------------------------------------------------------------------------------------
-
-    def state(self) -> State:
-        """Return the present state with the integrator's history: what follows from it is the same, bit for bit."""
-        if self._failed is not None:
-            raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
-        self.take_effect()
-        point, run = self._point, self._run
-        if not self._equations:
-            self._equations = equations_of(self._base)
-        history = run.history(self._equations) if run.started else None
-        tables = self._own_tables(point.idata, run.state.rdata)
-        state = State.of(self._base, point.t, point.y, point.yp, tables, history)
-        held = {control.name: control.memory() for control in self._controls if control.remembers}
-        return replace(state, controllers=held) if held else state
-
-    def _own_tables(self, idata: np.ndarray, rdata: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return tables without what stops have added to them."""
-        return idata[: len(self._base.idata)], rdata[: len(self._base.rdata)]
-
-    def restore(self, state: State) -> None:
-        """Go back, or on, to a state of the same mechanism.
-
-        Of the points those before it are kept if it is one of them, as a state of this simulator is, else none.
-
-        Raises
-        ------
-        ModelError
-            If the state is one of another model, or lies outside the span of this simulator; from within a controller.
-
-        Warns
-        -----
-        UserWarning
-            If the state has the memory of a controller that is not here, or samples otherwise.
-        """
-        self._check_outside("restore")
-        check_state("restore", state)
-        if not self._t_start <= state.t < self.t_end:
-            remedy = "pass it as initial=" if state.t < self._t_start else "make it with a later t_end"
-            raise ModelError(
-                f"state: it is at t = {state.t:.9g} s, the simulator goes from {self._t_start:.9g} to "
-                f"{self.t_end:.9g} s; {remedy}"
-            )
-        if state.t_model != self._base.t0:
-            raise ModelError(
-                f"state: its model was assembled for t = {state.t_model:g} s, this one for {self._base.t0:g} s; "
-                "start both simulators at the same time"
-            )
-        first, origin = self._own_point(state), (self._problem, self._origin)
-        if (first is not None or not self._records) and self._go_back(state):
-            if first is not None:
-                del self._points[first + 1 :]
-        else:
-            kept = self._points[: first + 1] if first is not None else []
-            self._begin(state)
-            if kept:
-                # what stood there up to the state, which a jump may follow
-                self._problem, self._origin = origin
-                self._points[:] = kept
-        if self._controls or state.controllers:
-            given = [control.name for control in self._controls]
-            self._unmet = [name for name in state.controllers if name not in given]
-            for control in self._controls:
-                control.go_back(self.t, state.controllers.get(control.name))
-        elif self._unmet:
-            self._unmet = []
-
-    def _own_point(self, state: State) -> int | None:
-        """Return which of the points a state is, or None."""
-        at = bisect_left(self._points, state.t, key=itemgetter(0))
-        while at < len(self._points) and self._points[at][0] == state.t:
-            if self._points[at].y.tobytes() == state.y.tobytes():
-                return at
-            at += 1
-        return None
-
-    def _go_back(self, state: State) -> bool:
-        """Go to a state of the present run in place, as a new run from it would; return whether it is one of it."""
-        history = state.history
-        if history is None or not state.is_own or history.equations != self._equations:
-            return False
-        if not self._run.go_back(history):
-            return False
-        self._tell_clock()
-        look = state.t if self._system.has_dropped_rows else np.inf
-        # past the look at names, as in `_stand_at`
-        self.__dict__.update(_failed=None, _counted={}, _since=state.t, _next_look=look)
-        self._settings.begin(self._run.state.rdata, state.t)
-        table = self._run.table
-        place = self._run.place(state.y, state.yp, keep=False)
-        self._stand_at(Point(state.t, *place, table, self._settings.held), False)
-        return True
-
-    def __copy__(self) -> Simulator:
-        raise ModelError(
-            "a simulator is not copied: both would go on with one run; make another one with initial=sim.state()"
-        )
-
-    def __deepcopy__(self, _: Any) -> Simulator:
-        return self.__copy__()
-
-    def __reduce__(self) -> tuple:
-        raise ModelError("a simulator is not pickled; save its state() and make another one with initial=")
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"

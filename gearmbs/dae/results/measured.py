@@ -1,0 +1,67 @@
+"""What a solution tells of joints, markers, states and expressions of the mechanism that it is of, by their names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gearmbs.dae.model.system import System
+
+
+class Measured:
+    """The part of a `gearmbs.dae.results.solution.Solution` that asks the mechanism what its names stand for."""
+
+    system: System
+
+    def _measures(self):
+        mechanism = self.system.mechanism
+        if mechanism is None:
+            raise ValueError("the solution does not know its mechanism, so nothing can be asked of it by name")
+        return mechanism.measures(self)
+
+    def joint_angle(self, joint) -> np.ndarray:
+        """Return the rotation of a joint's I about z_J with full turns counted, shape (m,), rad; by joint or name."""
+        return self._measures().angle(joint)
+
+    def joint_displacement(self, joint) -> np.ndarray:
+        """Return the way of a joint's I from J along z_J, shape (m,), m; by joint or name."""
+        return self._measures().displacement(joint)
+
+    def marker_position(self, marker) -> np.ndarray:
+        """Return the origin of a marker, shape (m, 3), m, global; by marker or name, or of a body's own frame."""
+        return self._measures().place(marker)
+
+    def marker_velocity(self, marker) -> np.ndarray:
+        """Return the velocity of a marker's origin, shape (m, 3), m/s, global; arguments as of `marker_position`."""
+        return self._measures().velocity(marker)
+
+    def deflection(self, marker) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacement (m) and rotation (rad) by deformation at a marker of a modal body, each (m, 3).
+
+        In the body's axes, against the undeformed body about the same centre of mass; by marker or name. Markers may
+        have been added after the run, so that any node can be asked for: ``body.marker(model.place(17))``.
+        """
+        return self._measures().deflection(marker)
+
+    def state(self, state) -> np.ndarray:
+        """Return a user-defined state of the mechanism, shape (m,); by state or name."""
+        return self._measures().state(state)
+
+    def evaluate(self, expression: str) -> np.ndarray:
+        """Return an expression in the ADAMS function language over time, shape (m,), SI.
+
+        As ``"DM(tip, anchor)"`` or ``"AZ(i, j)*RTOD"``; accelerations (ACCX, WDTZ ..) can be asked for, too. Markers
+        may have been added to the bodies after the run.
+        """
+        return self._measures().expression(expression)
+
+    def output(self, name: str) -> Any:
+        """Return an output of the mechanism by its name over time, see `gearmbs.mechanism.Mechanism.output`.
+
+        Raises
+        ------
+        KeyError
+            For a name that is not there.
+        """
+        return self._measures().output(name)
