@@ -11,6 +11,7 @@ import numpy as np
 from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
 from gearmbs.campaigns.results import factor_names, numeric_results, result_names
+from gearmbs.campaigns.sensitivity import in_scale
 from gearmbs.campaigns.settings import CampaignError, texts, whole
 from gearmbs.schema.described import chosen
 
@@ -50,6 +51,8 @@ def varied_results(campaign: Campaign, most: int = 4) -> list[str]:
     table = campaign.table
     names = numeric_results(campaign.folder, table)
     values = table[names].to_numpy(dtype=float)
+    if names:
+        values = np.stack([in_scale(column)[0] for column in values.T], axis=1)
     with np.errstate(all="ignore"):
         share = np.nanstd(values, axis=0) / np.sqrt(np.nanmean(values**2, axis=0))
     # rounding is no variation
@@ -105,7 +108,7 @@ def _main_effects(table: pd.DataFrame, results: list[str], factors: list[str], u
         place, names, group = _levels(table[factor])
         means = np.array([np.nanmean(y[group == k]) for k in range(len(place))])
         counts = np.array([np.isfinite(y[group == k]).sum() for k in range(len(place))])
-        spread = np.array([np.nanstd(y[group == k], ddof=1) if counts[k] > 1 else np.nan for k in range(len(place))])
+        spread = np.array([deviation(y[group == k]) for k in range(len(place))])
         ax.axhline(np.nanmean(y), color=GREY, lw=0.8, ls="--")
         ax.errorbar(place, means, NORMAL * spread / np.sqrt(counts), fmt="o-", ms=4, capsize=2, color=COLOURS[i])
         if names is not None:
@@ -227,6 +230,12 @@ def _parallel(table: pd.DataFrame, results: list[str], factors: list[str], units
     return picture
 
 
+def deviation(y: np.ndarray) -> float:
+    """Return the standard deviation of values, NaN left out; NaN of fewer than two."""
+    scaled, power = in_scale(y[np.isfinite(y)])
+    return float(np.ldexp(scaled.std(ddof=1), power)) if scaled.size > 1 else math.nan
+
+
 KINDS = {
     "main effects": _main_effects,
     "tornado": _tornado,
@@ -289,7 +298,7 @@ def _rank_correlation(x: np.ndarray, y: np.ndarray) -> float:
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     good = np.isfinite(x) & np.isfinite(y)
-    x, y = x[good], y[good]
+    x, y = in_scale(x[good])[0], in_scale(y[good])[0]
     if x.size < 3 or x.std() == 0.0 or y.std() == 0.0:
         return float("nan")
     return float(np.corrcoef(x, y)[0, 1])

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.figures import varied_results
+from gearmbs.campaigns.figures import deviation, varied_results
 from gearmbs.campaigns.results import factor_names, numeric_results, result_names
-from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
+from gearmbs.campaigns.sensitivity import SobolIndices, in_scale, sensitivity
 from gearmbs.campaigns.settings import CampaignError, texts
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
 from gearmbs.campaigns.stored.exports import place
@@ -77,13 +77,14 @@ def _all_results(campaign: Campaign, table: pd.DataFrame, shown: list[str]) -> s
     """Return the results that vary with their spread, the most varied first."""
     names = numeric_results(campaign.folder, table)
     values = table[names].astype(float)
+    scaled = values.apply(lambda column: in_scale(column.to_numpy())[0])
     with np.errstate(all="ignore"):
-        share = (values.std() / np.sqrt((values**2).mean())).fillna(0.0)
+        share = (scaled.std() / np.sqrt((scaled**2).mean())).fillna(0.0)
     order = share[share > 0.0].sort_values(ascending=False).index
     rows = ""
     for name in order[:SHOWN_RESULTS]:
         told = f"<b>{html.escape(str(name))}</b>" if name in shown else html.escape(str(name))
-        cells = (values[name].mean(), values[name].std(), values[name].min(), values[name].max())
+        cells = (values[name].mean(), deviation(values[name].to_numpy()), values[name].min(), values[name].max())
         numbers = "".join(f"<td>{v:.4g}</td>" for v in cells)
         rows += (
             f"<tr><td>{told}</td><td>{unit_text(campaign.units.get(name))}</td>{numbers}<td>{share[name]:.1%}</td></tr>"
@@ -119,7 +120,7 @@ def _span(factor: Any) -> str:
 
 def _numbers(values: pd.Series) -> str:
     q = values.quantile([0.0, 0.05, 0.5, 0.95, 1.0])
-    cells = "".join(f"<td>{v:.5g}</td>" for v in (values.mean(), values.std(), *q))
+    cells = "".join(f"<td>{v:.5g}</td>" for v in (values.mean(), deviation(values.to_numpy(dtype=float)), *q))
     heads = "".join(f"<th>{n}</th>" for n in ("mean", "deviation", "least", "5 %", "median", "95 %", "largest"))
     return f"<table><tr>{heads}</tr><tr>{cells}</tr></table>"
 

@@ -35,6 +35,33 @@ CONFIDENCE = 0.95
 """Probability of the intervals of indices, the customary one."""
 
 
+def in_scale(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return values over a power of two, so that the largest is between 0.5 and 1, and that power.
+
+    Squares of results near 1e300 are no numbers any more, and those near 1e-300 are zero. A power of two changes no
+    digit.
+    """
+    sizes = np.abs(values[np.isfinite(values)])
+    power = int(np.frexp(sizes.max())[1]) if sizes.size else 0
+    return np.ldexp(values, -power), power
+
+
+def out_of_scale(values: np.ndarray | float, power: int, what: str) -> np.ndarray:
+    """Return values times a power of two.
+
+    Warns
+    -----
+    CampaignWarning
+        If one is beyond the largest number, and infinite.
+    """
+    with np.errstate(over="ignore"):
+        found = np.ldexp(values, power)
+    if (np.isinf(found) & np.isfinite(values)).any():
+        told = f"{what}: beyond {np.finfo(float).max:.2g}, the largest number, and told as infinite; take other units"
+        warnings.warn(told, CampaignWarning, stacklevel=4)
+    return found
+
+
 @dataclass(frozen=True)
 class SobolIndices:
     """Sobol' indices of a result.
@@ -120,9 +147,11 @@ def sobol_indices(
     blocks = blocks[good]
     if len(blocks) < 4:
         raise CampaignError(f"sobol: {len(blocks)} base points have all their results; at least four are needed")
+    blocks, power = in_scale(blocks)
     mean, variance = float(blocks[:, [0, -1]].mean()), float(blocks[:, [0, -1]].var())
     if variance == 0.0:
         raise CampaignError("sobol: the result is the same everywhere; it depends on none of the factors")
+    mean, variance = float(out_of_scale(mean, power, "mean")), float(out_of_scale(variance, 2 * power, "variance"))
     blocks = (blocks - blocks.mean()) / blocks.std()
     controlled = None
     if points is not None:
@@ -186,7 +215,7 @@ def morris_effects(
     y, x = np.asarray(values, dtype=float).reshape(-1, d + 1), np.asarray(points).reshape(-1, d + 1, d)
     good = np.isfinite(y).all(axis=1)
     at = x if places is None else np.asarray(places).reshape(x.shape)
-    y, x, at = y[good], x[good], at[good]
+    (y, power), x, at = in_scale(y[good]), x[good], at[good]
     if not len(y):
         raise CampaignError("morris: no trajectory has all its results")
     moves = np.diff(x, axis=1)
@@ -200,15 +229,14 @@ def morris_effects(
     size = np.abs(effect)
     drawn = np.random.default_rng(seed).integers(len(y), size=(RESAMPLES, len(y)))
     spread = size[drawn].mean(axis=1).std(axis=0, ddof=1)
-    table = pd.DataFrame(
-        {
-            "mu": effect.mean(axis=0),
-            "mu_star": size.mean(axis=0),
-            "sigma": effect.std(axis=0, ddof=1) if len(y) > 1 else np.full(d, np.nan),
-            "confidence": norm.ppf(0.5 + 0.5 * CONFIDENCE) * spread,
-        },
-        index=pd.Index(names, name="factor"),
-    )
+    found = {
+        "mu": effect.mean(axis=0),
+        "mu_star": size.mean(axis=0),
+        "sigma": effect.std(axis=0, ddof=1) if len(y) > 1 else np.full(d, np.nan),
+        "confidence": norm.ppf(0.5 + 0.5 * CONFIDENCE) * spread,
+    }
+    columns = {name: out_of_scale(values, power, name) for name, values in found.items()}
+    table = pd.DataFrame(columns, index=pd.Index(names, name="factor"))
     return table.sort_values("mu_star", ascending=False)
 
 
@@ -232,6 +260,7 @@ def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, int
     missing = int((~np.isfinite(values)).sum())
     if missing:
         raise CampaignError(f"effects: {missing} of {values.size} cases have no result; a factorial needs them all")
+    values, power = in_scale(values)
     terms = {name: coded[:, k] for k, name in enumerate(names)}
     if interactions:
         for i, j in itertools.combinations(range(len(names)), 2):
@@ -240,7 +269,8 @@ def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, int
     for name, column in terms.items():
         up, down = column > 0, column < 0
         if up.any() and down.any():
-            rows[name] = float(values[up].mean() - values[down].mean())
+            effect = values[up].mean() - values[down].mean()
+            rows[name] = float(out_of_scale(effect, power, f"effect of {name}"))
     table = pd.DataFrame({"effect": rows})
     table.index.name = "term"
     return table.reindex(table.effect.abs().sort_values(ascending=False).index)
@@ -298,6 +328,7 @@ def grid_indices(values: np.ndarray, counts: Sequence[int], names: list[str]) ->
     missing = int((~np.isfinite(y)).sum())
     if missing:
         raise CampaignError(f"grid: {missing} of {y.size} cases have no result; the parts of a grid need them all")
+    y, power = in_scale(y)
     variance = float(y.var())
     if variance == 0.0:
         raise CampaignError("grid: the result is the same everywhere; it depends on none of the factors")
@@ -306,7 +337,8 @@ def grid_indices(values: np.ndarray, counts: Sequence[int], names: list[str]) ->
     first = np.array([y.mean(axis=axes).var() for axes in others]) / variance
     total = np.array([y.var(axis=k).mean() for k in range(d)]) / variance
     zero = np.zeros(d)
-    return SobolIndices(names, first, total, zero, zero, y.size, 0, float(y.mean()), variance)
+    mean, spread = out_of_scale(y.mean(), power, "mean"), out_of_scale(variance, 2 * power, "variance")
+    return SobolIndices(names, first, total, zero, zero, y.size, 0, float(mean), float(spread))
 
 
 def coordinates(campaign: Campaign) -> tuple[list[str], np.ndarray]:

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.campaigns.sensitivity import in_scale
 from gearmbs.campaigns.settings import CampaignError
 
 if TYPE_CHECKING:
@@ -121,6 +122,7 @@ def total_bounds(
     x, y = _places(np.asarray(u, dtype=float)[good], levels or [0] * len(names)), y[good]
     if y.size < FEWEST or np.ptp(y) == 0.0:
         raise CampaignError(f"bounds: {y.size} points, or a result that is the same everywhere; draw more points")
+    y, _ = in_scale(y)
     y = (y - y.mean()) / y.std()
     order = np.random.default_rng(seed).permutation(y.size)
     kernel = _lengths(x[order[:MOST_FOR_LENGTHS]], y[order[:MOST_FOR_LENGTHS]])
@@ -270,7 +272,7 @@ def first_indices(
 
     y = np.asarray(values, dtype=float)
     good = np.isfinite(y)
-    y = y[good]
+    y, _ = in_scale(y[good])
     count = bins or max(2, round(y.size**0.5))
     generator = np.random.default_rng(seed)
     rows = {}

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.campaigns.sensitivity import coordinates, results_in_order
+from gearmbs.campaigns.sensitivity import coordinates, in_scale, out_of_scale, results_in_order
 from gearmbs.campaigns.settings import CampaignError
 
 if TYPE_CHECKING:
@@ -76,7 +76,8 @@ class PolynomialChaos:
         pair = [self.names.index(one), self.names.index(other)]
         active = self.degrees > 0
         both = active[:, pair].all(axis=1) & (active.sum(axis=1) == 2)
-        return float((self.coefficients[both] ** 2).sum() / (self.coefficients[1:] ** 2).sum())
+        part, _ = in_scale(self.coefficients[1:])
+        return float((part[both[1:]] ** 2).sum() / (part**2).sum())
 
     def table(self) -> pd.DataFrame:
         """Return first and total indices with their confidence by factor, the most important first."""
@@ -134,6 +135,7 @@ def fit_chaos(
     few = tuple(levels or [0] * len(names))
     if y.size < 2 or np.ptp(y) == 0.0:
         raise CampaignError("polynomial chaos: the result is the same everywhere; it depends on none of the factors")
+    y, power = in_scale(y)
     best = best_chaos(u, y, few, degree=degree, together=together)
     x = chaos_columns(u, best.degrees, few)
     generator, drawn = np.random.default_rng(seed), []
@@ -142,8 +144,9 @@ def fit_chaos(
         weight = np.sqrt(generator.exponential(size=y.size))
         drawn.append(chaos_indices(best.degrees, np.linalg.lstsq(x * weight[:, None], y * weight, rcond=None)[0]))
     confidence = 1.96 * np.std(drawn, axis=0, ddof=1)
+    coefficients = out_of_scale(best.coefficients, power, "coefficients")
     return PolynomialChaos(
-        list(names), few, best.degrees, best.coefficients, best.r_squared, best.q_squared, confidence, y.size
+        list(names), few, best.degrees, coefficients, best.r_squared, best.q_squared, confidence, y.size
     )
 
 
@@ -197,11 +200,10 @@ def _least_squares(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, flo
 
 def chaos_indices(degrees: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """Return first and total indices of a sum, shape (2, d)."""
-    active = degrees > 0
-    part = coefficients**2
-    whole = part[1:].sum()
+    active = degrees[1:] > 0
+    part = in_scale(coefficients[1:])[0] ** 2
     alone = active & (active.sum(axis=1) == 1)[:, None]
-    return np.array([part @ alone, part @ active]) / whole
+    return np.array([part @ alone, part @ active]) / part.sum()
 
 
 def _terms(levels: Sequence[int], degree: int, together: int) -> np.ndarray:
@@ -435,6 +437,7 @@ def fit_surface(
             f"more points of a "
             "sequence, or degree=1"
         )
+    y, power = in_scale(y)
     inverse = np.linalg.inv(x.T @ x)
     coefficients = inverse @ (x.T @ y)
     rest = y - x @ coefficients
@@ -446,11 +449,11 @@ def fit_surface(
     return ResponseSurface(
         names,
         degree,
-        coefficients,
-        np.sqrt(np.diag(inverse) * noise),
+        out_of_scale(coefficients, power, "coefficients"),
+        out_of_scale(np.sqrt(np.diag(inverse) * noise), power, "standard errors"),
         1.0 - float(rest @ rest) / spread if spread else 1.0,
         1.0 - float(np.sum(out**2)) / spread if spread else 1.0,
-        float(np.sqrt(np.mean(out**2))),
+        float(out_of_scale(np.sqrt(np.mean(out**2)), power, "error")),
         n,
     )
 
