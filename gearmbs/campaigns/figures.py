@@ -11,8 +11,8 @@ import numpy as np
 from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
 from gearmbs.campaigns.results import factor_names, numeric_results, result_names
-from gearmbs.campaigns.sensitivity import in_scale
 from gearmbs.campaigns.settings import CampaignError, texts, whole
+from gearmbs.campaigns.sobol_bounds import in_scale
 from gearmbs.schema.described import chosen
 
 if TYPE_CHECKING:

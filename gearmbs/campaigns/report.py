@@ -13,9 +13,9 @@ import numpy as np
 
 from gearmbs.campaigns.figures import deviation, varied_results
 from gearmbs.campaigns.results import factor_names, numeric_results, result_names
-from gearmbs.campaigns.sensitivity import SobolIndices, in_scale, sensitivity
+from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
 from gearmbs.campaigns.settings import CampaignError, texts
-from gearmbs.campaigns.sobol_bounds import first_indices, probability
+from gearmbs.campaigns.sobol_bounds import first_indices, in_scale, probability
 from gearmbs.campaigns.stored.exports import place
 from gearmbs.campaigns.surrogates import PolynomialChaos
 from gearmbs.files import write_whole

@@ -21,6 +21,7 @@ import numpy as np
 from gearmbs.campaigns.plans.designs import SEQUENCES
 from gearmbs.campaigns.plans.factors import Choice
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning
+from gearmbs.campaigns.sobol_bounds import in_scale, out_of_scale
 from gearmbs.schema.described import chosen
 
 if TYPE_CHECKING:
@@ -33,33 +34,6 @@ if TYPE_CHECKING:
 RESAMPLES = 200
 CONFIDENCE = 0.95
 """Probability of the intervals of indices, the customary one."""
-
-
-def in_scale(values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return values over a power of two, so that the largest is between 0.5 and 1, and that power.
-
-    Squares of results near 1e300 are no numbers any more, and those near 1e-300 are zero. A power of two changes no
-    digit.
-    """
-    sizes = np.abs(values[np.isfinite(values)])
-    power = int(np.frexp(sizes.max())[1]) if sizes.size else 0
-    return np.ldexp(values, -power), power
-
-
-def out_of_scale(values: np.ndarray | float, power: int, what: str) -> np.ndarray:
-    """Return values times a power of two.
-
-    Warns
-    -----
-    CampaignWarning
-        If one is beyond the largest number, and infinite.
-    """
-    with np.errstate(over="ignore"):
-        found = np.ldexp(values, power)
-    if (np.isinf(found) & np.isfinite(values)).any():
-        told = f"{what}: beyond {np.finfo(float).max:.2g}, the largest number, and told as infinite; take other units"
-        warnings.warn(told, CampaignWarning, stacklevel=4)
-    return found
 
 
 @dataclass(frozen=True)

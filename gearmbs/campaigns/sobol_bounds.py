@@ -27,8 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.sensitivity import in_scale
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -313,3 +312,33 @@ def probability(held: np.ndarray, level: float = 0.95) -> tuple[float, float, fl
     middle = (p + q * q / (2 * n)) / (1 + q * q / n)
     half = q / (1 + q * q / n) * float(np.sqrt(p * (1 - p) / n + q * q / (4 * n * n)))
     return p, max(0.0, middle - half), min(1.0, middle + half)
+
+
+# Results of any size.
+
+
+def in_scale(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return values over a power of two, so that the largest is between 0.5 and 1, and that power.
+
+    Squares of results near 1e300 are no numbers any more, and those near 1e-300 are zero. A power of two changes no
+    digit.
+    """
+    sizes = np.abs(values[np.isfinite(values)])
+    power = int(np.frexp(sizes.max())[1]) if sizes.size else 0
+    return np.ldexp(values, -power), power
+
+
+def out_of_scale(values: np.ndarray | float, power: int, what: str) -> np.ndarray:
+    """Return values times a power of two.
+
+    Warns
+    -----
+    CampaignWarning
+        If one is beyond the largest number, and infinite.
+    """
+    with np.errstate(over="ignore"):
+        found = np.ldexp(values, power)
+    if (np.isinf(found) & np.isfinite(values)).any():
+        told = f"{what}: beyond {np.finfo(float).max:.2g}, the largest number, and told as infinite; take other units"
+        warnings.warn(told, CampaignWarning, stacklevel=4)
+    return found

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.campaigns.sensitivity import coordinates, in_scale, out_of_scale, results_in_order
+from gearmbs.campaigns.sensitivity import coordinates, results_in_order
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.sobol_bounds import in_scale, out_of_scale
 
 if TYPE_CHECKING:
     import pandas as pd
