@@ -29,8 +29,11 @@ def test_stages_on_fixed_axes_are_integrated_by_their_angles():
     assert lump.problem.n == 6
     assert full.problem.n > 100
     for k in range(3):
-        ours, theirs = (one.contact(f"m{k}")["normal_force"] for one in (lump, full))
-        np.testing.assert_allclose(ours, theirs, atol=1e-3 * theirs.max())
+        ours, theirs = (one.contact(f"m{k}") for one in (lump, full))
+        assert set(ours) == set(theirs)
+        for name in set(theirs) - {"pairs_drive", "pairs_back"}:
+            # numbers of teeth change at other steps
+            np.testing.assert_allclose(ours[name], theirs[name], atol=1e-3 * np.abs(theirs[name]).max())
     for name in ("of 0", "of 3", "drive"):
         for ours, theirs in zip(lump.reaction(name), full.reaction(name), strict=True):
             np.testing.assert_allclose(ours, theirs, atol=2e-3 * (np.abs(theirs).max() + 1e-9))

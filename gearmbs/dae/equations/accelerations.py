@@ -361,38 +361,58 @@ def put_rows(slot, vals, k, t, y, rhs, phi, idata, tab):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def apply_wrench(f, wrench, rhs, loads, tab):
+    """Record the wrench of force element f in ``loads`` and add it to ``rhs``; J's body feels the opposite."""
+    row = tab.force[f]
+    for c in range(6):
+        loads[f, c] = wrench[c]
+    for side in range(2):
+        b = tab.marker_body[row[T.FORCE_I + side]]
+        apply_load(
+            b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial, tab.scratch, rhs
+        )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def apply_evaluated(f, rhs, loads, tab):
+    """Record a compiled element with the diagnostics that its kernel has left, and add its wrench to ``rhs``."""
+    row = tab.force[f]
+    if row[T.FORCE_PART] == 0:
+        first = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
+        for c in range(row[T.FORCE_DIAGNOSTICS]):
+            loads[f, FORCE_RECORD + c] = tab.scratch[first + c]
+    wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
+    for c in range(3):
+        # what the kernel wrote for unknowns that it does not have
+        wrench[c] = wrench[c] if row[T.FORCE_F] >= 0 else 0.0
+        wrench[3 + c] = wrench[3 + c] if row[T.FORCE_N] >= 0 else 0.0
+    apply_wrench(f, wrench, rhs, loads, tab)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def apply_element(f, t, y, rhs, loads, tab):
+    """Evaluate force element f, record it in ``loads`` and add it to ``rhs``; parameters as of `saddle`."""
+    row = tab.force[f]
+    if row[T.FORCE_KIND] == T.REACTION:
+        # it follows from the multipliers that this system is solved for; the integrator's is at hand
+        for c in range(3):
+            loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
+    elif row[T.FORCE_KIND] == T.COMPILED:
+        if row[T.FORCE_PART] == 0:
+            evaluate_element(row, t, y, tab, np.int64(DIAGNOSTICS))
+        apply_evaluated(f, rhs, loads, tab)
+    else:
+        wrench = vector_at(tab.scratch, S_WRENCH, 6)
+        jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, row[T.FORCE_WIDTH])
+        expressions.load(row, t, y, tab, wrench, jac, np.int64(0))
+        apply_wrench(f, wrench, rhs, loads, tab)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def apply_loads(t, y, rhs, loads, idata, tab):
     """Evaluate all force elements, record them in ``loads`` and add them to ``rhs``; parameters as of `saddle`."""
     for f in range(idata[T.H_FORCES]):
-        row = tab.force[f]
-        wrench = vector_at(tab.scratch, S_WRENCH, 6)
-        if row[T.FORCE_KIND] == T.REACTION:
-            # it follows from the multipliers that this system is solved for; the integrator's is at hand
-            for c in range(3):
-                loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
-            continue
-        if row[T.FORCE_KIND] == T.COMPILED:
-            if row[T.FORCE_PART] == 0:
-                evaluate_element(row, t, y, tab, np.int64(DIAGNOSTICS))
-                first = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
-                for c in range(row[T.FORCE_DIAGNOSTICS]):
-                    loads[f, FORCE_RECORD + c] = tab.scratch[first + c]
-            wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
-            for c in range(3):
-                # what the kernel wrote for unknowns that it does not have
-                wrench[c] = wrench[c] if row[T.FORCE_F] >= 0 else 0.0
-                wrench[3 + c] = wrench[3 + c] if row[T.FORCE_N] >= 0 else 0.0
-        else:
-            jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, row[T.FORCE_WIDTH])
-            expressions.load(row, t, y, tab, wrench, jac, np.int64(0))
-        for c in range(6):
-            loads[f, c] = wrench[c]
-        for side in range(2):
-            b = tab.marker_body[row[T.FORCE_I + side]]
-            apply_load(
-                b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial,
-                tab.scratch, rhs,
-            )  # fmt: skip
+        apply_element(f, t, y, rhs, loads, tab)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -11,12 +11,13 @@ from numba import float64, int64, void
 
 from gearmbs.dae.equations import fixed_axes as fx
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.accelerations import ROW_PARTIAL, ROW_RECORD, apply_loads
+from gearmbs.dae.equations.accelerations import ROW_PARTIAL, ROW_RECORD, apply_element, apply_evaluated
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.fixed_axes import (
     AXIS_FUNCTION,
     AXIS_OMEGA,
+    S_TURNS,
     TURN_AXIS,
     TURN_INERTIA,
     TURN_MASS,
@@ -25,16 +26,19 @@ from gearmbs.dae.equations.fixed_axes import (
     axes_in,
     axes_jacobian,
     axes_pattern,
+    put_turns,
     update_axes,
 )
 from gearmbs.dae.equations.kinematics import track, turns_are_counted
 from gearmbs.dae.equations.loads.forces import (
+    DIAGNOSTICS,
     FRAME_A,
     FRAME_COLUMNS,
     FRAME_P,
     LEAN_ADDRESS,
     LEAN_COLUMNS,
     TURNING_SIG,
+    evaluate_lean,
 )
 from gearmbs.dae.equations.rotation import KIN_R, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.equations.unknowns import SI2
@@ -414,11 +418,13 @@ def joint_reaction(k, function, members, tab, wrench, multipliers, phi, force, m
     i, j, side = turn[TURN_I], turn[TURN_J], 1.0 * turn[TURN_SIDE]
     of_i, of_j = members.of_marker[i], members.of_marker[j]
     for c in range(6):
-        total = 0.0
-        for m in range(members.group.size):
-            if members.group[m] == k + 1:
-                total += wrench[m, c]
-        s[c] = total
+        s[c] = 0.0
+    for m in range(members.group.size):
+        if members.group[m] == k + 1:
+            for c in range(6):
+                s[c] += wrench[m, c]
+    for c in range(6):
+        total = s[c]
         if of_i >= 0:
             wrench[of_i, c] -= side * total
         if of_j >= 0:
@@ -471,7 +477,7 @@ def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turn
     idata, t, rdata, work = uncounted(idata), uncounted(t), uncounted(rdata), uncounted(work)
     own, turning, s = uncounted(own), uncounted(turning), uncounted(s)
     tab = T.unpack(idata, rdata, work)
-    _, axes, markers, _, turns = axes_in(idata, rdata)
+    leans, axes, markers, _, turns = axes_in(idata, rdata)
     n, count = y.shape[1], members.group.size
     all_y, wrench = matrix_at(y, 0, y.shape[0], n), matrix_at(wrench, 0, count, 6)
     elements, columns = records.loads.shape[1], records.loads.shape[2]
@@ -491,7 +497,13 @@ def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turn
             track(t[k], at, tab, True)
         for c in range(own.size):
             own[c] = 0.0
-        apply_loads(t[k], at, own, loads, idata, tab)
+        for f in range(idata[T.H_FORCES]):
+            if leans[f, LEAN_ADDRESS] != 0:
+                put_turns(tab.force[f], at, axes, turns, tab)
+                evaluate_lean(tab.force[f], leans[f], S_TURNS, rdata, tab, np.int64(DIAGNOSTICS))
+                apply_evaluated(f, own, loads, tab)
+            else:
+                apply_element(f, t[k], at, own, loads, tab)
         for a in range(axes.shape[0]):
             accelerate(a, axes, turns, tab, own, turning, s)
         for m in range(count):
