@@ -11,7 +11,7 @@ import typer
 
 from gearmbs._command import case_bars, check_kind, guarded, kind_of, stage_bar
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
-from gearmbs.signals.commands import check_targets, hand_over, save_figures
+from gearmbs.signals.command_line import check_targets, hand_over, save_figures
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:

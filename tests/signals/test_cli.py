@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from gearmbs.cli import app
 from gearmbs.signals import make_signal, write_signal
-from gearmbs.signals.commands import tooth_counts
+from gearmbs.signals.command_line import tooth_counts
 
 RATE, SHAFT, TEETH = 12800.0, 30.0, 32
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gearmbs._command import check_kind, guarded, stage_bar
-from gearmbs.signals.commands import ReportFile, check_targets, hand_over, save_figures, save_tables, tooth_counts
+from gearmbs.signals.command_line import ReportFile, check_targets, hand_over, save_figures, save_tables, tooth_counts
 from gearmbs.signals.files.table import titles
 
 if TYPE_CHECKING:
