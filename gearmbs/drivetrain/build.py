@@ -20,7 +20,7 @@ from gearmbs.drivetrain.placement import Layout, Seat, order, seats
 from gearmbs.drivetrain.planetary import add_stage, carried, check_stage
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
-from gearmbs.gears.spec import COUNTED_TWICE
+from gearmbs.gears.spec import COUNTED_TWICE, GearSpec
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.inputs import Output
@@ -370,9 +370,14 @@ class _Builder:
         if shaft.mass is not None:
             # a mass from a drawing or a scale leaves open what is in it
             return
-        wheels = [wheel for wheel in self.train.wheels if wheel.shaft == shaft.name]
-        twice = {wheel.name: self._counted_twice(shaft, wheel) for wheel in wheels}
-        total, doubled = shaft.body()[0] + sum(wheel.gear.mass for wheel in wheels), sum(twice.values())
+        train = self.train
+        wheels = {w.name: (w.gear, train.station(w)) for w in train.wheels if w.shaft == shaft.name}
+        for stage in train.planetary_stages:
+            # a mass that was given leaves open what is in it
+            if stage.sun == shaft.name and "sun" not in stage.masses:
+                wheels[f"{stage.name} sun"] = (stage.gears.sun, stage.station(train, "sun"))
+        twice = {name: self._counted_twice(shaft, *wheel) for name, wheel in wheels.items()}
+        total, doubled = shaft.body()[0] + sum(gear.mass for gear, _ in wheels.values()), sum(twice.values())
         if doubled <= COUNTED_TWICE * total:
             return
         names = ", ".join(f"'{name}'" for name, mass in twice.items() if mass > 0.0)
@@ -383,13 +388,13 @@ class _Builder:
             stacklevel=stacklevel,
         )
 
-    def _counted_twice(self, shaft: Shaft, wheel: Wheel) -> float:
-        """Return the mass of a wheel's body where its shaft is, kg."""
-        half, place = 0.5 * wheel.gear.face_width, self.train.station(wheel)
+    def _counted_twice(self, shaft: Shaft, gear: GearSpec, place: float) -> float:
+        """Return the mass of a wheel's body at a station where its shaft is, kg."""
+        half = 0.5 * gear.face_width
         found, z = 0.0, 0.0
         for length, radius in shaft.cylinders:
             width = min(z + length, place + half) - max(z, place - half)
-            found += wheel.gear.mass_within(radius, max(0.0, width))
+            found += gear.mass_within(radius, max(0.0, width))
             z += length
         return found
 

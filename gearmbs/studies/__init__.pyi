@@ -52,6 +52,8 @@ from .run.steady import SteadyCase as SteadyCase
 from .run.steady import steady as steady
 from .run.sweep import Sweep as Sweep
 from .run.sweep import sweep as sweep
+from .train_page import TrainPage as TrainPage
+from .train_page import train_page as train_page
 from .train_views import train_campbell as train_campbell
 from .train_views import train_report as train_report
 from .train_views import train_scene as train_scene

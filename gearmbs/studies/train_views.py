@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -127,7 +128,7 @@ def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
         return _highest(train, record)
     lines = ["## Mesh harmonics, RMS", ""]
     harmonics = record.harmonic.values
-    for mesh in _one_a_group(train):
+    for mesh in one_a_group(train):
         levels = record["mesh_rms"].sel(mesh=mesh.name)
         rows = [[signal, *(f"{v:.4g}" for v in levels.sel(signal=signal).values)] for signal in record.signal.values]
         table = markdown_table(["signal", *(f"{h} x" for h in harmonics)], rows)
@@ -135,7 +136,7 @@ def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
     return lines
 
 
-def _one_a_group(train: Drivetrain) -> list[Meshing]:
+def one_a_group(train: Drivetrain) -> list[Meshing]:
     """Return the meshes whose harmonics are told: planets of a stage mesh at one frequency."""
     return list({mesh.group: mesh for mesh in reversed(train.meshings)}.values())[::-1]
 
@@ -153,7 +154,7 @@ def _highest(train: Drivetrain, record: xr.Dataset) -> list[str]:
     lines = ["## Mesh harmonics along the run-up: highest RMS, at the speed of the drive, at the mesh frequency", ""]
     tracks = record["mesh_track"]
     speed = tracks["track_speed"].values * RPM
-    for mesh in _one_a_group(train):
+    for mesh in one_a_group(train):
         rows = []
         for signal in tracks.signal.values:
             for h in tracks.harmonic.values:
@@ -238,6 +239,10 @@ def train_scene(train: Drivetrain) -> Scene:
     housings = [housing.name for housing in train.housings]
     mechanism = train.build()
     scene = mechanism_scene(mechanism, shapes=train_shapes(train), through=housings, title=train.name)
+    planets = train.planets
+    scene.parts = [
+        replace(part, colour=PART_COLOURS["planet"]) if part.name in planets else part for part in scene.parts
+    ]
     for stage in train.planetary_stages:
         # the solids of a ring that is held are on no body of their own
         marker = mechanism.elements[f"{stage.planet(1)}-ring"].j

@@ -6,9 +6,10 @@ import base64
 import html
 import io
 import json
+from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,9 @@ import numpy.typing as npt
 from gearmbs._display import draw
 from gearmbs.files import write_whole
 from gearmbs.view.figures.style import look
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FILMS = ", which plays in any browser; films (.mp4, .gif) are made of mesh animations and scenes that move"
 
@@ -91,18 +95,25 @@ STYLE = (
 
 def report_html(report: Any) -> str:
     """Return a report as a page: its text, and the figure that says most where it has one."""
-    title = html.escape(report.to_markdown().partition("\n")[0].lstrip("# "))
+    return _page(report.to_markdown().partition("\n")[0].lstrip("# "), report_body(report))
+
+
+def _page(title: str, body: str) -> str:
     return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
-        f"</head>\n<body>\n{report_body(report)}</body></html>\n"
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
+        f"<style>{STYLE}</style></head>\n<body>\n{body}</body></html>\n"
     )
 
 
 def report_body(report: Any) -> str:
     """Return what a notebook shows of a report: its figure and its text."""
+    return _picture(report) + _rendered(report.to_markdown())
+
+
+def _rendered(text: str) -> str:
     from markdown_it import MarkdownIt
 
-    return _picture(report) + MarkdownIt("commonmark", {"html": False}).enable("table").render(report.to_markdown())
+    return MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
 
 
 def write_report_page(report: Any, path: str | Path) -> Path:
@@ -110,13 +121,24 @@ def write_report_page(report: Any, path: str | Path) -> Path:
     return write_whole(path, report_html(report))
 
 
+def page_of(title: str, figures: Iterable[tuple[str, Figure]], text: str) -> str:
+    """Return a page of figures with captions, and below them a text in Markdown."""
+    return _page(title, "".join(_image(figure, caption) for caption, figure in figures) + _rendered(text))
+
+
 def _picture(report: Any) -> str:
     try:
         figure = draw(report)
     except TypeError:
         return ""
+    return _image(figure)
+
+
+def _image(figure: Figure, caption: str = "") -> str:
     content = io.BytesIO()
     with look():
         figure.savefig(content, format="svg", bbox_inches="tight")
     data = base64.b64encode(content.getvalue()).decode("ascii")
-    return f'<p><img alt="" src="data:image/svg+xml;base64,{data}"></p>\n'
+    told = html.escape(caption)
+    below = f"<br>{told}" if told else ""
+    return f'<p><img alt="{told}" src="data:image/svg+xml;base64,{data}">{below}</p>\n'

@@ -133,7 +133,10 @@ def contact_pattern_plot(
     pressure = np.ma.masked_less_equal(np.asarray(pattern.pressure, dtype=float) * 1e-3, 0.0)
     with drawing(ax, 6.6, 4.4, title=title) as (figure, ax):
         top = max(float(pressure.max()) if pressure.count() else 1.0, 1e-12)
-        mesh = ax.pcolormesh(section, roll, pressure, cmap="cividis", vmin=0.0, vmax=top, shading="nearest")
+        # as a picture: thousands of cells make files of a megabyte
+        mesh = ax.pcolormesh(
+            section, roll, pressure, cmap="cividis", vmin=0.0, vmax=top, shading="nearest", rasterized=True
+        )
         ax.set_facecolor("#ECEDEF")
         ax.grid(visible=False)
         if pair is not None:

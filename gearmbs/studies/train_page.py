@@ -1,0 +1,297 @@
+"""The report of a drivetrain for whoever decides: figures, then what it is, carries and does, and by which laws."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from gearmbs._display import readable, settings_of
+from gearmbs.bearings import mean_load, rating_life
+from gearmbs.drivetrain import Drivetrain, DrivetrainError
+from gearmbs.drivetrain.kinematics import RPM
+from gearmbs.drivetrain.plants import resting
+from gearmbs.files import write_whole
+from gearmbs.gears import GearPair
+from gearmbs.gears.pattern import ContactPattern, contact_pattern
+from gearmbs.mechanism.solve.analyses import static_equilibrium
+from gearmbs.signals.analysis.report import markdown_table
+from gearmbs.signals.files.simulated import holds_speed
+from gearmbs.studies.mode_names import mode_table, named_modes, ranked_crossings
+from gearmbs.studies.train_views import one_a_group, train_campbell, train_report, train_scene, train_spectrum
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MODES, CROSSINGS = 20, 10
+"""Rows of the tables of modes and of crossings: those of which a decision may be made come first."""
+ANGLE = (35.0, 25.0)
+"""Azimuth and elevation from which the drivetrain is seen, degrees."""
+
+SOURCES = (
+    ("speeds, mesh and fault frequencies", "teeth and ratios; planets by Willis' equation", "docs/theory/planetary.md"),
+    ("torques and power flow", "equilibrium of every shaft under the nominal loads, without losses",
+     "docs/theory/drivetrains.md"),
+    ("stiffness of teeth, where a law of the wheels is named", "mean over a mesh cycle, c_gamma b", "ISO 6336-1"),
+    ("damping of teeth, where nothing else is given", "0.07 of critical of the bare wheels: a convention",
+     "docs/theory/drivetrains.md"),
+    ("contact patterns", "at rest under the nominal load; sections of the face are springs of their own",
+     "docs/theory/gears.md"),
+    ("bearing lives", "L10 = (C/P)^p, p = 3 of balls and 10/3 of rollers; a_1 = a_ISO = 1", "ISO 281"),
+    ("modes, Campbell diagram", "linearised at rest under the nominal loads; no whirl", "docs/howto/gearboxes.md"),
+)  # fmt: skip
+"""What the report tells, the law behind it, and where that is stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainPage:
+    """A drivetrain and what a run of it gave, as a page that stands alone.
+
+    Save it by `gearmbs.save`, as ``.html`` with its figures or ``.md`` without them; a notebook shows it.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    record : Dataset
+        From `gearmbs.studies.run_train`.
+    maximum : float
+        Highest frequency of the Campbell diagram, Hz.
+    """
+
+    train: Drivetrain
+    record: xr.Dataset
+    maximum: float = 2000.0
+
+    @cached_property
+    def patterns(self) -> dict[str, ContactPattern]:
+        """Contact pattern of each mesh under its share of the operating torque; planets of a stage are alike."""
+        out = {}
+        for mesh in one_a_group(self.train):
+            pair, spring = self.train.pairs[mesh.name], self.train.mesh_springs[mesh.name]
+            if isinstance(pair, GearPair) and spring.preload > 0.0:
+                out[mesh.group] = contact_pattern(pair, spring.preload * pair.geometry.driven.base_radius)
+        return out
+
+    @cached_property
+    def campbell(self) -> xr.Dataset | None:
+        """Modes against speed with the crossings; None where no mode lies that low."""
+        from gearmbs.signals import SignalError
+
+        try:
+            return train_campbell(self.train, maximum=self.maximum)
+        except SignalError:
+            return None
+
+    @cached_property
+    def lives(self) -> list[tuple[str, str, float, float, float, float]]:
+        """Name, designation, C (N), equivalent load (N), life (revolutions) and (h) of bearings in which parts roll."""
+        rows = []
+        for name, rolling, force, speed in self._rolling():
+            load = mean_load(rolling, np.hypot(force[:, 0], force[:, 1]), force[:, 2], speed) if speed.any() else 0.0
+            turns = rating_life(rolling, load) if load > 0.0 else np.inf
+            mean = float(speed.mean())
+            hours = turns * 2.0 * np.pi / mean / 3600.0 if mean > 0.0 else np.inf
+            rows.append((name, rolling.designation or "-", rolling.rating, load, turns, hours))
+        return rows
+
+    def _rolling(self) -> Iterator[tuple[str, Any, np.ndarray, np.ndarray]]:
+        """Yield name, bearing, force across and along its axis (m, 3) and speed of its rings (m,)."""
+        train, forces = self.train, self.record["bearing_force"]
+        turning, rest = set(map(str, self.record.shaft.values)), np.zeros(self.record.sizes["time"])
+
+        def speed(one: str, two: str) -> np.ndarray:
+            found = [self.record["speed"].sel(shaft=b).values if b in turning else rest for b in (one, two)]
+            return np.abs(found[0] - found[1])
+
+        for bearing in train.bearings:
+            if bearing.rolling is not None:
+                axes = train.layout.seats[bearing.shaft].axes
+                force = forces.sel(bearing=bearing.name).values @ axes
+                yield bearing.name, bearing.rolling, force, speed(bearing.shaft, train.carrier(bearing))
+        for pin, (stage, _) in train.pins.items():
+            rolling = getattr(stage.on_pins, "rolling", None)
+            if rolling is not None:
+                force = forces.sel(bearing=pin).values
+                yield pin, rolling, force, speed(pin.removesuffix(" pin"), stage.carrier)
+
+    def figures(self) -> Iterator[tuple[str, Figure]]:
+        """Yield the figures with what they show, those first of which most is decided."""
+        from gearmbs.view import campbell_plot, contact_pattern_plot
+
+        train, record = self.train, self.record
+        yield "The drivetrain at its start", train_scene(train).still(azimuth=ANGLE[0], elevation=ANGLE[1])
+        if train.meshings and holds_speed(record):
+            yield "Spectrum with its strongest lines named", train_spectrum(train, record)
+        if self.campbell is not None:
+            yield "Modes under load against speed, and what crosses them", campbell_plot(self.campbell)
+        for name, pattern in self.patterns.items():
+            yield f"Contact pattern of {name} under its nominal load", contact_pattern_plot(pattern, title=name)
+
+    def to_markdown(self) -> str:
+        """Return the text and all tables."""
+        sections: tuple[Callable[[], list[str]], ...] = (
+            self._input, self._power, self._static, self._life, self._pattern, self._modes,
+        )  # fmt: skip
+        told = ["\n".join(section()) for section in sections]
+        # speeds, meshes, bearings, sensors, harmonics and cost stand in the report of the record
+        measured = train_report(self.train, self.record).partition("\n")[2]
+        return "\n".join([f"# {self.train.name}", "", *told, measured, *self._sources()])
+
+    def to_html(self) -> str:
+        """Return the page: figures, then text and tables."""
+        from gearmbs.view.pages import page_of
+
+        return page_of(self.train.name, self.figures(), self.to_markdown())
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page as ``.html``, or its text as ``.md``.
+
+        Raises
+        ------
+        ValueError
+            For another ending.
+        """
+        ending = Path(path).suffix.lower()
+        if ending not in (".html", ".md"):
+            raise ValueError(f"path is {str(path)!r}; the page of a drivetrain is saved as .html or .md")
+        return write_whole(path, self.to_html() if ending == ".html" else self.to_markdown())
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{html.escape(self.to_html(), quote=True)}" style="width:100%;height:700px;border:0">'
+
+    # --- sections -----------------------------------------------------------------------------------
+
+    def _input(self) -> list[str]:
+        rows = []
+        for part in self.train.parts.values():
+            settings = "; ".join(f"{key.replace('_', ' ')} {readable(v)}" for key, v in settings_of(part)[1:])
+            rows.append([part.title, part.name, settings.replace("|", "/")])
+        return ["## What it is", "", markdown_table(["part", "name", "settings"], rows), ""]
+
+    def _power(self) -> list[str]:
+        train, flow, rows = self.train, self.train.power, []
+
+        def row(kind: str, name: str, shaft: str, torque: float) -> None:
+            speed = train.speeds.get(shaft, 0.0)
+            told = (f"{torque:.5g}", f"{speed * RPM:.5g}", f"{1e-3 * torque * speed:.5g}")
+            rows.append([kind, name, shaft, *told])
+
+        for drive in train.drives:
+            if drive.name in flow.drive:
+                row("drive", drive.name, drive.shaft, flow.drive[drive.name])
+        for coupling in train.couplings:
+            row("coupling", coupling.name, coupling.second, flow.torques[coupling.name][1])
+        for mesh in train.meshes:
+            driver, driven = train.wheels_of(mesh)
+            for wheel, torque in zip((driver, driven), flow.torques[mesh.name]):
+                row("mesh", f"{mesh.name} on {wheel.name}", wheel.shaft, torque)
+        for stage in train.planetary_stages:
+            for member, torque in flow.members[stage.name].items():
+                row("planetary stage", f"{stage.name} on its {member}", getattr(stage, member), torque)
+        for load in train.loads:
+            speed = train.speeds[load.shaft]
+            row("load", load.name, load.shaft, -np.copysign(load.nominal(abs(speed)), speed))
+        header = ["", "name", "on", "torque about its axis, N m", "speed, rpm", "power into it, kW"]
+        return ["## Power flow", "", markdown_table(header, rows), ""]
+
+    def _static(self) -> list[str]:
+        train = resting(self.train)
+        mechanism = train.build()
+        rest = static_equilibrium(mechanism, t=2.0 * train.run_up).solution
+        rows = []
+        for bearing in train.bearings:
+            # of joints reactions, of elements loads
+            is_joint = bearing.name in mechanism.joints
+            force = (rest.reaction(bearing.name) if is_joint else rest.load(bearing.name))[0][-1]
+            along = force @ train.layout.seats[bearing.shaft].axes
+            told = (np.hypot(along[0], along[1]), along[2], np.linalg.norm(along))
+            rows.append([bearing.name, bearing.shaft, *(f"{value:.5g}" for value in told)])
+        header = ["bearing", "shaft", "across its axis, N", "along it, N", "whole, N"]
+        meshes = [[m.name, f"{rest.diagnostics(m.name)['normal_force'][-1]:.5g}"] for m in train.meshings]
+        lines = ["## Loads at rest", "", markdown_table(header, rows), ""]
+        return [*lines, markdown_table(["mesh", "normal force, N"], meshes), ""] if meshes else lines
+
+    def _life(self) -> list[str]:
+        header = ["bearing", "designation", "C, kN", "equivalent load of the record, N", "L10, 10^6 turns", "L10, h"]
+        rows = [
+            [name, kind, f"{1e-3 * rating:.4g}", f"{load:.4g}", f"{1e-6 * turns:.4g}", f"{hours:.4g}"]
+            for name, kind, rating, load, turns, hours in self.lives
+        ]
+        told = markdown_table(header, rows) if rows else "No bearing says what rolls in it: give it `rolling`."
+        return ["## Bearing lives", "", told, ""]
+
+    def _pattern(self) -> list[str]:
+        rows = [
+            [
+                name,
+                f"{1e-3 * pattern.pressure.max():.4g}",
+                f"{pattern.face_load_factor:.3f}",
+                f"{pattern.share.max():.3f}",
+            ]
+            for name, pattern in self.patterns.items()
+        ]
+        header = ["mesh", "largest load along the face, N/mm", "face load factor", "largest share of one tooth"]
+        told = markdown_table(header, rows) if rows else "No teeth carry load that have a contact of their own."
+        return ["## Contact patterns", "", told, ""]
+
+    def _modes(self) -> list[str]:
+        table = mode_table(named_modes(self.train)).head(MODES)
+        shares = [name for name in table.columns if name not in ("frequency_hz", "damping_ratio", "name", "other")]
+        rows = [
+            [
+                f"{row['frequency_hz']:.5g}",
+                f"{row['damping_ratio']:.3g}",
+                row["name"],
+                *(f"{row[s]:.2f}" for s in shares),
+            ]
+            for _, row in table.iterrows()
+        ]
+        lines = ["## Modes under load", "", markdown_table(["Hz", "of critical damping", "largest part",
+                 *(f"share of {name}" for name in shares)], rows), ""]  # fmt: skip
+        if self.campbell is None:
+            return [*lines, f"No mode lies below {self.maximum:.5g} Hz.", ""]
+        found = [
+            [f"{c.speed_rpm:.5g}", f"{c.frequency_hz:.5g}", c.order, c.name, f"{c.gain:.3g}"]
+            for c in ranked_crossings(self.campbell).head(CROSSINGS).itertuples()
+        ]
+        header = ["speed of the first drive, rpm", "Hz", "order", "mode", "gain"]
+        return [*lines, "Crossings, by how far the excitation moves the mode:", "", markdown_table(header, found), ""]
+
+    def _sources(self) -> list[str]:
+        return [
+            "## Laws and where they are from",
+            "",
+            markdown_table(["what", "law", "source"], [list(row) for row in SOURCES]),
+            "",
+        ]
+
+
+def train_page(train: Drivetrain, record: xr.Dataset, *, maximum: float = 2000.0) -> TrainPage:
+    """Return the report of a drivetrain and a run of it for whoever decides, to be saved by `gearmbs.save`.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    record : Dataset
+        From `gearmbs.studies.run_train` of the same drivetrain.
+    maximum : float
+        Highest frequency of the Campbell diagram, Hz.
+
+    Raises
+    ------
+    DrivetrainError
+        For the record of another drivetrain.
+    """
+    shafts = [str(name) for name in record["shaft"].values]
+    if shafts != list(train.turning):
+        raise DrivetrainError(
+            f"{train.name}: the record has the shafts {', '.join(shafts)}, which are not those of the drivetrain, "
+            f"{', '.join(train.turning)}; give the record of this drivetrain"
+        )
+    return TrainPage(train, record, maximum)
