@@ -112,6 +112,32 @@ def test_a_wrong_speed_acquits_no_cage(share):
     assert "CHECK THE SPEED" not in diagnose_bearing(cage, "6205", rpm(share)).verdict
 
 
+@pytest.mark.parametrize("factor", [2.0, 0.5, 4.0, 0.25])
+@pytest.mark.parametrize("part", ["outer race", "inner race", "rolling element"])
+@pytest.mark.parametrize("running", [RUNNING, 0.0 * RUNNING], ids=["orders", "quiet"])
+def test_a_wrong_sampling_rate_acquits_nobody(part, factor, running):
+    """Where another rate is told all lines stand elsewhere, those of the shaft and of the mesh, too."""
+    heard = record(pulses(LINES.orders[part] * SHAFT, 0.002), running)
+    told = make_signal(heard.values, factor * RATE, units="m/s^2")
+    report = diagnose_bearing(told, "6205", rpm(0.0), shafts=())
+    assert report.fault is None
+    (doubted,) = [finding for finding in report.findings if finding.grade == "shifted"]
+    assert doubted.part == part
+    assert doubted.found / doubted.kinematic == pytest.approx(factor, rel=5e-3)
+    for words in ("CHECK THE RATE", f"{factor:.2g}", "Not certain"):
+        assert words in report.verdict
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("parts", [(), (RUNNING,), (0.3 * np.cos(2 * np.pi * 36.0 * SHAFT * TIME),)])
+def test_a_right_rate_is_not_doubted(seed, parts):
+    """Of a sound bearing, among noise, orders of the shaft, and a mesh; nor another one, of which nothing tells then."""
+    heard = record(*parts, seed=seed)
+    for factor in (1.0, 2.0):
+        told = make_signal(heard.values, factor * RATE, units="m/s^2")
+        assert "CHECK THE RATE" not in diagnose_bearing(told, "6205", rpm(0.0), shafts=()).verdict
+
+
 def test_looseness_near_a_shifted_cage_is_none():
     """All multiples of 2/5 of the turns, 2.6 % beside the cage of this bearing."""
     lines = bearing_lines({"name": "loose", "FTF": 0.41, "BSF": 2.3, "BPFO": 3.69, "BPFI": 5.31})

@@ -5,6 +5,8 @@ and else at those that the width of its lines leaves. A part is named if no othe
 half of them at least; otherwise it is uncertain, and so is a part that would be named beside the middle speed only.
 A told speed may also be wrong. So the shaft's line is looked for within 6 %, too, and the record is judged where it
 stands. Without one, a part whose lines are clear at a speed beyond the tolerance is told, but not accused.
+A sampling rate told too high by a factor moves all lines by it. So where no part is named, a part whose lines are clear
+at a plain multiple of the told speed, and at no other, is told in the same way.
 
 **Level.** The stiffness of a sound bearing changes as elements pass through the load (varying compliance), and waves of
 its rings do the same. Where nothing hides them, as in a calculation or on a quiet rig, the lines of that motion are as
@@ -47,6 +49,11 @@ LEAST_AGREEMENT = 0.5
 SHIFTS = (-0.03, 0.03, -0.05, 0.05)
 """Shares by which a told speed is tried to be wrong: with the windows of slip about them they reach to 6.5 % without a
 gap, as far as a shaft's own line is looked for."""
+
+
+RATES = (2.0, 0.5, 4.0, 0.25)
+"""Factors by which a sampling rate is told wrongly: that of another channel, of a filter's band, or a file that was
+decimated (records at 12 and 48 kHz stand beside each other)."""
 
 
 Verdicts = tuple[tuple[Judged, ...], ...]
@@ -102,6 +109,7 @@ def weigh(
     tolerance: float,
     others: Sequence[float],
     judge_at: Callable[[float], Iterator[Sequence[Judged]]],
+    timed: bool = False,
 ) -> Weighed:
     """Judge a record at the told speed, at those within its tolerance, and where its shaft's own line stands.
 
@@ -115,14 +123,18 @@ def weigh(
         Ratios of the machine's other shafts.
     judge_at : callable
         Returns what is judged at a speed in Hz, by channel.
+    timed : bool
+        Whether the speed comes from the record itself, by pulses, whatever its sampling rate is.
     """
     answers = answers_at(tried_speeds(spectra, told, tolerance), judge_at, SPEED_SHARE)
     near = Weighed(answers, verdicts_of(answers))
-    if near.speed.found or tolerance <= 0.0:
+    if timed:
         return near
+    if near.speed.found or tolerance <= 0.0:
+        return replace(near, verdicts=_shifted(near, told, tolerance, judge_at, ()))
     far = far_shaft(spectra, told, tolerance, others)
     if not far.found:
-        return replace(near, verdicts=_shifted(near, told, tolerance, judge_at))
+        return replace(near, verdicts=_shifted(near, told, tolerance, judge_at, SHIFTS))
     (there,) = answers_at([far], judge_at, SPEED_SHARE)
     own, other = leading(near.verdicts), leading(there.judged)
     lines = f"CHECK THE SPEED: lines such as a shaft's own stand at {60 * far.turns:.1f} rpm"
@@ -144,22 +156,32 @@ def _doubted(judged: Judged) -> Judged:
 
 
 def _shifted(
-    near: Weighed, told: float, tolerance: float, judge_at: Callable[[float], Iterator[Sequence[Judged]]]
+    near: Weighed,
+    told: float,
+    tolerance: float,
+    judge_at: Callable[[float], Iterator[Sequence[Judged]]],
+    shifts: Sequence[float],
 ) -> Verdicts:
     """Return the verdicts, with the part whose lines are clear at a speed beyond the tolerance if none is named.
 
-    A cage, whose lines are never called clear, counts where they are no noise, after all other parts.
+    A cage, whose lines are never called clear, counts where they are no noise, after all other parts. It says nothing
+    of the sampling rate: at multiples of its turns many things stand.
     """
     if any(one.grade in (CLEAR, SIGNS, UNCERTAIN) for channel in near.verdicts for one in channel):
         return near.verdicts
-    found = [
-        (one, c, p)
-        for shift in SHIFTS
-        for c, channel in enumerate(judge_at(told * (1.0 + shift)))
-        for p, one in enumerate(channel)
-        if one.grade == CLEAR or (one.part == CAGE and one.grade == SIGNS and one.evidence.log_chance <= CLEAR_CHANCE)
-        if not _in_step(one, told, tolerance)
-    ]
+
+    def found_at(speed: float, cages: bool) -> list[tuple[Judged, int, int]]:
+        return [
+            (one, c, p)
+            for c, channel in enumerate(judge_at(speed))
+            for p, one in enumerate(channel)
+            if (one.grade == CLEAR and (cages or one.part != CAGE))
+            or (cages and one.part == CAGE and one.grade == SIGNS and one.evidence.log_chance <= CLEAR_CHANCE)
+            if not _in_step(one, told, tolerance)
+        ]
+
+    found = [each for shift in shifts for each in found_at(told * (1.0 + shift), True)]
+    found = found or [each for factor in RATES for each in found_at(told * factor, False)]
     if not found:
         return near.verdicts
     one, c, p = min(found, key=lambda each: (each[0].part == CAGE, each[0].evidence.log_chance))

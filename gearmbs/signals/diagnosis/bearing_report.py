@@ -115,6 +115,8 @@ WORDS = {
     "cage": "a rolling element or the cage",
 }
 SHOWN = 4
+MOST_OFF = 0.1
+"""Share beyond which no speed is off by slip or load: a told one is looked for within 6.5 %."""
 ENOUGH_TURNS = 60
 """Turns below which an acquittal says that it is of a short record: blows that four of four records of 40 turns show
 one of four of 30 turns does."""
@@ -234,6 +236,13 @@ class PartFinding:
                 f"{self.bearing} at some of the speeds that the record leaves open, at others they are another part's "
                 "or none's. Give a tacho, a measured speed (speed=, --speed; tolerance=0, --speed-tolerance 0 if it is "
                 "exact) or a longer record."
+            )
+        if self.grade == "shifted" and abs(self.slip) > MOST_OFF:
+            return (
+                f"CHECK THE RATE: clear lines at {self.found:.2f} Hz {place} are those of {WORDS[self.part]} of "
+                f"bearing {self.bearing} ({self.kinematic:.2f} Hz) if the sampling rate is told {1.0 + self.slip:.3g} "
+                "times as high as it is, or the shaft turns so many times as fast as told. Not certain: look up the "
+                "rate (rate=, --rate), or give a tacho of the same record."
             )
         if self.grade == "shifted":
             return (

@@ -254,7 +254,8 @@ def diagnose_bearing(
 
     own = [] if phase is not None else [channel_spectrum(values, rate, told) for values in signal.values.T]
     spectra = [*own, *(each[-1] for each in heard.values())]
-    weighed = weigh(spectra, told, 0.0 if phase is not None else tolerance, others or (), judge_at)
+    timed = phase is not None
+    weighed = weigh(spectra, told, 0.0 if timed else tolerance, others or (), judge_at, timed)
     findings, clearest = _found(signal, weighed, heard, known, others, slip, level, highest)
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
@@ -426,7 +427,9 @@ def _finding(
     spectrum = next(s for s in spectra if s.where == evidence.where)
     sides = _sidebands(spectrum, evidence.found, lines.sidebands[part] * shaft * lines.ratio)
     loud = grade in (CLEAR, SIGNS, SHIFTED)
-    modulated = _modulated(signal, evidence.found, highest) if loud else math.nan
+    # of a rate that is told too high, lines and bands are as much wider apart
+    widest = highest * max(1.0, evidence.found / evidence.kinematic)
+    modulated = _modulated(signal, evidence.found, widest) if loud else math.nan
     if modulated < level:
         grade = QUIET
     step = None if grade != NONE else _multiple_of_turns(judged, spectra, shaft, slip)
