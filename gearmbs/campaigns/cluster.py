@@ -142,6 +142,8 @@ class DaskRunner:
         CampaignError
             If the scheduler is lost.
         """
+        from concurrent.futures import CancelledError
+
         from distributed import wait
         from distributed.comm import CommClosedError
 
@@ -167,7 +169,8 @@ class DaskRunner:
                         back.append(unit)
                     else:
                         yield *unit, kind, value
-        except CommClosedError as error:
+        except (CommClosedError, CancelledError) as error:
+            # what waits for its answers is cancelled by the client that has lost the connection
             at_work.clear()
             raise CampaignError(
                 "the scheduler is lost; what is done is in the folder: start another one and run again"

@@ -10,11 +10,12 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import CancelledError
 
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError
-from gearmbs.campaigns.cluster import batch_cluster, job_script
+from gearmbs.campaigns.cluster import DaskRunner, batch_cluster, job_script
 from gearmbs.campaigns.limits import TimeLimitReached, limited
 from gearmbs.studies.run.engine import WorkerReplaced
 from tests.campaigns.support import digest, small
@@ -146,6 +147,39 @@ def test_a_dask_worker_that_lacks_a_module_is_left_out(tmp_path):
         with pytest.warns(WorkerReplaced), pytest.raises(CampaignError, match=says("colorsys", "host")):
             campaign.extend(64).run(client=client)
     assert campaign.status().failed == 0
+
+
+@pytest.mark.parametrize("lost", ["closed", "cancelled"])
+def test_a_scheduler_that_is_lost_is_told(monkeypatch, lost):
+    """Whichever way the client notices it; an error of another kind stays what it is."""
+    distributed = pytest.importorskip("distributed")
+    errors = {"closed": distributed.comm.CommClosedError("gone"), "cancelled": CancelledError()}
+
+    class Client:
+        """One of a cluster of one worker, which takes everything and never answers."""
+
+        def nthreads(self):
+            return {"tcp://worker": 1}
+
+        def submit(self, *_args, **_kwargs):
+            return object()
+
+        def cancel(self, _futures):
+            raise AssertionError
+
+    def failing(error):
+        def wait(*_args, **_kwargs):
+            raise error
+
+        return wait
+
+    monkeypatch.setattr(distributed, "wait", failing(errors[lost]))
+    with pytest.raises(CampaignError, match=says("scheduler", "lost", "run again")):
+        list(DaskRunner(Client())(None, range(3), 1))
+    monkeypatch.setattr(distributed, "wait", failing(KeyError("x")))
+    monkeypatch.setattr(Client, "cancel", lambda self, futures: None)
+    with pytest.raises(KeyError):
+        list(DaskRunner(Client())(None, range(3), 1))
 
 
 def test_job_scripts_of_both_systems():

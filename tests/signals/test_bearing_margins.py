@@ -131,7 +131,7 @@ def test_a_wrong_sampling_rate_acquits_nobody(part, factor, running):
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("parts", [(), (RUNNING,), (0.3 * np.cos(2 * np.pi * 36.0 * SHAFT * TIME),)])
 def test_a_right_rate_is_not_doubted(seed, parts):
-    """Of a sound bearing, among noise, orders of the shaft, and a mesh; nor another one, of which nothing tells then."""
+    """Of a sound bearing, among noise, orders of the shaft, and a mesh; nor another, of which nothing tells then."""
     heard = record(*parts, seed=seed)
     for factor in (1.0, 2.0):
         told = make_signal(heard.values, factor * RATE, units="m/s^2")
