@@ -177,7 +177,7 @@ def test_a_scheduler_that_is_lost_is_told(monkeypatch, lost):
     with pytest.raises(CampaignError, match=says("scheduler", "lost", "run again")):
         list(DaskRunner(Client())(None, range(3), 1))
     monkeypatch.setattr(distributed, "wait", failing(KeyError("x")))
-    monkeypatch.setattr(Client, "cancel", lambda self, futures: None)
+    monkeypatch.setattr(Client, "cancel", lambda *_: None)
     with pytest.raises(KeyError):
         list(DaskRunner(Client())(None, range(3), 1))
 
