@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from gearmbs.adams.view.lexer import ViewError
@@ -48,7 +49,16 @@ def parse(text: str, units: Units, line: int = 0) -> Tree:
     ViewError
         If it has no such form.
     """
-    parser = _Parser(text, units, line)
+    try:
+        return _parsed(text, tuple(units.names.items()))
+    except ViewError as error:
+        raise ViewError(str(error), line) from error
+
+
+@lru_cache(maxsize=1024)
+def _parsed(text: str, units: tuple[tuple[str, str], ...]) -> Tree:
+    """Return the tree of an expression; loops ask for the same ones again and again."""
+    parser = _Parser(text, Units(dict(units)))
     tree = parser.level(0)
     if parser.kind:
         raise parser.error(f"{parser.token!r} is not expected")
@@ -56,15 +66,15 @@ def parse(text: str, units: Units, line: int = 0) -> Tree:
 
 
 class _Parser:
-    def __init__(self, text: str, units: Units, line: int) -> None:
-        self.text, self.units, self.line = text, units, line
+    def __init__(self, text: str, units: Units) -> None:
+        self.text, self.units = text, units
         self.at = 0
         self.depth = 0
         self.kind = self.token = ""
         self.next()
 
     def error(self, message: str) -> ViewError:
-        return ViewError(f"in the expression {self.text[:80].strip()}: {message}", self.line)
+        return ViewError(f"in the expression {self.text[:80].strip()}: {message}")
 
     def next(self) -> None:
         match = _TOKEN.match(self.text, self.at)

@@ -166,6 +166,8 @@ def main() -> None:
             counts[word] = counts.get(word, 0) + 1
             if word in ("failed", "slow", "opened"):
                 print(f"seed {seed}: {found.strip()[-900:]}\n", flush=True)
+            if (seed + 1 - given.first) % 1000 == 0:
+                print(seed + 1, counts, f"{time.process_time() - began:.0f} s", flush=True)
     print("end", counts, f"{time.process_time() - began:.0f} s of processor time", flush=True)
 
 
