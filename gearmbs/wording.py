@@ -4,9 +4,23 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 ALIKE = 0.6
 """Least likeness, 0 to 1, of a name that may be meant: difflib's default; one wrong letter of five leaves 0.8."""
+
+OF_ADAMS = {
+    ".cmd": "a command file of ADAMS View: `gearmbs adams {name}` runs it",
+    ".adm": "a deck of ADAMS: `gearmbs adams {name}` runs it",
+    ".acf": "commands of the solver of ADAMS: `gearmbs adams DECK.adm {name}` carries them out",
+}
+"""What files of ADAMS are, by their endings."""
+
+
+def of_adams(path: str | Path) -> str:
+    """Return the end of a message about a file that is none of what is wanted: what it is, if it is one of ADAMS."""
+    told = OF_ADAMS.get(Path(path).suffix.lower())
+    return "" if told is None else f"; by its name it is {told.format(name=Path(path).name)}"
 
 
 def closest(name: object, known: Iterable[str], count: int = 1, alike: float = ALIKE) -> list[str]:

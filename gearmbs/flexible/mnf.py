@@ -24,6 +24,7 @@ from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile, check_numbers
 from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.progress import waiting
+from gearmbs.wording import of_adams
 
 SAME = 1e-12
 """Largest difference of two places that move alike, in m and in what a unit of a mode moves and turns them."""
@@ -77,6 +78,7 @@ def read_mnf(path: str | Path) -> ModalNeutralFile:
     if data[:4] != VERSION:
         raise FlexibleError(
             f"{label}: byte 0: {data[:4].hex()} is not the version code of an MNF of version 6 (0000013c)"
+            f"{of_adams(path)}"
         )
     r = Reader(data, label)
     r.at = FLAGS

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, Union, get_
 
 from gearmbs._display import Written
 from gearmbs.schema.quantities import Measure, NoQuantity, OutOfRange, counts, flag, no_truth
-from gearmbs.wording import did_you_mean
+from gearmbs.wording import did_you_mean, of_adams
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -266,7 +266,7 @@ def read_toml(path: str | Path, error: type[ValueError] = ValueError) -> dict[st
             f"{path}: not a text file, so no description in TOML; records are read by `gearmbs analyse`"
         ) from None
     except tomllib.TOMLDecodeError as caught:
-        raise error(f"{path}: not a valid TOML file ({caught})") from None
+        raise error(f"{path}: not a valid TOML file ({caught}){of_adams(path)}") from None
 
 
 def toml_value(value: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -15,9 +16,11 @@ from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.plants import name_plants
 from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.builders.scopes import IN_DYNAMICS, AdamsModel, BodyState, Present
+from gearmbs.adams.doors import read_model
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.view.reader import ViewModel
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
@@ -135,14 +138,16 @@ MAKERS: dict[type, Maker] = CONSTRAINTS | CURVES | FORCES | LINE_LOADS | CONTACT
 
 
 def build_mechanism(
-    deck: Deck, allow_unsupported: bool = False, routines: Mapping[str, Callable] | None = None
+    deck: Deck | ViewModel | str | Path,
+    allow_unsupported: bool = False,
+    routines: Mapping[str, Callable] | None = None,
 ) -> Mechanism:
     """Return the mechanism a deck describes, its joints with the initial conditions given.
 
     Parameters
     ----------
-    deck : Deck
-        Gets the remarks on what is left out.
+    deck : Deck, ViewModel or path
+        Gets the remarks on what is left out. A path is that of a deck or of a command file of View.
     allow_unsupported : bool
         Build it without what is not supported instead of refusing.
     routines : mapping, optional
@@ -153,6 +158,8 @@ def build_mechanism(
     DeckError
         Naming the line of what is not supported or cannot be built.
     """
+    read = read_model(Path(deck)) if isinstance(deck, (str, Path)) else deck
+    deck = read.deck if isinstance(read, ViewModel) else read
     made = bound(deck, routines, allow_unsupported)
     model = build_model(made, allow_unsupported)
     if model.initial_motions:

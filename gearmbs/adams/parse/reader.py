@@ -56,6 +56,9 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
         Naming the line of everything that is wrong.
     """
     refuse_view(text, file)
+    if is_script(text):
+        message = "these are commands of the solver (.acf), not a deck; give the deck (.adm) first, and them behind it"
+        raise DeckError([Diagnostic(ERROR, message, file, 1)])
     first = re.split(r"\r\n|\r|\n", text, maxsplit=1)[0]
     deck = Deck(file=file)
     errors: list[Diagnostic] = []
@@ -72,7 +75,17 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
 def is_view(text: str) -> bool:
     """Return whether a text is a command file of ADAMS View: its commands, and no statement of a deck."""
     found = COMMANDS_OF_VIEW.search(text)
-    return found is not None and not re.search(r"^\s*(?:PART|MARKER|UNITS)\s*/", text, re.MULTILINE)
+    return found is not None and not is_deck(text)
+
+
+def is_deck(text: str) -> bool:
+    """Return whether a text has statements of a deck."""
+    return re.search(r"^\s*(?:PART|MARKER|UNITS)\s*/", text, re.MULTILINE | re.IGNORECASE) is not None
+
+
+def is_script(text: str) -> bool:
+    """Return whether a text has commands for the solver, and no statement of a deck."""
+    return not is_deck(text) and re.search(r"^\s*(?:SIM\w*|LINEAR)\s*/", text, re.MULTILINE | re.IGNORECASE) is not None
 
 
 def refuse_view(text: str, file: str) -> None:

@@ -16,6 +16,7 @@ from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS, POINT_COLUMNS, RunRecord
 from gearmbs.adams.results.remarks import TRACK_COLUMNS
+from gearmbs.wording import of_adams
 
 NAMESPACE = "http://www.mscsoftware.com/:xrf10"
 PER_LINE = 6
@@ -258,7 +259,7 @@ def read_results(path: str | Path) -> ResultsFile:
     try:
         root = ET.parse(path).getroot()
     except ET.ParseError as error:
-        message = f"{error}; the file is cut off, or no results file in XML (RESULTS/XRF)"
+        message = f"{error}; the file is cut off, or no results file in XML (RESULTS/XRF){of_adams(path)}"
         raise fail(message, error.position[0]) from error
     except OSError as error:
         raise fail(f"{error.strerror}") from error

@@ -11,7 +11,7 @@ from typing import Any
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse.commands import Script, parse_script
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.reader import deck_of, read_file
+from gearmbs.adams.parse.reader import COMMANDS_OF_VIEW, deck_of, is_deck, is_script, read_file
 from gearmbs.adams.view import data, forces, instances, machinery, measures, statements
 from gearmbs.adams.view.deckmaker import PART_KEYWORDS, Deckmaker, Made
 from gearmbs.adams.view.expressions import text_of
@@ -114,6 +114,11 @@ def parse_view(
     ------
     DeckError
     """
+    if not COMMANDS_OF_VIEW.search(text) and (is_deck(text) or is_script(text)):
+        kind = "a deck (.adm); `read_deck` reads it" if is_deck(text) else "commands (.acf); `read_script` reads them"
+        raise DeckError(
+            [Diagnostic(ERROR, f"this is of the solver, not of View: {kind}, `run_deck` runs them", file, 1)]
+        )
     run = Interpreter(folder, variables)
     run.run(text)
     errors = [Diagnostic(ERROR, str(error), file, max(error.line, 0)) for error in run.errors]

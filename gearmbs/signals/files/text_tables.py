@@ -25,6 +25,7 @@ from gearmbs.signals.signal.labels import (
     unique_names,
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
+from gearmbs.wording import of_adams
 
 HEAD_LINES = 400
 COMMENT = re.compile(r"^\s*[#%]")
@@ -196,7 +197,8 @@ def _find_numbers(head: list[str], path: Path) -> tuple[int, str | None, str, li
     if not sample:
         raise SignalFileError(path, "holds nothing but empty lines")
     raise SignalFileError(
-        path, f"holds no row of numbers in its first {len(head)} lines; it begins with {sample[:60]!r}"
+        path,
+        f"holds no row of numbers in its first {len(head)} lines; it begins with {sample[:60]!r}{of_adams(path)}",
     )
 
 

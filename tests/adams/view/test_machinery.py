@@ -125,6 +125,12 @@ def test_a_ring_turns_the_same_way():
     assert speeds[:, 2].mean() / speeds[:, 1].mean() == pytest.approx(0.5, rel=5e-3)
 
 
+def test_what_a_set_lists_has_a_name_through_it():
+    text = wheels() + "marker create marker_name = .m.ground.D location = (.m.MESH.TEETH.contact_stiffness), 0, 0\n"
+    marker = next(one for one in parse_view(text).deck.of(st.Marker).values() if one.name == "D")
+    assert marker.qp == (1e5, 0.0, 0.0)
+
+
 def test_a_wheel_on_springs_has_a_bushing_and_one_without_stands_free():
     soft = "".join(
         f"variable modify variable_name = .m.ONE.{name} real_value = {k}, 2.0, 3.0\n"
