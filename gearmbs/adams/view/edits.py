@@ -12,6 +12,7 @@ from gearmbs.adams.view import frames, machinery
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.lexer import Command, ViewError
 from gearmbs.adams.view.model import BLOCKS, JOINTS, PARTS, PLACED, Database, Item
+from gearmbs.adams.view.renaming import rename
 from gearmbs.adams.view.values import ORIENTATIONS, Stored, Values, fixed, is_ground
 from gearmbs.adams.view.vocabulary import Row, argument_of
 
@@ -97,11 +98,11 @@ class Editor:
     def _object(self, row: Row, given: dict[str, Stored], line: int) -> None:
         """Make or change an object."""
         name = self._name(row, given, line)
-        renamed = f"new_{row.naming}"
-        if renamed in given:
-            raise ViewError(f"{' '.join(row.words)}: {renamed} is not carried out; give the name at first", line)
         item = self._of_name(row, name, line)
         fields = {key: value for key, value in given.items() if key != row.naming}
+        new = fields.pop(f"new_{row.naming}", None)
+        if new is not None:
+            rename(self.database, item, text_of((self._now(new) or [""])[0]), line)
         if "ground_part" in fields:
             self._ground(item, fields, line)
         if item.kind in PLACED and item.kind != "model":

@@ -231,6 +231,23 @@ class Database:
             self.move(child, f"{path}.{child.name}", line)
         self.version += 1
 
+    def rename(self, item: Item, path: str) -> None:
+        """Give an object, and with it what belongs to it, another full name at the same place."""
+        old = item.path
+        for one in self.items.values():
+            if one is item or one.path.lower().startswith(f"{old}.".lower()):
+                siblings = self.by_name.get(one.name.lower(), [])
+                if one in siblings:
+                    siblings.remove(one)
+                one.path = path + one.path[len(old) :]
+                self.by_name.setdefault(one.name.lower(), []).append(one)
+        items = list(self.items.values())
+        self.items.clear()
+        self.items.update((one.path.lower(), one) for one in items)
+        for one in items:
+            one.children = {child.path.lower(): child for child in one.children.values()}
+        self.version += 1
+
     def find(self, name: str, kinds: tuple[str, ...] = ()) -> Item | None:
         """Return the object of a full or partial name, None if there is none or not just one.
 
