@@ -110,8 +110,11 @@ def main() -> None:
         costs, states = stepping_costs(m, span, **options), state_costs(m, 0.2 * span, **options)
         one = costs["one run"]
         ratios = [number(costs[kind] / one, 3) for kind in ("no outputs", "stepped", "no records")]
-        rows.append([name, number(1e3 * one, 3), *ratios, *(number(1e6 * took, 3) for took in states.values())])
+        between = one / (span * RATE)
+        taken = [number(took / between, 2) for took in states.values()]
+        rows.append([name, number(1e3 * one, 3), *ratios, *(number(1e6 * took, 3) for took in states.values()), *taken])
     heads = ["model", "one run, ms", "no outputs", "stepped", "no records", "state, us", "restore, us"]
+    heads += ["state / 0.1 ms of the run", "restore / 0.1 ms of the run"]
     print(table(heads, rows))
     rows, heads = [], ["model", "one run, ms"]
     for name, (m, span, options) in models.items():

@@ -24,6 +24,7 @@ class Restored(Told):
     _base: DAEProblem
     _t_start: float
     _equations: str
+    _integers: tuple[Any, Any]
     _controls: list[Control]
     _unmet: list[str]
     _begin: Callable[..., None]
@@ -41,7 +42,12 @@ class Restored(Told):
             self._equations = equations_of(self._base)
         history = run.history(self._equations) if run.started else None
         tables = self._own_tables(point.idata, run.state.rdata)
-        state = State.of(self._base, point.t, point.y, point.yp, tables, history)
+        # tables of integers change seldom, and are others then; to look through one takes a tenth of the rest
+        known = self._integers if self._integers[0] is point.idata else None
+        state = State.of(self._base, point.t, point.y, point.yp, tables, history, integers=known and known[1])
+        if known is None:
+            # past the look at names that are assigned
+            self.__dict__["_integers"] = point.idata, state.integers
         held = {control.name: control.memory() for control in self._controls if control.remembers}
         return replace(state, controllers=held) if held else state
 

@@ -181,6 +181,8 @@ class Simulator(Sampled, Restored):
             options["event_direction"] = [stop.direction for stop in stops]
         self._options = Options.gather(name, None, {"corrector": "modified", "tol": tol, **options})
         self._records = records
+        self._integers: tuple[Any, Any] = None, None
+        """A table of integers, and what differs in it from that of the model, of the last state."""
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
         numbers, aliases = self._base.numbers, self._base.aliases
