@@ -221,9 +221,11 @@ def _solid(m: Deckmaker, shape: Item) -> list[str | None]:
         return _drawn_out(m, shape)
     if kind == "parasolid":
         return _of_file(m, shape)
+    if kind == "shell":
+        return _facets(m, shape)
     raise ViewError(
         f"{shape.path} is a {kind}, which cannot touch here; give a block, cylinder, frustum, torus, ellipsoid, link, "
-        "plate or extrusion"
+        "plate, extrusion or shell"
     )
 
 
@@ -272,6 +274,19 @@ def _shapes(m: Deckmaker, item: Item, side: str) -> list[Item]:
             shape = Item("parasolid", f"{part.path}.{name}", item.line, {"part": fixed(part)})
         found.append(m.solids.setdefault(shape.path.lower(), shape))
     return found
+
+
+def _facets(m: Deckmaker, shape: Item) -> list[str | None]:
+    """Return the arguments of a shell of a file beside the command file, which touches with its facets."""
+    name = m.values.text(shape, "file_name") or ""
+    path = m.beside(name)
+    if path is None:
+        raise ViewError(f"{name[:80]} of {shape.path} is not beside the command file", shape.line)
+    marker, part = m.values.ref(shape, "reference_marker", ("marker",)), m.db.owner(shape)
+    if part is None:
+        raise ViewError(f"{shape.path} belongs to no part", shape.line)
+    at = m.new_marker(shape, part, *m.values.pose(part)) if marker is None else m.id(marker)
+    return ["EXTERNAL", f"RM = {at}", f"FILE = {path.name}"]
 
 
 def _of_file(m: Deckmaker, shape: Item) -> list[str | None]:

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from gearmbs.adams import parse_view, read_view
+from gearmbs.adams import parse_script, parse_view, read_view, run_deck
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.view import masses, solids
 from tests.says import says
@@ -279,3 +279,30 @@ def test_a_shell_without_its_file_is_refused(tmp_path):
     assert re.search(says("HULL.shl", ".m.P.S", "mass"), read_view(path).deck.unsupported[0].message)
     (tmp_path / "hull.shl").write_text("8 12 1.0\n0 0 0\n")
     assert re.search(says("hull.shl", "mass"), read_view(path).deck.unsupported[0].message)
+
+
+RESTING = """\
+force create body gravitational gravity_field_name = .m.g z_component = -10
+geometry create shape plane plane_name = .m.ground.F ref_marker_name = .m.ground.O x_minimum = -9 x_maximum = 9 &
+   y_minimum = -9 y_maximum = 9
+contact create contact_name = .m.C i_geometry_name = .m.P.S j_geometry_name = .m.ground.F stiffness = 4.8E+05 &
+   damping = 1000 exponent = 1 dmax = 1E-4
+"""
+
+
+@pytest.mark.slow
+def test_a_shell_touches_with_its_facets(tmp_path):
+    """A box of 48 kg on a floor: its force is its weight."""
+    places, triangles = unwelded_box()
+    rows = [f"{len(places)} {len(triangles)} 1.000000", *(" ".join(f"{x:.6f}" for x in p) for p in places)]
+    turned = masses.facing_outward(places, triangles)
+    (tmp_path / "hull.shl").write_text("\n".join([*rows, *(f"3 {a + 1} {b + 1} {c + 1}" for a, b, c in turned)]))
+    path = tmp_path / "a.cmd"
+    text = PART + SHELL % "2, 1.5, 2" + "marker create marker_name = .m.ground.O location = 1, 1.5, 0.0009\n" + RESTING
+    path.write_text(text)
+    view = read_view(path)
+    assert not view.deck.unsupported
+    result = run_deck(view.deck, parse_script("a\nb\nSIMULATE/STATICS\n"))
+    assert result.force("contact", 1)[-1, 2] == pytest.approx(480.0, rel=1e-6)
+    (tmp_path / "hull.shl").unlink()
+    assert any(re.search(says("HULL.shl", ".m.P.S", "beside"), d.message) for d in read_view(path).deck.unsupported)
