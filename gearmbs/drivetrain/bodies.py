@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -104,13 +104,46 @@ def housing_model(train: Drivetrain, housing: Housing) -> ModalModel:
         return reduce_model(housing.model, faces, modes=housing.modes or MODES, name=housing.name)
 
 
+class RingSeat(NamedTuple):
+    """The ring of a planetary stage in a housing: what is known of its seat as of a bearing's."""
+
+    name: str
+    shaft: str
+    station: float
+    outside_diameter: float
+    width: float
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"'{self.name}'"
+
+    @property
+    def rolling(self) -> RingSeat:
+        """What has the size of the seat."""
+        return self
+
+
+def ring_seats(train: Drivetrain, housing: str) -> dict[str, RingSeat]:
+    """Return the rings of planetary stages that a housing holds, by the names of their seats."""
+    out = {}
+    for stage in train.planetary_stages:
+        if stage.ring == housing:
+            member, shaft = next(iter(stage.turning(train).items()))
+            ring, name = stage.gears.ring, f"{stage.name} ring"
+            out[name] = RingSeat(name, shaft, stage.station(train, member), 2.0 * ring.outer_radius, ring.face_width)
+    return out
+
+
 def seat_places(train: Drivetrain, housing: Housing) -> dict[str, np.ndarray]:
-    """Return where the bearings and mounts of a housing are, m, in the frame of its nodes, by name."""
+    """Return where the bearings, rings and mounts of a housing are, m, in the frame of its nodes, by name."""
     origin, axes = np.asarray(housing.at, dtype=float), housing.turned
     out = {}
     for bearing in train.bearings:
         if train.carrier(bearing) == housing.name:
             out[bearing.name] = axes.T @ (train.layout.seats[bearing.shaft].at(train.station(bearing)) - origin)
+    for name, ring in ring_seats(train, housing.name).items():
+        out[name] = axes.T @ (train.layout.seats[ring.shaft].at(ring.station) - origin)
     for mount in housing.mounts:
         out[mount.name] = axes.T @ (np.asarray(mount.at, dtype=float) - origin)
     return out
@@ -129,7 +162,7 @@ def _face(train: Drivetrain, housing: Housing, name: str, place: np.ndarray) -> 
         inside = np.linalg.norm(arm, axis=1) <= mount.radius
         size = f"radius = {MM * mount.radius:.4g} mm"
         return _interface(housing, mount, place, inside, size)
-    bearing = train.part(name, Bearing)
+    bearing = ring_seats(train, housing.name).get(name) or train.part(name, Bearing)
     diameter, width = _size(housing, bearing)
     axis = housing.turned.T @ train.layout.seats[bearing.shaft].axes[:, 2]
     along = arm @ axis
@@ -150,7 +183,7 @@ def _interface(housing: Housing, part: Any, place: np.ndarray, inside: np.ndarra
     return Interface(part.name, [int(k) for k in model.ids[inside]], housing.faces, at=tuple(place))
 
 
-def _size(housing: Housing, bearing: Bearing) -> tuple[float, float]:
+def _size(housing: Housing, bearing: Bearing | RingSeat) -> tuple[float, float]:
     """Return the diameter and the width of what a bearing sits in, m."""
     given = housing.seats.get(bearing.name)
     if given is not None:
@@ -168,7 +201,8 @@ def _size(housing: Housing, bearing: Bearing) -> tuple[float, float]:
 def _carried(train: Drivetrain, housing: Housing, name: str, place: np.ndarray) -> Seat:
     """Return the seat of a bearing or mount on a body with modes: the nearest of its own, with a rigid arm."""
     model: ModalModel = housing.model
-    part: Bearing | Mount = next((m for m in housing.mounts if m.name == name), None) or train.part(name, Bearing)
+    mount = next((m for m in housing.mounts if m.name == name), None)
+    part = mount or ring_seats(train, housing.name).get(name) or train.part(name, Bearing)
     asked = housing.seats.get(name)
     with errors_named(f"{part.label}, seated in {housing.label}"):
         if asked is not None:

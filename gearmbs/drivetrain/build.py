@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.drivetrain.bodies import ring_seats
 from gearmbs.drivetrain.connections import Bearing, Coupling
 from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.housing import Housing
@@ -48,10 +49,10 @@ def check(train: Drivetrain) -> None:
     """
     if not train.shafts:
         raise DrivetrainError(f"{train.name}: there are no shafts; give at least one")
-    _names(train)
-    _stations(train)
     for stage in train.planetary_stages:
         check_stage(train, stage)
+    _names(train)
+    _stations(train)
     _ = train.speeds
     _driven(train)
     pairs = train.pairs
@@ -101,7 +102,8 @@ def _names(train: Drivetrain) -> None:
                 "an accelerometer cannot be on; give a housing",
             )
     for housing in train.housings:
-        for name in housing.seats.keys() - {mount.name for mount in housing.mounts}:
+        known = {mount.name for mount in housing.mounts} | set(ring_seats(train, housing.name))
+        for name in housing.seats.keys() - known:
             train.part(name, Bearing, f"{housing.label}: seats")
         for mode in housing.modes if housing.model is None else ():
             for place in mode.shape:

@@ -158,16 +158,21 @@ def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
     bearing : Bearing or str
         A `gearmbs.bearings.Bearing` or its designation. The inner ring is on the pin.
     **settings
-        Of `gearmbs.bearings.RollingBearing`: defects, damping, ...
+        Of `gearmbs.bearings.RollingBearing`: defects (also as tables with their ``kind``), damping, ...
 
     Raises
     ------
     BearingError
-        If the designation is unknown.
+        If the designation or a setting is unknown.
     """
     from gearmbs.bearings import RollingBearing
+    from gearmbs.bearings.defects import as_defects
+    from gearmbs.bearings.settings import bearing_settings
 
     kind = rolling_bearing(bearing)
+    if "defects" in settings:
+        settings["defects"] = as_defects(settings["defects"])
+    bearing_settings(kind, settings, "RollingBearing")
 
     def make(name: str, pin: Any, bore: Any) -> RollingBearing:
         return RollingBearing(name, pin, bore, bearing=kind, **settings)
@@ -345,9 +350,9 @@ def check_stage(train: Drivetrain, stage: PlanetaryStage) -> None:
             f"{stage.label}: {member} is '{on}', a {part.title}; give a shaft, a housing or 'ground'",
         )
         require(
-            getattr(part, "model", None) is None,
-            f"{stage.label}: {member} is on {part.label}, a model of finite elements or modes, which has no seat for "
-            "it; give 'ground', a rigid housing, or a shaft on bearings in that housing",
+            member == "ring" or getattr(part, "model", None) is None,
+            f"{stage.label}: {member} is on {part.label}, a model of finite elements or modes, which has a seat for a "
+            "ring only; give 'ground', a rigid housing, or a shaft in that housing",
         )
         if isinstance(part, Shaft):
             place = stage.station(train, member)

@@ -15,6 +15,7 @@ from gearmbs.drivetrain import (
     GearMesh,
     Housing,
     IdealBearing,
+    Mount,
     PlanetaryStage,
     RunSettings,
     Shaft,
@@ -190,6 +191,54 @@ def test_lines_are_those_of_the_set_and_its_neighbours():
     # all wheels stand as before after whole turns of shafts and planets
     turns = table.common_period() * np.array([*table.train.turning.values()]) / (2 * math.pi)
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)
+
+
+def turbine(low, middle, fast):
+    """Two planetary stages from rotor to a parallel one, or one planetary and two parallel ones."""
+    names = ["rotor", "first", "second", "high"]
+    shafts = [light(name) for name in names]
+    shafts = [replace(shaft, length=2.0) for shaft in shafts]
+    stages, wheels, meshes = [], [], []
+    for k, stage in enumerate((low, middle, fast)):
+        before, after = names[k], names[k + 1]
+        if isinstance(stage, PlanetaryStage):
+            at = {"sun_station": 0.2, "carrier_station": 1.8}
+            stages.append(replace(stage, sun=after, carrier=before, ring="ground", **at))
+        else:
+            for name, shaft, gear in ((f"big {k}", before, stage[0]), (f"small {k}", after, stage[1])):
+                wheels.append(Wheel(name=name, shaft=shaft, gear=gear, station=1.0 + 0.1 * k))
+            meshes.append(GearMesh(name=f"mesh {k}", driver=f"big {k}", driven=f"small {k}"))
+    return Drivetrain(
+        "turbine", shafts=shafts, wheels=wheels, meshes=meshes, planetary_stages=stages,
+        bearings=[IdealBearing(name=f"b {name}", shaft=name) for name in names],
+        drives=[SpeedDrive(name="wind", shaft="rotor", speed="12.1 rpm")],
+        loads=[TorqueLoad(name="generator", shaft="high", torque="1 kN m")],
+    )  # fmt: skip
+
+
+def planets_of(name, teeth, module, radius, **others):
+    wheels = {"fillet_radius": 0.2 * module}
+    stage_of = planetary(teeth, module, 3, carrier_radius=radius, wheels=wheels, **others)
+    return PlanetaryStage(name=name, gears=stage_of, sun="", carrier="", ring="")
+
+
+def test_ratios_of_published_turbine_gearboxes():
+    # Nejad, Guo, Gao, Moan: Development of a 5 MW reference gearbox for offshore wind turbines. Wind Energy 19 (2016)
+    one = planets_of("one", (19, 17, 56), 0.045, 0.863, face_width=0.491, profile_shifts=(0.617, 0.802, -0.501))
+    two = planets_of("two", (18, 36, 93), 0.021, 0.584, face_width=0.550, profile_shifts=(0.389, 0.504, 0.117))
+    wheels = {"face_width": 0.36, "helix_angle": "10 deg", "bore_radius": 0.01}
+    fast = (GearSpec(95, 0.014, profile_shift=0.669, hand="right", **wheels),
+            GearSpec(24, 0.014, profile_shift=0.480, hand="left", **wheels))  # fmt: skip
+    train = turbine(one, two, fast)
+    table = train.kinematics
+    assert abs(table.ratio("high", "rotor")) == pytest.approx(96.354, abs=5e-4)
+    rotor = 12.1 / 60.0
+    assert table.mesh_frequency("one") == pytest.approx(56 * rotor, rel=1e-12)
+    assert table.mesh_frequency("two") == pytest.approx(93 * 75 / 19 * rotor, rel=1e-12)
+    # what the generator takes the rotor gives, and planets push the rotor back
+    assert train.power.drive["wind"] == pytest.approx(1e3 * 96.354, rel=1e-5)
+    assert train.power.members["one"]["carrier"] == pytest.approx(-train.power.drive["wind"], rel=1e-12)
+    assert train.pairs["mesh 2"].geometry.centre_distance == pytest.approx(0.861, abs=2e-4)
 
 
 # The mechanism.
@@ -440,6 +489,19 @@ def test_what_is_wrong_in_a_file_is_named(tmp_path, old, new, words):
         load_train(path)
 
 
+def test_rolling_pins_have_defects_from_a_file(tmp_path):
+    path = tmp_path / "train.toml"
+    springs = 'pins = { radial = "5e8 N/m", damping = "1e-6 s" }'
+    spall = 'defects = [{ kind = "spall", part = "outer", width = "1 mm" }]'
+    path.write_text(FILE.replace(springs, f'pins = {{ rolling = "6203", {spall} }}'))
+    pin = load_train(path).train.build().elements["low planet 2 pin"]
+    assert pin.bearing.designation == "6203"
+    assert pin.settings.defects[0].part == "outer"
+    path.write_text(FILE.replace(springs, 'pins = { rolling = "6203", dampings = 5.0 }'))
+    with pytest.raises(DrivetrainError, match=says("'low'", "pins", "dampings", "damping")):
+        load_train(path)
+
+
 def test_faults_need_a_reader_of_theirs(tmp_path):
     path = tmp_path / "train.toml"
     path.write_text(FILE)
@@ -451,16 +513,47 @@ def case(**others):
     return Housing(name="case", mass="20 kg", inertia=(1.0, 1.0, 1.0), **others)
 
 
-def test_a_ring_may_be_on_a_rigid_housing_and_not_on_finite_elements():
+def in_walls(**changes):
+    """A stage whose ring is in the end wall of a box on four feet."""
+    feet = [Mount(name=f"foot {k}", at=(x, y, 0.0), stiffness=(changes.get("feet", 1e8),) * 3, radius="30 mm")
+            for k, (x, y) in enumerate(((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))]  # fmt: skip
+    model = box_model((0.24, 0.24, 0.1), "12 mm", divisions=(4, 4, 1))
+    stiff = changes.get("stiffness", 1.0)
+    walls = Housing(name="case", model=replace(model, stiffness=stiff * model.stiffness), mounts=feet, modes=6,
+                    at=(-0.12, -0.12, -0.006), seats=changes.get("seats", {}))  # fmt: skip
+    return alone(on="case", housings=[walls], pins=PINS)
+
+
+@pytest.mark.slow
+def test_a_ring_in_a_housing_of_finite_elements_pushes_on_its_mounts():
+    train = in_walls()
+    still = resting(train)
+    rest = static_equilibrium(still.build(), t=2 * still.run_up).solution
+    forces = np.array([rest.load(f"foot {k}")[0][-1] for k in range(4)])
+    places = np.array([mount.at for mount in train.housings[0].mounts])
+    moment = np.cross(places, forces)[:, 2].sum()
+    assert moment == pytest.approx(-train.power.members["set"]["ring"], rel=1e-5)
+    assert "set ring" in train.modal_models["case"].seats
+    expected = train_modes(alone(pins=PINS)).frequencies.max()
+    soft, stiff = (train_modes(in_walls(stiffness=x, feet=x * 1e8)) for x in (1.0, 1e2))
+    near = [np.abs(modes.frequencies[modes.oscillating] / expected - 1.0).min() for modes in (soft, stiff)]
+    assert near[1] < 1e-3
+    assert near[0] > 10 * near[1]
+
+
+def test_a_ring_without_nodes_of_its_housing_is_refused():
+    with pytest.raises(DrivetrainError, match=says("'set ring'", "'case'", "nodes")):
+        _ = in_walls(seats={"set ring": ("1 mm", "1 mm")}).modal_models
+
+
+def test_a_ring_may_be_on_a_rigid_housing_and_a_carrier_not_on_finite_elements():
     train = alone(on="case", housings=[case()])
     assert train.build().elements["set planet 1-ring"].j.body.name == "case"
-    from gearmbs.drivetrain import Mount
-
     feet = [Mount(name=f"foot {k}", at=at, stiffness=(1e7,) * 3, radius="20 mm")
             for k, at in enumerate(((0, 0, 0), (0.2, 0, 0), (0.1, 0, 0.2)))]  # fmt: skip
     walls = Housing(name="case", model=box_model((0.2, 0.2, 0.2), "40 mm", divisions=(1, 1, 1)), mounts=feet)
-    with pytest.raises(DrivetrainError, match=says("'set'", "ring", "'case'", "finite elements")):
-        alone(on="case", housings=[walls])
+    with pytest.raises(DrivetrainError, match=says("'set'", "carrier", "'case'", "finite elements")):
+        alone(held="carrier", load="ring", on="case", housings=[walls])
 
 
 @pytest.mark.parametrize(
