@@ -45,12 +45,15 @@ class History:
         Pivots in use, where the process that chose them is still there; they follow from ``numbers``.
     equations : str
         Of the model that the steps were made with, see `equations_of`.
+    tol : float
+        Tolerance of the steps, 0 where it is not known.
     """
 
     method: str
     numbers: Mapping[str, np.ndarray]
     plan: Any = None
     equations: str = ""
+    tol: float = 0.0
 
 
 class Memory(NamedTuple):
@@ -201,13 +204,24 @@ class State:
             y, yp = problem.own_start(self.t, y, yp, idata, rdata)
         return replace(problem, t0=self.t, y0=y, yp0=yp, idata=idata, rdata=rdata)
 
-    def history_for(self, problem: DAEProblem, method: str) -> History | None:
+    def history_for(self, problem: DAEProblem, method: str, tol: float) -> History | None:
         """Return the history if a run of a problem, as assembled at ``t_model``, may go on with it, else None.
 
-        Its last step may end after ``t``. So it is of no use to another integrator, nor to other equations.
+        Its last step may end after ``t``. So it is of no use to another integrator, nor to other equations. Nor is it
+        to a tighter run: its points are off by their own tolerance, from one to the next, which no shorter step makes
+        smaller.
+
+        Parameters
+        ----------
+        problem : DAEProblem
+        method : str
+        tol : float
+            Of the run.
         """
         history = self.history
         if history is None or not self.is_own or history.method != method or history.equations != equations_of(problem):
+            return None
+        if history.tol > tol:
             return None
         return history
 
@@ -306,6 +320,7 @@ class State:
         if self.history is not None:
             arrays |= {"method": np.array(self.history.method), "equations": np.array(self.history.equations)}
             arrays |= {f"history {name}": values for name, values in self.history.numbers.items()}
+            arrays["tol"] = np.float64(self.history.tol)
         for name, memory in self.controllers.items():
             arrays |= {f"schedule {name}": memory.schedule, f"memory {name}": memory.numbers}
         with whole_file(path) as part, open(part, "wb") as file:
@@ -348,7 +363,8 @@ class State:
             if "method" in arrays:
                 head = "history "
                 numbers = {name.removeprefix(head): a for name, a in arrays.items() if name.startswith(head)}
-                history = History(str(arrays["method"]), numbers, equations=str(arrays["equations"]))
+                tol = float(arrays.get("tol", 0.0))
+                history = History(str(arrays["method"]), numbers, equations=str(arrays["equations"]), tol=tol)
             names = tuple(map(str, arrays["names"]))
             inputs = [name.removeprefix("memory ") for name in arrays if name.startswith("memory ")]
             held = {name: Memory(arrays[f"schedule {name}"], arrays[f"memory {name}"]) for name in inputs}

@@ -168,6 +168,30 @@ def test_a_state_brings_no_tolerance_and_no_order():
     assert low.stats.steps > 5 * usual.stats.steps
 
 
+@pytest.mark.parametrize("at", [0.15, 0.2, 0.25, 0.3, 0.35])
+def test_a_state_of_a_loose_run_is_gone_on_from_afresh_by_tight_ones(at, tmp_path):
+    """What it remembers is off from one point to the next by its own tolerance; as tight a run goes on with that."""
+    state = advanced(slider_crank(), (0.0, at), tol=1e-4).state()
+    read = gm.State.load(state.save(tmp_path / "s.npz"))
+    for given in (state, read):
+        assert given.history.tol == 1e-4
+        tight, alone = (
+            slider_crank().simulate(1.0, t_eval=[at, 1.0], tol=1e-9, initial=each)
+            for each in (given, given.without_history())
+        )
+        assert tight.success, tight.message
+        np.testing.assert_array_equal(tight.result.y, alone.result.y)
+    exact = slider_crank().simulate(1.0, t_eval=[at, 1.0], tol=1e-11, initial=state)
+    off = tight.com_position("block")[-1] - exact.com_position("block")[-1]
+    assert np.abs(off).max() < 1e-8
+    loose, alone = (
+        slider_crank().simulate(1.0, t_eval=[at, 1.0], tol=1e-4, initial=each)
+        for each in (state, state.without_history())
+    )
+    assert loose.success
+    assert not np.array_equal(loose.result.y[-1], alone.result.y[-1])
+
+
 @pytest.mark.parametrize(("model", "joint"), [(slider_crank, "pin"), (top, "foot")])
 def test_a_state_of_a_loose_run_is_moved_onto_the_constraints(model, joint):
     """It leaves them open by its own tolerance: tighter runs close them, by no more, and go on with theirs."""

@@ -291,7 +291,7 @@ def simulate(
         if initial.controllers:
             warn_of_unmet(initial.controllers, stacklevel=4)
         # events in what is left of the last step would be missed
-        history = None if stops else initial.history_for(problem, name)
+        history = None if stops else initial.history_for(problem, name, tol)
         options |= starting_options(name, history)
         problem = initial.problem(problem, history)
         # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there

@@ -204,7 +204,7 @@ class Simulator(Sampled, Restored):
         self._tell_clock()
         problem, options = self._base, self._options
         if state is not None:
-            history = state.history_for(problem, options.method)
+            history = state.history_for(problem, options.method, options.tol)
             problem = state.problem(problem, history)
             options = replace(options, **starting_options(options.method, history))
         if self._stops:

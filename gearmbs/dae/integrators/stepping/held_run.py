@@ -350,7 +350,8 @@ class HeldRun(Run):
         given, jumped = self._given, self._jumped
         told = self.last_records.changed_at == st.steps or (given and given[0] == st.steps)
         told = told or (jumped and jumped[0] == st.steps)
-        return History(self.options.method, Held(self, self.last_step() if told else None), self.plan, equations)
+        held = Held(self, self.last_step() if told else None)
+        return History(self.options.method, held, self.plan, equations, self.options.tol)
 
     def put_back(self, history: History) -> None:
         """Go on with a history; the tables are those of its state."""
