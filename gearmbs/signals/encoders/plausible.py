@@ -2,7 +2,8 @@
 
 A pair of equal wheels turns with one ratio whatever its teeth are, and two discs of one count show that ratio whatever
 the count is told to be. The mesh itself knows better: where it stands out of marks and noise it does so at an order and
-at multiples of it. If these are others than the told ones, one of the numbers is wrong.
+at multiples of it. If these are others than the told ones, one of the numbers is wrong. Where the marks hide it, they
+know themselves: those of a disc that is told for twice its lines repeat after half a turn of the told ones.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from itertools import pairwise
 import numpy as np
 import scipy.fft
 
+from gearmbs.signals.encoders.marks import ECCENTRIC, SIDEBANDS, encoder_marks
 from gearmbs.signals.encoders.orders import Deviations, Gearing, folded
-from gearmbs.signals.encoders.pulses import TURN
+from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 
 STANDS = 4.0
 """Times the median of the largest lines beside it, one for each order, from which a line is the mesh's: of chance, with
@@ -30,6 +32,11 @@ MULTIPLES = 3
 CANDIDATES = 12
 WIDTH = 1.5
 """Lines of the spectrum by which an order may seem to be off."""
+TIMES = (2, 3, 4)
+"""Counts that are told for so many times the true one: both edges of a pulse, or of two tracks, are counted so."""
+REPEATED, FEWEST_ORDERS = 0.1, 16
+"""Share of the errors' power between the multiples of an order, by that at them, from which on marks repeat: medians of
+sixteen orders each, exponentially distributed, are so far apart by chance once in some hundred thousand discs."""
 
 
 def doubted_numbers(
@@ -93,6 +100,48 @@ def doubted_numbers(
     ):
         return None
     return _words(found, told, gearing, lines, turns * count)
+
+
+def repeating_marks(trains: Sequence[PulseTrain], mesh: Sequence[float]) -> str | None:
+    """Return what the marks of some discs say against the told lines: that they repeat after a part of a turn; or None.
+
+    Parameters
+    ----------
+    trains : sequence of PulseTrain
+    mesh : sequence of float
+        Told mesh order of each shaft, about whose multiples nothing is taken for marks.
+    """
+    found = [_repetitions(train, order) for train, order in zip(trains, mesh, strict=True)]
+    words = [
+        f"marks of the {train.name!r} repeat {times} times in a turn of {train.lines} lines (between, errors have "
+        f"{share:.2g} of their power)"
+        for train, (times, share) in zip(trains, found, strict=True)
+        if times > 1
+    ]
+    if not words:
+        return None
+    counts = " and ".join(str(train.lines // times) for train, (times, _) in zip(trains, found, strict=True))
+    return f"CHECK THE LINES AND TEETH: {'; '.join(words)}; discs of {counts} lines would explain it."
+
+
+def _repetitions(train: PulseTrain, mesh: float) -> tuple[int, float]:
+    """Return how often marks repeat in a told turn, 1 if they do not, and what share of their power does not.
+
+    Errors of marks have no reason to repeat, so that all orders of their disc have some; where more lines are told than
+    there are, orders of the told turn that are none of the true one have noise alone.
+    """
+    power = np.abs(scipy.fft.rfft(encoder_marks(train).errors)) ** 2
+    orders = np.arange(ECCENTRIC + 1, (train.lines + 1) // 2)
+    orders = orders[np.abs((orders + 0.5 * mesh) % mesh - 0.5 * mesh) > SIDEBANDS]
+    for times in sorted((n for n in TIMES if train.lines % n == 0), reverse=True):
+        # those of half as many repetitions stand between, too
+        classes = [power[orders[orders % times == k]] for k in range(times)]
+        if min(each.size for each in classes) < FEWEST_ORDERS:
+            continue
+        at, *between = (float(np.median(each)) for each in classes)
+        if max(between) < REPEATED * at:
+            return times, max(between) / at
+    return 1, 1.0
 
 
 def _spectrum(first: Deviations, second: Deviations, begin: float, turns: float, limit: float) -> np.ndarray:

@@ -24,7 +24,7 @@ from gearmbs.signals.encoders.orders import (
     lines,
     smooth_angle,
 )
-from gearmbs.signals.encoders.plausible import doubted_numbers
+from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
 from gearmbs.signals.encoders.visible import MOST_HARMONICS, Order, visible_orders
@@ -293,7 +293,10 @@ def _lines_of(
     steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
     values = lines((first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh)
     mesh = [o.order for o in orders if o.harmonic]
-    doubt = doubted_numbers(first, second, begin, end, gearing, (run.driver.lines, run.driven.lines))
+    trains = (run.driver, run.driven)
+    doubt = repeating_marks(trains, (float(gearing.mesh), float(gearing.on_second(gearing.mesh))))
+    # marks that repeat are told for lines of a mesh otherwise
+    doubt = doubt or doubted_numbers(first, second, begin, end, gearing, (run.driver.lines, run.driven.lines))
     return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)), doubt)
 
 

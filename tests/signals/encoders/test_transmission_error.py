@@ -18,6 +18,7 @@ from gearmbs.signals import (
     transmission_error_from_pulses,
 )
 from gearmbs.signals.encoders.estimate import amplitude_interval
+from gearmbs.signals.encoders.plausible import repeating_marks
 from gearmbs.view import measured_error_plot
 from tests.generators import seed
 from tests.says import says
@@ -320,6 +321,42 @@ def test_another_count_of_lines_is_told_by_the_mesh(told, remedy):
     else:
         assert found.verdict.startswith("CHECK THE LINES AND TEETH")
         assert remedy in found.verdict
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("times", "turns"), [(1, 12), (2, 24), (3, 36), (4, 36)])
+@pytest.mark.parametrize("error", [0.01, 0.003])
+def test_more_lines_than_there_are_are_told_by_the_marks(times, turns, error):
+    """Errors of 1 % hide the mesh, which would tell; the marks of a disc repeat after its own turn."""
+    curve, radius = paper_error()
+    lag = closed(curve.error)
+    angles = coupled(lambda turned: lag(29 * turned), TEETH, radius, turns, rate=20e3)
+    trains = [
+        pulse_train(
+            encoder(a, 256, marks=mark_errors(256, error, k), jitter="50 ns", seed=k).times, 256 * times, name=name
+        )
+        for k, (a, name) in enumerate(zip(angles, ("driver", "driven"), strict=True))
+    ]
+    found = transmission_error_from_pulses(CoupledRun(*trains), TEETH, base_radius=radius)
+    if times == 1:
+        assert found.doubt is None
+    else:
+        assert found.verdict.startswith("CHECK THE LINES AND TEETH")
+        assert f"repeat {times} times" in found.verdict
+        assert "256 and 256 lines" in found.verdict
+
+
+@pytest.mark.parametrize("lines", [64, 100, 360, 1024])
+@pytest.mark.parametrize("error", [0.01, 1e-4, 0.0])
+def test_marks_that_repeat_by_chance_are_rare(lines, error):
+    """Of true counts none is doubted: random marks, marks below the counter's noise, and an eccentric disc."""
+    turning = free(seconds=0.8)
+    for number in range(12):
+        marks = (
+            mark_errors(lines, error, seed(300 + number)) + 0.01 * np.cos(math.tau * np.arange(lines) / lines) / lines
+        )
+        train = encoder(turning, lines, marks=marks, jitter="50 ns", seed=number)
+        assert repeating_marks([train], [29.0]) is None
 
 
 @pytest.mark.slow
