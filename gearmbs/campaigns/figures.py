@@ -10,7 +10,7 @@ import numpy as np
 
 from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
-from gearmbs.campaigns.results import factor_names, numeric_results, result_names
+from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names
 from gearmbs.campaigns.settings import CampaignError, texts, whole
 from gearmbs.campaigns.sobol_bounds import in_scale
 from gearmbs.schema.described import chosen
@@ -48,7 +48,7 @@ def varied_results(campaign: Campaign, most: int = 4) -> list[str]:
     They are ordered by their standard deviation over their RMS, which compares results of different units; those whose
     correlation with one that varies more is above 0.95 are left out.
     """
-    table = campaign.table
+    table = only_numbers(campaign.folder, campaign.table)
     names = numeric_results(campaign.folder, table)
     values = table[names].to_numpy(dtype=float)
     if names:
@@ -74,7 +74,7 @@ def figure(
 ) -> Picture:
     """Draw results of a campaign over its factors; see `gearmbs.campaigns.Campaign.figure`."""
     draw = chosen(KINDS, kind, "", CampaignError, "figure")
-    table = campaign.table
+    table = only_numbers(campaign.folder, campaign.table)
     table = table[table["status"] == "done"]
     known = result_names(campaign.folder, table)
     wanted = texts(results, "figure: results") if results else varied_results(campaign, 3)
@@ -106,7 +106,7 @@ def _main_effects(table: pd.DataFrame, results: list[str], factors: list[str], u
     for (i, result), (j, factor) in ((a, b) for a in enumerate(results) for b in enumerate(factors)):
         ax, y = panels[i, j], table[result].to_numpy(dtype=float)
         place, names, group = _levels(table[factor])
-        means = np.array([np.nanmean(y[group == k]) for k in range(len(place))])
+        means = np.array([mean(y[group == k]) for k in range(len(place))])
         counts = np.array([np.isfinite(y[group == k]).sum() for k in range(len(place))])
         spread = np.array([deviation(y[group == k]) for k in range(len(place))])
         ax.axhline(np.nanmean(y), color=GREY, lw=0.8, ls="--")
@@ -133,7 +133,7 @@ def _tornado(table: pd.DataFrame, results: list[str], factors: list[str], units:
         y = table[result].to_numpy(dtype=float)
         middle = float(np.nanmean(y))
         ends = {factor: _ends(table[factor], y) for factor in factors}
-        order = sorted(factors, key=lambda factor: abs(ends[factor][1] - ends[factor][0]))
+        order = sorted(factors, key=lambda factor: np.nan_to_num(abs(ends[factor][1] - ends[factor][0])))
         for k, factor in enumerate(order):
             low, high, text_low, text_high = ends[factor]
             for value, text, colour, place in ((low, text_low, BLUE, k + 0.19), (high, text_high, ORANGE, k - 0.19)):
@@ -230,6 +230,12 @@ def _parallel(table: pd.DataFrame, results: list[str], factors: list[str], units
     return picture
 
 
+def mean(y: np.ndarray) -> float:
+    """Return the mean of values, NaN left out; NaN of none."""
+    good = y[np.isfinite(y)]
+    return float(good.mean()) if good.size else math.nan
+
+
 def deviation(y: np.ndarray) -> float:
     """Return the standard deviation of values, NaN left out; NaN of fewer than two."""
     scaled, power = in_scale(y[np.isfinite(y)])
@@ -264,14 +270,17 @@ def _ends(column: pd.Series, y: np.ndarray) -> tuple[float, float, str, str]:
     """Return the means of a result at both ends of a factor, and what the factor is there."""
     if column.dtype.kind not in "biuf" or column.nunique() <= FEW:
         place, names, group = _levels(column)
-        means = np.array([np.nanmean(y[group == k]) for k in range(len(place))])
+        means = np.array([mean(y[group == k]) for k in range(len(place))])
         if names is not None:
-            k, m = int(means.argmin()), int(means.argmax())
+            k, m = (
+                int(f(np.where(np.isnan(means), worst, means)))
+                for f, worst in ((np.argmin, np.inf), (np.argmax, -np.inf))
+            )
             return float(means[k]), float(means[m]), names[k], names[m]
         return float(means[0]), float(means[-1]), f"{place[0]:.4g}", f"{place[-1]:.4g}"
     x = column.to_numpy(dtype=float)
     low, high = np.quantile(x, [TAIL, 1.0 - TAIL])
-    return float(np.nanmean(y[x <= low])), float(np.nanmean(y[x >= high])), f"≤ {low:.4g}", f"≥ {high:.4g}"
+    return mean(y[x <= low]), mean(y[x >= high]), f"≤ {low:.4g}", f"≥ {high:.4g}"
 
 
 def _as_numbers(column: pd.Series) -> tuple[np.ndarray, list[str] | None]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.campaigns.figures import deviation, varied_results
-from gearmbs.campaigns.results import factor_names, numeric_results, result_names
+from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names
 from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
 from gearmbs.campaigns.settings import CampaignError, texts
 from gearmbs.campaigns.sobol_bounds import first_indices, in_scale, probability
@@ -54,7 +54,7 @@ def write_report(campaign: Campaign, path: str | Path, results: str | Sequence[s
         If the path is a folder, or for an unknown column.
     """
     path = place(path, ".html", campaign.path.stem)
-    table = campaign.table
+    table = only_numbers(campaign.folder, campaign.table)
     known = result_names(campaign.folder, table)
     results = varied_results(campaign, MOST_RESULTS) if results is None else list(texts(results, "report: results"))
     for name in results:
@@ -122,7 +122,9 @@ def _numbers(values: pd.Series) -> str:
     q = values.quantile([0.0, 0.05, 0.5, 0.95, 1.0])
     cells = "".join(f"<td>{v:.5g}</td>" for v in (values.mean(), deviation(values.to_numpy(dtype=float)), *q))
     heads = "".join(f"<th>{n}</th>" for n in ("mean", "deviation", "least", "5 %", "median", "95 %", "largest"))
-    return f"<table><tr>{heads}</tr><tr>{cells}</tr></table>"
+    missing = int(values.isna().sum())
+    note = f"<p>{missing} of {values.size} cases have no such number.</p>" if missing else ""
+    return f"{note}<table><tr>{heads}</tr><tr>{cells}</tr></table>"
 
 
 def _decides(campaign: Campaign, result: str) -> str:

@@ -106,6 +106,12 @@ def numeric_results(folder: Folder, table: pd.DataFrame) -> list[str]:
     return [name for name in names if table[name].dtype.kind in "biuf"]
 
 
+def only_numbers(folder: Folder, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table whose results that are infinite are missing: they have no mean and no place in a figure."""
+    names = numeric_results(folder, table)
+    return table.assign(**{name: table[name].where(np.isfinite(table[name].to_numpy(dtype=float))) for name in names})
+
+
 def column_units(folder: Folder) -> dict[str, str]:
     """Return the units of the columns of factors and results that have one."""
     names = read_table(folder).columns if folder.done() else folder.cases(0)[0]

@@ -91,6 +91,24 @@ def test_splits_and_columns_that_are_none(campaign, tmp_path, settings, words):
     assert not (tmp_path / "o" / "data").exists()
 
 
+def nothing(x: float) -> dict[str, float]:
+    """Return nothing, or a result without a name."""
+    if x < 0.5:
+        raise ValueError("x: too little")
+    return {"": x}
+
+
+def test_nothing_is_exported_where_nothing_is_done(tmp_path):
+    subject = FunctionSubject(nothing, {"x": 0.0})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, Factor("x", 0.0, 1.0), n=4))
+    assert campaign.run(workers=0).failed == 4
+    assert campaign.failed().message.str.contains("without a name").sum() == 2
+    with pytest.raises(CampaignError, match=says("export", "none", "failed")):
+        campaign.export(tmp_path / "o", "parquet")
+    # the table says how each of them has ended
+    assert len(pd.read_csv(campaign.export(tmp_path / "t.csv", "csv")[0])) == 4
+
+
 def test_splits_and_columns_that_are_some(campaign, tmp_path):
     with pytest.raises(CampaignError, match=says("split_by", "csv", "parquet")):
         campaign.export(tmp_path / "t.csv", "csv", split_by="point")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -108,6 +109,29 @@ def test_a_scale_changes_no_digit():
         y = np.array(values)
         found, power = in_scale(y)
         np.testing.assert_array_equal(np.ldexp(found, power), y)
+
+
+def ending(x1: float, x2: float) -> dict[str, float]:
+    """Return a result that has no end for some."""
+    return {"y": float("inf") if x1 > 0.8 else x1 + x2}
+
+
+@pytest.mark.slow
+def test_results_without_end_are_told_and_left_out(tmp_path):
+    """Of the others a report and its figures tell all the same."""
+    subject = FunctionSubject(ending, {"x1": 0.0, "x2": 0.0})
+    plan = make_plan(subject, [Factor("x1", 0.0, 1.0), Factor("x2", 0.0, 1.0)], n=32)
+    campaign = Campaign(tmp_path / "c", plan)
+    assert campaign.run(workers=0).not_numbers == 7
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        with pytest.warns(CampaignWarning, match=says("y", "7 of 32", "no result")):
+            text = campaign.report(tmp_path / "r.html").read_text()
+        for kind in ("tornado", "parallel coordinates"):
+            campaign.figure(kind, "y")
+    assert "<h2>y</h2><p>7 of 32 cases have no such number.</p>" in text
+    y = campaign.table.y
+    assert f"<td>{y[np.isfinite(y)].mean():.5g}</td>" in text
 
 
 def large(x1: float, x2: float) -> dict[str, float]:

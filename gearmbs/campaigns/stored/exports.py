@@ -191,6 +191,8 @@ def _parquet(
 
     data, specs = open_dataset(campaign.folder, table), campaign.folder.specs
     table, done = _with_more(table, add), (table["status"] == "done").to_numpy()
+    if not done.any():
+        raise CampaignError("export: none of the cases has results; see failed()")
     names = signal_columns(specs)
     taken = {*names.values(), *(f"sampling_rate.{spec.name}" for spec in specs)} & {*map(str, table.columns)}
     if taken:

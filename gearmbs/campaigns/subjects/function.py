@@ -146,6 +146,8 @@ class FunctionSubject(Subject):
             )
         kept = Kept(numbers=kept_by_functions(keep, record))
         items = {**record.attrs, **record.data_vars} if hasattr(record, "data_vars") else dict(record)
+        if not all(str(name).strip() for name in items):
+            raise CampaignError(f"{self.function} returned a result without a name; give it one")
         if "numbers" in keep:
             kept.numbers |= {
                 str(k): float(v)
