@@ -192,24 +192,24 @@ def turning_basis(
     none = Basis(basis, np.zeros_like(basis), np.zeros_like(basis), axes, [], np.zeros((len(basis),) * 2))
     if not basis.shape[1]:
         return none
-    if not velocity.any():
+    leaves = leaves_rest(instant)
+    if leaves or not velocity.any():
         owner = _owners(instant)
-        way = along(instant, here, anchors, np.ones(len(owner), dtype=bool)) if leaves_rest(instant) else None
+        way = along(instant, here, anchors, np.ones(len(owner), dtype=bool)) if leaves else None
         return none if way is None else replace(none, second=way.rates(basis)[1], along=way)
     acceleration = instant.system.accelerations(instant.configuration(), instant.t)[0]
     owner = _owners(instant)
     label = _chains(here.constraint, owner, len(velocity))
     fastest = np.abs(velocity[:, :3]).max() + instant.system.length * np.abs(velocity[:, 3:]).max()
     chains = [label == k for k in range(label.max() + 1)]
-    rates = [_rates(velocity[one], acceleration[one], SLOW * fastest) for one in chains]
+    length = instant.system.length
+    rates = [_rates(velocity[one], acceleration[one], SLOW * fastest, length) for one in chains]
     largest = max((float(np.linalg.norm(w)) for own in rates for w in own), default=0.0)
     if largest <= SLOWEST:
         return none
-    # what brakes a body hard is looked at before it has come to rest
-    turned = np.linalg.norm(velocity[:, 3:], axis=1)
-    turns = turned > SLOW * largest
-    braked = np.linalg.norm(acceleration[:, 3:], axis=1)[turns] / turned[turns]
-    step = LOOK / max(largest, float(braked.max(initial=0.0)))
+    # what turns slowly, and is braked or driven hard, is looked at where its acceleration has turned it
+    driven = np.sqrt(np.linalg.norm(acceleration[:, 3:], axis=1).max())
+    step = LOOK / max(largest, float(driven))
     try:
         near = [(h, linearised(_later(instant, h))) for h in (-step, step)]
     except ModelError:
@@ -398,15 +398,17 @@ def _chains(constraint: np.ndarray, owner: np.ndarray, bodies: int) -> np.ndarra
     return np.unique(label, return_inverse=True)[1]
 
 
-def _rates(velocity: np.ndarray, acceleration: np.ndarray, still: float) -> list[np.ndarray]:
+def _rates(velocity: np.ndarray, acceleration: np.ndarray, still: float, length: float) -> list[np.ndarray]:
     """Return the angular velocities at which bodies, and the directions of their paths, turn: each once.
 
-    Speeds up to ``still``, m/s, are rounding.
+    Speeds up to ``still``, m/s, are rounding. Paths of what is at rest a hundredth of the mechanism's ``length``
+    away, before or after, turn fast, and nothing with them.
     """
     found: list[np.ndarray] = []
     paths = np.cross(velocity[:, :3], acceleration[:, :3])
     squares = np.square(velocity[:, :3]).sum(axis=1)[:, None]
-    paths = np.divide(paths, squares, out=np.zeros_like(paths), where=squares > still**2)
+    least = np.maximum(LOOK * length * np.linalg.norm(acceleration[:, :3], axis=1)[:, None], still**2)
+    paths = np.divide(paths, squares, out=np.zeros_like(paths), where=squares > least)
     for w in (*velocity[:, 3:], *paths):
         size = float(np.linalg.norm(w))
         if size > 0.0 and all(np.linalg.norm(w - other) > 1e-9 * size for other in found):

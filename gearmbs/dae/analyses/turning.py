@@ -57,6 +57,10 @@ from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, POSE_A, POSE_V, P
 EQUAL = 1e-6
 """Relative distance of squared frequencies, and of damping, of modes that may turn into each other."""
 
+RESTS = 1e-6
+"""Angular velocity, rad/s, and speed by the size of the mechanism, 1/s, up to which a body is at rest: its square,
+which counts, is rounding."""
+
 UNBALANCED = 1e-6
 """Rate of a momentum, N and N m, and acceleration, m/s^2, up to which a mechanism at rest is in balance."""
 
@@ -240,7 +244,11 @@ def turning(instant: Instant) -> Turning | None:
 
 def leaves_rest(instant: Instant) -> bool:
     """Return whether nothing moves yet in a motion that constraints guide."""
-    if not instant.released or instant.y[: instant.at["R"]].any() or instant.at["lambda"] == instant.at["F"]:
+    if not instant.released or instant.at["lambda"] == instant.at["F"]:
+        return False
+    pose = instant.pose()
+    moving = max(np.abs(pose[:, POSE_W:]).max(), np.abs(pose[:, POSE_V:POSE_W]).max() / instant.system.length)
+    if moving > RESTS or np.abs(instant.y[instant.block("v_f", "R")]).max(initial=0.0) > RESTS:
         return False
     rates = instant.problem.yp0[instant.block("u", "eps")]
     return bool(np.abs(rates).max(initial=0.0) > UNBALANCED)
