@@ -14,7 +14,7 @@ from gearmbs.campaigns.plans.plan import TAKEN
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning
 from gearmbs.campaigns.subjects.base import DONE, Kept, SignalSpec
 
-_known: dict[tuple[str, ...], Reuse] = {}
+_known: dict[tuple[str, ...], tuple[Folder, Reuse]] = {}
 
 
 class Reuse:
@@ -40,8 +40,8 @@ class Reuse:
         self._specs = specs
         self._at: dict[str, tuple[Folder, int, int]] = {}
         self._tables: dict[tuple[Path, int], list[dict[str, Any]]] = {}
-        for path in paths:
-            folder = Folder(path)
+        self.folders = [Folder(path) for path in paths]
+        for path, folder in zip(paths, self.folders, strict=True):
             if set(keep) - set(folder.plan.keep):
                 missing = ", ".join(sorted(set(keep) - set(folder.plan.keep)))
                 raise CampaignError(f"reuse: {path} does not keep {missing}; leave it out, or keep the same")
@@ -67,9 +67,11 @@ class Reuse:
         if not plan.reuse:
             return None
         key = (str(folder.path), *plan.reuse)
-        if key not in _known:
-            _known[key] = cls(plan.reuse, plan.keep, folder.specs)
-        return _known[key]
+        known = _known.get(key)
+        # folders may be made anew under the same names
+        if known is None or known[0] is not folder or any(source.changed for source in known[1].folders):
+            _known[key] = known = folder, cls(plan.reuse, plan.keep, folder.specs)
+        return known[1]
 
     def record(self, key: str) -> bytes | None:
         """Return the content of the file of the record of a case with this key, or None."""

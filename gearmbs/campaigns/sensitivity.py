@@ -273,8 +273,7 @@ def one_factor_studies(campaign: Campaign, result: str) -> pd.DataFrame:
             slopes = np.diff(found) / np.diff(values.astype(float))
             slope = 0.5 * (np.r_[slopes[:1], slopes] + np.r_[slopes, slopes[-1:]])
         rows += [(factor.name, v, r, r - y[0], k) for v, r, k in zip(values, found, slope)]
-        # further coordinates of a factor have one value each, which is not a study
-        first = stop + factor.width - 1
+        first = stop
     table = pd.DataFrame(rows, columns=["factor", "value", "result", "change", "sensitivity"])
     return table.set_index(["factor", "value"])
 

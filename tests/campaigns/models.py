@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import time
@@ -110,3 +111,32 @@ class Ringing(Subject):
 
     def signals(self, keep, things):
         return [SignalSpec("housing", ("housing",), 4000, 10000.0, "m/s^2")]
+
+
+def adding(a: float = 1.0, b: float = 2.0, c: float = 3.0) -> dict[str, float]:
+    """Return a sum."""
+    return {"s": a + b + c}
+
+
+def told(p: float | None = 5.0, i: int = 3) -> dict[str, float]:
+    """Return what kind of things the arguments are."""
+    return {"pp": -1.0 if p is None else p, "is_whole": float(isinstance(i, int)), "ii": i}
+
+
+def tenfold(function):
+    """Return a function that returns ten times as much under the same name."""
+
+    @functools.wraps(function)
+    def inner(**given: float) -> dict[str, float]:
+        return {name: 10.0 * value for name, value in function(**given).items()}
+
+    return inner
+
+
+adding_tenfold = tenfold(adding)
+
+
+@tenfold
+def doubling(a: float = 1.0) -> dict[str, float]:
+    """Return twice as much."""
+    return {"s": 2.0 * a}

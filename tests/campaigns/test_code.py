@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from gearmbs.campaigns.codes import code_counts
 from gearmbs.campaigns.surroundings import refusal
 from gearmbs.studies.run import code
 from gearmbs.studies.run.code import Code, CodeChanged, code_of, running_code, what_counts
+from gearmbs.studies.run.loaded import as_loaded
 from tests.campaigns.models import PLACES, needy
 from tests.says import says
 
@@ -81,6 +83,8 @@ def modules(tmp_path, monkeypatch):
     (tmp_path / name / "helper.py").write_text("OFFSET = 1.0\n\n\ndef offset():\n    return OFFSET\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(code, "_seen", {})
+    # bytecode is known by seconds and size, and edits come faster
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     return tmp_path / name
 
 
@@ -161,6 +165,86 @@ def test_an_edit_under_a_worker_makes_it_refuse(modules, tmp_path, monkeypatch):
     helper.write_text('"""Texts."""\n' + text)
     monkeypatch.setattr(code, "_seen", {})
     assert running_code([*campaign.plan.subject.modules()]).sources
+
+
+BEFORE = '''
+import functools
+from math import sin as g
+
+LARGE = 2.0 ** 2
+
+
+class K:
+    v: float = 2.0
+
+
+def around(f):
+    return functools.wraps(f)(lambda *a: f(*a))
+
+
+@around
+def inner(a):
+    return a
+
+
+def f(a, k=2.0, *, m=1.0):
+    """Return a number."""
+    return g(a) + k + m + K.v
+'''
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("k=2.0", "k=3.0"),
+        ("m=1.0", "m=3.0"),
+        ("v: float = 2.0", "v: float = 3.0"),
+        ("import sin", "import cos"),
+        ("return a\n", "return -a\n"),
+        ("2.0 ** 2", "2.0 ** 3"),
+    ],
+)
+def test_what_is_loaded_is_held_against_its_source(tmp_path, monkeypatch, old, new):
+    """What can be seen of a module by what it has, the rest by the bytecode that its import has left."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    path = tmp_path / f"seen_{abs(hash((tmp_path, old)))}.py"
+
+    def same(text, later):
+        path.write_text(text)
+        os.utime(path, (1e9 + later, 1e9 + later))
+        about = path.stat()
+        return as_loaded(path.stem, path, (about.st_mtime_ns, about.st_ctime_ns, about.st_size))
+
+    assert same(BEFORE, 0)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setitem(sys.modules, path.stem, importlib.import_module(path.stem))
+    assert same(BEFORE, 0)
+    assert old in BEFORE
+    assert not same(BEFORE.replace(old, new), 5)
+    # all of this can be seen
+    plain = BEFORE.replace("LARGE = 2.0 ** 2\n", "").replace("@around\n", "")
+    (tmp_path / f"{path.stem}_2.py").write_text(plain)
+    path = tmp_path / f"{path.stem}_2.py"
+    monkeypatch.setitem(sys.modules, path.stem, importlib.import_module(path.stem))
+    assert same(plain.replace("Return a number", "Return some number"), 5)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_an_edit_after_the_import_is_refused_in_one_process(modules, tmp_path, named):
+    """Also of what two campaigns of it have in common; what is loaded as it stands there runs."""
+    first = made(modules, tmp_path / "first")
+    assert first.run(workers=0).done == 8
+    helper = modules / "helper.py"
+    helper.write_text(helper.read_text().replace("1.0", "2.5"))
+    (modules / "other.py").write_text((modules / "model.py").read_text())
+    other = importlib.import_module(f"{modules.name}.other").model
+    subject = FunctionSubject(f"{modules.name}.other:model" if named else other, {"x": 0.0})
+    second = Campaign(tmp_path / "second", make_plan(subject, [Factor("x", 0.0, 1.0)], n=8))
+    with pytest.raises(CampaignError, match=says("edited after", f"{modules.name}.helper")):
+        second.run(workers=0)
+    assert second.status().done == 0
+    helper.write_text(helper.read_text().replace("2.5", "1.0"))
+    assert made(modules, tmp_path / "third").run(workers=0).done == 8
 
 
 def test_the_code_of_a_campaign_is_found_again_when_its_note_is_lost(modules, tmp_path):

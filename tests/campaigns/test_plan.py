@@ -9,6 +9,7 @@ from gearmbs.campaigns import (
     Campaign,
     CampaignError,
     Factor,
+    FunctionSubject,
     Specimens,
     choose,
     load_plan,
@@ -17,6 +18,8 @@ from gearmbs.campaigns import (
     subject_kinds,
 )
 from gearmbs.studies import Case
+from tests.campaigns import models
+from tests.campaigns.models import told
 from tests.campaigns.support import function, ranges, small
 from tests.says import says
 
@@ -245,3 +248,77 @@ def test_ends_of_ranges_are_exact(scale):
         assert found.max() == high
         outside = factor.columns(np.array([[factor.coordinate(2.0 * high, "1")]]))["x1"]
         assert outside == pytest.approx(2.0 * high)
+
+
+def test_a_grid_of_crossed_choices_has_every_point_once():
+    """Wherever the choice stands, with the ranges of its options or without."""
+    g = Factor("x1", 1.0, 3.0, levels=5)
+    x2 = choose("x2", crossed=True, one=1.0, two=2.0)
+    x3 = choose("x3", crossed=True, plain=0.0, of_a_range={"depth": (1.0, 2.0)})
+    for factors in ([x2, g], [g, x2], [x3, g], [g, x3], [x2]):
+        columns = table(make_plan(function(), factors, "grid"))
+        rows = list(zip(*(columns[f.name] for f in factors)))
+        assert len(rows) == len(set(rows)) == 2 * (5 if g in factors else 1)
+        assert g not in factors or sorted(set(columns["x1"])) == [1.0, 1.5, 2.0, 2.5, 3.0]
+    columns = table(make_plan(function(), [x2, Factor("x1", 1.0, 3.0)], "one at a time", options={"levels": 3}))
+    assert columns["x1"].tolist() == [0.0] * 2 + [1.0] * 2 + [2.0] * 2 + [3.0] * 2
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_one_at_a_time_stands_at_the_option_of_the_base(order):
+    x2 = choose("x2", one=1.0, none=0.0, two=2.0)
+    columns = table(make_plan(function(), [x2, Factor("x1", -1.0, 3.0, levels=3)][::order], "one at a time"))
+    rows = list(zip(columns["x1"], columns["x2"]))
+    assert rows[0] == (0.0, "none")
+    assert sorted(rows[1:]) == [(-1.0, "none"), (0.0, "none"), (0.0, "one"), (0.0, "two"), (1.0, "none"), (3.0, "none")]
+    with pytest.raises(CampaignError, match=says("x2", "base", "one more")):
+        table(make_plan(function(), [choose("x2", one=1.0, two=2.0)], "one at a time"))
+
+
+def test_one_at_a_time_with_ranges_of_options():
+    broken = {"kind": "broken tooth", "lost": (0.2, 0.8), "tooth": (0, 28)}
+    choice = choose("fault.teeth", none=(), broken=broken)
+    torque = Factor("operation.torque", 50.0, 200.0)
+    columns = table(make_plan(SHORT, [torque, choice], "one at a time"))
+    assert columns["fault.teeth"].tolist() == ["none"] * 4 + ["broken"]
+    assert columns["fault.teeth.lost"][4] == pytest.approx(0.5)
+    base = Case(operation={"duration": 0.1}, fault={"teeth": [{"kind": "broken tooth", "lost": 0.3, "tooth": 5}]})
+    columns = table(make_plan(base, [choice, torque], "one at a time"))
+    assert columns["fault.teeth"].tolist() == ["broken", "none", "broken", "broken", "broken"]
+    assert columns["fault.teeth.lost"][0] == pytest.approx(0.3)
+    assert columns["fault.teeth.tooth"][0] == 5
+
+
+def test_errors_of_specimens_are_of_fields_of_their_own():
+    """Of two that set a field one would be lost without a word."""
+    errors = Specimens(3, {"x1": (1.0, 2.0)})
+    with pytest.raises(CampaignError, match=says("x1", "several")):
+        make_plan(function(), [Factor("x1", 10.0, 20.0), errors], n=4)
+    with pytest.raises(CampaignError, match=says("x1", "several")):
+        make_plan(function(), [errors, Specimens(2, {"x1": (3.0, 4.0)}, name="part")], n=4)
+    plan = make_plan(function(), [errors, Specimens(2, {"x2": (3.0, 4.0)}, name="part")], n=4)
+    assert {"specimen", "part"} <= table(plan).keys()
+
+
+def test_rows_of_a_list_are_what_they_say(tmp_path):
+    """None is None, whole numbers stay whole beside rows that leave them out; factors have no place there."""
+    rows = [{"p": None, "i": 4}, {"p": 2.0}, {"i": 5}]
+    subject = FunctionSubject(told, {"p": 5.0, "i": 3})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, design="list", options={"rows": rows}))
+    campaign.run(workers=0)
+    found = Campaign(tmp_path / "c").table
+    assert found[["pp", "ii", "is_whole"]].to_numpy().tolist() == [[-1.0, 4.0, 1.0], [2.0, 3.0, 1.0], [5.0, 5.0, 1.0]]
+    assert campaign.read(["index"], "i >= 4")["index"].tolist() == [0, 2]
+    with pytest.raises(CampaignError, match=says("factors", "rows", "leave")):
+        make_plan(subject, [Factor("i", 1, 5, whole=True)], design="list", options={"rows": rows})
+
+
+def test_a_function_is_the_one_that_its_name_stands_for():
+    parameters = {"a": 1.0}
+    with pytest.raises(CampaignError, match=says("adding", "wraps", "'module:name'")):
+        FunctionSubject(models.adding_tenfold, parameters)
+    for given, result in (
+        ("tests.campaigns.models:adding_tenfold", 60.0), (models.adding, 6.0), (models.doubling, 20.0),
+    ):  # fmt: skip
+        subject = FunctionSubject(given, parameters)
+        assert subject.run(subject.check({"a": 1.0}, "x"), lambda _: None, ["numbers"])["s"] == result

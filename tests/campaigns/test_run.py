@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 import socket
 from functools import partial
 
@@ -421,3 +422,30 @@ def test_reuse_counts_what_is_no_number(tmp_path, function):
     second = listed(tmp_path / "second", function, keep, reuse=[str(first.path)])
     assert first.status().not_numbers == second.status().not_numbers == 2
     np.testing.assert_array_equal(second.open().wave, first.open().wave)
+
+
+def test_what_is_taken_over_is_looked_for_anew(tmp_path):
+    """In a folder made anew, which keeps something else; equal cases of a unit are equal to the last bit."""
+    rows = [{"x": x} for x in (1.0, 1.0 + 1e-13, 1.0)]
+
+    def made(name, size, keep, **settings):
+        subject = FunctionSubject(louder, {"x": 0.0}, signals={"wave": size})
+        plan = make_plan(subject, design="list", options={"rows": rows}, keep=keep, unit=3, **settings)
+        campaign = Campaign(tmp_path / name, plan)
+        return campaign, campaign.run(workers=0)
+
+    first, _ = made("first", (4, 1.0), ["numbers", "signal:wave"])
+    reuse = [str(first.path)]
+    made("second", (4, 1.0), ["numbers"], reuse=reuse)
+    shutil.rmtree(tmp_path / "second")
+    second, status = made("second", (4, 1.0), ["numbers", "signal:wave"], reuse=reuse)
+    assert status.reused == 3
+    np.testing.assert_array_equal(second.open().wave, first.open().wave)
+    shutil.rmtree(first.path)
+    rows[:] = [{"x": x} for x in (2.0, 2.0 + 1e-13, 2.0)]
+    made("first", (4, 1.0), ["numbers", "signal:wave"])
+    rows[:] = [{"x": x} for x in (1.0, 1.0 + 1e-13, 1.0)]
+    shutil.rmtree(tmp_path / "second")
+    second, status = made("second", (4, 1.0), ["numbers", "signal:wave"], reuse=reuse)
+    assert status.reused == 1
+    assert second.table["y"].tolist() == [row["x"] for row in rows]

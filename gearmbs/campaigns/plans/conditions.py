@@ -7,6 +7,8 @@
 from __future__ import annotations
 
 import ast
+import functools
+import math
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -36,13 +38,24 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Or: np.logical_or,
     ast.Not: np.logical_not,
 }
+SEVERAL: dict[str, Callable[..., Any]] = {
+    "min": np.minimum,
+    "max": np.maximum,
+    "minimum": np.minimum,
+    "maximum": np.maximum,
+}
+"""Functions of two or more values, of two of them at a time."""
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "abs", "minimum", "maximum")
+    **{name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "abs")},
+    **SEVERAL,
 }
 
 
 def satisfied(
-    text: str, given: Mapping[str, np.ndarray], unit_of: Callable[[str], str] = lambda name: ""
+    text: str,
+    given: Mapping[str, np.ndarray],
+    unit_of: Callable[[str], str] = lambda name: "",
+    results: Iterable[str] = (),
 ) -> np.ndarray:
     """Return which rows of a table satisfy a constraint.
 
@@ -53,6 +66,8 @@ def satisfied(
         The columns.
     unit_of : callable, optional
         Returns the unit of a column by its name, "" or "1" where it has none, in which quantities are read.
+    results : iterable of str, optional
+        Columns of which NaN stands for a number that is not known: what is compared with it is neither so nor not so.
 
     Raises
     ------
@@ -63,6 +78,7 @@ def satisfied(
         raise CampaignError(f"constraint {text!r}: give a text, as 'operation.torque <= 100'")
     written, columns = _as_names(text, given)
     names = {stand_in: name for stand_in, values in columns.items() for name in given if given[name] is values}
+    results = set(results)
     try:
         tree = ast.parse(written, mode="eval").body
     except SyntaxError as error:
@@ -71,7 +87,12 @@ def satisfied(
             f"has them: {', '.join(map(str, given))}"
         ) from None
     try:
-        result = np.asarray(_value(_in_units(tree, columns, names, unit_of, text), columns, text))
+        missing = {
+            stand_in: np.isnan(values.astype(float))
+            for stand_in, values in columns.items()
+            if names.get(stand_in) in results and _is_number(values)
+        }
+        result = np.asarray(_value(_in_units(tree, columns, names, unit_of, text), columns, text, missing))
     except TypeError:
         about = ", ".join(f"{name} has {_kind(given[name]) or 'neither'}" for name in names_in(text, given))
         raise CampaignError(
@@ -86,12 +107,12 @@ def satisfied(
 
 def names_in(text: str, columns: Iterable[str]) -> list[str]:
     """Return those of some columns that a condition names."""
-    return [name for name in columns if re.search(_alone(name), text)]
+    return [name for name in columns if re.search(_alone(name, r"\s*\.\s*"), text)]
 
 
-def _alone(name: str) -> str:
-    """Return the pattern of a name that is no part of a longer one."""
-    return rf"(?<![\w.]){re.escape(name)}(?![\w.])"
+def _alone(name: str, dot: str = r"\.") -> str:
+    """Return the pattern of a name that is no part of a longer one, with that of the dots in it."""
+    return rf"(?<![\w.]){dot.join(map(re.escape, name.split('.')))}(?![\w.])"
 
 
 STAND_IN = "_column_"
@@ -170,17 +191,46 @@ def _in_units(
     return tree
 
 
-def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
-    def sub(part: ast.AST) -> Any:
-        return _value(part, columns, text)
+def _called(node: ast.Call, name: str, values: list[Any], text: str) -> Any:
+    """Return what a function gives of some values; what numpy takes besides, as a place for the result, is none."""
+    wrong = "takes no names of arguments" if node.keywords else ""
+    if name in SEVERAL:
+        wrong = wrong or ("takes two values or more" if len(values) < 2 else "")
+        found = wrong or functools.reduce(SEVERAL[name], values)
+    else:
+        wrong = wrong or (f"takes one value, not {len(values)}" if len(values) != 1 else "")
+        found = wrong or FUNCTIONS[name](*values)
+    if wrong:
+        more = ", the natural logarithm; log(x) / log(10) has the base 10" if name == "log" else ""
+        raise CampaignError(f"constraint {text!r}: {name} {wrong}{more}")
+    return found
 
-    def truth(part: ast.AST) -> Any:
-        found = sub(part)
+
+def _value(
+    node: ast.AST,
+    columns: Mapping[str, np.ndarray],
+    text: str,
+    missing: Mapping[str, np.ndarray],
+    unknown: bool = False,
+) -> Any:
+    """Return the value of an expression; a comparison with what is missing has the value ``unknown``.
+
+    True under a negation and false elsewhere: a whole condition then holds where it does whatever is missing may be.
+    """
+
+    def sub(part: ast.AST) -> Any:
+        return _value(part, columns, text, missing, unknown)
+
+    def truth(part: ast.AST, unknown: bool = unknown) -> Any:
+        found = _value(part, columns, text, missing, unknown)
         if np.asarray(found).dtype != bool:
             raise CampaignError(f"constraint {text!r}: {ast.unparse(part)!r} is no comparison, as and, or, not take")
         return found
 
     if isinstance(node, ast.Constant) and isinstance(node.value, (int, float, str)):
+        if isinstance(node.value, int) and node.value >= 2**63:
+            # a whole number beyond 64 bits is compared as a real one
+            return float(node.value) if node.value < 2**1023 else math.inf
         return node.value
     if isinstance(node, (ast.Name, ast.Attribute)):
         name = ast.unparse(node)
@@ -192,7 +242,7 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
         return OPERATORS[type(node.op)](_real(sub(node.left)), _real(sub(node.right)))
     if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-        negated = truth(node.operand) if isinstance(node.op, ast.Not) else _real(sub(node.operand))
+        negated = truth(node.operand, not unknown) if isinstance(node.op, ast.Not) else _real(sub(node.operand))
         return OPERATORS[type(node.op)](negated)
     if isinstance(node, ast.BoolOp):
         result = truth(node.values[0])
@@ -208,9 +258,11 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray], text: str) -> Any:
             result = np.logical_and(result, _compared(op, left, right))
             left = right
         else:
+            for name in {ast.unparse(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}:
+                result = np.where(missing[name], unknown, result) if name in missing else result
             return result
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
-        return FUNCTIONS[node.func.id](*(_real(sub(arg)) for arg in node.args))
+        return _called(node, node.func.id, [_real(sub(arg)) for arg in node.args], text)
     raise CampaignError(
         f"constraint {text!r}: {ast.unparse(node)!r} is not understood; it takes columns, numbers, + - * / **, "
         f"comparisons, and, or, not, and {', '.join(FUNCTIONS)}"

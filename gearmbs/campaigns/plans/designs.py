@@ -110,8 +110,8 @@ def grid(counts: Sequence[int]) -> np.ndarray:
 
     Two values or more of a range are spread from end to end; see `end_to_end`.
     """
-    axes = [end_to_end(count) for count in counts]
-    return np.array(list(itertools.product(*axes))).reshape(-1, len(counts))
+    points = list(itertools.product(*(end_to_end(count) for count in counts)))
+    return np.array(points, dtype=float).reshape(len(points), len(counts))
 
 
 def end_to_end(count: int) -> np.ndarray:
@@ -197,11 +197,10 @@ def box_behnken(dimensions: int, centre: int = 1) -> np.ndarray:
 
 
 def one_at_a_time(counts: Sequence[int], base: Sequence[float]) -> np.ndarray:
-    """Return a study of one factor after the other: the base point, then each factor over its values from end to
-    end."""
+    """Return the base point, then each coordinate over so many values from end to end, the others at the base."""
     rows = [np.asarray(base, dtype=float)]
     for axis, count in enumerate(counts):
-        for value in end_to_end(count):
+        for value in end_to_end(count) if count else ():
             row = rows[0].copy()
             row[axis] = value
             rows.append(row)

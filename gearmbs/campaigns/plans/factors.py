@@ -7,7 +7,7 @@ table into changes of the nested data of a case. Columns hold numbers in SI or t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
@@ -265,6 +265,22 @@ class Choice:
                 low, high = self.options[name][key]
                 found[here, place] = (columns[f"{self.name}.{key}"][here] - low) / (high - low or 1.0)
         return found
+
+    def candidates(self, value: Any) -> Iterator[list[float]]:
+        """Yield the coordinates of each option that may give a value; the middle of ranges that the option has not."""
+        table = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
+        for k, (name, keys) in enumerate(self.ranges.items()):
+            places = [0.5] * (self.width - 1)
+            for place, key in enumerate(keys):
+                low, high = self.options[name][key]
+                given = table.get(key) if isinstance(table, Mapping) else None
+                if not (all(isinstance(v, (int, float)) for v in (given, low, high)) and low <= given <= high):
+                    break
+                whole = isinstance(low, int) and isinstance(high, int)
+                # a whole number has a part of the range, whose middle is taken
+                places[place] = (given - low + 0.5) / (high - low + 1) if whole else (given - low) / (high - low or 1.0)
+            else:
+                yield [(k + 0.5) / len(self.options), *places]
 
     def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
         """Set the field in nested data to the chosen option with its values."""

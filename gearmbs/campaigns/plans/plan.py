@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -22,10 +24,11 @@ from gearmbs.campaigns.plans.factors import (
     check_kinds,
     factor_from,
     factor_table,
+    get_path,
     number_in_si,
     set_path,
 )
-from gearmbs.campaigns.settings import CampaignError, check_settings, texts, whole
+from gearmbs.campaigns.settings import CampaignError, check_settings, content_key, texts, whole
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
 from gearmbs.files import python_scalar
 from gearmbs.schema.described import chosen, read_toml
@@ -191,7 +194,9 @@ class Plan:
         if self.design == "grid":
             return designs.grid(self.counts())
         if self.design == "one at a time":
-            return designs.one_at_a_time(self.counts(), [self._base_coordinate(f) for f in self.factors])
+            base = self.subject.base()
+            at = [x for factor in self.factors for x in self._base_coordinates(factor, base)]
+            return designs.one_at_a_time(self.counts(beyond=0), at)
         if self.design == "factorial":
             return 0.5 + 0.5 * designs.factorial(d, o.get("generators", ()))
         if self.design == "plackett burman":
@@ -226,17 +231,43 @@ class Plan:
             return int(self.options.get("levels", 2))
         return factor.count
 
-    def counts(self) -> list[int]:
-        """Return how many values of each coordinate a grid takes: one of those beyond a factor's first."""
-        return [count for f in self.factors for count in (self.count(f), *([1] * (f.width - 1)))]
+    def counts(self, beyond: int = 1) -> list[int]:
+        """Return how many values of each coordinate are taken: ``beyond`` of those beyond a factor's first.
 
-    def _base_coordinate(self, factor: AnyFactor) -> float:
-        if not isinstance(factor, Factor):
-            return 0.0
-        value: Any = self.subject.base()
-        for part in factor.path.split("."):
-            value = value[part]
-        return factor.coordinate(value, self.subject.unit_of(factor.path))
+        A crossed choice, all of whose options are taken with each point, has no coordinate of the choice.
+        """
+        return [
+            count
+            for f in self.factors
+            for count in ([beyond] * f.width if _crossed(f) else [self.count(f), *([beyond] * (f.width - 1))])
+        ]
+
+    def _base_coordinates(self, factor: AnyFactor, base: dict[str, Any]) -> list[float]:
+        """Return the coordinates at which a factor gives what the base has; the first of the specimens."""
+        if isinstance(factor, Specimens):
+            return [0.0]
+        if _crossed(factor):
+            return [0.5] * factor.width
+        value = get_path(base, factor.path)
+        if isinstance(factor, Factor):
+            return [factor.coordinate(value, self.subject.unit_of(factor.path))]
+        key = self._key(base)
+        for at in factor.candidates(value):
+            data = copy.deepcopy(base)
+            row = {name: python_scalar(column[0]) for name, column in factor.columns(np.array([at])).items()}
+            factor.apply(data, row)
+            with suppress(ValueError):
+                # an option that is impossible is not what the base has
+                if self._key(data) == key:
+                    return at
+        raise CampaignError(
+            f"{factor.path}: the base has {value!r:.60}, which is none of the options {', '.join(factor.options)}; "
+            "give it as one more, with which the others are compared"
+        )
+
+    def _key(self, data: dict[str, Any]) -> str:
+        """Return what nested data of the same content have in common."""
+        return content_key(self.subject.kind, self.subject.canonical(self.subject.check(data, "base")))
 
     def columns(self, u: np.ndarray, first_point: int = 0) -> Columns:
         """Return the columns of points u, each with all its variants, and the number of the point."""
@@ -248,7 +279,9 @@ class Plan:
             for name in dict.fromkeys(key for row in self.options["rows"] for key in row):
                 values = [row.get(name) for row in here]
                 # NaN stands for a number that a row leaves at the base's
-                numbers = all(v is None or isinstance(v, float) for v in values)
+                numbers = all(v is None or isinstance(v, float) for v in values) or (
+                    None in values and all(v is None or type(v) is int for v in values)
+                )
                 found[name] = np.array(values, dtype=float) if numbers else _column(values)
             return found
         variant = np.tile(np.arange(count), len(u))
@@ -298,10 +331,9 @@ class Plan:
         """Return the nested data of a row of the table."""
         data = self.subject.base()
         if self.design == "list":
-            for name in dict.fromkeys(key for r in self.options["rows"] for key in r):
-                value = python_scalar(row[name])
-                if value is not None and value == value:
-                    set_path(data, name, value)
+            # the table does not tell None from what a row leaves at the base's, nor whole numbers beside such
+            for name, value in self.options["rows"][int(row["point"])].items():
+                set_path(data, name, value)
             return data
         # the errors of a specimen come on top of what else is chosen
         for factor in sorted(self.factors, key=lambda f: isinstance(f, Specimens)):
@@ -489,7 +521,7 @@ def _rows_in_si(plan: Plan) -> list[dict[str, Any]]:
     found = [{k: number_in_si(python_scalar(v), units[k], k) for k, v in row.items()} for row in rows]
     for path in units:
         column = [row.get(path) for row in found]
-        if any(isinstance(v, float) or v is None for v in column):
+        if any(isinstance(v, float) for v in column):
             for row in found:
                 if isinstance(row.get(path), int) and not isinstance(row[path], bool):
                     row[path] = float(row[path])
@@ -513,10 +545,12 @@ def _consistent(plan: Plan) -> None:
         raise CampaignError(
             f"factors: {', '.join(sorted(doubled))} stand for several columns; give them names of their own"
         )
-    paths = [f.path for f in plan.factors if not isinstance(f, Specimens)]
+    paths = [path for f in plan.factors for path in (f.errors if isinstance(f, Specimens) else (f.path,))]
     doubled = {path for path in paths if paths.count(path) > 1}
     if doubled:
         raise CampaignError(f"factors: {', '.join(sorted(doubled))} is set by several of them; give one")
+    if plan.design == "list" and plan.factors:
+        raise CampaignError("factors: a list has its rows alone; leave the factors out, or take another design")
     if plan.design != "list" and not plan.factors:
         raise CampaignError("factors: give at least one")
     if plan.constraints and plan.design in designs.ANALYSES:
@@ -527,7 +561,11 @@ def _consistent(plan: Plan) -> None:
 
 
 def _variant(factor: AnyFactor) -> tuple:
-    return (np.zeros(1, dtype=int),) if isinstance(factor, Choice) and factor.crossed else ()
+    return (np.zeros(1, dtype=int),) if _crossed(factor) else ()
+
+
+def _crossed(factor: AnyFactor) -> bool:
+    return isinstance(factor, Choice) and factor.crossed
 
 
 def load_plan(path: str | Path) -> Plan:

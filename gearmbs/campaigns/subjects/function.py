@@ -222,6 +222,12 @@ def _name_of(function: str | Callable[..., Any]) -> str:
         )
     if not attribute.isidentifier():
         raise CampaignError(f"function {name!r}: give module:name of a function at the top of a module")
+    if not isinstance(function, str) and imported(name, "function") is not function:
+        # as functools.wraps makes it, which gives what is around a function its name
+        raise CampaignError(
+            f"function {name!r}: under this name workers import something else than what is given, which wraps it or "
+            "was loaded before; give the text 'module:name' under which it stands at the top of a module"
+        )
     return name
 
 

@@ -26,16 +26,15 @@ import os
 import platform
 import sys
 import sysconfig
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 from gearmbs.files import write_whole
+from gearmbs.studies.run.loaded import as_loaded
 
 PACKAGE = Path(__file__).parents[2]
 
@@ -59,9 +58,6 @@ OPTIONS = ("GEARMBS_COMPILER", "NUMBA_OPT", "NUMBA_LOOP_VECTORIZE", "NUMBA_SLP_V
 
 MESSAGES_FROM = ("warn", "warn_explicit")
 """Functions whose texts are read by people only."""
-
-CLOCK_TICKS = 0.02
-"""Seconds to which the beginning of a process is known; an interpreter takes longer until it imports anything."""
 
 MOST_KNOWN = 5000
 """Digests of sources that are remembered between processes."""
@@ -126,6 +122,8 @@ def _stamp(path: Path) -> tuple[int, int, int]:
 
 
 _seen: dict[tuple[str, ...], tuple[Code, list[_Source]]] = {}
+_looked_at: set[_Source] = set()
+"""Sources that this process, or the one that it was forked from, has not loaded in another form."""
 
 
 def code_of(modules: Iterable[str] = ()) -> Code:
@@ -163,11 +161,12 @@ def running_code(modules: Iterable[str] = ()) -> Code:
         If a source was edited since it was loaded, and what that changed can be seen or cannot be told.
     """
     names = tuple(sorted(set(modules)))
-    first = names not in _seen
     code = code_of(names)
-    if first:
-        for source in _seen[names][1]:
-            _as_loaded(source)
+    for source in _seen[names][1]:
+        if source not in _looked_at:
+            if not as_loaded(source.name, source.path, source.stamp):
+                raise CodeChanged(f"{source.name} was edited after this process had loaded it; start it again")
+            _looked_at.add(source)
     return code
 
 
@@ -387,83 +386,3 @@ def _installed_as(name: str) -> str:
         if not line.startswith("..") and line.partition(",")[0].endswith((".py", ".so", ".pyd", ".dylib", ".dll"))
     ]
     return f"{about.version} {hashlib.sha256(repr(sorted(noted)).encode()).hexdigest()[:8]}"
-
-
-# Whether a process runs what stands in the files.
-
-
-def _began() -> float:
-    """Return when this process began, in seconds since 1970; where that is not known, now."""
-    try:
-        ticks = float(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
-        since_boot = float(Path("/proc/uptime").read_text().split()[0]) - ticks / os.sysconf("SC_CLK_TCK")
-        return time.clock_gettime(time.CLOCK_REALTIME) - since_boot
-    except (OSError, ValueError, IndexError):
-        return time.time()
-
-
-BEGAN = _began()
-"""When this process began, or the one that it was forked from: what that had loaded, it has."""
-
-
-def _as_loaded(source: _Source) -> None:
-    """Refuse a source that was edited since this process began unless what it has loaded is the same.
-
-    Raises
-    ------
-    CodeChanged
-    """
-    module = sys.modules.get(source.name)
-    if module is None or source.path.suffix != ".py" or source.stamp[1] / 1e9 < BEGAN + CLOCK_TICKS:
-        return
-    if not _same(module, source.path.read_bytes(), str(source.path)):
-        raise CodeChanged(f"{source.name} was edited after this process had loaded it")
-
-
-def _same(module: ModuleType, source: bytes, path: str) -> bool:
-    """Return whether a module's functions and constants are those of a source, as far as that can be seen."""
-    tree = ast.parse(source)
-    codes = {c.co_qualname: _doing(c) for c in _inner(compile(source, path, "exec"))}
-    for value in vars(module).values():
-        functions = vars(value).values() if isinstance(value, type) else [value]
-        for function in functions:
-            function = getattr(function, "py_func", getattr(function, "__func__", function))
-            if not isinstance(function, FunctionType) or function.__module__ != module.__name__:
-                continue
-            if "<locals>" not in function.__qualname__ and codes.get(function.__qualname__) != _doing(
-                function.__code__
-            ):
-                return False
-    return all(_same_statement(module, node) for node in tree.body)
-
-
-def _same_statement(module: ModuleType, node: ast.stmt) -> bool:
-    """Return whether a statement at the top of a module gave what the module has; of most that cannot be seen."""
-    if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Import, ast.ImportFrom, ast.AsyncFunctionDef)):
-        return True
-    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-        return True
-    if isinstance(node, ast.Assign) and all(isinstance(target, ast.Name) for target in node.targets):
-        try:
-            value = ast.literal_eval(node.value)
-        except ValueError:
-            return False
-        return all(getattr(module, target.id, node) == value for target in node.targets)  # type: ignore[attr-defined]
-    return False
-
-
-def _inner(code: CodeType) -> Iterator[CodeType]:
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield constant
-            yield from _inner(constant)
-
-
-def _doing(code: CodeType) -> tuple:
-    """Return what a function does, without its lines and its texts of several words."""
-    constants = [
-        _doing(c) if isinstance(c, CodeType) else repr(c)
-        for c in code.co_consts
-        if not (isinstance(c, str) and " " in c)
-    ]
-    return code.co_code, constants, code.co_names, code.co_varnames
