@@ -107,6 +107,9 @@ class KinematicTable:
         rolling = getattr(stage.on_pins, "rolling", None)
         if rolling is not None:
             for name, multiple in rolling.multiples.items():
+                if name == "FTF":
+                    # forces are felt by the pin, and the outer ring turns about it: it sees the cage turn the faster
+                    name, multiple = "cage at the pin", 1.0 - multiple
                 yield "bearing", f"{stage.name} pins", name, multiple * turns["planet"]
 
     def hunting_frequency(self, mesh: str) -> float:

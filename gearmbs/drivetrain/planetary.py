@@ -131,6 +131,10 @@ class PlanetaryStage(Part):
         known = {member: train.speeds.get(on, 0.0) for member, on in self.holders.items()}
         return self.gears.speeds(sun=known["sun"], carrier=known["carrier"]) | known
 
+    def sense(self, train: Drivetrain) -> int:
+        """Return the sense of rotation about the axis, see `gearmbs.gears.PlanetarySet.sense`."""
+        return self.with_rotation(train).sense(self.speeds(train))
+
     def with_rotation(self, train: Drivetrain) -> PlanetarySet:
         """Return the set with the drive flanks of the operating point: the sun drives if its planets hold it back."""
         on_sun, known = train.power.members[self.name]["sun"], self.speeds(train)
@@ -350,6 +354,11 @@ def check_stage(train: Drivetrain, stage: PlanetaryStage) -> None:
             f"{stage.label}: {member} is '{on}', a {part.title}; give a shaft, a housing or 'ground'",
         )
         require(
+            isinstance(part, Shaft) or member not in stage.masses,
+            f"{stage.label}: masses has {member}, which is on {part.label}: add it to the housing's own mass and "
+            "inertia, and leave it out here",
+        )
+        require(
             member == "ring" or getattr(part, "model", None) is None,
             f"{stage.label}: {member} is on {part.label}, a model of finite elements or modes, which has a seat for a "
             "ring only; give 'ground', a rigid housing, or a shaft in that housing",
@@ -540,9 +549,8 @@ def add_stage(m: Mechanism, train: Drivetrain, layout: Layout, stage: PlanetaryS
         "steps": np.array([layout.wheels[stage.planet(k)] for k in planets]),
     }
     ring = wheel("ring", layout.wheels[f"{stage.name} ring"])
-    members = Members(
-        wheel("sun", 0.0), _carrier(m, train, stage, origin, axes), ring, origin, axes, carrier_angle, f"{stage.name} "
-    )
+    carrier, sense = _carrier(m, train, stage, origin, axes), stage.sense(train)
+    members = Members(wheel("sun", 0.0), carrier, ring, origin, axes, carrier_angle, f"{stage.name} ", sense)
     turns = {name: share * speeds[name] for name in ("carrier", "planet")}
     with errors_named(stage.label):
         gears = stage.with_rotation(train)

@@ -156,7 +156,8 @@ def planetary_mechanism(
         if member in loads:
             load = loads[member] if over == 0 else step(0.0, 0.0, over, loads[member])
             m.torque(f"{member} load", body, load, axis=Z)
-    members = Members(m.bodies["sun"], m.bodies["carrier"], m.bodies["ring"])
+    sense = gears.sense(gears.speeds(**known) if len(known) == 2 else known)
+    members = Members(m.bodies["sun"], m.bodies["carrier"], m.bodies["ring"], sense=sense)
     add_planets(m, gears, members, start, masses["planet"], turning, pins, rim)
     return m
 
@@ -266,6 +267,8 @@ class Members(NamedTuple):
         Of the carrier from that frame at the start, rad.
     prefix : str
         Before the names of bodies, pins and meshes.
+    sense : int
+        Of rotation, in which pins are off tangentially: `PlanetarySet.sense`.
     """
 
     sun: Body | Marker
@@ -275,6 +278,7 @@ class Members(NamedTuple):
     axes: np.ndarray = np.eye(3)
     angle: float = 0.0
     prefix: str = ""
+    sense: int = 1
 
 
 def add_planets(
@@ -308,7 +312,8 @@ def add_planets(
     wheels: list[Any] = []
     for k in range(gears.planets):
         psi = float(gears.angles[k]) + members.angle  # type: ignore[index]
-        radial, tangential = gears.pin_errors.get(k, (0.0, 0.0))
+        radial, ahead = gears.pin_errors.get(k, (0.0, 0.0))
+        tangential = members.sense * ahead
         c, s = math.cos(psi), math.sin(psi)
         arm = (gears.carrier_radius + radial) * np.array([c, s, 0.0]) + tangential * np.array([-s, c, 0.0])
         place = members.origin + axes @ arm

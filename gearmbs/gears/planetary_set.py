@@ -33,6 +33,8 @@ LEFT_OVER = 1e-4
 """Share of forces in step below which their sum is none: places of planets are exact to `FITTING` of a pitch."""
 UNASKED = 1e-3
 """Share of a backlash that is asked for, beyond which more than that is told."""
+CLEARANCE = 0.25
+"""Bottom clearance of the basic rack of ISO 53 over the module: a pin that is further off drives tips into roots."""
 NEARBY = 8
 """Teeth by which sun and planet of a set that is recommended may differ."""
 
@@ -62,7 +64,8 @@ class PlanetarySet(Written):
     slices : int, optional
         As of `GearPair`.
     pin_errors : mapping of int to (float, float)
-        By planet, from 0: how far its pin is off radially (outwards) and tangentially (in the sense of rotation), m.
+        By planet, from 0: how far its pin is off radially (outwards) and tangentially (in the sense of rotation, see
+        `sense`), m or text.
     faults : sequence of (str, Fault)
         What has the fault and which: "sun", "ring", "planet 1", or one of a planet's sets of flanks: "planet 1 sun
         side", "planet 1 ring side". Planets count from 1.
@@ -106,7 +109,7 @@ class PlanetarySet(Written):
     contact: ContactLaw | None = None
     friction: FlankFriction = field(default_factory=FlankFriction)
     slices: int | None = None
-    pin_errors: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    pin_errors: Mapping[int, tuple[Any, Any]] = field(default_factory=dict)
     faults: Sequence[tuple[str, Fault]] = ()
     rotation: int = 1
     ideal: tuple[float, float] | None = None
@@ -147,12 +150,7 @@ class PlanetarySet(Written):
             object.__setattr__(self, "carrier_radius", PairGeometry(self.sun, self.planet).nominal_centre_distance)
         self._check_angles()
         self._check_neighbours()
-        for at, error in self.pin_errors.items():
-            if not (0 <= at < self.planets and len(error) == 2):
-                raise ValueError(
-                    f"PlanetarySet.pin_errors has planet {at!r}: {error!r}; give planets 0 to {self.planets - 1} two "
-                    "lengths"
-                )
+        object.__setattr__(self, "pin_errors", {at: self._pin_error(at, e) for at, e in self.pin_errors.items()})
         for where, fault in self.faults:
             self._holder(where, fault)
         for name in ("stiffness", "damping_ratio"):
@@ -242,6 +240,21 @@ class PlanetarySet(Written):
                 f"PlanetarySet.planets is {self.planets}: neighbouring planets stand {distance * 1e3:.4f} mm apart and "
                 f"reach {reach * 1e3:.4f} mm; use fewer or smaller planets"
             )
+
+    def _pin_error(self, at: int, error: Any) -> tuple[float, float]:
+        """Return how far a pin is off, m."""
+        field = "PlanetarySet.pin_errors"
+        if not (at in range(self.planets) and np.ndim(error) == 1 and len(error) == 2):
+            raise ValueError(f"{field} has planet {at!r}: {error!r}; give planets 0 to {self.planets - 1} two lengths")
+        radial, ahead = (float(to_si(e, "length", f"{field}[{at}]")) for e in error)
+        most = CLEARANCE * self.planet.module
+        if not max(abs(radial), abs(ahead)) <= most:
+            raise ValueError(
+                f"{field}[{at}] is ({1e3 * radial:.6g} mm, {1e3 * ahead:.6g} mm): teeth yield by micrometres, and from "
+                f"{1e3 * most:.4g} mm, the clearance at their roots, they do not fit at all; give less, or another "
+                "carrier_radius for all planets"
+            )
+        return radial, ahead
 
     def _holder(self, where: str, fault: Fault) -> tuple[str, int, str]:
         """Return the member, the planet's number from 0 and the set of flanks of a fault."""
@@ -416,6 +429,16 @@ class PlanetarySet(Written):
         found[missing] = -sum(row[m] * given[m] for m in given) / row[missing]
         found["planet"] = found["carrier"] - (found["sun"] - found["carrier"]) / self.ratios[0]
         return {m: found[m] for m in (*MEMBERS, "planet")}
+
+    def sense(self, speeds: Mapping[str, float]) -> int:
+        """Sense of rotation of the set about its axis: that of the carrier, or where it stands that of the sun.
+
+        Parameters
+        ----------
+        speeds : mapping
+            Of "sun" and "carrier", rad/s, as far as they are known; where nothing turns ``rotation`` tells it.
+        """
+        return next((-1 if w < 0.0 else 1 for m in ("carrier", "sun") if (w := speeds.get(m, 0.0))), self.rotation)
 
     def torques(self, **given: float) -> dict[str, float]:
         """Outer torques on sun, carrier and ring in balance without losses, from one of them, N m."""

@@ -163,11 +163,11 @@ def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Datas
     for k, order in zip(diagram["critical_mode"].values, diagram["critical_order"].values):
         one = named.sel(mode=int(k))
         part = orders[float(order)].split(" x ", 1)[1]
-        if isinstance(train.parts[part], Shaft):
+        if isinstance(train.parts.get(part), Shaft):
             share = one["kinetic"].sel(body=part)
         else:
             # all planets of a stage, as if they meshed in the phase that moves the mode most
-            share = one["energy"].sel(part=[m.name for m in train.meshings if part in (m.name, m.stage)]).sum()
+            share = one["energy"].sel(part=[m.name for m in train.meshings if part in (m.name, m.group, m.stage)]).sum()
         ratio = float(one["damping_ratio"])
         # the force that a mesh carries turns with its wheels, and may make a share that is all but none negative
         gains.append(max(float(share), 0.0) / (2.0 * ratio) if ratio > 0.0 else np.inf)

@@ -17,7 +17,7 @@ import xarray as xr
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Accelerometer, Drivetrain, Housing, Laser, Shaft, SpeedSensor, TorqueSensor
 from gearmbs.drivetrain.kinematics import RPM
-from gearmbs.drivetrain.planetary import Meshing
+from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
 from gearmbs.mechanism import Mechanism
 
 CONTACT = {
@@ -43,11 +43,12 @@ class TrainColumns(NamedTuple):
         The quantities of `CONTACT`.
     bearing_force : ndarray, shape (m, bearings + pins, 3)
         Force of the seat on the shaft, global components, N; of pins that on the planet, outwards, in the sense of
-        rotation about z, and along the axis.
+        rotation (`gearmbs.gears.PlanetarySet.sense`), and along the axis.
     sensors : ndarray, shape (m, sensors)
-    turned : ndarray, shape (m, shafts + planets)
-        Angles about the shafts' axes, rad; within one turn until they are joined.
-    speed : ndarray, shape (m, shafts + planets)
+    turned : ndarray, shape (m, shafts + planets + stages)
+        Angles about the shafts' axes, rad; within one turn until they are joined. Behind them those of what holds a
+        member of each planetary stage, from its start: a housing rocks on its mounts.
+    speed : ndarray, shape (m, shafts + planets + stages)
         rad/s.
     twisted : ndarray, shape (m, wheels)
         Angles of wheels, and of members of planetary stages, `on_shafts`, against their shafts that bend and twist,
@@ -71,13 +72,21 @@ def on_shafts(train: Drivetrain) -> dict[str, str]:
     return out
 
 
+def column_of(train: Drivetrain, mesh: Meshing, body: str, columns: np.ndarray) -> np.ndarray:
+    """Return the column of `TrainColumns.turned` or ``speed`` of what carries a wheel or planets of a mesh, (m,)."""
+    names = list(train.turning)
+    if body in names:
+        return columns[:, names.index(body)]
+    if not mesh.stage:
+        return np.zeros(columns.shape[0])
+    return columns[:, len(names) + [stage.name for stage in train.planetary_stages].index(mesh.stage)]
+
+
 def driver_angle(train: Drivetrain, known: TrainColumns, mesh: Meshing, of_speed: bool = False) -> np.ndarray:
     """Return the angle (rad) or speed (rad/s) of the driver of a mesh against what carries the axes, shape (m,)."""
-    names, columns = list(train.turning), known.speed if of_speed else known.turned
-    found = [
-        columns[:, names.index(b)] if b in names else np.zeros(known.t.size) for b in (mesh.bodies[0], mesh.carrier)
-    ]
-    return found[0] - found[1]
+    columns = known.speed if of_speed else known.turned
+    one, carrier = (column_of(train, mesh, body, columns) for body in (mesh.bodies[0], mesh.carrier))
+    return one - carrier
 
 
 def counted_turns(t: np.ndarray, turned: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -148,28 +157,51 @@ class TrainRecorder:
         for k, bearing in enumerate(train.bearings):
             is_joint = bearing.name in self.mechanism.joints
             force[:, k] = (part.reaction(bearing.name) if is_joint else part.load(bearing.name))[0]
-        turned, speed = np.empty((m, len(train.turning))), np.empty((m, len(train.turning)))
+        count = len(train.turning)
+        turned, speed = (
+            np.zeros((m, count + len(train.planetary_stages))),
+            np.zeros((m, count + len(train.planetary_stages))),
+        )
         for k, body in enumerate(train.turning):
             axes = self._axes[body]
             x = part.orientation(body)[:, :, 0] @ axes[:, :2]
             turned[:, k] = np.arctan2(x[:, 1], x[:, 0])
             speed[:, k] = part.angular_velocity(body) @ axes[:, 2]
+        for k, stage in enumerate(train.planetary_stages, start=count):
+            turned[:, k], speed[:, k] = self._rocks(part, stage)
         twisted = np.zeros((m, len(on_shafts(train))))
         for k, (wheel, shaft) in enumerate(on_shafts(train).items()):
             if train.part(shaft, Shaft).modes is not None:
                 twisted[:, k] = part.deflection(wheel)[1][:, 2]
         bodies = list(train.turning)
         for k, (pin, (stage, angle)) in enumerate(train.pins.items(), start=len(train.bearings)):
-            held = np.zeros(m)
-            at = angle + (turned[:, bodies.index(stage.carrier)] if stage.carrier in bodies else held)
+            place = (
+                bodies.index(stage.carrier) if stage.carrier in bodies else count + train.planetary_stages.index(stage)
+            )
+            at = angle + turned[:, place]
             force[:, k] = self._on_planet(part, pin, self._axes[stage.planet(1)], at)
+            force[:, k, 1] *= stage.sense(train)
         sensors = np.empty((m, len(train.sensors)))
         for k, sensor in enumerate(train.sensors):
             sensors[:, k] = self._sensed(sensor, part, speed)
         return TrainColumns(part.t.copy(), contact, force, sensors, turned, speed, twisted)
 
+    def _rocks(self, part: Solution, stage: PlanetaryStage) -> tuple[np.ndarray, np.ndarray]:
+        """Return angle (rad) and speed (rad/s) about the axis of what holds a member of a stage, its seat included."""
+        holder = next((on for on in stage.holders.values() if isinstance(self.train.parts.get(on), Housing)), None)
+        if holder is None:
+            return np.zeros(part.t.size), np.zeros(part.t.size)
+        axes = self._axes[stage.planet(1)]
+        first = self.mechanism.bodies[holder].orientation
+        moved = part.orientation(holder) @ first.T @ axes[:, 0] @ axes
+        angle = np.arctan2(moved[:, 1], moved[:, 0])
+        if self.train.part(holder, Housing).model is not None:
+            # the seat of a ring in finite elements turns against the housing's mean axes
+            angle += part.deflection(f"{stage.name} ring")[1] @ (first.T @ axes[:, 2])
+        return angle, part.angular_velocity(holder) @ axes[:, 2]
+
     def _on_planet(self, part: Solution, pin: str, axes: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Return the force of a pin on its planet: outwards, in the sense of rotation, along the axis."""
+        """Return the force of a pin on its planet: outwards, about the axis, along it."""
         held, element = self.mechanism.joints.get(pin), self.mechanism.elements.get(pin)
         if held is None and element is None:
             # springs without stiffness

@@ -321,8 +321,11 @@ def mesh_orders(train: Drivetrain, harmonics: int = 2) -> dict[str, float]:
     if harmonics < 1:
         raise ValueError(f"harmonics is {harmonics}; give 1 or more")
     turns = train.kinematics.shaft_frequency(train.drives[0].shaft)
-    # both sides of plain planets mesh at one frequency
-    names = [mesh.name for mesh in train.meshes] + [stage.name for stage in train.planetary_stages]
+    names = [mesh.name for mesh in train.meshes]
+    for stage in train.planetary_stages:
+        # both sides of plain planets mesh at one frequency, those of stepped ones at two
+        plain = stage.gears.planet_at_ring is None
+        names += [stage.name] if plain else [f"{stage.name} sun", f"{stage.name} ring"]
     return {
         f"{h} x {name}": h * train.kinematics.mesh_frequency(name) / turns
         for name in names

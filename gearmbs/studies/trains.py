@@ -37,6 +37,7 @@ from gearmbs.studies.train_record import (
     TrainColumns,
     TrainRecorder,
     by_angle,
+    column_of,
     driver_angle,
     held_speeds,
     on_shafts,
@@ -207,15 +208,14 @@ def raw_record(train: Drivetrain, known: TrainColumns, solution: Solution) -> xr
 
 def transmission_error(train: Drivetrain, turned: np.ndarray, twisted: np.ndarray) -> np.ndarray:
     """Return the lag of the driven wheel along the line of action, from the touching start, shape (m, meshes), m."""
-    names, twists = list(train.turning), _twists(train, twisted)
+    twists = _twists(train, twisted)
     out = np.empty((turned.shape[0], len(train.meshings)))
-    still = np.zeros(turned.shape[0])
     for k, mesh in enumerate(train.meshings):
         pair = train.pairs[mesh.name]
         ratio = pair.geometry.sign * mesh.gears[0].teeth / mesh.gears[1].teeth
         sense = pair.rotation * pair.geometry.sign * pair.geometry.driven.base_radius
         bodies = (*mesh.bodies, mesh.carrier)
-        one, two, carrier = ((turned[:, names.index(b)] if b in names else still) + twists(mesh, b) for b in bodies)
+        one, two, carrier = (column_of(train, mesh, b, turned) + twists(mesh, b) for b in bodies)
         first, second, third = (train.layout.angles.get(b, 0.0) for b in bodies)
         if mesh.stage:
             one, two, first, second = one - carrier, two - carrier, first - third, second - third
@@ -401,7 +401,11 @@ def _dataset(
         ("time", "bearing", "xyz"), bearing, {"units": "N", "long_name": "force of the seat on the shaft"}
     )  # fmt: skip
     data["measured"] = (("time", "sensor"), sensors, {"long_name": "what the sensors measure"})
-    data["speed"] = (("time", "shaft"), speed, {"units": "rad/s", "long_name": "speed about the shaft's axis"})
+    data["speed"] = (
+        ("time", "shaft"),
+        speed[:, : len(train.turning)],
+        {"units": "rad/s", "long_name": "speed about the shaft's axis"},
+    )
     coords = {
         "time": ("time", t, {"units": "s"}),
         "mesh": [m.name for m in train.meshings],

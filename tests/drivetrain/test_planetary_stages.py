@@ -27,7 +27,7 @@ from gearmbs.drivetrain import (
 from gearmbs.drivetrain.drivetrain import read_description
 from gearmbs.drivetrain.plants import resting
 from gearmbs.flexible import box_model
-from gearmbs.gears import GearPair, GearSpec, IdealMesh, Support, planetary, planetary_mechanism
+from gearmbs.gears import GearPair, GearSpec, IdealMesh, PlanetarySet, Support, planetary, planetary_mechanism
 from gearmbs.mechanism import linear_modes
 from gearmbs.mechanism.solve.analyses import static_equilibrium
 from gearmbs.studies import (
@@ -41,6 +41,9 @@ from gearmbs.studies import (
     train_scene,
     train_signal,
 )
+from gearmbs.studies.train_record import TrainRecorder
+from gearmbs.studies.train_views import mesh_orders
+from gearmbs.studies.trains import transmission_error
 from tests.says import says
 
 TEETH = (24, 30, 84)
@@ -186,6 +189,10 @@ def test_lines_are_those_of_the_set_and_its_neighbours():
         assert found[of, name] == pytest.approx(expected, rel=1e-12), (of, name)
     pins = two_stages(pins="6203").planetary_stages[0].on_pins.rolling
     assert found["second pins", "BPFO"] == pytest.approx(pins.multiples["BPFO"] * planet, rel=1e-12)
+    # what passes the loaded side of a pin: its inner ring stands, and the cage is dragged on by the outer one
+    cage = pins.multiples["BPFI"] / pins.elements * planet
+    assert found["second pins", "cage at the pin"] == pytest.approx(cage, rel=1e-12)
+    assert ("second pins", "FTF") not in found
     assert table.nearest(2 * mesh)[0] == "2 x GMF of second"
     assert table.nearest(mesh + planet)[0] == "1 x GMF of second +1 x planet of second"
     # all wheels stand as before after whole turns of shafts and planets
@@ -294,6 +301,44 @@ def test_planets_share_equally_and_by_statics_with_a_pin_error():
         np.testing.assert_allclose(shares, expected, rtol=1e-4)
 
 
+@pytest.mark.parametrize("held", ["ring", "carrier"])
+@pytest.mark.parametrize("drive", ["sun", "other"])
+def test_pin_errors_are_in_the_sense_of_rotation_whichever_way_the_set_turns(held, drive):
+    other = "carrier" if held == "ring" else "ring"
+    shafts = {"drive": drive if drive == "sun" else other, "load": other if drive == "sun" else "sun"}
+    set_of = gears(**IDEAL, pin_errors={1: (1e-6, 2e-6)})
+    one, mirrored = (at_rest(alone(held, **shafts, speed=s, set_of=set_of, pins=PINS)) for s in (60.0, -60.0))
+    np.testing.assert_allclose(list(mirrored.values()), list(one.values()), rtol=1e-6)
+    shares = [one[f"set sun-planet {k}"] for k in (1, 2, 3)]
+    assert max(shares) > 1.2 * min(shares)
+
+
+def test_forces_of_pins_are_in_the_sense_of_rotation_too():
+    set_of = gears(**IDEAL, pin_errors={1: (0.0, 2e-6)})
+    told = []
+    for speed in (60.0, -60.0):
+        still = resting(alone(speed=speed, set_of=set_of, pins=PINS))
+        m = still.build()
+        rest = static_equilibrium(m, t=2 * still.run_up).solution
+        told.append(TrainRecorder(still, m).columns(rest).bearing_force[-1, -3:])
+    np.testing.assert_allclose(told[1], told[0], rtol=1e-5, atol=1e-3)
+    # the load on the carrier holds planets back by their pins
+    assert told[0][:, 1].sum() * float(set_of.carrier_radius) == pytest.approx(-50.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("carrier", [1.0, 0.0])
+def test_pin_errors_of_the_set_alone_are_in_the_sense_of_rotation(carrier):
+    errors = {0: (0.0, 1e-4)}
+    for sign in (1, -1):
+        speeds = {"carrier": 60.0 * sign * carrier} if carrier else {"sun": 60.0 * sign}
+        m = planetary_mechanism(gears(**IDEAL, pin_errors=errors), speeds=speeds, held="ring" if carrier else "carrier")
+        assert m.bodies["planet 1"].position[1] == pytest.approx(sign * 1e-4, rel=1e-12)
+    # nothing turns: the drive flanks tell it
+    for rotation in (1, -1):
+        m = planetary_mechanism(gears(**IDEAL, rotation=rotation, pin_errors=errors), speeds={"sun": 0.0})
+        assert m.bodies["planet 1"].position[1] == pytest.approx(rotation * 1e-4, rel=1e-12)
+
+
 def test_a_parallel_and_a_planetary_stage_are_as_a_mechanism_made_by_hand():
     settings = {"stiffness": 3e8, "damping_ratio": 0.0}
     mesh = GearMesh(name="first", driver="z1", driven="z2", settings=settings, pair=IdealMesh)
@@ -350,7 +395,8 @@ def test_a_carrier_on_a_shaft_that_bends_becomes_that_on_a_rigid_one():
 
 @pytest.mark.slow
 def test_energy_is_closed_and_the_record_holds_what_the_stage_does():
-    train = two_stages(gears(pin_errors={1: (0.0, 5e-6)}, backlash_sun="50 um", backlash_ring="50 um"),
+    # the sun drives: a pin that is behind carries more
+    train = two_stages(gears(pin_errors={1: (0.0, "-5 um")}, backlash_sun="50 um", backlash_ring="50 um"),
                        sensors=[SpeedSensor(name="speed", shaft="out")])  # fmt: skip
     solution = train.build().simulate(0.03, every_step=True, tol=1e-9, rate_scale=train.rate_scale)
     assert solution.energy_balance().relative_imbalance < 1e-5
@@ -358,13 +404,13 @@ def test_energy_is_closed_and_the_record_holds_what_the_stage_does():
     # mean forces carry the load, planet by planet in proportion to their pins
     stage, radius = train.planetary_stages[0], float(train.planetary_stages[0].gears.carrier_radius)
     pins = record.bearing_force.sel(bearing=[stage.pin(k) for k in (1, 2, 3)]).mean("time").values
-    assert pins[:, 1].sum() * radius == pytest.approx(60.0, rel=1e-2)
-    assert pins[1, 1] > 2 * pins[0, 1]
+    assert pins[:, 1].sum() * radius == pytest.approx(-60.0, rel=1e-2)
+    assert pins[1, 1] < 2 * pins[0, 1]
     sun = record.normal_force.sel(mesh=[f"second sun-planet {k}" for k in (1, 2, 3)]).mean("time").values
     base = stage.gears.sun.base_radius
     assert sun.sum() * base == pytest.approx(60.0 * 24 / 108, rel=1e-2)
     # both meshes push a planet on
-    np.testing.assert_allclose(pins[:, 1], 2 * math.cos(math.radians(20.0)) * sun, rtol=0.03)
+    np.testing.assert_allclose(-pins[:, 1], 2 * math.cos(math.radians(20.0)) * sun, rtol=0.03)
     assert record.speed.sel(shaft="second planet 1").mean() == pytest.approx(train.turning["second planet 1"], rel=1e-3)
     signal = train_signal(record, "speed", mesh="second planet 3-ring")
     frequency = signal.attrs["teeth"][0] * signal.attrs["speed"] / (2 * math.pi)
@@ -385,6 +431,27 @@ def test_transmission_errors_of_planets_on_ideal_pins_are_how_far_the_teeth_yiel
         assert float(one.transmission_error.mean()) == pytest.approx(float(one.penetration_drive.mean()), rel=0.02)
 
 
+@pytest.mark.parametrize("held", ["ring", "carrier"])
+def test_transmission_errors_know_how_far_a_housing_that_holds_a_member_turns(held):
+    feet = [Mount(name=f"foot {k}", at=(0.2 * math.cos(a), 0.2 * math.sin(a), 0.0), stiffness=(1e6,) * 3)
+            for k, a in enumerate((0.3, 0.3 + math.tau / 3, 0.3 + 2 * math.tau / 3))]  # fmt: skip
+    load = "carrier" if held == "ring" else "ring"
+    for changes, turns in (({"housings": [case(mounts=feet)], "on": "case"}, True), ({}, False)):
+        still = resting(alone(held, load=load, run_up=0.005, **changes))
+        m = still.build()
+        rest = static_equilibrium(m, t=2 * still.run_up).solution
+        told = TrainRecorder(still, m).columns(rest)
+        angle = told.turned[-1, -1]
+        # three springs around the axis against the torque on the member held
+        torque = still.power.members["set"][held]
+        expected = torque / (3 * 1e6 * 0.2**2) if turns else 0.0
+        assert angle == pytest.approx(expected, rel=1e-2)
+        errors = transmission_error(still, told.turned, told.twisted)[-1]
+        forces = [float(rest.diagnostics(mesh.name)["normal_force"][-1]) for mesh in still.meshings]
+        stiffness = np.repeat(IDEAL["ideal"], 3)
+        np.testing.assert_allclose(errors, np.array(forces) / stiffness, rtol=1e-4)
+
+
 @pytest.mark.slow
 def test_a_train_that_runs_already_turns_as_it_must_with_rolling_pins():
     train = replace(two_stages(gears(), pins="6203"), running=True)
@@ -402,6 +469,22 @@ def test_modes_are_named_by_the_stage_and_its_pins():
     diagram = train_campbell(train, ["0 rpm", "3000 rpm"], maximum=12e3)
     assert "1 x second" in diagram.order_name.values
     assert np.all(np.isfinite(diagram.critical_gain))
+
+
+def test_each_side_of_stepped_planets_excites_at_its_own_frequency():
+    stepped = PlanetarySet(GearSpec(24, "1.5 mm"), GearSpec(36, "1.5 mm"), GearSpec.ring(86, "1.5 mm"),
+                           planet_at_ring=GearSpec(26, "1.5 mm"), **IDEAL)  # fmt: skip
+    train = alone(set_of=stepped, pins=PINS)
+    turns = stepped.frequencies(sun=train.speeds["sun"], ring=0.0)
+    orders = mesh_orders(train)
+    shaft = train.kinematics.shaft_frequency("sun")
+    assert set(orders) == {f"{h} x set {side}" for h in (1, 2) for side in ("sun", "ring")}
+    assert orders["2 x set ring"] * shaft == pytest.approx(2 * turns["mesh_ring"], rel=1e-12)
+    assert orders["1 x set sun"] * shaft == pytest.approx(turns["mesh"], rel=1e-12)
+    diagram = train_campbell(train, ["0 rpm", "3000 rpm"], maximum=2e4)
+    assert "1 x set ring" in diagram.order_name.values
+    assert np.all(np.isfinite(diagram.critical_gain))
+    assert set(mesh_orders(alone())) == {"1 x set", "2 x set"}
 
 
 @pytest.mark.slow
@@ -603,6 +686,15 @@ def test_a_stage_that_no_member_holds_needs_two_speeds_that_agree():
     assert driven().speeds["carrier"] == pytest.approx(speeds["carrier"])
     with pytest.raises(DrivetrainError, match=says("'set'", "30", "teeth")):
         driven(carrier=30.0)
+
+
+def test_the_mass_of_a_member_on_a_housing_belongs_to_that():
+    heavy = {"masses": {"ring": (50.0, 1.0)}}
+    with pytest.raises(DrivetrainError, match=says("'set'", "masses", "ring", "'case'")):
+        alone(on="case", housings=[case()], **heavy)
+    assert alone(on="case", housings=[case()], masses={"sun": (2.0, 1e-3)}).build().bodies["sun"].mass > 2.0
+    on_shaft = alone(held="carrier", load="ring", **heavy)
+    assert on_shaft.build().bodies["ring"].mass == pytest.approx(50.0)
 
 
 def test_a_stage_that_nothing_drives_is_refused():

@@ -403,3 +403,16 @@ def test_negative_backlash_is_refused(name):
         with pytest.raises(ValueError, match=rf"PlanetarySet.{name} is -.* mm.*give 0"):
             planetary((24, 30, 84), "1.5 mm", **{name: value})
     assert planetary((24, 30, 84), "1.5 mm", **{name: "0.05 mm"})
+
+
+def test_pin_errors_are_lengths_that_teeth_allow():
+    assert small_set(pin_errors={1: ("0 um", "5 um")}).pin_errors == {1: (0.0, pytest.approx(5e-6))}
+    module = small_set().planet.module
+    assert small_set(pin_errors={0: (0.2 * module, 0.0)}).pin_errors[0][0] == 0.2 * module
+    for error, words in (
+        ((0.0, 5e-3), ("pin_errors[0]", "5 mm", "roots")),
+        ((float("nan"), 0.0), ("pin_errors[0]", "finite")),
+        ((1.0,), ("pin_errors", "planet 0", "two lengths")),
+    ):
+        with pytest.raises(ValueError, match=says(*words)):
+            small_set(pin_errors={0: error})
