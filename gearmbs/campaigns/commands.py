@@ -192,7 +192,9 @@ def export(
     split_by: Annotated[
         str | None, typer.Option(help="Column, as specimen, whose values each are in one split only (parquet, hf).")
     ] = None,
-    test: Annotated[float, typer.Option(help="Part of its values that is for the test.")] = 0.2,
+    test: Annotated[
+        float | None, typer.Option(help="Part of its values that is for the test; a fifth if not given.")
+    ] = None,
     held_out: Annotated[
         list[str] | None,
         typer.Option(help='Range of a column kept from training, as "severity=0.45:0.6"; repeat (parquet, hf).'),

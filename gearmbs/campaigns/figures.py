@@ -10,7 +10,7 @@ import numpy as np
 
 from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
-from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names
+from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names, say_unfinished
 from gearmbs.campaigns.settings import CampaignError, texts, whole
 from gearmbs.campaigns.sobol_bounds import in_scale
 from gearmbs.schema.described import chosen
@@ -76,6 +76,7 @@ def figure(
     draw = chosen(KINDS, kind, "", CampaignError, "figure")
     table = only_numbers(campaign.folder, campaign.table)
     table = table[table["status"] == "done"]
+    say_unfinished(campaign.folder, "figure", stacklevel=4)
     known = result_names(campaign.folder, table)
     wanted = texts(results, "figure: results") if results else varied_results(campaign, 3)
     chosen_factors = texts(factors, "figure: factors") if factors else main_factors(campaign, table)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import numpy as np
 from gearmbs.campaigns.folder import REMEDY, Folder
 from gearmbs.campaigns.plans.conditions import names_in, satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
-from gearmbs.campaigns.settings import CampaignError, texts
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning, texts
 from gearmbs.campaigns.subjects.base import ABOUT_RECORD
 
 if TYPE_CHECKING:
@@ -87,6 +88,14 @@ def read_record(folder: Folder, unit: int, index: int) -> xr.Dataset:
 
     with xr.open_dataset(io.BytesIO(folder.record(unit, index)), engine="h5netcdf") as found:
         return found.load()
+
+
+def say_unfinished(folder: Folder, what: str, stacklevel: int = 3) -> None:
+    """Warn that something is made of a part of a campaign alone."""
+    done = len(folder.done())
+    if done < folder.unit_count:
+        told = f"{what}: {done} of {folder.unit_count} units are done; what is not is left out"
+        warnings.warn(told, CampaignWarning, stacklevel=stacklevel)
 
 
 def factor_names(folder: Folder) -> list[str]:

@@ -217,6 +217,8 @@ def morris_effects(
 def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, interactions: bool = True) -> pd.DataFrame:
     """Return main effects and two-factor interactions of a two-level design: mean at high less mean at low.
 
+    Of a fraction ``aliases`` names those of them that an effect cannot be told from, it being the sum of all.
+
     Parameters
     ----------
     coded : ndarray, shape (n, d)
@@ -239,13 +241,17 @@ def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, int
     if interactions:
         for i, j in itertools.combinations(range(len(names)), 2):
             terms[f"{names[i]} x {names[j]}"] = coded[:, i] * coded[:, j]
-    rows = {}
+    rows, aliases = {}, {}
     for name, column in terms.items():
         up, down = column > 0, column < 0
         if up.any() and down.any():
             effect = values[up].mean() - values[down].mean()
             rows[name] = float(out_of_scale(effect, power, f"effect of {name}"))
-    table = pd.DataFrame({"effect": rows})
+            # in a fraction the columns of some terms are equal but for the sign, and so are their effects
+            both = {other: float(column @ terms[other]) / len(column) for other in terms if other != name}
+            same = [other if share > 0 else f"-{other}" for other, share in both.items() if abs(share) > 1.0 - 1e-9]
+            aliases[name] = ", ".join(same)
+    table = pd.DataFrame({"effect": rows} | ({"aliases": aliases} if any(aliases.values()) else {}))
     table.index.name = "term"
     return table.reindex(table.effect.abs().sort_values(ascending=False).index)
 

@@ -8,7 +8,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,14 @@ def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str
     options = found.get("options", {})
     if not isinstance(options, Mapping):
         raise CampaignError(f"options = {options!r}; give a dictionary of the design's options")
+    if not isinstance(options.get("faced", True), bool):
+        raise CampaignError(f"options: faced = {options['faced']!r}; give true or false")
+    if "centre" in options:
+        options = found["options"] = {**options, "centre": whole(options["centre"], "options: centre", 0)}
+    if "generators" in options:
+        given = options["generators"]
+        if isinstance(given, str) or not isinstance(given, Sequence) or not all(isinstance(g, str) for g in given):
+            raise CampaignError(f"options: generators = {given!r}; give a list of texts such as 'D=ABC'")
     if "levels" in options:
         levels = whole(options["levels"], "options: levels", 1)
         if design == "morris" and levels % 2:

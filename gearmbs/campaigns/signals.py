@@ -125,7 +125,9 @@ def write_signals(
         for k, case in enumerate(signals):
             if spec.name in case:
                 values = case[spec.name]
-                block[k, :, : values.shape[1]] = values
+                # what single precision does not hold is infinite, and counted as no number
+                with np.errstate(over="ignore"):
+                    block[k, :, : values.shape[1]] = values
         # one unit by itself: a shard does not know where it belongs
         array, files = _in_memory(spec, unit, 1)
         array[:] = block

@@ -11,14 +11,16 @@ References
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs.campaigns.plans.factors import Factor
 from gearmbs.campaigns.sensitivity import coordinates, results_in_order
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning
 from gearmbs.campaigns.sobol_bounds import in_scale, out_of_scale
 
 if TYPE_CHECKING:
@@ -460,7 +462,15 @@ def fit_surface(
 
 
 def response_surface(campaign: Campaign, result: str, degree: int = 2) -> ResponseSurface:
-    """Return the response surface of a campaign's result over the coordinates of its plan."""
+    """Return the response surface of a campaign's result over the coordinates of its plan.
+
+    Whole numbers have the place of their value in the range, and not that of the coordinate that chose them.
+
+    Warns
+    -----
+    CampaignWarning
+        If results are missing, of cases that failed or are not done.
+    """
     if campaign.plan.variants > 1:
         raise CampaignError("response surface: not of crossed choices; fit each option's cases by fit_surface")
     names, points = coordinates(campaign)
@@ -469,4 +479,15 @@ def response_surface(campaign: Campaign, result: str, degree: int = 2) -> Respon
         raise CampaignError(
             "response surface: constraints have left points out; fit the table's columns by fit_surface"
         )
+    if missing := int((~np.isfinite(values)).sum()):
+        warnings.warn(
+            f"{result}: {missing} of {values.size} cases have no result; the surface is of the others alone",
+            CampaignWarning,
+            stacklevel=3,
+        )
+    at, points = 0, points.copy()
+    for factor in campaign.plan.factors:
+        if isinstance(factor, Factor) and factor.whole and not factor.values:
+            points[:, at : at + 1] = factor.places(points[:, at : at + 1])
+        at += factor.width
     return fit_surface(points, values, names, degree)

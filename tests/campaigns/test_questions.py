@@ -30,7 +30,7 @@ from gearmbs.campaigns import (
 )
 from gearmbs.campaigns.plans.designs import factorial, morris, saltelli, sequence
 from gearmbs.cli import app
-from tests.campaigns.models import PI
+from tests.campaigns.models import PI, PLACES, adding
 from tests.campaigns.support import function, ranges, small
 from tests.says import says
 
@@ -429,3 +429,28 @@ def test_columns_whose_names_matlab_tells_apart_keep_them(tmp_path):
         warnings.simplefilter("error", CampaignWarning)
         (mat,) = campaign.export(tmp_path / "t.mat", "matlab")
     assert {"y", "x1", "wave"} <= set(loadmat(mat))
+
+
+def test_a_fraction_names_what_it_cannot_tell(tmp_path):
+    """With C = AB the effect of each is that of the product of the others besides."""
+    factors = [Factor(name, -1.0, 1.0) for name in PLACES]
+    for options, told in (({"generators": ["C=AB"]}, True), ({}, False)):
+        plan = make_plan(function(), factors, "factorial", options=options)
+        campaign = Campaign(tmp_path / f"c{told}", plan)
+        campaign.run(workers=0)
+        table = campaign.sensitivity("y")
+        assert ("aliases" in table) == told
+        if told:
+            assert table.aliases["x3"] == "x1 x x2"
+            assert table.aliases["x1 x x2"] == "x3"
+            assert table.effect["x3"] == table.effect["x1 x x2"]
+
+
+def test_a_surface_of_whole_numbers_goes_by_their_values(tmp_path):
+    factors = [Factor("a", 1, 6, whole=True), Factor("b", 1.0, 3.0)]
+    plan = make_plan(FunctionSubject(adding, {"a": 1.0, "b": 2.0}), factors, n=32)
+    campaign = Campaign(tmp_path / "c", plan)
+    campaign.run(workers=0)
+    surface = campaign.response_surface("s", 1)
+    assert surface.r_squared == pytest.approx(1.0)
+    np.testing.assert_allclose(surface.coefficients, [3.0 + 3.5 + 2.0, 2.5, 1.0])

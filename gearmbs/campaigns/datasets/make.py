@@ -243,6 +243,9 @@ def write_data_set(
     out, layers = place(out, None, title), layers or SensorLayers(seed=seed)
     check_card(out)
     given = [campaigns] if isinstance(campaigns, Campaign) else list(campaigns)
+    paths = [campaign.path.resolve() for campaign in given]
+    if doubled := sorted({str(path) for path in paths if paths.count(path) > 1}):
+        raise CampaignError(f"data set: {', '.join(doubled)} is given more than once; give each campaign once")
     parts = [measured(campaign, layers, number) for number, campaign in enumerate(given)]
     # campaigns whose specimens are drawn alike have the same individuals, each of which is in one split
     alike: dict[str, list[pd.DataFrame]] = {}

@@ -27,11 +27,18 @@ def split_by_group(
     CampaignError
         If there are too few groups, or no such parts.
     """
-    groups = np.asarray(groups)
+    try:
+        groups = np.asarray(groups)
+        names = np.unique(groups)
+    except (TypeError, ValueError):
+        names = np.empty(0)
+    if not names.size or np.ndim(groups) != 1:
+        raise CampaignError(
+            "split: groups are none; give the number or name of the specimen of each row, all of a kind"
+        )
     parts = (test, validation)
     if not all(isinstance(part, Real) and 0.0 <= float(part) < 1.0 for part in parts):
         raise CampaignError(f"split: test = {test!r}, validation = {validation!r}; give parts from 0 to below 1")
-    names = np.unique(groups)
     counts = [max(1, round(part * names.size)) if part > 0.0 else 0 for part in parts]
     if sum(counts) >= names.size:
         raise CampaignError(

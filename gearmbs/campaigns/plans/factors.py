@@ -7,6 +7,7 @@ table into changes of the nested data of a case. Columns hold numbers in SI or t
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
@@ -69,6 +70,8 @@ class Factor:
             object.__setattr__(self, "levels", whole_number(self.levels, f"factor {self.path!r}: levels", 1))
         if bool(self.values) == (self.low is not None or self.high is not None):
             raise CampaignError(f"factor {self.path!r}: give low and high, or values")
+        if self.values and (self.levels is not None or self.scale != "linear"):
+            raise CampaignError(f"factor {self.path!r}: levels and scale are of a range; leave them out beside values")
         if not self.values and (self.low is None or self.high is None):
             raise CampaignError(f"factor {self.path!r}: low = {self.low!r}, high = {self.high!r}; give both")
         if self.scale not in ("linear", "log"):
@@ -189,7 +192,9 @@ class Choice:
     def ranges(self) -> dict[str, list[str]]:
         """Names of the entries of each option that are ranges."""
         return {
-            name: [k for k, v in table.items() if _is_range(v)] if isinstance(table, Mapping) else []
+            name: [k for k, v in table.items() if _is_range(v) and not _are_words(v)]
+            if isinstance(table, Mapping)
+            else []
             for name, table in self.options.items()
         }
 
@@ -223,6 +228,10 @@ class Choice:
                 for key, value in table.items():
                     if _is_range(value):
                         unit = subject.table_unit(self.path, table, key)
+                        if unit == "1" and any(isinstance(v, str) for v in value) and not _are_words(value):
+                            raise CampaignError(
+                                f"{self.path}.{name}.{key} = {value!r}: it has no unit here; give two numbers"
+                            )
                         table[key] = _range_in_si(value, unit, f"{self.path}.{name}.{key}")
             options[name] = list(table) if isinstance(table, tuple) else table
         return Choice(self.path, options, self.crossed, self.name)
@@ -292,7 +301,9 @@ class Choice:
                 value = float(row[f"{self.name}.{key}"])
                 low, high = table[key]
                 chosen[key] = int(value) if isinstance(low, int) and isinstance(high, int) else value
-            set_path(data, self.path, [chosen])
+            # a table takes the place of a table, and is one of several elsewhere, as faults are
+            alone = isinstance(get_path(data, self.path), Mapping)
+            set_path(data, self.path, chosen if alone else [chosen])
         else:
             set_path(data, self.path, table)
 
@@ -376,7 +387,11 @@ class Specimens:
                 if value == "drawn":
                     drawn[key] = int(generator.integers(1 << 31))
                 elif _is_range(value):
-                    drawn[key] = float(generator.uniform(*value))
+                    low, high = value
+                    if isinstance(low, int) and isinstance(high, int):
+                        drawn[key] = min(math.floor(generator.uniform(low, high + 1)), high)
+                    else:
+                        drawn[key] = float(generator.uniform(low, high))
             path = drawn.pop("path", TEETH)
             set_path(data, path, [*(get_path(data, path) or ()), drawn])
 
@@ -464,6 +479,11 @@ def _within(values: np.ndarray, u: np.ndarray, low: float, high: float) -> np.nd
 
 def _is_range(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
+
+
+def _are_words(ends: Sequence[Any]) -> bool:
+    """Whether two values are texts that begin with no number, and so no range."""
+    return all(isinstance(v, str) and not re.match(r"\s*[-+.]?\d", v) for v in ends)
 
 
 def _range_in_si(ends: Sequence[Any], unit: str, where: str) -> list[Any]:

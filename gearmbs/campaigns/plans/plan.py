@@ -557,6 +557,10 @@ def _consistent(plan: Plan) -> None:
         raise CampaignError(
             f"constraints: points left out would break the {plan.design} design; narrow the ranges instead"
         )
+    if plan.n and not plan.has_n:
+        raise CampaignError(
+            f"n = {plan.n}: the points of a {plan.design} design follow from factors and options; leave n out"
+        )
     chosen(FAILURE_POLICIES, plan.on_failure, "", CampaignError, "on_failure")
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.results import open_dataset
+from gearmbs.campaigns.results import open_dataset, say_unfinished
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local
 from gearmbs.campaigns.stored.rows import held_out_of_training, split_of_rows
 from gearmbs.campaigns.subjects.base import SignalSpec
@@ -36,7 +36,7 @@ def export(
     *,
     split: Sequence[str] | np.ndarray | None = None,
     split_by: str | None = None,
-    test: float = 0.2,
+    test: float | None = None,
     held_out: Mapping[str, Sequence[Any]] | None = None,
     add: Mapping[str, Any] | None = None,
 ) -> list[Path]:
@@ -53,7 +53,7 @@ def export(
     split_by : str, optional
         Instead the column, as "specimen", whose values each are in one split only: "train" or "test".
     test : float
-        Part of its values that is for the test.
+        Part of its values that is for the test; default a fifth.
     held_out : mapping of str to (low, high), optional
         Ranges of columns, as ``{"severity": (0.45, 0.6)}`` or ``{"operation.torque": ("50 N m", "60 N m")}``: training
         rows inside any of them are the split "withheld". What has no severity, as a sound gear, is in none of them.
@@ -68,7 +68,8 @@ def export(
     Warns
     -----
     CampaignWarning
-        If columns have other names in the file, or what is held out leaves an option of a choice without training rows.
+        If not all is done, columns have other names in the file, or what is held out leaves an option of a choice
+        without training rows.
     """
     if format not in FORMATS:
         raise CampaignError(f"format {format!r} is unknown; choose one of {', '.join(FORMATS)}")
@@ -80,9 +81,12 @@ def export(
         )
     if split is not None and split_by is not None:
         raise CampaignError("export: split and split_by both say how rows are split; give one")
+    if test is not None and split_by is None:
+        raise CampaignError(f"export: test = {test!r} is a part of the values of a column; give it as split_by")
     target = place(target, FILES.get(format), campaign.path.stem)
     # one reading: cases that are done meanwhile would put signals beside the numbers of others
     table = campaign.table
+    say_unfinished(campaign.folder, "export", stacklevel=4)
     if format == "csv":
         return [write_whole(target, table.to_csv(index=False))]
     if format in FILES:
@@ -90,7 +94,7 @@ def export(
         return [(_netcdf if format == "netcdf" else _matlab)(data, target)]
     if format == "hf":
         check_card(target)
-    rows = split_of_rows(campaign.plan, table, split, split_by, test)
+    rows = split_of_rows(campaign.plan, table, split, split_by, 0.2 if test is None else test)
     if held_out:
         rows = held_out_of_training(campaign.plan, table, held_out, rows)
     files = _parquet(campaign, table, target, rows, add or {})

@@ -62,10 +62,10 @@ class Kept:
 
     @property
     def finite(self) -> bool:
-        """Whether all of it is a number."""
-        return all(map(math.isfinite, self.numbers.values())) and all(
-            np.isfinite(x).all() for x in self.signals.values()
-        )
+        """Whether all of it is a number, signals as they are stored, in single precision."""
+        with np.errstate(over="ignore"):
+            stored = [np.asarray(x).astype(np.float32) for x in self.signals.values()]
+        return all(map(math.isfinite, self.numbers.values())) and all(np.isfinite(x).all() for x in stored)
 
 
 @dataclass(frozen=True)
@@ -217,8 +217,21 @@ def kept_by_functions(keep: Sequence[str], record: Any) -> dict[str, float]:
     found: dict[str, float] = {}
     for item in keep:
         if ":" in item and not item.startswith("signal:"):
-            found.update({str(k): float(v) for k, v in imported(item, "keep")(record).items()})
+            given = {str(k): float(v) for k, v in imported(item, "keep")(record).items()}
+            refuse_doubled(found, given, item)
+            found |= given
     return found
+
+
+def refuse_doubled(found: Mapping[str, float], given: Mapping[str, float], item: str) -> None:
+    """Refuse numbers of an entry of ``keep`` that have the names of others, of which one would be lost.
+
+    Raises
+    ------
+    CampaignError
+    """
+    if doubled := sorted(found.keys() & given.keys()):
+        raise CampaignError(f"keep: {item!r} gives {', '.join(doubled)}, as another entry does; rename one")
 
 
 def check_keep(subject: Subject, keep: Sequence[str]) -> None:

@@ -17,6 +17,7 @@ from gearmbs.campaigns.subjects.base import (
     Subject,
     imported,
     kept_by_functions,
+    refuse_doubled,
 )
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import DIMENSIONS, to_si
@@ -117,6 +118,10 @@ class FunctionSubject(Subject):
         self._found(path)
         return self.units.get(path, "1")
 
+    def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
+        """Return the SI unit of an entry of a table among the parameters."""
+        return self.units.get(f"{path}.{key}", "1")
+
     def check(self, data: dict[str, Any], name: str) -> dict[str, Any]:
         """Return the parameters in SI."""
         imported(self.function, "function")
@@ -149,11 +154,13 @@ class FunctionSubject(Subject):
         if not all(str(name).strip() for name in items):
             raise CampaignError(f"{self.function} returned a result without a name; give it one")
         if "numbers" in keep:
-            kept.numbers |= {
+            own = {
                 str(k): float(v)
                 for k, v in items.items()
                 if not isinstance(v, str) and np.ndim(getattr(v, "values", v)) == 0
             }
+            refuse_doubled(kept.numbers, own, "numbers")
+            kept.numbers |= own
         for item in keep:
             if item.startswith("signal:"):
                 name = item.removeprefix("signal:")

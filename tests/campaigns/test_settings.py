@@ -1,0 +1,144 @@
+"""What a plan or a question takes means something, and what a part of a campaign gives says so."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from gearmbs.campaigns import (
+    Campaign,
+    CampaignError,
+    CampaignWarning,
+    Factor,
+    FunctionSubject,
+    Specimens,
+    choose,
+    make_plan,
+)
+from gearmbs.campaigns.datasets.splits import split_by_group
+from tests.campaigns.support import function, ranges, small
+from tests.says import says
+
+
+@pytest.mark.parametrize(
+    ("design", "settings", "words"),
+    [
+        ("grid", {"n": 100}, ("n = 100", "grid", "leave")),
+        ("central composite", {"options": {"faced": "no"}}, ("faced", "'no'", "true")),
+        ("central composite", {"options": {"centre": -1}}, ("centre", "-1")),
+        ("box behnken", {"options": {"centre": "x"}}, ("centre", "'x'")),
+        ("factorial", {"options": {"generators": [3]}}, ("generators", "texts")),
+        ("factorial", {"options": {"generators": "C=AB"}}, ("generators", "texts")),
+    ],
+)
+def test_options_that_mean_nothing(design, settings, words):
+    with pytest.raises(CampaignError, match=says(*words)):
+        make_plan(function(), ranges(), design, **settings)
+
+
+@pytest.mark.parametrize(
+    ("design", "options", "cases"),
+    [
+        ("central composite", {"faced": False, "centre": 2}, 16),
+        ("box behnken", {"centre": 0}, 12),
+        ("factorial", {"generators": ["C=AB"]}, 4),
+    ],
+)
+def test_options_that_mean_something(design, options, cases):
+    assert make_plan(function(), ranges(), design, options=options).size == cases
+
+
+def test_what_is_of_ranges_stands_beside_no_values():
+    for settings in ({"levels": 3}, {"scale": "log"}):
+        with pytest.raises(CampaignError, match=says("levels", "scale", "values")):
+            Factor("x1", values=[1.0, 2.0], **settings)
+        assert Factor("x1", 1.0, 2.0, **settings).in_si(function()).width == 1
+
+
+def spring(spring: dict, m: float = 1.0) -> dict:
+    """Return what a spring has."""
+    return {"k": spring["k"], "words": float(len(spring.get("names", ())))}
+
+
+def test_tables_of_functions_have_ranges_with_units(tmp_path):
+    choice = choose("spring", soft={"k": ("1 N/mm", "2 N/mm"), "names": ["x", "y"]}, stiff={"k": ("3 N/mm", "4 N/mm")})
+    parameters = {"spring": {"k": 1.0}}
+    subject = FunctionSubject(spring, parameters, units={"spring.k": "N/m"})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, [choice], n=8))
+    assert campaign.run(workers=0).failed == 0
+    table = campaign.table
+    soft = table.spring == "soft"
+    assert table.k[soft].between(1e3, 2e3).all()
+    assert table.k[~soft].between(3e3, 4e3).all()
+    assert (table.words == 2.0 * soft).all()
+    with pytest.raises(CampaignError, match=says("spring.soft.k", "no unit", "numbers")):
+        make_plan(FunctionSubject(spring, parameters), [choice], n=8)
+
+
+def same(record) -> dict:
+    """Return a number under a name that the record has."""
+    return {"y": 1.0}
+
+
+def test_numbers_of_one_name_are_told(tmp_path):
+    own = f"{__name__}:same"
+    campaign = small(tmp_path / "c", keep=["numbers", own], n=2)
+    assert campaign.run(workers=0).failed == 2
+    assert re.search(says("keep", "'numbers'", "y"), campaign.failed().message[0])
+    alone = small(tmp_path / "d", keep=[own], n=2)
+    alone.run(workers=0)
+    assert set(alone.table.y) == {1.0}
+
+
+def loud(x: float) -> dict:
+    """Return a signal that single precision does not hold."""
+    return {"y": x, "wave": [x * 1e39, 1.0]}
+
+
+def test_signals_beyond_single_precision_are_counted(tmp_path):
+    subject = FunctionSubject(loud, {"x": 0.0}, signals={"wave": (2, 1.0)})
+    rows = [{"x": 1.0}, {"x": 0.1}]
+    plan = make_plan(subject, design="list", options={"rows": rows}, keep=["numbers", "signal:wave"])
+    campaign = Campaign(tmp_path / "c", plan)
+    assert campaign.run(workers=0).not_numbers == 1
+    assert np.isinf(campaign.open().wave.values[:, 0, 0]).tolist() == [True, False]
+
+
+def test_a_specimen_has_a_whole_tooth():
+    drawn = []
+    for number in range(40):
+        data = {}
+        faults = [{"kind": "broken tooth", "lost": (0.2, 0.8), "tooth": (0, 3)}]
+        Specimens(40, faults=faults).apply(data, {"specimen": number})
+        drawn.append(data["fault"]["teeth"][0])
+    assert {type(fault["tooth"]) for fault in drawn} == {int}
+    assert {fault["tooth"] for fault in drawn} == {0, 1, 2, 3}
+    assert all(0.2 <= fault["lost"] <= 0.8 for fault in drawn)
+
+
+@pytest.mark.parametrize("groups", [[[1], [2], [3]], ["a", None, "b"], [[1], [2, 3]], []])
+def test_groups_that_are_none(groups):
+    with pytest.raises(CampaignError, match=says("groups", "specimen", "kind")):
+        split_by_group(groups)
+    assert set(split_by_group(list("aabbccdd"))) == {"train", "test", "validation"}
+
+
+def test_what_is_made_of_a_part_says_so(tmp_path):
+    campaign = small(tmp_path / "c")
+    campaign.work(1, 2)
+    with pytest.warns(CampaignWarning, match=says("export", "units", "left out")):
+        campaign.export(tmp_path / "a.csv", "csv")
+    with pytest.warns(CampaignWarning, match=says("figure", "units", "left out")):
+        campaign.figure("main effects", "y")
+    with pytest.warns(CampaignWarning, match=says("y", "no result", "surface")):
+        campaign.response_surface("y", 1)
+    with pytest.raises(CampaignError, match=says("test", "split_by")):
+        campaign.export(tmp_path / "b", "hf", test=0.3)
+    campaign.run(workers=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", CampaignWarning)
+        campaign.export(tmp_path / "b", "hf", split_by="point", test=0.3)
+        campaign.response_surface("y", 1)
