@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from functools import partial
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
-from gearmbs.drivetrain.planetary import add_stage, carried, check_stage
+from gearmbs.drivetrain.planetary import PlanetaryStage, add_stage, carried, check_stage
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
 from gearmbs.gears.spec import COUNTED_TWICE, GearSpec
@@ -227,6 +227,8 @@ def _collisions(train: Drivetrain, places: dict[str, Seat]) -> None:
             _wheel_and_wheel(train, one, two, places)
     for shaft in train.shafts:
         _wheels_of_one_shaft(train, shaft)
+    for stage in train.planetary_stages:
+        _stage_and_others(train, stage, places)
 
 
 def _between(a: Seat, b: Seat, point: np.ndarray) -> tuple[float, float]:
@@ -277,6 +279,68 @@ def _wheels_of_one_shaft(train: Drivetrain, shaft: Shaft) -> None:
             f"{two.label}: its face overlaps wheel '{one.name}' on shaft '{shaft.name}' by {-MM * free:.4g} mm; "
             "move its station",
         )
+
+
+class Swept(NamedTuple):
+    """The room that planets and ring of a stage take: between two radii about its axis, over its face width, m."""
+
+    inner: float
+    outer: float
+    half: float
+    seat: Seat
+    centre: np.ndarray
+
+    @classmethod
+    def of(cls, train: Drivetrain, stage: PlanetaryStage, places: dict[str, Seat]) -> Swept:
+        """Return the room of a stage."""
+        gears, (member, shaft) = stage.gears, next(iter(stage.turning(train).items()))
+        widths = [gear.face_width for gear in (gears.planet, gears.planet_at_ring or gears.planet)]
+        seat = places[shaft]
+        inner = float(gears.carrier_radius) - gears.planet.tip_radius
+        return cls(inner, gears.ring.root_radius, 0.5 * max(widths), seat, seat.at(stage.station(train, member)))
+
+    def hits(self, inner: float, outer: float, distance: float, gap: float) -> bool:
+        """Return whether another ring, or with ``inner`` 0 cylinder, is in it: ``gap`` m beyond its face."""
+        if gap >= -COAXIAL:
+            return False
+        if distance < COAXIAL:
+            return outer > self.inner and inner < self.outer
+        return distance - outer < self.outer and distance + outer > self.inner
+
+
+def _stage_and_others(train: Drivetrain, stage: PlanetaryStage, places: dict[str, Seat]) -> None:
+    """No shaft, wheel or other stage may be where the planets of a stage pass and its ring is."""
+    room = Swept.of(train, stage, places)
+    at = f"{stage.label}: its planets, from {MM * room.inner:.5g} mm about the axis to its ring, run through"
+    remedy = "move a station or the shaft, or make one of them smaller"
+    for shaft in train.shafts:
+        distance, along = _between(room.seat, places[shaft.name], room.centre)
+        start = 0.0
+        for length, radius in shaft.cylinders:
+            gap = max(along - room.half - start - length, start - along - room.half)
+            start += length
+            # the carrier is around its planets, and so is what turns the ring
+            if shaft.name in (stage.carrier, stage.ring) or not room.hits(0.0, radius, distance, gap):
+                continue
+            raise DrivetrainError(f"{at} shaft '{shaft.name}' of radius {MM * radius:.5g} mm; {remedy}")
+    for wheel in train.wheels:
+        distance, along = _between(room.seat, places[wheel.shaft], room.centre)
+        gap = abs(along - train.station(wheel)) - room.half - 0.5 * wheel.gear.face_width
+        inside = wheel.gear.sign < 0 or wheel.shaft == stage.ring
+        if not inside and room.hits(0.0, wheel.gear.tip_radius, distance, gap):
+            raise DrivetrainError(
+                f"{at} wheel '{wheel.name}' of tip radius {MM * wheel.gear.tip_radius:.5g} mm; {remedy}"
+            )
+    for other in train.planetary_stages[train.planetary_stages.index(stage) + 1 :]:
+        second = Swept.of(train, other, places)
+        distance, along = _between(room.seat, second.seat, room.centre)
+        gap = (
+            abs(along - float((second.centre - second.seat.origin) @ second.seat.axes[:, 2])) - room.half - second.half
+        )
+        if room.hits(second.inner, second.outer, distance, gap):
+            raise DrivetrainError(
+                f"{at} stage '{other.name}'; give stations that are {MM * (room.half + second.half):.5g} mm apart"
+            )
 
 
 SAME_POINT = 1e-9

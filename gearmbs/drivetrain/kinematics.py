@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -298,6 +299,15 @@ class KinematicTable:
 
     def __repr__(self) -> str:
         return f"KinematicTable of {self.train.name!r}\n{self.lines.to_string(index=False)}"
+
+
+def table_at(train: Drivetrain, speeds: Mapping[str, float]) -> KinematicTable:
+    """Return the kinematic table of a drivetrain whose shafts turn at other speeds, rad/s: motors slip each its way."""
+    turned = copy(train)
+    for name in ("speeds", "turning", "kinematics"):
+        turned.__dict__.pop(name, None)
+    turned.__dict__["speeds"] = {**train.speeds, **speeds}
+    return turned.kinematics
 
 
 # Speeds of all shafts from the drives, torques of meshes and couplings from the loads, who pushes, and weak drives.

@@ -16,9 +16,10 @@ import xarray as xr
 
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Accelerometer, Drivetrain, Housing, Laser, Shaft, SpeedSensor, TorqueSensor
-from gearmbs.drivetrain.kinematics import RPM
-from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
+from gearmbs.drivetrain.kinematics import RPM, KinematicTable, table_at
+from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, differentials
 from gearmbs.mechanism import Mechanism
+from gearmbs.signals.files.simulated import held_speed
 
 CONTACT = {
     "normal_force": "N", "penetration_drive": "m", "penetration_back": "m", "pairs_drive": "1", "pairs_back": "1",
@@ -31,6 +32,10 @@ FAR = 0.1
 """The same that is warned of: motors slip less than that between no load and their rated torque."""
 SMEAR = 1.0
 """Largest phase, rad, by which a harmonic may stray from one frequency: it then loses 1 % of its level."""
+
+
+WHOLE = 0.999
+"""Turns that count as one: a record of one nominal turn differs from it by what speeds do in the run-up."""
 
 
 class TrainColumns(NamedTuple):
@@ -388,12 +393,56 @@ def remarks(held: dict[str, HeldSpeed]) -> list[str]:
     return out
 
 
-def speed_attributes(held: dict[str, HeldSpeed]) -> dict[str, Any]:
-    """Return what a record says of its speeds as attributes."""
+def speed_attributes(held: dict[str, HeldSpeed], others: list[str]) -> dict[str, Any]:
+    """Return what a record says of its speeds, and other remarks, as attributes."""
     return {
         "speed_is_steady": int(all(one.is_steady for one in held.values())),
-        "remarks": "; ".join(remarks(held)) or "none",
+        "remarks": "; ".join([*remarks(held), *others]) or "none",
     }
+
+
+def recorded_table(train: Drivetrain, record: xr.Dataset) -> tuple[KinematicTable, float]:
+    """Return a kinematic table and the factor that puts its lines where the speeds of a record do.
+
+    All shafts slip alike, but for those of a planetary stage without a held member: each has its own.
+    """
+    if differentials(train):
+        shafts = [shaft.name for shaft in train.shafts]
+        means = record["speed"].sel(shaft=shafts).mean("time").values
+        return table_at(train, dict(zip(shafts, means.tolist()))), 1.0
+    return train.kinematics, held_speed(record)
+
+
+def sidebands(planets: int) -> np.ndarray:
+    """Return the turns of the carrier beside a mesh harmonic at which planets shake what does not turn with them.
+
+    A force that is f_m in the carrier's frame is f_m +- f_c across the axis in one that stands, where planets in other
+    phases leave little at f_m itself; as they pass a place, up to f_m +- N f_c.
+    """
+    return np.arange(-planets, planets + 1)
+
+
+def carrier_turns(train: Drivetrain, known: TrainColumns, mesh: Meshing, start: float, stop: float) -> float | None:
+    """Return the turns of the carrier of planets between two times; None of other meshes, and where it is held."""
+    if train.turning.get(mesh.carrier, 0.0) == 0.0:
+        return None
+    angle = np.interp([start, stop], known.t, column_of(train, mesh, mesh.carrier, known.turned))
+    return float(abs(angle[1] - angle[0])) / TURN
+
+
+def unresolved(train: Drivetrain, known: TrainColumns, start: float, stop: float) -> list[str]:
+    """Return what a record says of stages whose carriers do not make a whole turn in it."""
+    out = []
+    for stage in train.planetary_stages:
+        mesh = next(one for one in train.meshings if one.stage == stage.name)
+        turns = carrier_turns(train, known, mesh, start, stop)
+        if turns is not None and turns < WHOLE:
+            out.append(
+                f"stage '{stage.name}': its carrier makes {turns:.3g} turns in the record, which does not resolve mesh "
+                "harmonics of shafts and housings, that lie beside those of the meshes by turns of the carrier; one "
+                f"turn takes {TURN / abs(train.speeds[stage.carrier]):.4g} s"
+            )
+    return out
 
 
 def warn_of_speeds(train: Drivetrain, held: dict[str, HeldSpeed]) -> None:

@@ -15,10 +15,10 @@ from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
 from gearmbs.gears.geometry import turn_z
 from gearmbs.signals import spectrum
 from gearmbs.signals.analysis.report import markdown_table
-from gearmbs.signals.files.simulated import held_speed, holds_speed
+from gearmbs.signals.files.simulated import holds_speed
 from gearmbs.studies.mode_names import train_modes, with_gains
 from gearmbs.studies.run.record import flank_shares
-from gearmbs.studies.train_record import STRAY
+from gearmbs.studies.train_record import STRAY, recorded_table
 from gearmbs.studies.trains import train_signal
 
 if TYPE_CHECKING:
@@ -294,13 +294,13 @@ def train_spectrum(
     sensors = sorted(train.sensors, key=lambda sensor: not isinstance(sensor, Accelerometer))
     name = channel or (sensors[0].name if sensors else f"force of {train.meshings[0].name}")
     signal = train_signal(record, name)
-    held = held_speed(record)
+    table, held = recorded_table(train, record)
     found = spectrum(signal)
-    turning = [f for mesh in train.meshings if (f := held * train.kinematics.mesh_frequency(mesh.name)) > 0.0]
+    turning = [f for mesh in train.meshings if (f := held * table.mesh_frequency(mesh.name)) > 0.0]
     highest = float(found["frequency"][-1])
     top = maximum or min(highest, 1.08 * HARMONICS * max(turning, default=highest))
-    few = train.kinematics.lines_by_part(HARMONICS, SIDEBANDS)
-    many = train.kinematics.lines_by_part(MESH_HARMONICS, SIDEBANDS)
+    few = table.lines_by_part(HARMONICS, SIDEBANDS)
+    many = table.lines_by_part(MESH_HARMONICS, SIDEBANDS)
     known = {
         part: {line: held * at for line, at in (many if part.startswith(MESHES) else few)[part].items()} for part in few
     }

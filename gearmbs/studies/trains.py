@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -15,9 +16,9 @@ import gearmbs
 from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
+from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError, Laser, RunSettings
 from gearmbs.drivetrain.drivetrain import Description, read_description
-from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
+from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, differentials
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.files import json_value
 from gearmbs.mechanism import Mechanism
@@ -33,15 +34,20 @@ from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupt
 from gearmbs.studies.train_record import (
     CONTACT,
     TURN,
+    WHOLE,
     HeldSpeed,
     TrainColumns,
     TrainRecorder,
     by_angle,
+    carrier_turns,
     column_of,
     driver_angle,
     held_speeds,
     on_shafts,
+    recorded_table,
+    sidebands,
     speed_attributes,
+    unresolved,
     warn_of_speeds,
 )
 
@@ -100,9 +106,11 @@ def run_train(
         tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft;
         by ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal``
         (the normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the record's mean
-        speed, and NaN where the speed is not steady, see `gearmbs.studies.train_record`; of a run-up or coast-down
-        (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the same at 60 moments. The attribute
-        ``remarks`` names speeds that are not the nominal ones.
+        speed, and NaN where the speed is not steady, see `gearmbs.studies.train_record`. What planets do to bearings,
+        lasers and accelerometers has their sidebands by turns of the carrier in it, and is NaN without a whole turn.
+        Of a run-up or coast-down (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the same at
+        60 moments, without sidebands. The attribute ``remarks`` names speeds that are not the nominal ones, and
+        carriers that make no whole turn.
 
     Raises
     ------
@@ -275,7 +283,10 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
         return out
     held = held_speeds(train, out)
     out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop, held)
-    out.attrs = attributes(train, run, solution) | speed_attributes(held)
+    out.attrs = attributes(train, run, solution) | speed_attributes(held, unresolved(train, known, start, stop))
+    if differentials(train):
+        table, factor = recorded_table(train, out)
+        out.attrs["placed_lines"] = json.dumps({name: factor * at for name, at in table.known_lines().items()})
     warn_of_speeds(train, held)
     return out
 
@@ -361,6 +372,9 @@ def _harmonics(
     rms = np.full((len(names), len(train.meshings), run.harmonics), np.nan)
     frequency = np.zeros(len(train.meshings))
     groups: dict[str, int] = {}
+    standing = {f"{bearing.name} {axis}" for bearing in train.bearings for axis in "xyz"}
+    standing |= {sensor.name for sensor in train.sensors if isinstance(sensor, Laser | Accelerometer)}
+    stands = np.array([name in standing for name in names], dtype=bool)
     for k, mesh in enumerate(train.meshings):
         if (same := groups.setdefault(mesh.group, k)) != k:
             # all planets of a stage mesh at one frequency
@@ -378,6 +392,12 @@ def _harmonics(
                 angle = np.interp(record["time"].values, known.t, whole)
                 seen, samples, fundamental = by_angle(signals, teeth * np.abs(angle - angle[0]) / TURN)
             rms[:, k] = np.abs(harmonic_amplitudes(seen, samples, fundamental, orders)).T / np.sqrt(2.0)
+            turns = carrier_turns(train, known, mesh, start, stop)
+            if turns is not None:
+                # cycles of the mesh in a turn of the carrier
+                cycles = frequency[k] * (stop - start) / max(turns, 1.0) if turns >= WHOLE else math.nan
+                planets = train.part(mesh.stage, PlanetaryStage).gears.planets
+                rms[stands, k] = _with_sidebands(seen[:, stands], samples, fundamental, cycles, orders, planets)
     return xr.DataArray(
         rms, dims=("signal", "mesh", "harmonic"),
         coords={"signal": names, "mesh": [m.name for m in train.meshings], "harmonic": np.arange(1, run.harmonics + 1),
@@ -386,6 +406,28 @@ def _harmonics(
                                       {"units": "Hz"})},
         attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
     )  # fmt: skip
+
+
+def _with_sidebands(
+    values: np.ndarray, rate: float, fundamental: float, cycles: float, orders: np.ndarray, planets: int
+) -> np.ndarray:
+    """Return the RMS of mesh harmonics with their `sidebands`, (signals, orders), over whole turns of the carrier.
+
+    Parameters
+    ----------
+    cycles : float
+        Of the mesh in a turn of the carrier; NaN where the record has no whole turn, whose lines it cannot part.
+    """
+    out = np.full((values.shape[1], orders.size), np.nan)
+    if not math.isfinite(cycles):
+        return out
+    turn = fundamental / cycles
+    for n, order in enumerate(orders):
+        lines = order * cycles + sidebands(planets)
+        lines = lines[(lines > 0.0) & (lines * turn < 0.5 * rate)]
+        found = harmonic_amplitudes(values, rate, turn, lines, least=1)
+        out[:, n] = np.sqrt(0.5 * np.sum(np.abs(found) ** 2, axis=0))
+    return out
 
 
 def _dataset(

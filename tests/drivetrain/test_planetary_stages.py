@@ -1,5 +1,6 @@
 """Planetary stages inside drivetrains, against the set alone, closed laws and mechanisms made by hand."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from gearmbs.drivetrain import (
     GearMesh,
     Housing,
     IdealBearing,
+    InductionMotor,
     Mount,
     PlanetaryStage,
     RunSettings,
@@ -81,7 +83,8 @@ def two_stages(set_of=None, pins=PINS, mesh=None, **changes):
     """A parallel stage before a planetary one, whose carrier turns the output in two bearings."""
     first, second = ({"bore_radius": "10 mm"} for _ in range(2))
     given = {
-        "shafts": [Shaft(name=n, length="100 mm", diameter="20 mm") for n in ("in", "mid", "out")],
+        "shafts": [Shaft(name=n, length=length, diameter="20 mm")
+                   for n, length in (("in", "50 mm"), ("mid", "100 mm"), ("out", "100 mm"))],
         "wheels": [
             Wheel(name="z1", shaft="in", station="20 mm", gear=GearSpec(20, "2 mm", **first)),
             Wheel(name="z2", shaft="mid", station="20 mm", gear=GearSpec(50, "2 mm", **second)),
@@ -204,7 +207,8 @@ def turbine(low, middle, fast):
     """Two planetary stages from rotor to a parallel one, or one planetary and two parallel ones."""
     names = ["rotor", "first", "second", "high"]
     shafts = [light(name) for name in names]
-    shafts = [replace(shaft, length=2.0) for shaft in shafts]
+    # the last one is short: it passes beside the ring of the stage before it
+    shafts = [replace(shaft, length=0.5 if shaft.name == "high" else 2.0) for shaft in shafts]
     stages, wheels, meshes = [], [], []
     for k, stage in enumerate((low, middle, fast)):
         before, after = names[k], names[k + 1]
@@ -213,7 +217,9 @@ def turbine(low, middle, fast):
             stages.append(replace(stage, sun=after, carrier=before, ring="ground", **at))
         else:
             for name, shaft, gear in ((f"big {k}", before, stage[0]), (f"small {k}", after, stage[1])):
-                wheels.append(Wheel(name=name, shaft=shaft, gear=gear, station=1.0 + 0.1 * k))
+                wheels.append(
+                    Wheel(name=name, shaft=shaft, gear=gear, station=0.2 if shaft == "high" else 1.0 + 0.1 * k)
+                )
             meshes.append(GearMesh(name=f"mesh {k}", driver=f"big {k}", driven=f"small {k}"))
     return Drivetrain(
         "turbine", shafts=shafts, wheels=wheels, meshes=meshes, planetary_stages=stages,
@@ -450,6 +456,30 @@ def test_transmission_errors_know_how_far_a_housing_that_holds_a_member_turns(he
         forces = [float(rest.diagnostics(mesh.name)["normal_force"][-1]) for mesh in still.meshings]
         stiffness = np.repeat(IDEAL["ideal"], 3)
         np.testing.assert_allclose(errors, np.array(forces) / stiffness, rtol=1e-4)
+
+
+@pytest.mark.slow
+def test_levels_of_what_planets_do_to_shafts_do_not_depend_on_the_length_of_the_record():
+    train = alone(set_of=planetary((22, 26, 74), "1.5 mm", 3), pins=PINS, speed="3000 rpm", run_up=0.01)
+    turn = math.tau / train.speeds["carrier"]
+    force, other = ("carrier seat x", "force of set sun-planet 1")
+    found = []
+    for duration in (0.5 * turn, turn, 1.7 * turn, 2 * turn):
+        record = run_train(train, RunSettings(settling=0.05, duration=duration, tolerance=1e-6))
+        levels = record.mesh_rms.sel(mesh="set sun-planet 1", harmonic=[1, 2])
+        assert (record.attrs["remarks"] == "none") == (duration >= turn)
+        found.append([levels.sel(signal=signal).values for signal in (force, other)])
+    # of two turns every second line is an order of the carrier: the mesh is the 74th, and each third moves the axis
+    x = record.bearing_force.sel(bearing="carrier seat", xyz="x").values
+    lines = np.abs(np.fft.rfft(x - x.mean()))[::2] * math.sqrt(2) / x.size
+    expected = [math.hypot(*lines[order - 3 : order + 4]) for order in (74, 148)]
+    assert lines[75] > 5 * lines[74]
+    np.testing.assert_allclose(found[3][0], expected, rtol=0.02)
+    for levels, meshes in found[1:]:
+        np.testing.assert_allclose(levels, found[3][0], rtol=0.02)
+        np.testing.assert_allclose(meshes, found[3][1], rtol=0.02)
+    assert np.isnan(found[0][0]).all()
+    np.testing.assert_allclose(found[0][1], found[3][1], rtol=0.02)
 
 
 @pytest.mark.slow
@@ -697,9 +727,83 @@ def test_the_mass_of_a_member_on_a_housing_belongs_to_that():
     assert on_shaft.build().bodies["ring"].mass == pytest.approx(50.0)
 
 
+def crowded(sun="20 mm", first="0 mm", wheel="0 mm", teeth=18, second="60 mm"):
+    """A wheel on the sun's shaft, with a pinion beside it, a stage behind it, and a second one behind that."""
+    shafts = [
+        Shaft(name="sun", length="200 mm", diameter=sun),
+        Shaft(name="mid", length="200 mm", diameter="10 mm"),
+        Shaft(name="out", length="60 mm", diameter="10 mm"),
+        Shaft(name="side", length="20 mm", diameter="10 mm"),
+    ]
+    one = PlanetaryStage(name="one", gears=gears(), sun="sun", sun_station="100 mm", carrier="mid", ring="ground",
+                         carrier_station=first)  # fmt: skip
+    two = PlanetaryStage(name="two", gears=gears(), sun="mid", sun_station=second, carrier="out", ring="ground")
+    return Drivetrain(
+        "crowded", shafts=shafts, planetary_stages=[one, two],
+        bearings=[IdealBearing(name=f"b {s.name}", shaft=s.name) for s in shafts],
+        wheels=[Wheel(name="w", shaft="sun", station=wheel, gear=GearSpec(teeth, "1.5 mm")),
+                Wheel(name="pinion", shaft="side", gear=GearSpec(100, "1.5 mm"))],
+        meshes=[GearMesh(name="m", driver="pinion", driven="w")],
+        drives=[SpeedDrive(name="motor", shaft="side", speed=10.0)],
+        loads=[TorqueLoad(name="brake", shaft="out", torque=40.0)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sun": "40 mm", "teeth": 60}, ("'one'", "shaft 'sun'", "20 mm")),
+        ({"wheel": "100 mm"}, ("'one'", "'pinion'", "76.5 mm")),
+        ({"wheel": "75 mm", "teeth": 60}, None),
+        ({"wheel": "85 mm", "teeth": 60}, ("'one'", "'w'", "46.5 mm")),
+        ({"second": "15 mm"}, ("'one'", "stage 'two'", "20 mm")),
+        ({"sun": "30 mm", "teeth": 60, "second": "25 mm"}, None),
+    ],
+)
+def test_planets_need_room_of_their_own(changes, words):
+    crowded()
+    if words is None:
+        crowded(**changes)
+        return
+    with pytest.raises(DrivetrainError, match=says(*words)):
+        crowded(**changes)
+
+
 def test_a_stage_that_nothing_drives_is_refused():
     with pytest.raises(DrivetrainError, match=says("'set'", "drive")):
         alone(drives=[], loads=[])
+
+
+def differential(drives, duration, settling=0.01, **more):
+    """Return a train without a held member and its record."""
+    train = alone(held=None, drives=drives, set_of=gears(), pins=PINS, run_up=0.005, **more)
+    return train, run_train(train, RunSettings(settling=settling, duration=duration))
+
+
+def test_a_stage_that_turns_as_a_block_has_signals_and_lines_of_shafts():
+    drives = [SpeedDrive(name=f"on {n}", shaft=n, speed="1000 rpm") for n in ("sun", "ring")]
+    train, record = differential(drives, 0.02)
+    signal = train_signal(record, "force of set sun-planet 1")
+    assert "speed" not in signal.attrs
+    lines = json.loads(signal.attrs["known_lines"])
+    assert lines["1 x 1x of carrier"] == pytest.approx(1000 / 60, rel=1e-6)
+    assert lines["1 x GMF of set"] == pytest.approx(0.0, abs=1e-4)
+    assert train_report(train, record).count("### ") == 2
+
+
+@pytest.mark.slow
+def test_lines_of_shafts_that_slip_each_its_way_are_at_their_own_speeds():
+    motor = InductionMotor(name="on sun", shaft="sun", speed="1400 rpm", power="2 kW", breakdown=2.5)
+    drives = [motor, SpeedDrive(name="on ring", shaft="ring", speed="200 rpm")]
+    record = differential(drives, 0.1, settling=0.1)[1]
+    lines = json.loads(train_signal(record, "force of set sun-planet 1").attrs["known_lines"])
+    turns = record.speed.mean("time") / math.tau
+    assert abs(float(turns.sel(shaft="sun")) / (1400 / 60) - 1.0) > 0.005
+    for shaft in MEMBERS:
+        assert lines[f"1 x 1x of {shaft}"] == pytest.approx(float(turns.sel(shaft=shaft)), rel=1e-9)
+    mesh = 24 * float(turns.sel(shaft="sun") - turns.sel(shaft="carrier"))
+    assert lines["2 x GMF of set"] == pytest.approx(2 * mesh, rel=1e-9)
+    assert float(record.mesh_frequency[0]) == pytest.approx(mesh, rel=1e-4)
 
 
 def test_a_clutch_leads_into_a_stage():

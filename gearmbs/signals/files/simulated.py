@@ -20,6 +20,8 @@ from gearmbs.signals.signal.signal import make_signal, with_metadata
 
 AT_REST = 0.01
 """Part of its highest speed by which a shaft that starts or comes to rest may swing back: no line is told there."""
+STILL = 1e-6
+"""Part of the fastest speed up to which a mean one is none: what a vibrating shaft keeps over a record."""
 
 
 def parse_states(items: Sequence[str], what: str = "experiment") -> dict[str, dict[str, Path]]:
@@ -128,8 +130,12 @@ def driver_speed(record: xr.Dataset, mesh: str | None = None) -> np.ndarray:
 
 
 def held_speed(record: xr.Dataset) -> float:
-    """Return the mean speed of a record over the nominal one: lines of a spectrum are where that puts them."""
-    return abs(float(driver_speed(record).mean())) / float(record.attrs["mesh_speed"])
+    """Return the mean speed of a record over the nominal one: lines of a spectrum are where that puts them.
+
+    1 where the first mesh does not turn, as in a planetary stage that turns as a block.
+    """
+    nominal = float(record.attrs["mesh_speed"])
+    return abs(float(driver_speed(record).mean())) / nominal if nominal else 1.0
 
 
 def holds_speed(record: xr.Dataset) -> bool:
@@ -141,9 +147,11 @@ def with_speed_of(signal: xr.DataArray, record: xr.Dataset, mesh: str | None = N
     """Return a signal with the speed of the driver of a mesh, by default the first, that a drivetrain's record holds.
 
     Where it is steady that is its mean, else the coordinate ``speed`` (rad/s) over time; a shaft that turns back, or
-    rests throughout, has none.
+    rests throughout, also against the carrier, has none.
     """
     values = driver_speed(record, mesh)
+    if abs(values.mean()) <= STILL * float(np.abs(record["speed"]).max()):
+        return signal
     if holds_speed(record):
         return with_metadata(signal, speed=float(np.abs(values).mean()))
     turning = values if values.mean() > 0.0 else -values
@@ -153,7 +161,9 @@ def with_speed_of(signal: xr.DataArray, record: xr.Dataset, mesh: str | None = N
 
 
 def placed_lines(record: xr.Dataset) -> str:
-    """Return the lines of the kinematic table where the speed of a drivetrain's record puts them, as JSON."""
+    """Return the lines of the kinematic table where the speeds of a drivetrain's record put them, as JSON."""
+    if "placed_lines" in record.attrs:
+        return str(record.attrs["placed_lines"])
     held = held_speed(record)
     return json.dumps({name: held * at for name, at in json.loads(record.attrs["known_lines"]).items()})
 
