@@ -196,7 +196,7 @@ def simulate(
     rate : float, optional
         Outputs a second from the start on, and one at the end; default: 500 outputs over the span.
     t_eval : ndarray, optional
-        Output times instead of ``rate``; the first is the start.
+        Output times instead of ``rate``; the first is the start, the last the end, whatever ``t_end`` is.
     every_step : bool
         Outputs at the end of every accepted step instead: uneven times, dense where much happens.
     t_start : float
