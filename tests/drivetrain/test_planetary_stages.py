@@ -2,11 +2,13 @@
 
 import json
 import math
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import gearmbs as gm
 from gearmbs.adams import write_deck
 from gearmbs.drivetrain import (
     Drivetrain,
@@ -43,6 +45,7 @@ from gearmbs.studies import (
     train_scene,
     train_signal,
 )
+from gearmbs.studies.run import steady
 from gearmbs.studies.train_record import TrainRecorder
 from gearmbs.studies.train_views import mesh_orders
 from gearmbs.studies.trains import transmission_error
@@ -804,6 +807,36 @@ def test_lines_of_shafts_that_slip_each_its_way_are_at_their_own_speeds():
     mesh = 24 * float(turns.sel(shaft="sun") - turns.sel(shaft="carrier"))
     assert lines["2 x GMF of set"] == pytest.approx(2 * mesh, rel=1e-9)
     assert float(record.mesh_frequency[0]) == pytest.approx(mesh, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_steady_motion_of_planets_on_axes_that_stand_repeats_itself_after_a_mesh():
+    set_of = gears(backlash_sun="50 um", backlash_ring="50 um")
+    train = alone(held="carrier", load="ring", set_of=set_of, speed="3000 rpm", run_up=0.005)
+    mesh = 1.0 / train.kinematics.mesh_frequency("set")
+    motion = gm.steady(train)
+    assert motion.orbit.period == pytest.approx(mesh, rel=1e-12)
+    record = run_train(train, RunSettings(settling=0.06, duration=0.02, tolerance=1e-7))
+    t = motion.solution.t
+    for name in ("set sun-planet 1", "set planet 3-ring"):
+        force, found = motion.solution.contact(name)["normal_force"], record.sel(mesh=name)
+        assert np.trapezoid(force, t) / mesh == pytest.approx(float(found.normal_force.mean()), rel=1e-3)
+        first = abs(np.trapezoid(force * np.exp(-1j * math.tau * t / mesh), t)) * math.sqrt(2.0) / mesh
+        level = found.mesh_rms.sel(signal=f"force of {name}", harmonic=1)
+        assert first == pytest.approx(float(level), rel=1e-2)
+
+
+def test_a_long_period_of_planets_is_told_before_it_is_integrated(monkeypatch):
+    monkeypatch.setattr(steady, "steady_motion", lambda mechanism, period, **settings: period)
+    train = alone()
+    mesh = 1.0 / train.kinematics.mesh_frequency("set")
+    with pytest.warns(UserWarning, match=says("840", "period", "run_train")):
+        assert gm.steady(train) == pytest.approx(840 * mesh, rel=1e-9)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert gm.steady(train, 0.1) == 0.1
+        held = alone(held="carrier", load="ring")
+        assert gm.steady(held) == pytest.approx(1.0 / held.kinematics.mesh_frequency("set"))
 
 
 def test_a_clutch_leads_into_a_stage():

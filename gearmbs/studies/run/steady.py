@@ -7,6 +7,7 @@ near an orbit; see `gearmbs.dae.orbits` and docs/theory/orbits.md.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -42,6 +43,8 @@ CLOSED = 1e-5
 motions of that part of their own amplitude to 1e-4."""
 AROUND = 2
 """Mesh periods ahead of a record that its interpolation and its seams need."""
+LONG = 200
+"""Mesh cycles of a period from which a search is told of: it integrates several, which takes a minute and more."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -163,7 +166,8 @@ def steady_train(train: Drivetrain, period: Any = None, **settings: Any) -> Stea
     train : Drivetrain
         Its drives prescribe constant speeds.
     period : float or str, optional
-        s; default the time after which all meshes have made whole cycles, with faulty teeth all shafts whole turns.
+        s; default the time after which all meshes have made whole cycles; with faulty teeth, and planets that a carrier
+        takes along or whose pins give way, all shafts and planets whole turns.
     **settings
         As of `gearmbs.mechanism.solve.orbits.steady_motion`; ``t_start`` is by default the end of the run-up.
 
@@ -173,6 +177,11 @@ def steady_train(train: Drivetrain, period: Any = None, **settings: Any) -> Stea
         If no drive prescribes a constant speed: the period of what a motor drives is not known.
     ModelError
         Where elastic bearings let shafts turn about axes that move: it repeats itself after whole turns alone.
+
+    Warns
+    -----
+    UserWarning
+        Where planets come back after more than `LONG` mesh cycles alone, before they are integrated.
     """
     for drive in train.drives:
         if not isinstance(drive, SpeedDrive) or drive.curve is not None or drive.function is not None:
@@ -182,7 +191,20 @@ def steady_train(train: Drivetrain, period: Any = None, **settings: Any) -> Stea
             )
     if period is None:
         period = mesh_period(train)
+        _warn_of_length(train, period)
     return steady_motion(train.build(), period, **{"t_start": train.run_up, **settings})
+
+
+def _warn_of_length(train: Drivetrain, period: float) -> None:
+    """Warn of a period in which planets come back after very many meshes, before it is integrated."""
+    cycles = period * max(abs(train.kinematics.mesh_frequency(mesh.name)) for mesh in train.meshings)
+    if train.planetary_stages and cycles > LONG:
+        warnings.warn(
+            f"steady: all teeth of drivetrain '{train.name}' stand as before after {cycles:.0f} mesh cycles, "
+            f"{period:.4g} s, and the search takes several such periods; run_train records some turns of the carrier "
+            "in less, or give the period after which your planets come back",
+            stacklevel=4,
+        )
 
 
 def mesh_period(train: Drivetrain) -> float:
@@ -195,8 +217,11 @@ def mesh_period(train: Drivetrain) -> float:
     if not turning:
         raise DrivetrainError(f"drivetrain '{train.name}': no mesh turns; give the period")
     faulty = [mesh.settings.get("faults") for mesh in train.meshes]
-    # unequal planets, and shafts on bearings that are not round, come back with the carrier
-    if any(faulty) or train.planetary_stages:
+    # planets whose pins turn, or give way, come back with the carrier; those on axes that stand with their teeth
+    faulty += [
+        stage.gears.faults or stage.on_pins is not None or stage.carrier != "ground" for stage in train.planetary_stages
+    ]
+    if any(faulty):
         return train.kinematics.common_period()
     shares = [Fraction(f / turning[0]).limit_denominator(10**7) for f in turning]
     return math.lcm(*(share.denominator for share in shares)) / turning[0]
