@@ -104,7 +104,7 @@ def repair_vibrometer(
     Raises
     ------
     SignalError
-        If more than a fifth of a channel is lost.
+        If more than a fifth of a channel is lost, or beyond `full_scale`.
     """
     names = [str(c) for c in signal["channel"].values]
     if level is not None and (level not in names or len(names) < 2):
@@ -121,6 +121,14 @@ def repair_vibrometer(
         bound = None if full_scale is None else _in_unit(full_scale, units_of(signal)[names.index(name)])
         lost, found = _lost(column, dark, bound, spikes)
         share = float(lost.mean())
+        over = float(found["over the range"].mean())
+        if over > MOST_LOST:
+            unit = units_of(signal)[names.index(name)]
+            raise SignalError(
+                f"full_scale: {100 * over:.3g} % of {name!r} is at or beyond {full_scale!r}, its largest value is "
+                f"{float(np.abs(column).max()):.4g} {unit}; give the range of the instrument at its setting, with its "
+                "unit, or leave full_scale out"
+            )
         if share > MOST_LOST:
             raise SignalError(
                 f"signal: {100 * share:.3g} % of {name!r} is lost, more than {100 * MOST_LOST:g} % can be bridged; "
@@ -159,7 +167,7 @@ def _lost(
     known = _widened(lost)
     found["spikes"] = np.zeros_like(dark)
     for _ in range(PASSES):
-        if spikes is None:
+        if spikes is None or lost.mean() > MOST_LOST:
             break
         more = _spikes(_bridged(column, lost), lost, known, spikes) & ~lost
         if not more.any():

@@ -327,6 +327,17 @@ def test_records_of_noise_name_nothing_together_and_bearings_must_be_the_same():
         combine_bearings([noise[0], other])
 
 
+def test_a_record_is_one_witness():
+    first, second = (diagnose_bearing(record(seed=k), "6205", rpm(0.0)) for k in range(2))
+    with pytest.raises(SignalError, match=says("record 1", "record 3", "one witness")):
+        combine_bearings([first, second, first])
+    again = diagnose_bearing(record(seed=1), "6205", rpm(0.002))
+    with pytest.raises(SignalError, match=says("'load'", "'again'", "once")):
+        combine_bearings({"load": second, "again": again})
+    assert combine_bearings([first, second]).verdict.endswith("by 2 records together.")
+    assert combine_bearings([first]).verdict.endswith("by one record alone.")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("defect", "part"),

@@ -155,3 +155,18 @@ def test_what_zones_refuse():
         vibration_zones(TIME, "1500 rpm", rate=RATE, units="Pa")
     with pytest.raises(SignalError, match=says("displacement", "50 um", "increase")):
         vibration_zones(TIME, "300 rpm", rate=RATE, units="m/s", displacement=("50 um", "20 um", "90 um"))
+
+
+def test_zones_need_a_record_as_long_and_as_fast_as_their_band():
+    wave = 10.0 * np.cos(2 * np.pi * 25.0 * np.arange(12800) / 12800.0)
+    with pytest.raises(SignalError, match=says("0.0117 s", "10 Hz", "0.5 s")):
+        vibration_zones(wave[:150], "1500 rpm", rate=12800, units="mm/s")
+    with pytest.raises(SignalError, match=says("rate", "15 Hz", "2000 Hz")):
+        vibration_zones(wave, "1500 rpm", rate=15, units="mm/s")
+    short = vibration_zones(wave[:6400], "1500 rpm", rate=12800, units="mm/s")
+    assert short["velocity"][0] == pytest.approx(7.07e-3, rel=0.02)
+    assert not short["meaning"][0].startswith("at least")
+    slow = vibration_zones(wave[::32], "1500 rpm", rate=400, units="mm/s")
+    assert slow["zone"][0] == "D"
+    assert slow["meaning"][0].startswith("at least")
+    assert "200 Hz" in slow["meaning"][0]

@@ -581,3 +581,39 @@ def test_units_of_acceleration(units, factor):
 @pytest.mark.parametrize("units", ["V/m", "V/s", "mm/s", "A/m", "N/m", "C", "deg/s", "1/s"])
 def test_quotients_that_are_units(units):
     assert to_signal([0.0, 1.0, 2.0], rate=10.0, units=units).attrs["units"] == units
+
+
+def commas(*columns, sign=","):
+    return rows(*columns, sign=sign).replace(".", ",")
+
+
+@pytest.mark.parametrize("head", ["acc [g]", "# dt = 0,078125 ms\nacc [g]"])
+@pytest.mark.parametrize("digits", [1, 3])
+def test_one_column_with_decimal_commas_is_one_channel(tmp_path, head, digits):
+    values = [f"{v:.{digits}f}" for v in 10.0 * X]
+    rate = None if "dt" in head else RATE
+    signal = read_signal(written(tmp_path, head + "\n" + "\n".join(values).replace(".", ",")), rate=rate)
+    assert_is(signal, np.array(values, dtype=float))
+    assert (list(signal["channel"].values), units_of(signal)) == (["acc"], ["g"])
+
+
+def test_one_heading_above_a_column_that_counts_keeps_two_columns(tmp_path):
+    whole = [str(round(100 * v)) for v in np.abs(X)]
+    counted = read_signal(written(tmp_path, "acc [g]\n" + rows(range(COUNT), whole)), rate=RATE)
+    assert_is(counted, np.array(whole, dtype=float))
+    bare = read_signal(written(tmp_path, rows(whole[::-1], whole)), rate=RATE)
+    assert_is(bare, np.array(whole[::-1], dtype=float), np.array(whole, dtype=float))
+    named = read_signal(written(tmp_path, "a [g],b [g]\n" + rows(whole[::-1], whole)), rate=RATE)
+    assert_is(named, np.array(whole[::-1], dtype=float), np.array(whole, dtype=float))
+
+
+def test_commas_between_columns_and_in_numbers_are_refused_unless_quoted(tmp_path):
+    times = [f"{k / RATE:.9f}" for k in range(COUNT)]
+    values = [f"{v:.2f}" for v in X]
+    with pytest.raises(SignalFileError, match=says("2 headings", "4 fields", "semicolons")):
+        read_signal(written(tmp_path, "Zeit [s],a [g]\n" + commas(times, values)))
+    quoted = [[f'"{cell}"' for cell in column] for column in (times, values)]
+    for text in (commas(times, values, sign=";"), commas(*quoted)):
+        sign = ";" if ";" in text else ","
+        signal = read_signal(written(tmp_path, f"Zeit [s]{sign}a [g]\n" + text))
+        assert_is(signal, np.array(values, dtype=float))

@@ -241,3 +241,13 @@ def test_the_papers_comparison_by_laser_and_camera_says_what_the_force_says(tmp_
     out = CliRunner().invoke(app, words)
     assert out.exit_code != 0
     assert "band" in out.output
+
+
+def test_a_range_below_the_signal_is_named():
+    clean = add_noise(vibration(levels=(1.0, 0.4), seconds=0.2), seed=seed(3), rms=2e-5)
+    largest = float(np.abs(clean.values).max())
+    with pytest.raises(SignalError, match=says("full_scale", "largest value", "leave")):
+        repair_vibrometer(clean, full_scale=1e-3 * largest)
+    with pytest.raises(SignalError, match=says("full_scale", "100 %", "0.0")):
+        repair_vibrometer(clean, full_scale=0.0)
+    np.testing.assert_array_equal(repair_vibrometer(clean, full_scale=1.1 * largest).values, clean.values)

@@ -18,6 +18,7 @@ from gearmbs.signals.conversion import convert
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.given import given_speed
+from gearmbs.signals.signal.signal import rate_of
 from gearmbs.units import Quantity, to_si
 
 ZONES = "ABCD"
@@ -37,11 +38,15 @@ LIMITS: dict[tuple[int, str], tuple[float, float, float]] = {
 }
 """Upper ends of zones A, B and C, m/s RMS, by group (1: above 300 kW, or shafts 315 mm high and more; 2: 15 to 300 kW,
 or 160 to 315 mm) and support."""
+ROUNDING = 1e-9
+"""Part of a duration by which a rate written as a decimal may make it short."""
 QUANTITIES: tuple[Literal["velocity", "displacement"], ...] = ("velocity", "displacement")
 TOP = 1000.0
 """Hz."""
 SLOW, SLOWEST = 600.0, 120.0
 """rpm: below the first the band begins at 2 Hz instead of 10; below the second the standard does not apply."""
+FEWEST_PERIODS = 5.0
+"""Periods of the band's lower end in a record: a line just above it is then 10 % low at most, in three periods 25 %."""
 
 
 @takes_data()
@@ -75,13 +80,15 @@ def vibration_zones(
     -------
     DataFrame
         A row for each channel: ``velocity`` (m/s) and ``displacement`` (m), RMS over the band; ``velocity_zone`` and,
-        with limits of it, ``displacement_zone``; the worse of the two, ``zone``; ``meaning``.
+        with limits of it, ``displacement_zone``; the worse of the two, ``zone``; ``meaning``, which says so if the
+        rate does not hold the band: the zone is then the best there can be.
 
     Raises
     ------
     SignalError
-        If there are no such tables, the speed is below 120 rpm, or below 600 rpm without limits of the displacement, or
-        a unit is none of motion.
+        If there are no such tables, the speed is below 120 rpm, or below 600 rpm without limits of the displacement, a
+        unit is none of motion, the record is shorter than five periods of the band's lower end, or the rate below
+        twice it.
 
     Examples
     --------
@@ -108,13 +115,29 @@ def vibration_zones(
     limits: dict[str, tuple[float, ...]] = {"velocity": LIMITS[group, support]}
     if displacement is not None:
         limits["displacement"] = _ends(displacement)
-    band = (10.0 if rpm >= SLOW else 2.0, TOP)
+    rate = rate_of(signal)
+    band = (10.0 if rpm >= SLOW else 2.0, min(TOP, 0.5 * rate))
+    duration, least = signal.sizes["time"] / rate, FEWEST_PERIODS / band[0]
+    if band[1] <= band[0]:
+        raise SignalError(
+            f"rate: {rate:g} Hz holds nothing of the band from {band[0]:g} Hz on; record at 2000 Hz or more"
+        )
+    if duration < least * (1.0 - ROUNDING):
+        raise SignalError(
+            f"signal: a record of {duration:.3g} s is too short for levels from {band[0]:g} Hz on; {least:g} s or more "
+            "are needed"
+        )
+    best = (
+        f"at least, for the rate of {rate:g} Hz holds the band up to {band[1]:g} Hz only, not {TOP:g} Hz: "
+        if band[1] < TOP
+        else ""
+    )
     rows = []
     for c, name in enumerate(signal["channel"].values):
         one = signal.isel(channel=[c])
         levels: dict[str, float] = {to: float(convert(one, to, band=band, edges="keep").std()) for to in QUANTITIES}
         zones = [ZONES[int(np.searchsorted(ends, levels[of]))] for of, ends in limits.items()]
-        rows.append((str(name), *levels.values(), *zones, max(zones), MEANING[max(zones)]))
+        rows.append((str(name), *levels.values(), *zones, max(zones), best + MEANING[max(zones)]))
     columns = ["channel", *QUANTITIES, *(f"{of}_zone" for of in limits), "zone", "meaning"]
     return pd.DataFrame(rows, columns=columns)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -71,7 +72,8 @@ class CombinedBearings:
         n = len(self.records)
         named = self.table[self.table["grade"] != NONE]
         if named.empty:
-            return f"No part of a bearing is named by {n} records together."
+            by = f"{n} records together" if n > 1 else "one record alone"
+            return f"No part of a bearing is named by {by}."
         return " ".join(
             f"{'Clear lines' if r.grade == CLEAR else 'Signs'} such as a defect of {WORDS[r.part]} of bearing "
             f"{r.bearing} makes, heard in {r.heard} of {n} records, {r.slip_percent:+.2f} % beside the kinematic place "
@@ -110,7 +112,7 @@ def combine_bearings(reports: Mapping[str, BearingReport] | Sequence[BearingRepo
     Raises
     ------
     SignalError
-        If there are no reports, or of different bearings.
+        If there are no reports, or of different bearings, or two of one record.
 
     Examples
     --------
@@ -128,6 +130,12 @@ def combine_bearings(reports: Mapping[str, BearingReport] | Sequence[BearingRepo
     for name, report in named.items():
         if [lines.orders for lines in report.bearings] != [lines.orders for lines in first.bearings]:
             raise SignalError(f"reports: {name!r} is of other bearings than the first; combine reports of the same")
+    for (name, one), (again, other) in combinations(named.items(), 2):
+        # levels of two records differ in their last digits at least
+        if one.levels.equals(other.levels):
+            raise SignalError(
+                f"reports: {name!r} and {again!r} are of the same record, which is one witness; give each record once"
+            )
     keys = [(lines.name, part) for lines in first.bearings for part in lines.orders]
     clearest = {key: [_clearest(report, k) for report in named.values()] for k, key in enumerate(keys)}
     rows = [(*key, *_together(found)) for key, found in clearest.items()]

@@ -8,6 +8,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,8 +42,9 @@ STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("clock", re.compile(rf"^{CLOCK}$")),
 )
 SEPARATIONS: tuple[tuple[str | None, str], ...] = (
-    (";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ","),
+    (";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (",", ","), (None, "."), (None, ","),
 )  # fmt: skip
+"""Commas between numbers with decimal commas are those of quoted cells."""
 TIME_UNITS = frozenset(("s", "sec", "ms", "us", "µs", "ns"))
 INDEX_NAMES = frozenset(
     {"", "unnamed: 0", "index", "idx", "sample", "samples", "nr", "no", "no.", "#", "row", "level_0"}
@@ -101,6 +103,15 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         If none of them is a row of numbers.
     """
     first, separator, decimal, kinds = _find_numbers(head, path)
+    headings = _headings_by_halves(head, first, path) if (separator, decimal) == (",", ".") else 0
+    if headings == 1:
+        separator, decimal, kinds = None, ",", kinds[:1]
+    elif headings:
+        raise SignalFileError(
+            path,
+            f"has {headings} headings above {len(kinds)} fields in a row, such as {head[first].strip()[:60]!r}: commas "
+            "both between columns and in numbers; write it again with semicolons between columns or decimal points",
+        )
     width = len(kinds)
     labels, header_line = _labels(head[:first], separator, width)
     units_row = None
@@ -202,9 +213,36 @@ def _find_numbers(head: list[str], path: Path) -> tuple[int, str | None, str, li
     )
 
 
+def _headings_by_halves(head: list[str], first: int, path: Path) -> int:
+    """Return how many headings stand above twice as many fields, of which each second is digits alone; 0 if not so.
+
+    Decimal commas have been taken for separators there. One heading above two whole numbers may also leave out the
+    column that counts the rows.
+    """
+    rows = [split_cells(line, ",") for line in head[first:] if line.strip() and not COMMENT.match(line)]
+    above = [line for line in head[:first] if line.strip() and not COMMENT.match(line)]
+    names = split_cells(above[-1], ",") if above else []
+    digits = all(cell.isdigit() for row in rows for cell in row[1::2])
+    if not names or not digits or any(len(row) != 2 * len(names) for row in rows):
+        return 0
+    if any(cell_kind(name, ".") != "text" for name in names) or not all(is_whole(c) for r in rows for c in r[::2]):
+        return 0
+    steps = {int(row[0]) - int(before[0]) for before, row in pairwise(rows)}
+    counts = len(names) == 1 and len(steps) == 1 and steps != {0}
+    return 0 if counts else len(names)
+
+
+def is_whole(cell: str) -> bool:
+    """Return whether a cell holds digits, with a sign or none."""
+    return re.fullmatch(r"[-+]?\d+", cell) is not None
+
+
 def _row(line: str, separator: str | None, decimal: str) -> list[Kind] | None:
     """Kinds of the cells of a row of data, or None if it is none."""
-    kinds = [cell_kind(cell, decimal) for cell in split_cells(line.split("#")[0], separator)]
+    cells = split_cells(line.split("#")[0], separator)
+    kinds = [cell_kind(cell, decimal) for cell in cells]
+    if separator == decimal and any("." in cell for cell in cells):
+        return None
     if "number" not in kinds or "text" in kinds:
         return None
     if any(kind in ("stamp", "date", "clock") for kind in kinds[2:]):
