@@ -134,3 +134,29 @@ def test_springs_may_be_negative():
     sim = gm.Simulator(m, 1.0)
     sim.set("s.stiffness", -2.0)
     assert sim.get("input", "s.stiffness") == -2.0
+
+
+def test_two_names_of_one_number_are_one():
+    """Two controllers or two inputs are refused under them as under one; two numbers are not."""
+    m = case_mechanism(gm.Case())
+    names = "operation.torque", "load.torque"
+    for first, second in (names, names[::-1]):
+        sim = gm.Simulator(m, 0.01)
+        sim.control(first, lambda t, _: 60.0, sample_time=1e-3)
+        with pytest.raises(ModelError, match=says(repr(first), repr(second), "controller")):
+            sim.control(second, lambda t, _: 50.0, sample_time=1e-3)
+        with pytest.raises(ModelError, match=says(repr(first), repr(second), "inputs")):
+            m.simulate(0.001, inputs={first: 60.0, second: 50.0})
+    m, body, _ = disc()
+    one, other = m.input("one", "N m"), m.input("other", "N m")
+    m.torque("drive", body, one)
+    m.torque("load", body, other)
+    sim = gm.Simulator(m, 1.0)
+    for number in (one, other):
+        sim.control(number, lambda t, _: 1.0, sample_time=0.1)
+    with pytest.raises(ModelError, match=says("'one'", "controller")):
+        sim.control("one", lambda t, _: 1.0, sample_time=0.1)
+    sim.advance(1.0)
+    solution = m.simulate(1.0, rate=1.0, inputs={"one": 1.0, "other": 1.0})
+    for found in (sim.get("angular_velocity", "disc"), solution.angular_velocity("disc")[-1]):
+        assert found[2] == pytest.approx(1.0)

@@ -56,3 +56,52 @@ def test_advance_ends_where_a_state_passes_a_value(tmp_path):
         gm.Simulator(swinging(), 2.0, stops=stops, lump=True)
     with pytest.raises(ModelError, match=says("plase", "place")):
         gm.Simulator(swinging(), 2.0, stops=[StopAt("plase")])
+
+
+def jumping(level):
+    """A disc at rest whose sum of speed and an input jumps with the input, or whose speed does."""
+    m = Mechanism("jumps")
+    disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    if level is None:
+        m.torque("drive", disc, m.input("u", "N m"))
+        m.algebraic_state("al", "WZ(pin.I, pin.J) + u")
+    else:
+        m.rotation("drive", pin, m.input("u", "rad/s"), level=level)
+        m.algebraic_state("al", "WZ(pin.I, pin.J)")
+    return m
+
+
+@pytest.mark.parametrize("level", [None, "velocity"])
+def test_a_stop_that_a_jump_passes_is_told_where_it_jumps(level):
+    """Once, at the time of the jump, up or down as it asks for; the motion goes on as without stops."""
+    stops = [StopAt("al", 5.0, 1), StopAt("al", 4.0, -1)]
+    sim, plain = (gm.Simulator(jumping(level), 2.0, tol=1e-9, stops=some) for some in (stops, []))
+    for one in (sim, plain):
+        one.advance(0.5)
+        one.set("u", 10.0)
+    assert (sim.advance(1.0), sim.t) == (stops[0], 0.5)
+    assert (sim.advance(0.75), sim.t) == (None, 0.75)
+    plain.advance(0.75)
+    np.testing.assert_allclose(sim.get("angular_velocity", "disc"), plain.get("angular_velocity", "disc"), rtol=1e-7)
+    sim.set("u", -10.0)
+    assert (sim.advance(1.0), sim.t) == (stops[1], 0.75)
+    # a jump that stays above or below passes nothing, nor does what is set before the start
+    for u in (-20.0, 1.0, 3.0, 3.0):
+        sim.set("u", u)
+        assert sim.advance(sim.t + 0.01) is None
+    first = gm.Simulator(jumping(level), 2.0, tol=1e-9, stops=stops)
+    first.set("u", 10.0)
+    assert first.advance(0.5) is None
+    np.testing.assert_array_equal(sim.solution().t, [0.0, 0.5, 0.75, *(0.75 + 0.01 * np.arange(1, 5))])
+
+
+def test_a_controller_jumps_past_a_stop_at_its_sample():
+    """A point of the solution lies there, with the values up to the jump."""
+    stop = StopAt("al", 5.0)
+    sim = gm.Simulator(jumping(None), 2.0, tol=1e-9, stops=[stop])
+    sim.control("u", lambda t, _: 10.0 if t > 0.25 else 0.0, sample_time=0.1)
+    assert (sim.advance(1.0), sim.t) == (stop, pytest.approx(0.3))
+    np.testing.assert_allclose(sim.solution().state("al"), [0.0, 0.0], atol=1e-12)
+    assert (sim.advance(1.0), sim.t) == (None, 1.0)
+    np.testing.assert_allclose(sim.get("angular_velocity", "disc"), [0.0, 0.0, 0.7 * 5.0], atol=1e-7)

@@ -249,6 +249,28 @@ class Solution(Measured, Shown):
         )
         return part
 
+    def __copy__(self) -> Solution:
+        made = type(self).__new__(type(self))
+        made.__dict__.update(self.__dict__)
+        return made
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Solution:
+        """Return a copy with numbers of its own; the model behind them, which it does not change, is the same."""
+        made = copy.copy(self)
+        memo[id(self)] = made
+        made.at_steps = MappingProxyType({key: copy.deepcopy(value, memo) for key, value in self.at_steps.items()})
+        made._shared = None
+        for name in ("t", "result", "_records", "kinetic_energy"):
+            if name in self.__dict__:
+                made.__dict__[name] = copy.deepcopy(self.__dict__[name], memo)
+        return made
+
+    def __reduce__(self) -> tuple:
+        raise ModelError(
+            "a solution is not pickled: compiled equations are part of it; pass on its to_dataset(), write it with "
+            "gearmbs.save(solution, 'run.nc'), or go on from its state_at(t), which can be saved"
+        )
+
     def _evaluator(self) -> Fills:
         problem = self.problem
         if self.members is not None and len(self.members.turn):

@@ -144,12 +144,15 @@ class Sampled:
         UserWarning
             If the state gone on from has a memory that the function cannot take.
         """
-        self.number(name)
+        number = self.number(name)
+        name = getattr(name, "name", name)
         if not callable(function):
             raise ModelError(f"control: {function!r} for {name!r} cannot be called; give a function of t and simulator")
         check_takes(name, function)
-        if name in (control.name for control in self._controls):
-            raise ModelError(f"control: {name!r} has a controller already; let one function do what both are to")
+        other = next((one.name for one in self._controls if self.number(one.name) is number), None)
+        if other is not None:
+            told = f", under its name {other!r}" if other != name else ""
+            raise ModelError(f"control: {name!r} has a controller already{told}; let one function do what both are to")
         period = quantity(sample_time, "time", "control: sample_time")
         if not (np.isfinite(period) and period > 0.0):
             raise ModelError(f"control: sample_time = {period} s for {name!r}; it must be positive")
@@ -158,7 +161,7 @@ class Sampled:
                 f"control: sample_time = {period:g} s for {name!r}: times up to t_end = {self.t_end:g} s are not told "
                 f"apart by it; give {RESOLVED * self.t_end:.2g} s or more"
             )
-        positions = [row for row, order in self.number(name).prescribes if order == 0]
+        positions = [row for row, order in number.prescribes if order == 0]
         if positions:
             raise ModelError(
                 f"control: {name!r} is the position of {positions[0]!r}, which cannot jump from sample to sample; let "

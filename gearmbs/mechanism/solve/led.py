@@ -58,6 +58,7 @@ def simulate_led(
             raise ModelError(f"inputs: a run with inputs has no {option}; leave it away, or give rate or t_eval")
     start = float(t_eval[0]) if initial is None else 0.0
     sim = Simulator(mechanism, float(t_eval[-1]), t_start=start, advice=advice, initial=initial, **options)
+    _check_once(sim, inputs)
     tables = [table for name, given in inputs.items() if (table := _begin(sim, name, given)) is not None]
     for table in tables:
         value = float(np.interp(sim.t, table.times, table.values))
@@ -89,6 +90,16 @@ def simulate_led(
             raise
     # outputs may begin after the state that it starts in
     return sim.solution(int(begun not in wanted and sim.t > begun))
+
+
+def _check_once(sim: Simulator, inputs: Mapping[str, Any]) -> None:
+    """Raise a ModelError if one number is there under two of its names."""
+    known: dict[str, Any] = {}
+    for name in inputs:
+        number = sim.number(name).name
+        if number in known:
+            raise ModelError(f"inputs: {known[number]!r} and {name!r} are two names of one number; give one of them")
+        known[number] = name
 
 
 def _begin(sim: Simulator, name: str, given: Any) -> Table | None:

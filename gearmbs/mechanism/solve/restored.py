@@ -121,7 +121,7 @@ class Restored(Told):
         self._tell_clock()
         look = state.t if self._system.has_dropped_rows else np.inf
         # past the look at names, as in `_stand_at`
-        self.__dict__.update(_failed=None, _counted={}, _since=state.t, _next_look=look)
+        self.__dict__.update(_failed=None, _passed=None, _counted={}, _since=state.t, _next_look=look)
         self._settings.begin(self._run.state.rdata, state.t)
         table = self._run.table
         place = self._run.place(state.y, state.yp, keep=False)

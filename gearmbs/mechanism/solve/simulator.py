@@ -92,7 +92,8 @@ class Simulator(Sampled, Restored):
         Whether all points are kept for :meth:`solution`.
     stops : sequence of StopAt
         :meth:`advance` ends early where a state of the mechanism passes a value, and returns which; steps are those
-        without it. Not with ``lump``.
+        without it. Where what is set lets it jump past the value, that is the time at which it is set. Not with
+        ``lump``.
     **options
         Handed to the integrator.
 
@@ -225,6 +226,8 @@ class Simulator(Sampled, Restored):
         self._points: list[Point] = []
         self._counted: dict[tuple, tuple[int, float]] = {}
         self._failed: str | None = None
+        self._passed: StopAt | None = None
+        """The one of ``stops`` that a jump at the present time has passed, not told yet."""
         place = self._run.place(problem.y0, problem.yp0)
         self._stand_at(Point(float(problem.t0), *place, problem.idata, self._settings.held), self._records)
         self._since = self.t
@@ -267,11 +270,21 @@ class Simulator(Sampled, Restored):
             end = self._sample(t) if self._controls else t
             if settings.waiting or settings.led:
                 self._apply(t)
+            if self._passed is not None:
+                stop, self.__dict__["_passed"] = self._passed, None
+                self._stay(record)
+                return stop
             if self._stops and (hit := self._crossing(end)) is not None:
                 self._go_to(hit[0], record)
                 return self._stops[hit[1]]
             self._go_to(end, record and end == t)
         return None
+
+    def _stay(self, record: bool) -> None:
+        """Let the present time be a point of the solution if it is to be one and is none."""
+        point = self._point
+        if record and self._records and not (self._points and self._points[-1].t == point.t):
+            self._stand_at(Point(point.t, *self._run.place(point.y, point.yp), point.idata, point.held), True)
 
     def _crossing(self, end: float) -> tuple[float, int] | None:
         """Return time and number of the next stop up to a time that steps have come to, going on as far as needed."""
@@ -439,13 +452,27 @@ class Simulator(Sampled, Restored):
         change = settings.take(own["t"], end)
         if change is None:
             return
+        # where the simulation starts nothing has been before
+        before = run.event_values(own["_point"]) if own["_stops"] and own["t"] > own["_t_start"] else None
         if change.prescribes or not run.state.steps:
             self._start_with(change.values)
-            return
-        began = perf_counter()
-        with raised_errors(self._functions) if self._functions else NOTHING:
-            run.change(own["_point"], settings.cells, change)
-        own["_took"] += perf_counter() - began
+        else:
+            began = perf_counter()
+            with raised_errors(self._functions) if self._functions else NOTHING:
+                run.change(own["_point"], settings.cells, change)
+            own["_took"] += perf_counter() - began
+        if before is not None:
+            self._note_passed(before)
+
+    def _note_passed(self, before: np.ndarray) -> None:
+        """Note which stop is passed by what has just taken effect, from what their states were before."""
+        run = self._run
+        # velocities that are prescribed jump where a run begins
+        if not run.started and (failure := run.begin()) is not None:
+            self._failed = failure[1]
+            raise ModelError(failure[1])
+        if (event := run.passed_in_jump(before)) is not None:
+            self.__dict__["_passed"] = self._stops[event]
 
     def _steer(self, end: float) -> bool:
         """Let what has been set take effect in one compiled call, where it is one input of loads; return that."""

@@ -165,6 +165,13 @@ class HeldRun(Run):
 
     # --- going on -----------------------------------------------------------------------------------
 
+    def begin(self) -> tuple[Status, str] | None:
+        """Begin as any run; from where velocities jump to what motions prescribe, events are behind that."""
+        failure = super().begin()
+        if failure is None and self.state.n_events and not self.options.check_start:
+            self.state.g_old[:] = self.event_values()
+        return failure
+
     def go_to(self, t: float, keep: bool = True) -> tuple[Status, str] | None:
         """Take steps until one ends at ``t`` or later; return how the run has failed, or None.
 
@@ -243,12 +250,36 @@ class HeldRun(Run):
         values = [events(float(at)) for at in times] if t < st.t else []
         for (a, fa), (b, fb) in pairwise(zip(times.tolist(), values, strict=False)):
             for e in range(st.n_events):
-                rising, falling = fa[e] < 0.0 <= fb[e], fa[e] > 0.0 >= fb[e]
-                direction = st.event_direction[e]
-                if (rising and direction >= 0) or (falling and direction <= 0):
+                if self._passes(e, fa[e], fb[e]):
                     root = brentq(lambda at, e=e: events(at)[e], a, b, xtol=4.0 * EPS * max(abs(b), EPS))
                     self.crossings.append((float(root), e))
         st.g_old[:] = events(float(st.t))
+
+    def _passes(self, event: int, before: float, after: float) -> bool:
+        """Return whether an event is one of its direction from one value to another."""
+        direction = self.state.event_direction[event]
+        return bool((before < 0.0 <= after and direction >= 0) or (before > 0.0 >= after and direction <= 0))
+
+    def event_values(self, point: tuple | None = None) -> np.ndarray:
+        """Return the functions of events with the present numbers, where the run stands or at a point of its last step.
+
+        Those that have just been told at this point are 0: what has passed does so once.
+        """
+        st, run_events, found = self.state, self.problem.events, np.empty(self.state.n_events)
+        assert run_events is not None
+        t, rows, row, table, *_ = point or (st.t, None, 0, None)
+        if rows is None or t == st.t:
+            # behind a jump at this time, if there has been one
+            run_events(float(st.t), st.y, st.yp, found, st.idata, st.rdata, st.work)
+        else:
+            run_events(t, rows.y[row], rows.yp[row], found, table, st.rdata, st.work)
+        found[[e for at, e in self.crossings if at == t]] = 0.0
+        return found
+
+    def passed_in_jump(self, before: np.ndarray) -> int | None:
+        """Return the first event that a jump to where the run stands has passed, from what they were; None for none."""
+        after = self.event_values()
+        return next((e for e in range(before.size) if self._passes(e, before[e], after[e])), None)
 
     def _stand_at(self, keep: bool) -> None:
         records = self.last_records
