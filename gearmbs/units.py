@@ -79,6 +79,9 @@ COMMON = {
 }
 """Common units: factor to SI, and powers of m, kg, s and rad."""
 
+BEYOND = ("[current]", "[temperature]", "[substance]", "[luminosity]")
+"""Dimensions besides those of mechanics, as the library of units names them."""
+
 ANGULAR = re.compile("radian|degree(?!_)|turn|revolution|rpm|rps|arcminute|arcsecond|grade")
 WITHOUT_ANGLE = ("m", "m^2", "m^3", "s", "kg", "kg/m^3", "N", "Pa", "N/m", "N*s/m", "N*m", "dimensionless")
 """Units of quantities that are none for an angle, of which a library takes the radian for 1; a torque is also J/rad."""
@@ -153,6 +156,23 @@ def powers_of(unit: str) -> tuple[float, tuple] | None:
     for pattern, written in SPELLINGS:
         clean = re.sub(pattern, written, clean)
     return _common(clean)
+
+
+@functools.lru_cache(maxsize=256)
+def beyond_mechanics(unit: str) -> bool:
+    """Whether this is a unit of SI of what has a current, a temperature, a substance or a light in it.
+
+    Examples
+    --------
+    >>> [beyond_mechanics(unit) for unit in ("V", "N*m/A", "K", "mV", "degC", "m", "volts per hour")]
+    [True, True, True, False, False, False, False]
+    """
+    registry = _registry()
+    try:
+        one = registry.Quantity(1.0, registry.Unit(unit)).to_base_units()
+    except Exception:
+        return False
+    return bool(one.magnitude == 1.0 and {*BEYOND} & {*one.dimensionality})
 
 
 def _quick(text: str, target: str) -> float | None:

@@ -267,6 +267,8 @@ class State:
         ModelError
             For a name that is not there or of something that follows, and a value that is no finite number.
         """
+        if not isinstance(values, Mapping):
+            raise ModelError(f"state: changed is given {values!r}; give a mapping from names of unknowns to values")
         y = self.y.copy()
         for name, value in values.items():
             if str(name).startswith(FOLLOWING):
@@ -302,9 +304,9 @@ class State:
         Raises
         ------
         ModelError
-            If the name does not end in ``.npz``.
+            If the name does not end in ``.npz``, or is none.
         """
-        path = Path(path)
+        path = path_of(path, "state: save")
         if path.suffix != ".npz":
             raise ModelError(f"path is {str(path)!r}; a state is saved as .npz")
         arrays: dict[str, Any] = {
@@ -338,7 +340,7 @@ class State:
         FileNotFoundError
             If there is none.
         """
-        if Path(path).is_dir():
+        if path_of(path, "state: load").is_dir():
             raise ModelError(f"{path}: it is a folder; give the file in it that State.save wrote")
         if Path(path).is_file() and not zipfile.is_zipfile(path):
             raise ModelError(
@@ -379,6 +381,14 @@ class State:
 
 
 __all__ = ["History", "Memory", "State"]
+
+
+def path_of(path: Any, label: str) -> Path:
+    """Return a path; raise a ModelError for what is none."""
+    try:
+        return Path(path)
+    except TypeError:
+        raise ModelError(f"{label}: the path is {path!r}; give the name of a file") from None
 
 
 def check_state(label: str, state: Any) -> None:

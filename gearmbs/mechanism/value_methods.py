@@ -86,7 +86,7 @@ class ValueMethods:
         Raises
         ------
         ModelError
-            For a name that is in use, and an expression that cannot be read.
+            For a name that is in use, an expression that cannot be read, and what no solution or plant tells.
 
         Examples
         --------
@@ -99,7 +99,10 @@ class ValueMethods:
         >>> round(float(m.simulate(1.0).output("speed")[-1]), 6)
         3.0
         """
+        from gearmbs.mechanism.solve.told import check_told
+
         made = make_output(name, what)
+        check_told(made)
         self._check_number(name, "output")
         self.outputs[name] = made
         return made

@@ -184,6 +184,20 @@ PLANT = two_discs().linearize(["load", ("torque", "pin a")], [("joint_angle", "p
         (lambda m: PLANT.step(["2 m"]), ("times", "'2 m'", "'1 s'")),
         (lambda m: PLANT.transfer_function(("torque", "pin b")), ("'torque pin b'", "'torque pin a'")),
         (lambda m: PLANT.transfer_function(None), ("None", "'load'")),
+        (lambda m: gm.Simulator(m, 1.0).state().changed(3), ("changed", "3", "names")),
+        (lambda m: gm.Simulator(m, 1.0).state().changed(None), ("changed", "None", "names")),
+        (lambda m: gm.Simulator(m, 1.0).state().save(None), ("state", "None", "file")),
+        (lambda m: gm.State.load(None), ("state", "None", "file")),
+        (lambda m: PLANT.save(None), ("plant", "None", "file")),
+        (lambda m: m.linearize(None, []), ("inputs", "None", "list")),
+        (lambda m: m.linearize(["load"], None), ("outputs", "None", "list")),
+        (lambda m: m.linearize(m.inputs["load"], []), ("inputs", "'load'", "list")),
+        (lambda m: PLANT.frequency_response(1j), ("f", "1j", "Hz")),
+        (lambda m: PLANT.frequency_response(np.array([2j])), ("f", "2j", "Hz")),
+        (lambda m: m.output("o", ("angular_velocit", "a", "z")), ("'o'", "'angular_velocit'", "'angular_velocity'")),
+        (lambda m: m.output("o", ("_now", "a")), ("'o'", "'_now'", "reaction")),
+        (lambda m: (m.input("x y", "N"), m.output("o", "2*x y")), ("'o'", "'y'", "quotation")),
+        (lambda m: case_mechanism(Case()).linearize(["operation.torque"], []), ("'load.torque'", "('torque', 'load')")),
     ],
 )  # fmt: skip
 def test_what_cannot_be_meant_is_told_in_a_line(call, words):
@@ -210,6 +224,15 @@ def test_what_is_meant_runs():
     np.testing.assert_array_equal(PLANT.step(["500 ms"], ("torque", "pin a")), PLANT.step([0.5], 1))
     one = PLANT.transfer_function(("torque", "pin a"), ("angular_velocity", "b", "z"))
     np.testing.assert_array_equal(one.num, PLANT.transfer_function(1, 1).num)
+    np.testing.assert_array_equal(PLANT.frequency_response((1.0, 2.0)), PLANT.frequency_response([1.0, 2.0]))
+    assert m.linearize(("load",), ()).inputs == m.linearize(m.inputs, []).inputs == ["load"]
+    assert m.output("rate", ("joint_rate", "pin a")).asked == ("joint_rate", "pin a")
+    m.input("two words", "N m", 3.0)
+    m.output("double", '2*"two words"')
+    assert m.simulate(0.1, rate=10.0).output("double").tolist() == [6.0, 6.0]
+    m.aliases["second"] = "load"
+    one, other = (m.linearize([name], [("joint_rate", "pin a")]) for name in ("load", "second"))
+    np.testing.assert_array_equal(one.B, other.B)
     led = driven("displacement").simulate(1.0, inputs={"given": ([0, 1], [0.0, 2.0], 1)})
     assert led.joint_angle("pin a")[-1] == pytest.approx(2.0)
     stopped = Mechanism("disc")

@@ -424,3 +424,37 @@ def test_an_angle_that_was_led_stays_where_a_state_was_taken():
     assert on.success
     assert on.joint_angle("pin a")[-1] == pytest.approx(0.5, abs=1e-7)
     assert on.angular_velocity("a")[-1, 2] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("lump", [False, True])
+def test_what_is_set_acts_from_the_next_advance_on(lump):
+    """Until then an input tells what is going to act, all else what has: at the start as in a model made so."""
+
+    def model(u=0.0):
+        m = two_discs(lump)
+        m.input("u", "rad/s", u)
+        m.algebraic_state("sum", 'WZ("pin a.I", "pin a.J") + u')
+        m.algebraic_state("double", "2*VARVAL(sum)")
+        m.output("told", "3*u")
+        return m
+
+    def all_of(told):
+        return [np.ravel(told(*asked))[-1] for asked in (("state", "sum"), ("state", "double"), ("output", "told"))]
+
+    def over(solution):
+        return np.array([solution.input("u"), solution.state("sum"), solution.state("double"), solution.output("told")])
+
+    sim = gm.Simulator(model(), 1.0)
+    sim.set("u", 10.0)
+    assert (sim.get("input", "u"), all_of(sim.get)) == (10.0, [0.0, 0.0, 0.0])
+    sim.advance(0.5)
+    assert all_of(sim.get) == pytest.approx([10.0, 20.0, 30.0])
+    sim.set("u", 20.0)
+    for look in (lambda: None, sim.state):
+        look()
+        assert (sim.get("input", "u"), all_of(sim.get)) == (20.0, pytest.approx([10.0, 20.0, 30.0]))
+        np.testing.assert_allclose(over(sim.solution()), np.outer([10.0, 10.0, 20.0, 30.0], [1.0, 1.0]), atol=1e-9)
+    sim.advance(0.6)
+    assert (sim.get("input", "u"), all_of(sim.get)) == (20.0, pytest.approx([20.0, 40.0, 60.0]))
+    led, made = model().simulate(0.5, rate=2.0, inputs={"u": 10.0}), model(10.0).simulate(0.5, rate=2.0)
+    np.testing.assert_allclose(over(led), over(made), atol=1e-9)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import gearmbs as gm
 from gearmbs.mechanism import Mechanism, ModelError, constant, harmonic, ramp, step
+from gearmbs.mechanism.language.syntax import Units
 from tests.says import says
 
 
@@ -109,3 +111,32 @@ def test_decks_know_no_units_in_texts():
     deck += "SFORCE/1,TRANS,I=20,J=10,FUNCTION=5 N\nEND\n"
     with pytest.raises(DeckError, match="SFORCE/1"):
         parse_deck(deck).to_mechanism()
+
+
+@pytest.mark.parametrize("unit", ["deg", "rpm", "mm", "mV", "degC", "pump", 3])
+def test_an_input_is_in_a_unit_of_si(unit):
+    with pytest.raises(ModelError, match=says("'u'", repr(unit), "SI")):
+        Mechanism("motor").input("u", unit)
+
+
+@pytest.mark.parametrize("units", [Units(), Units(length=1e-3)])
+def test_a_voltage_drives_a_motor(units):
+    """J w' = k (U - k w)/R, of which the speed goes to U/k: units beyond mechanics are in no mechanism's own."""
+    m = Mechanism("motor")
+    m.units = units
+    rotor = m.body("rotor", mass=1.0, inertia=(1e-3, 1e-3, 1e-3))
+    pin = m.revolute("pin", rotor, m.ground, axis=(0, 0, 1))
+    m.input("voltage", "V", "12 V")
+    m.parameter("k", "N m/A", "0.1 N m/A")
+    m.parameter("R", "ohm", "2 ohm")
+    torque = 1.0 / units.length
+    m.axis_torque("drive", pin.i, pin.j, f"{torque}*k*(voltage - k*WZ({pin.i.name}, {pin.j.name}))/R")
+    sim = gm.Simulator(m, 1.0, tol=1e-8)
+    sim.advance(0.1)
+    slowing = np.exp(-0.1 * 0.01 / 2.0 / 1e-3)
+    assert sim.get("angular_velocity", "rotor")[2] == pytest.approx(120.0 * (1.0 - slowing), rel=1e-6)
+    sim.set("voltage", "24 V")
+    with pytest.raises(ModelError, match=says("'voltage'", "N", "V")):
+        sim.set("voltage", "24 N")
+    with pytest.raises(ModelError, match=says("'voltage'", "torque")):
+        m.torque("wrong", rotor, m.inputs["voltage"])

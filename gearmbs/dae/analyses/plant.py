@@ -30,6 +30,7 @@ from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Driven, Reduced, reduce, warn_of_varying
 from gearmbs.dae.analyses.response import Response, response_of
 from gearmbs.dae.problem import ModelError, SingularModelError
+from gearmbs.dae.state import path_of
 from gearmbs.units import to_si
 from gearmbs.wording import did_you_mean
 
@@ -345,10 +346,13 @@ class LinearPlant:
 def _read(values: Any, unit: str, field: str, factor: float = 1.0) -> np.ndarray:
     """Return numbers, or texts with a unit in a unit of some factor; refuse what is neither."""
     try:
+        if np.iscomplexobj(values):
+            # numpy would drop the imaginary part of an array
+            raise TypeError
         found = np.asarray(math.nan if values is None else values, dtype=float)
     except (TypeError, ValueError):
         try:
-            every = [values] if isinstance(values, str) else values
+            every = values if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else [values]
             found = np.array([to_si(v, unit, field) / (factor if isinstance(v, str) else 1.0) for v in every])
         except (TypeError, ValueError) as error:
             raise ModelError(str(error)) from None
@@ -390,7 +394,7 @@ def check_format(path: str | Path) -> Path:
     ModelError
         If its name does not end in .mat or .npz.
     """
-    path = Path(path)
+    path = path_of(path, "plant: save")
     if path.suffix not in FORMATS:
         raise ModelError(f"{path.name}: a plant is written as {' or '.join(FORMATS)}")
     return path

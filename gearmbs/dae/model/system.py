@@ -341,6 +341,22 @@ def own_start(t, y, yp, idata, rdata) -> tuple[np.ndarray, np.ndarray]:
     return y, yp
 
 
+def settle_states(function, t, y, yp, idata, rdata) -> np.ndarray:
+    """Return y with algebraic states z = f(...) of other numbers in the residual ``function``; all else stays."""
+    y = y.copy()
+    first, count = int(idata[T.H_Z]), int(idata[T.H_STATES])
+    if not count:
+        return y
+    out, work = np.zeros(y.size), np.zeros(int(idata[T.H_WORK]))
+    kinds = T.unpack(idata, rdata, work).state[:count, T.STATE_KIND]
+    places = first + np.flatnonzero(kinds == T.STATE_ALGEBRAIC)
+    # one may stand in the expression of another
+    for _ in places:
+        function(t, y, yp, out, idata, rdata, work)
+        y[places] -= out[places]
+    return y
+
+
 class System(BaseSystem):
     """A mechanism as a DAE.
 

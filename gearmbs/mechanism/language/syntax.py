@@ -266,13 +266,18 @@ class _Parser:
         if self.accept(symbol) is None:
             kind, value, at, _ = self.tokens[self.next]
             found = "the end" if kind == "end" else repr(value)
-            raise self.error(f"expected {symbol!r} {where}, found {found}", at)
+            raise self.error(f"expected {symbol!r} {where}, found {found}{self.hint()}", at)
+
+    def hint(self) -> str:
+        """Return what to do about a name behind another one."""
+        several = self.next > 0 and self.tokens[self.next][0] == self.tokens[self.next - 1][0] == "name"
+        return " (a name of several words stands in quotation marks)" if several else ""
 
     def whole(self) -> Node:
         node = unrolled(self.sum())
         kind, value, at, _ = self.tokens[self.next]
         if kind != "end":
-            raise self.error(f"unexpected {value!r} after the expression", at)
+            raise self.error(f"unexpected {value!r} after the expression{self.hint()}", at)
         return node
 
     # each rule yields the rules within it and is sent their nodes, see `unrolled`

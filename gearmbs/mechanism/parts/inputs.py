@@ -17,7 +17,7 @@ from gearmbs.mechanism.language.syntax import DIMENSIONS as LANGUAGE
 from gearmbs.mechanism.language.syntax import Name, Units, parse
 from gearmbs.mechanism.parts.functions import TimeFunction, function_text
 from gearmbs.mechanism.parts.quantities import quantity
-from gearmbs.units import DIMENSIONS, powers_of
+from gearmbs.units import DIMENSIONS, beyond_mechanics, powers_of
 
 COEFFICIENTS = tf.PIECE_SIZE - 1
 """Number of coefficients of the polynomial that an input is as a function of time."""
@@ -230,8 +230,8 @@ def checked_unit(unit: Any, field: str) -> str:
     if unit in ("", "1", "dimensionless"):
         return "dimensionless"
     found = powers_of(unit) if isinstance(unit, str) else None
-    if found is None or found[0] != 1.0:
-        raise ModelError(f"{field}: unit {unit!r} is none of SI; give one such as 'N m', 'rad/s', 'm' or '1'")
+    if (found is None or found[0] != 1.0) and not (isinstance(unit, str) and beyond_mechanics(unit)):
+        raise ModelError(f"{field}: unit {unit!r} is none of SI; give one such as 'N m', 'rad/s', 'm', 'V' or '1'")
     return DIMENSIONS.get(unit, unit)
 
 
@@ -246,9 +246,12 @@ def unit_factor(units: Units, unit: str) -> float:
     if units == Units() or unit in ("dimensionless", "rad"):
         return 1.0
     wanted = powers_of(unit)
+    if wanted is None:
+        # a voltage or a temperature: no set of units has another one for it
+        return 1.0
     for dimension, (mass, length, time, force) in LANGUAGE.items():
         powers = (length + force, mass + force, time - 2 * force)
-        if wanted is not None and wanted[1][:3] == powers:
+        if wanted[1][:3] == powers:
             return units.factor(dimension)
     raise ModelError(f"unit {unit!r} has no counterpart in the mechanism's units; give one of a force, length or time")
 

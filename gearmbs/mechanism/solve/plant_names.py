@@ -131,9 +131,17 @@ class PlantNames:
         """Return an input of the mechanism; it may be the speed or the acceleration that motions prescribe."""
         m = self.mechanism
         name = item if isinstance(item, str) else item.name
+        name = m.aliases.get(name, name)
         made = m.inputs.get(name)
         if made is None:
-            remedy = _there(name, list(m.inputs)) if m.inputs else "add one with Mechanism.input, or give a tuple"
+            remedy = (
+                _there(name, [*m.inputs, *(k for k, one in m.aliases.items() if one in m.inputs)])
+                if m.inputs
+                else "add one with Mechanism.input, or give a tuple"
+            )
+            part, _, field = name.partition(".")
+            if part in m.elements and field in ("torque", "force"):
+                remedy = f"it is a number of an element: give ({field!r}, {part!r})"
             raise ModelError(f"input {name!r}: the mechanism has no input of this name; {remedy}")
         orders: dict[int, list[Joint]] = {}
         for joint in m.joints.values():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -113,6 +113,8 @@ def linearize(
     for what, asked in (("inputs", inputs), ("outputs", outputs)):
         if isinstance(asked, str):
             raise ModelError(f"{what}: {asked!r} is one name; give a list, [{asked!r}]")
+        if not isinstance(asked, Iterable):
+            raise ModelError(f"{what}: {asked!r} is no list; give one of names and tuples, such as [('torque', 'pin')]")
     names = PlantNames(mechanism)
     point = point_of(mechanism, at, t)
     with markers_kept((mechanism.ground, *mechanism.bodies.values())):

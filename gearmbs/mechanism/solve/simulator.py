@@ -17,6 +17,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
+from gearmbs.dae.model.system import settle_states
 from gearmbs.dae.problem import DAEProblem, ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
@@ -402,7 +403,9 @@ class Simulator(Sampled, Restored):
     def set(self, name: str, value: Any, hold: int = 0) -> None:
         """Give an input or a parameter another value, from the present time on.
 
-        Values up to the present time stay as they were returned. The step that has gone past it is cut back to it.
+        Values up to the present time stay as they were returned. The step that has gone past it is cut back to it. It
+        acts from the next :meth:`advance` on: ``get("input", name)`` tells what is going to act, and all else what has
+        acted up to the present time, as `Solution.input` does. Before the first advance it acts from the start.
 
         Parameters
         ----------
@@ -495,7 +498,11 @@ class Simulator(Sampled, Restored):
         rdata = self._run.state.rdata.copy()
         rdata[self._settings.cells] = values
         first, points, started = (self._problem, self._origin), self._points, self._run.started
-        self._begin(State.of(self._base, point.t, point.y, point.yp, self._own_tables(point.idata, rdata)), repair=True)
+        tables, y = self._own_tables(point.idata, rdata), point.y
+        if not started:
+            # the first point is one with what is set before the start
+            y = settle_states(self._base.residual, point.t, y, point.yp, *tables)
+        self._begin(State.of(self._base, point.t, y, point.yp, tables), repair=True)
         self._settings.led = led
         if started:
             self._problem, self._origin = first

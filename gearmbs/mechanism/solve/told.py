@@ -14,6 +14,7 @@ from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
 from gearmbs.mechanism.parts.bodies import OwnAttributes, markers_kept
+from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.wording import did_you_mean
 
@@ -26,6 +27,8 @@ AT_AN_INSTANT = (
 """What `Solution` tells of one instant alone."""
 COUNTED = ("joint_angle", "evaluate")
 """What it tells with full turns counted from the first point on."""
+OF_PLANTS = ("joint_rate", "marker_acceleration")
+"""What a plant alone tells of an output."""
 COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 """AX, AY and AZ of the function language."""
 
@@ -188,6 +191,14 @@ class Told(OwnAttributes):
         solution.initial = self._origin
         solution.inside = self._row.inside
         return solution
+
+
+def check_told(output: Output) -> None:
+    """Raise a ModelError if an output is something that nobody tells."""
+    what, known = output.asked[0], [*AT_AN_INSTANT, *COUNTED, *OF_PLANTS]
+    if what.startswith("_") or not (what in known or hasattr(Solution, what)):
+        hint = did_you_mean(what, known, shown=repr, otherwise=f"there are {', '.join(known)}")
+        raise ModelError(f"output {output.name!r}: nothing is called {what!r}; {hint}")
 
 
 def _check_names(what: str, found: Any, names: tuple[Any, ...]) -> None:
