@@ -25,6 +25,17 @@ MOST_POINTS = 1 << 21
 """Points of a curve over all that two wheels do before they meet again, at most: 16 MB."""
 OUTSTANDING = 5.0
 """Robust standard deviations by which a tooth stands out: of 100 teeth of chance one does in 20,000 wheels."""
+RUN_OUT = 2
+"""Orders of a wheel that are its run-out: eccentricity is the first, a wheel pressed oval the second."""
+TEETH_OF_ORDER = 6
+"""Teeth for each order of run-out: fewer would be fitted by it, errors and all."""
+REWEIGHTED = 30
+"""Rounds of least squares with new weights: each halves what is left, or more, down to single precision."""
+LEAST_REST = 1e-6
+"""Part of the largest residual below which they weigh the same: far below the twentieth that teeth scatter by."""
+ENDS = 8
+"""Turns of the slower shaft that a record must have beside those of the window: two at either end for the smooth angle,
+four for its flank."""
 SHAFTS = ("driver", "driven")
 
 
@@ -68,6 +79,8 @@ class MeasuredTransmissionError(Shown):
     places : dict of str to float
         Angle of the driven disc as mark 0 of the driver passes, rad, by load.
     lines_of : tuple of int
+    turns : float
+        Of the driver, in the shortest run's window.
     doubt : str or None
         Why the told teeth or lines seem to be wrong (`gearmbs.signals.encoders.plausible`).
     """
@@ -85,6 +98,7 @@ class MeasuredTransmissionError(Shown):
     speed: float
     places: Mapping[str, float]
     lines_of: tuple[int, int]
+    turns: float
     doubt: str | None = None
     source: str = field(default="pulses")
 
@@ -234,8 +248,10 @@ class MeasuredTransmissionError(Shown):
         -------
         DataFrame
             ``tooth``, as the train's `tooth_at_zero` numbers them, else from the one in mesh at mark 0; ``error``, what
-            the wheel's orders beside the mesh orders come to over the tooth's pitch, on average, m; ``within`` what
-            that is known to; ``f_i`` the range over this pitch, mesh orders included, m; and whether it stands out.
+            the wheel's orders beside the mesh orders come to over the tooth's pitch, on average, m; ``deviation`` of it
+            from the run-out of the others, m; ``within`` what these are known to, with what the teeth of the other
+            wheel may add if the record ends before the wheels meet again; ``f_i`` the range over this pitch, mesh
+            orders included, m; and whether it stands out.
 
         Raises
         ------
@@ -246,25 +262,58 @@ class MeasuredTransmissionError(Shown):
         if self.teeth is None:
             raise SignalError("teeth: not known; give teeth=(z1, z2) for tooth-by-tooth errors")
         count = self.teeth[at]
-        own, _, _ = self._closed(load, at, with_mesh=False, clear=False)
         whole, _, _ = self._closed(load, at)
-        number, step = self.tooth_at_zero[at] or (0.0, 1.0)
-        # tooth m is in mesh, half a pitch to either side, at the angle (m - number) step pitches
-        slot = np.mod(np.round(number + step * count * np.arange(own.size) / own.size), count).astype(int)
-        inside = [slot == m for m in range(count)]
-        error = np.array([own[k].mean() for k in inside])
+        error, inside = self._by_tooth(load, at)
         variance = 0.0
         for one in self.lines:
             order = (one.first, one.second)[at]
             if order is not None and not one.harmonic:
                 variance += self._value(one, load)[1] * np.sinc(order / count) ** 2
-        within = float(stats.norm.ppf(0.5 + 0.5 * self.probability)) * math.sqrt(variance)
-        off = error - np.median(error)
+        within = float(stats.norm.ppf(0.5 + 0.5 * self.probability)) * math.sqrt(variance) + self._leak(load, at)
+        off = _beside_run_out(error)
         scale = 1.4826 * float(np.median(np.abs(off)))
         out = np.abs(off) > max(OUTSTANDING * scale, within)
         ranges = [float(np.ptp(np.roll(whole, whole.size // 2)[np.roll(k, k.size // 2)])) for k in inside]
         return pd.DataFrame(
-            {"tooth": np.arange(count), "error": error, "within": within, "f_i": ranges, "stands_out": out}
+            {
+                "tooth": np.arange(count), "error": error, "deviation": off, "within": within, "f_i": ranges,
+                "stands_out": out,
+            }
+        )  # fmt: skip
+
+    def _by_tooth(self, load: str, at: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return the mean errors over the pitches of a wheel's teeth, m, and which points of its turn each has."""
+        assert self.teeth is not None
+        count = self.teeth[at]
+        own, _, _ = self._closed(load, at, with_mesh=False, clear=False)
+        number, step = self.tooth_at_zero[at] or (0.0, 1.0)
+        # tooth m is in mesh, half a pitch to either side, at the angle (m - number) step pitches
+        slot = np.mod(np.round(number + step * count * np.arange(own.size) / own.size), count).astype(int)
+        inside = [slot == m for m in range(count)]
+        return np.array([own[k].mean() for k in inside]), inside
+
+    def _leak(self, load: str, at: int) -> float:
+        """Return what the other wheel's teeth may add to a tooth's mean over its turns, m.
+
+        Until the wheels meet again a tooth meets another one of the other wheel in each of its turns, so that their
+        mean is not zero: at most that of the largest, as many as there are turns. Over whole meetings it is.
+        """
+        if self.turns % self.gearing.ratio.numerator == 0:
+            return 0.0
+        met = max(1, math.floor(self.turns / (1.0 if at == 0 else float(self.gearing.ratio))))
+        other = np.sort(np.abs(self._by_tooth(load, 1 - at)[0]))[::-1]
+        return float(other[:met].sum()) / met
+
+    @property
+    def short(self) -> str | None:
+        """How long a record must be to tell the wheels' teeth apart, if it is shorter."""
+        meeting = self.gearing.ratio.numerator
+        if self.turns % meeting == 0:
+            return None
+        return (
+            f"The wheels meet again after {meeting} turns of the driver, of which the record holds {self.turns:.3g}: "
+            "until then errors of teeth of one wheel are seen in part as such of the other. Record "
+            f"{math.ceil(meeting + ENDS * max(1.0, float(self.gearing.ratio)))} turns or more."
         )
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -316,6 +365,8 @@ class MeasuredTransmissionError(Shown):
             *(f"- {note}" for note in self.notes), "",
             f"**{self.verdict}**",
         ]  # fmt: skip
+        if self.teeth is not None and self.short is not None:
+            parts += ["", self.short]
         for load in self.loads:
             title = f" ({load})" if len(self.loads) > 1 else ""
             parts += ["", f"## Mesh harmonics, peak amplitudes in um{title}", "", _micro(self.harmonics(load))]
@@ -323,7 +374,7 @@ class MeasuredTransmissionError(Shown):
             for shaft in SHAFTS if self.teeth is not None else ():
                 teeth = self.tooth_errors(shaft, load)
                 out = teeth[teeth["stands_out"]]
-                words = ", ".join(f"{t} ({1e6 * e:+.2f} um)" for t, e in zip(out["tooth"], out["error"]))
+                words = ", ".join(f"{t} ({1e6 * e:+.2f} um)" for t, e in zip(out["tooth"], out["deviation"]))
                 within = 1e6 * float(teeth["within"].iloc[0])
                 counted = "" if self.referenced[_shaft(shaft)] else ", counted from where the record begins"
                 parts += [
@@ -337,6 +388,21 @@ class MeasuredTransmissionError(Shown):
 
     def __str__(self) -> str:
         return self.to_markdown()
+
+
+def _beside_run_out(error: np.ndarray) -> np.ndarray:
+    """Return how far teeth are beside the mean and the first orders of their wheel, which few teeth do not move.
+
+    The sum of absolute residuals is least, by least squares with weights of 1/|residual|.
+    """
+    turn = TURN * np.arange(error.size) / error.size
+    orders = range(1, 1 + min(RUN_OUT, error.size // TEETH_OF_ORDER))
+    terms = np.stack([np.ones(error.size), *(f(k * turn) for k in orders for f in (np.cos, np.sin))], axis=1)
+    rest = error - np.median(error)
+    for _ in range(REWEIGHTED):
+        weight = 1.0 / np.sqrt(np.maximum(np.abs(rest), LEAST_REST * np.abs(rest).max() + np.finfo(float).tiny))
+        rest = error - terms @ np.linalg.lstsq(weight[:, None] * terms, weight * error, rcond=None)[0]
+    return rest
 
 
 def _shaft(name: str) -> int:

@@ -74,6 +74,7 @@ class _Measured:
     place: float
     turns: int
     doubt: str | None
+    window: Window
 
     @property
     def wander(self) -> float:
@@ -177,7 +178,7 @@ def transmission_error_from_pulses(
         tooth_at_zero=(trains[0].tooth_at_zero, trains[1].tooth_at_zero),
         referenced=(trains[0].referenced, trains[1].referenced), speed=trains[0].mean_speed,
         places={m.run.load: m.place for m in reversed(measured)},
-        lines_of=(trains[0].lines, trains[1].lines), doubt=next(filter(None, (m.doubt for m in measured)), None),
+        lines_of=(trains[0].lines, trains[1].lines), turns=min(m.window.turns for m in measured), doubt=next(filter(None, (m.doubt for m in measured)), None),
     )  # fmt: skip
 
 
@@ -297,7 +298,7 @@ def _lines_of(
     doubt = repeating_marks(trains, (float(gearing.mesh), float(gearing.on_second(gearing.mesh))))
     # marks that repeat are told for lines of a mesh otherwise
     doubt = doubt or doubted_numbers(first, second, begin, end, gearing, (run.driver.lines, run.driven.lines))
-    return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)), doubt)
+    return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)), doubt, window)
 
 
 def _check_clocks(run: CoupledRun, drift: float, mesh: float, turns: float) -> None:

@@ -483,3 +483,38 @@ def test_marks_with_a_period_are_no_chance():
     two = CoupledRun(encoder(angles[0], lines, marks=wave, index=True, mounted=turned), one.driven, shift=(turned, 0.0))
     known = transmission_error_from_pulses([one, two], TEETH, base_radius=radius, mark_error=(0.01, 1e-6)).harmonics()
     assert known["amplitude"][0] < 1e-3 * 1e-4 * radius
+
+
+def wrong_tooth(run_out, size=4e-6, tooth=8, teeth=21):
+    """A driver with one wrong tooth and run-out: m, over its turns."""
+
+    def error(turns):
+        place = np.mod(turns * teeth - tooth + 0.5, teeth) - 0.5
+        return size * np.cos(np.pi * np.clip(place, -0.5, 0.5)) ** 2 + run_out * np.cos(math.tau * turns)
+
+    return error
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [20, 48])
+@pytest.mark.parametrize("run_out", [0.0, 10e-6])
+def test_a_tooth_stands_out_of_run_out_and_on_its_own_wheel_alone(turns, run_out):
+    """Short of the turns after which the wheels meet again the other wheel's teeth seem to have a part of the error."""
+    radius = 41.76e-3
+    discs = Discs(error=1e-4, jitter="10 ns")
+    angles = coupled(wrong_tooth(run_out), (21, 34), radius, turns=turns)
+    found = transmission_error_from_pulses(discs.run(angles), (21, 34), base_radius=radius)
+    driver, driven = found.tooth_errors("driver"), found.tooth_errors("driven")
+    assert list(driver.index[driver["stands_out"]]) == [8]
+    assert not driven["stands_out"].any()
+    assert driver["deviation"][8] == pytest.approx(2e-6, rel=0.15)
+    assert (found.short is None) == (turns == 48)
+    assert ("meet again after 34 turns" in found.to_markdown()) == (turns == 20)
+
+
+@pytest.mark.slow
+def test_run_out_alone_accuses_no_tooth():
+    radius = 41.76e-3
+    angles = coupled(wrong_tooth(10e-6, size=0.0), (21, 34), radius, turns=48)
+    found = transmission_error_from_pulses(Discs(error=1e-4).run(angles), (21, 34), base_radius=radius)
+    assert not any(found.tooth_errors(shaft)["stands_out"].any() for shaft in ("driver", "driven"))
