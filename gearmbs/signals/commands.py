@@ -187,13 +187,18 @@ def _with_bearings(
     the record is analysed again at that of a family further off.
     """
     from gearmbs.signals import AnalysisReport, diagnose_bearing, shaft_phase
+    from gearmbs.signals.rotation.shaft import speed_of_channel
 
     known = done.shaft["speed"]
     constant = isinstance(known, float) and done.shaft["tacho"] is None and done.shaft["speed_channel"] is None
-    if not constant and (known is not None or done.shaft["tacho"] or done.shaft["speed_channel"]):
-        asked["phase"] = shaft_phase(done.signal, **done.shaft)
     turns = known if isinstance(known, float) else done.report.speed
     asked["speed"] = asked.get("speed") if turns is None else turns
+    if done.shaft["tacho"]:
+        asked["phase"] = shaft_phase(done.signal, **done.shaft)
+    elif done.shaft["speed_channel"]:
+        asked["speed"] = speed_of_channel(done.signal, done.shaft["speed_channel"])
+    elif not constant and known is not None:
+        asked["speed"] = known
     asked["band"] = None if band is None else pair_of(band)
     one = done.signal.sel(channel=done.report.levels["channel"].values)
     bearings = diagnose_bearing(one, **asked)

@@ -384,3 +384,28 @@ def test_an_acquittal_says_what_limits_it():
     assert acquitted.fault is hardly.fault is None
     assert "has 22 turns, in which only strong lines stand out: take 60 or more" in hardly.verdict
     assert "turns, in which" not in acquitted.verdict
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("off", [-0.02, 0.03])
+def test_a_run_up_told_wrongly_does_not_acquit(off):
+    """Blows at the outer race's order of a shaft from 15 to 40 turns a second, whose lines stand nowhere."""
+    rate, seconds = 12000, 5
+    time = np.arange(rate * seconds) / rate
+    turned = np.cumsum(np.linspace(15.0, 40.0, time.size)) / rate
+    noise = 0.1 * np.random.default_rng(8).standard_normal(time.size)
+    blows = np.zeros(time.size)
+    blows[np.searchsorted(turned, np.arange(1, int(turned[-1] * LINES.bpfo)) / LINES.bpfo)] = 0.6
+    fall = np.arange(200) / rate
+    rung = np.convolve(blows, np.exp(-800.0 * fall) * np.sin(2 * np.pi * 3000.0 * fall))[: time.size]
+
+    def told(values, share):
+        curve = [(0, f"{900 * (1 + share)} rpm"), (5, f"{2400 * (1 + share)} rpm")]
+        return diagnose_bearing(make_signal(values, float(rate), units="m/s^2"), "6205", curve)
+
+    assert told(noise + rung, 0.0).fault == "outer race"
+    doubted = told(noise + rung, off)
+    assert doubted.fault is None
+    assert "CHECK THE SPEED" in doubted.verdict
+    assert "Not certain" in doubted.verdict
+    assert told(noise, off).remarks == []

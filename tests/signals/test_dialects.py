@@ -15,6 +15,7 @@ from gearmbs.signals import (
     MissingMetadataError,
     SignalError,
     SignalFileError,
+    analyse,
     diagnose_bearing,
     make_signal,
     read_signal,
@@ -23,6 +24,7 @@ from gearmbs.signals import (
     units_of,
     write_signal,
 )
+from gearmbs.signals.signal.labels import name_and_unit, role_of
 from gearmbs.signals.signal.signal import unit_dimension
 from tests.says import says
 
@@ -617,3 +619,25 @@ def test_commas_between_columns_and_in_numbers_are_refused_unless_quoted(tmp_pat
         sign = ";" if ";" in text else ","
         signal = read_signal(written(tmp_path, f"Zeit [s]{sign}a [g]\n" + text))
         assert_is(signal, np.array(values, dtype=float))
+
+
+@pytest.mark.parametrize(
+    ("head", "speed"),
+    [
+        ("n [krpm]", 1.5), ("omega [deg/s]", 9000.0), ("U/s", 25.0), ("Speed (RPM x1000)", 1.5), ("n [1/min]", 1500.0),
+    ],
+)  # fmt: skip
+def test_columns_of_speeds_in_other_units_are_the_shafts(tmp_path, head, speed):
+    count = 4096
+    time = np.arange(count) / RATE
+    acc = np.cos(2 * np.pi * 400.0 * time) + 0.01 * np.random.default_rng(0).standard_normal(count)
+    table = pd.DataFrame({"Time [s]": time, "acc [g]": acc, head: speed, "Load [%]": 50.0 + acc})
+    report = analyse(read_signal(written(tmp_path, table.to_csv(index=False))))
+    assert report.speed == pytest.approx(2 * np.pi * 25.0)
+    assert list(report.levels["channel"]) == ["acc"]
+    assert any("Load" in note and "percents" in note for note in report.notes)
+
+
+def test_columns_called_like_units_of_turns_may_be_vibration():
+    for label in ("v [m/s]", "left/right", "u [mm/s]", "acc x"):
+        assert role_of(*name_and_unit(label)) is None

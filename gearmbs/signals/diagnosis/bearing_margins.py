@@ -38,7 +38,7 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     Judged,
 )
 from gearmbs.signals.diagnosis.bearing_report import CAGE
-from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, far_shaft, tried_speeds
+from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE, ShaftSpeed, far_shaft, find_shaft, tried_speeds
 
 CARRIERS = 20.0
 """Carriers above so many times a line show blows; below, smooth motions have lines, too."""
@@ -110,6 +110,7 @@ def weigh(
     others: Sequence[float],
     judge_at: Callable[[float], Iterator[Sequence[Judged]]],
     timed: bool = False,
+    curve: bool = False,
 ) -> Weighed:
     """Judge a record at the told speed, at those within its tolerance, and where its shaft's own line stands.
 
@@ -124,10 +125,14 @@ def weigh(
     judge_at : callable
         Returns what is judged at a speed in Hz, by channel.
     timed : bool
-        Whether the speed comes from the record itself, by pulses, whatever its sampling rate is.
+        Whether the angle of the shaft is known, whatever the sampling rate is.
+    curve : bool
+        Whether that angle is only that of a speed told over time, which a family of the shaft's orders may confirm.
     """
     answers = answers_at(tried_speeds(spectra, told, tolerance), judge_at, SPEED_SHARE)
     near = Weighed(answers, verdicts_of(answers))
+    if curve and not find_shaft(spectra, told).found:
+        return replace(near, verdicts=_shifted(near, told, TOLERANCE, judge_at, SHIFTS))
     if timed:
         return near
     if near.speed.found or tolerance <= 0.0:

@@ -200,7 +200,8 @@ def diagnose_bearing(
         that are alike and turn alike have the same lines and are reported as one, "a or b".
     speed : float, str or curve, optional
         Of the inner ring's shaft, rad/s or text; default the signal's, constant or over time. Of a curve, as for
-        `speed_curve`, the angle is taken, see ``phase``.
+        `speed_curve`, the angle is taken, see ``phase``; if no family of the shaft's orders confirms it and no part is
+        named, lines that would be clear if it were off by up to 6 % are told as not certain.
     band : pair of float or str, optional
         Hz or texts; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's
         edge.
@@ -236,10 +237,11 @@ def diagnose_bearing(
     """
     known = _distinct(_all_lines(bearing))
     _check_search(slip, harmonics, tolerance, level)
+    curve = False
     if phase is None and speed is not None and not isinstance(speed, (int, float, str)):
-        phase = phase_from_speed(signal, speed)
+        phase, curve = phase_from_speed(signal, speed), True
     elif phase is None and speed is None and shaft_coords(signal):
-        phase = shaft_phase(signal)
+        phase, curve = shaft_phase(signal), "angle" not in shaft_coords(signal)
     told, notes = _shaft(signal, speed, phase)
     notes += instrument_faults(signal)
     rate = rate_of(signal)
@@ -255,7 +257,7 @@ def diagnose_bearing(
     own = [] if phase is not None else [channel_spectrum(values, rate, told) for values in signal.values.T]
     spectra = [*own, *(each[-1] for each in heard.values())]
     timed = phase is not None
-    weighed = weigh(spectra, told, 0.0 if timed else tolerance, others or (), judge_at, timed)
+    weighed = weigh(spectra, told, 0.0 if timed else tolerance, others or (), judge_at, timed, curve)
     findings, clearest = _found(signal, weighed, heard, known, others, slip, level, highest)
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),

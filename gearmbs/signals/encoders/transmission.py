@@ -178,7 +178,8 @@ def transmission_error_from_pulses(
         tooth_at_zero=(trains[0].tooth_at_zero, trains[1].tooth_at_zero),
         referenced=(trains[0].referenced, trains[1].referenced), speed=trains[0].mean_speed,
         places={m.run.load: m.place for m in reversed(measured)},
-        lines_of=(trains[0].lines, trains[1].lines), turns=min(m.window.turns for m in measured), doubt=next(filter(None, (m.doubt for m in measured)), None),
+        lines_of=(trains[0].lines, trains[1].lines), turns=min(m.window.turns for m in measured),
+        doubt=next(filter(None, (m.doubt for m in measured)), None),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.labels import HERTZ, RPM_UNITS
+from gearmbs.signals.signal.labels import HERTZ, RPM_UNITS, THOUSANDS
 from gearmbs.signals.signal.signal import SHAFT, STEADY, check_teeth, with_metadata
 from gearmbs.units import to_si
 
@@ -178,6 +178,8 @@ def _of_points(speed: Any) -> tuple[np.ndarray, np.ndarray]:
 def unit_factor(unit: str) -> float:
     """Factor from a unit of rotation to rad/s: rpm, Hz, rad/s, deg/s, 1/min ..."""
     clean = unit.strip()
+    if clean.lower() in THOUSANDS:
+        return 1000.0 * _quantity("1 rpm", "angular speed", "speed")
     text = "rpm" if clean.lower() in RPM_UNITS else "Hz" if clean.lower() in HERTZ else clean
     return _quantity(f"1 {text}", "angular speed", "speed")
 

@@ -35,8 +35,11 @@ RPM_UNITS = frozenset(
     "rpm 1/min min-1 min^-1 u/min umin r/min rev/min tr/min t/min tpm ot/min ot./min otmin 1/minute giri/min obr/min "
     "obr./min varv/min omw/min rev./min об/мин".split()
 )
-HERTZ = frozenset("hz 1/s s-1 s^-1 rps".split())
-OF_ROTATION = HERTZ | {"rad/s"}
+THOUSANDS = frozenset(("krpm", "rpm x1000", "rpm x 1000", "rpm*1000", "x1000 rpm", "1000 rpm", "1000/min"))
+"""Of turns a minute."""
+TURNS = frozenset("rps u/s rev/s r/s tr/s ot/s".split())
+HERTZ = frozenset("hz 1/s s-1 s^-1".split()) | TURNS
+OF_ROTATION = HERTZ | THOUSANDS | {"rad/s", "deg/s", "°/s"}
 SPEED_COLUMN = re.compile(
     r"speed|rpm|drehzahl|umdrehung|otack|otacek|vitesse(?!vib)|regimemoteur|^n$|^n\d$|^omega$|shaftfreq|rotationfreq"
 )
@@ -56,7 +59,8 @@ FEWEST_EVEN = 16
 STEADY = 0.2
 """Standard deviation by mean up to which a column named n, without a unit, is a speed."""
 
-Role = Literal["time", "speed", "tacho", "temperature", "count", "angle"]
+SHARES = frozenset(("%", "percent"))
+Role = Literal["time", "speed", "tacho", "temperature", "count", "angle", "share"]
 SLOW_ROLES = ("speed", "temperature")
 """Columns of these may have fewer samples than the others, and are interpolated."""
 SLOW_SAID = "{name} has fewer samples than the {size} of the others; between them it is interpolated."
@@ -67,6 +71,7 @@ WORDS: dict[str, str] = {
     "temperature": "holds a temperature",
     "count": "counts or tells time: it rises evenly",
     "angle": "holds the angle of a shaft",
+    "share": "holds percents, as of a load,",
 }
 
 
@@ -94,6 +99,8 @@ def name_and_unit(label: str) -> tuple[str, str]:
     >>> name_and_unit("left/right"), name_and_unit("Y[0]")
     (('left/right', 'unknown'), ('Y[0]', 'unknown'))
     """
+    if label.strip().lower() in TURNS:
+        return label.strip(), label.strip()
     for pattern in (QUOTIENT, IN_WORDS):
         found = pattern.match(label)
         unit = (found.group(2) or found.group(3) or "").strip() if found else ""
@@ -152,8 +159,10 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
     key, low = key_of(name)[0], unit.strip().lower()
     unknown = low in ("", UNKNOWN_UNITS)
     timed = low in ("s", "ms", "us", "µs", "sec")
-    if low in RPM_UNITS or (SPEED_COLUMN.search(key) and low in OF_ROTATION):
+    if low in RPM_UNITS or low in THOUSANDS or low in TURNS or (SPEED_COLUMN.search(key) and low in OF_ROTATION):
         return "speed"
+    if low in SHARES:
+        return "share"
     if SHAFT_COLUMN.search(key) and low in HERTZ:
         return "speed"
     if low in ANGLE_UNITS and values is not None and np.mean(np.diff(values) > 0.0) >= FORWARD:
