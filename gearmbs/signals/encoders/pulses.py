@@ -114,12 +114,20 @@ def pulse_train(
     SignalError
         If times do not increase, pulses are too few, or something is out of range.
     """
-    at = np.asarray(times, dtype=float)
+    try:
+        at = np.asarray(times, dtype=float)
+    except (TypeError, ValueError):
+        raise SignalError(f"times: those of {name!r} must be numbers, s, got {str(times)[:60]}") from None
     if isinstance(lines, bool) or int(lines) != lines or lines < 1:
         raise SignalError(f"lines: must be a whole number of marks a turn, got {lines!r} for {name!r}")
     if faults not in ("mend", "refuse", "keep"):
         raise SignalError(f"faults: must be 'mend', 'refuse' or 'keep', got {faults!r}")
-    if at.ndim != 1 or not np.isfinite(at).all() or np.any(np.diff(at) <= 0.0):
+    if not np.isfinite(at).all():
+        raise SignalError(
+            f"times: that of pulse {int(np.argmax(~np.isfinite(at)))} of {name!r} is no finite number; leave out what "
+            "is none, pulses that are missing are found by the intervals beside them"
+        )
+    if at.ndim != 1 or np.any(np.diff(at) <= 0.0):
         steps = np.diff(at) if at.ndim == 1 and at.size > 1 else np.zeros(1)
         back = int(np.argmax(steps <= 0.0))
         falls = -steps[steps < 0.0]

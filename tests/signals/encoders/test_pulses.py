@@ -290,3 +290,12 @@ def test_what_is_no_train_is_refused():
     with pytest.raises(SignalError, match=says("record", "encoder")):
         shaft_angles(make_signal(times, 100.0).to_dataset(name="x"))
     assert mark_errors(1000, 0.01, 3).std() * 1000 / math.tau == pytest.approx(0.01, rel=0.1)
+
+
+def test_times_that_are_no_numbers_are_named():
+    times = np.arange(400) / 100.0
+    with pytest.raises(SignalError, match=says("pulse 5", "finite")):
+        pulse_train(np.where(np.arange(400) == 5, np.nan, times), 60)
+    with pytest.raises(SignalError, match=says("times", "numbers", "['a']")):
+        pulse_train(["a"], 60)
+    assert pulse_train(np.delete(times, 5), 60).turns == pytest.approx(399 / 60)
