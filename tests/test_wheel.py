@@ -103,10 +103,11 @@ def test_the_sdist_holds_what_is_checked_in(source, sdist):
     held = {name.partition("/")[2] for name in tarfile.open(sdist).getnames()}
     made = {"PKG-INFO", "setup.cfg"}
     files = {p.relative_to(source).as_posix() for p in source.rglob("*") if p.is_file()}
-    checked_in = {f for f in files if ".egg-info" not in f and not f.startswith((".git", "build/"))}
+    own = (".git/", ".gitignore", "build/")
+    checked_in = {f for f in files if ".egg-info" not in f and f != ".git" and not f.startswith(own)}
     assert {"CHANGELOG.md", "Makefile", "docs/conf.py", "tests/conftest.py", "benchmarks/__main__.py"} <= checked_in
     assert checked_in <= held
-    assert {f for f in held - checked_in - made if "." in Path(f).name and ".egg-info" not in f} <= {".ci"}
+    assert {f for f in held - checked_in - made if "." in Path(f).name and ".egg-info" not in f} <= {".ci", ".github"}
 
 
 def test_the_sdist_passes_from_itself(sdist, environment, tmp_path):
