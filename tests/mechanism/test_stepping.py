@@ -28,6 +28,7 @@ from gearmbs.studies import flexible_rig
 from gearmbs.studies.run.simulation import case_mechanism
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_kinds_of_wheels import QUIET
+from tests.mechanism.agreement import assert_all_names_agree
 from tests.says import says
 
 PAIR = {"tol": 1e-7, "rate_scale": 3000.0}
@@ -331,7 +332,7 @@ def test_pair_of_the_paper():
         for t in times[51:]:
             sim.advance(t)
         np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
-        _assert_all_names_agree(m, sim, one)
+        assert_all_names_agree(m, sim, one)
 
 
 def test_values_are_those_of_the_solution():
@@ -501,7 +502,7 @@ def test_planetary_set():
         sim.advance(t)
     one = m.simulate(0.02, t_eval=times, tol=1e-5)
     np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
-    _assert_all_names_agree(m, sim, one)
+    assert_all_names_agree(m, sim, one)
     run = m.simulate(0.02, t_eval=times[20:], tol=1e-5, initial=state)
     np.testing.assert_array_equal(run.result.y, one.result.y[20:])
 
@@ -564,55 +565,5 @@ def test_drivetrains_go_on_as_one_run(model):
         for t in times[101:]:
             sim.advance(t)
         np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
-    told = _assert_all_names_agree(m, sim, one)
+    told = assert_all_names_agree(m, sim, one)
     assert told["output"] == len(m.outputs) == (4 if model is rolling_train else 0)
-
-
-def _assert_all_names_agree(m, sim, solution):
-    """Whatever a solution tells by any name is the same by ``get`` at its last point; what it does not, neither."""
-    markers = [marker.name for body in (*m.bodies.values(), m.ground) for marker in body.markers]
-    names = {what: list(known) for known, kinds in (
-        (m.bodies, BODY_QUANTITIES), (m.joints, ("reaction", "reaction_force", "joint_angle", "joint_displacement")),
-        (m.elements, ("load", "diagnostics", "contact", "transmission_error")),
-        (markers, ("marker_position", "marker_velocity", "deflection")),
-        (m.state_names, ("state",)), (m.outputs, ("output",)), (sim.numbers, ("input",)),
-    ) for what in kinds}  # fmt: skip
-    told = dict.fromkeys([*names, "kinetic_energy", "multipliers", "constraint_violation"], 0)
-    asked = [(what, (name,)) for what, given in names.items() for name in given]
-    for what, given in [*asked, ("kinetic_energy", ()), ("multipliers", ()), ("constraint_violation", ())]:
-        series = getattr(solution, what, None)
-        try:
-            if what == "transmission_error":
-                series = m.measures(solution).transmission_error
-            wanted = series(*given) if callable(series) else series
-        except (ModelError, KeyError) as error:
-            with pytest.raises(type(error)):
-                sim.get(what, *given)
-            continue
-        _assert_same(sim.get(what, *given), wanted)
-        told[what] += 1
-    return told
-
-
-ROUNDED = 1e-8
-"""What is zero but for rounding, in SI: accelerations of what is held, beside those of what spins."""
-BODY_QUANTITIES = (
-    "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
-    "modal_coordinates", "modal_velocities",
-)  # fmt: skip
-
-
-def _assert_same(now, series):
-    """Compare a value of an instant with the last one of a series, to a millionth of the largest.
-
-    A configuration is moved onto its constraints with the factors of the row before, where there is one.
-    """
-    if isinstance(series, dict):
-        for key, values in series.items():
-            _assert_same(now[key], values)
-    elif isinstance(series, tuple):
-        for part, values in zip(now, series, strict=True):
-            _assert_same(part, values)
-    else:
-        size = np.abs(series).max(initial=0.0)
-        np.testing.assert_allclose(now, series[-1], rtol=0.0, atol=1e-6 * size + ROUNDED)

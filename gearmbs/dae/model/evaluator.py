@@ -38,7 +38,6 @@ from gearmbs.dae.model.records import (
     are_satisfied,
     displace,
     largest_violation,
-    violations,
 )
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.jit import njit
@@ -56,10 +55,6 @@ _IVEC = int64[::1]
 GENERIC_TURNS = (0.1, 0.02, 0.3, 0.0)
 """Rotations, rad, off the position at which pivots are chosen, tried in turn: at special positions entries vanish by
 accident and the pivots would not serve their neighbours."""
-
-SAME_POSITION = 0.05
-"""Rotation, rad, after which the factors of one output no longer serve to project the next."""
-
 
 SINGULAR = 1e-8
 """Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
@@ -184,13 +179,6 @@ def _evaluate(
         projected = rows == 0 or only_assemble or trusted
         passes = 0
         while True:
-            if not projected:
-                # the factors of the row before serve while the bodies have hardly turned since
-                spin = violations(t[k], at, phi, idata, tab)
-                trusted = projected = are_satisfied(phi, tab)
-                if not projected and k > first and spin * (t[k] - t[k - 1]) <= SAME_POSITION:
-                    records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
-                    projected = True
             if idata[T.H_MODE] == NUMBERS:
                 vals[:] = 0.0
             count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, projected)
@@ -199,10 +187,10 @@ def _evaluate(
                 if idata[T.H_MODE] == COUNT:
                     vals[0] = count
                 return last
-            if passes == 0 and trusted:
+            if passes == 0 and projected == trusted:
                 records.strayed[k] = largest_violation(phi)
-                if not are_satisfied(phi, tab):
-                    trusted = projected = False
+                if are_satisfied(phi, tab) != trusted:
+                    trusted = projected = not trusted
                     continue
             if passes == 0 and not unchanged(vals, factored, allowed):
                 if not factor(plan, factors, vals) <= growth:
@@ -210,6 +198,7 @@ def _evaluate(
                 for p in range(vals.size):
                     factored[p] = vals[p]
             if not projected:
+                # with its own factors: with those of the row before it would end up somewhere else
                 records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
                 projected = True
                 continue

@@ -8,16 +8,11 @@ import numpy as np
 from numba import float64, types
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD, tape_row_rates
+from gearmbs.dae.equations.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD
 from gearmbs.dae.equations.bodies.body import displace_body
-from gearmbs.dae.equations.constraints import terms
-from gearmbs.dae.equations.constraints.terms import OFFSET, RATE, RELATIVE, dot_motion, relative_motion
-from gearmbs.dae.equations.loads import expressions
-from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR
-from gearmbs.dae.equations.rotation import KIN_V, KIN_W, POSE_COLUMNS
+from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.structs import vector_at
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -140,57 +135,6 @@ def are_satisfied(phi, tab):
         satisfied &= abs(phi[row + ROW_PHI]) <= rounded
         satisfied &= abs(phi[row + ROW_RATE]) <= ROUNDED_RATE
     return satisfied
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def violations(t, y, phi, idata, tab):
-    """Write Phi and Phi_q v + Phi_t of each row to ``phi``, as `saddle` does; return the fastest body's |omega|.
-
-    The kinematics, marker and function tables must be up to date.
-    """
-    g = vector_at(tab.scratch, S_GRADIENT, 12)
-    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
-    s = vector_at(tab.scratch, S_TERM, 100)
-    apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
-    last_i = last_j = np.int64(-1)
-    for r in range(idata[T.H_ROWS]):
-        value, rate = 0.0, 0.0
-        if tab.row[r, T.ROW_FUNCTION] >= 0:
-            fun = tab.row[r, T.ROW_FUNCTION]
-            value, rate = -tab.fval[fun, 0], -tab.fval[fun, 1]
-        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
-            coef = tab.coef[j]
-            kind = tab.term[j, T.TERM_TYPE]
-            if kind == terms.POINT or kind == terms.DOT1:
-                if kind == terms.POINT:
-                    if tab.term[j, T.TERM_I] != last_i or tab.term[j, T.TERM_J] != last_j:
-                        last_i, last_j = tab.term[j, T.TERM_I], tab.term[j, T.TERM_J]
-                        relative_motion(last_i, last_j, tab.marker_body, tab.kin, tab.frame, apart)
-                    c = tab.term[j, T.TERM_AXES]
-                    p, d = apart[OFFSET + c], apart[RATE + c]
-                else:
-                    p, d, _ = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
-                value += coef * p
-                rate += coef * d
-                continue
-            p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
-            value += coef * p
-            rate += coef * p_t
-            for side in range(2):
-                kin = tab.kin[tab.marker_body[tab.term[j, T.TERM_I + side]]]
-                rate += coef * (terms.dot3(g, 6 * side, kin, KIN_V) + terms.dot3(g, 6 * side + 3, kin, KIN_W))
-        if tab.row[r, T.ROW_TAPE] >= 0:
-            k = tab.row[r, T.ROW_TAPE]
-            n = 6 * tab.tape[k, T.TAPE_N_BODIES] + 1
-            v, d, _, _ = tape_row_rates(k, t, y, tab, expressions.tail(tab, n * (n + 1)))
-            value += v
-            rate += d
-        phi[ROW_RECORD * r + ROW_PHI] = value
-        phi[ROW_RECORD * r + ROW_RATE] = rate
-    spin = 0.0
-    for b in range(1, idata[T.H_BODIES]):
-        spin = max(spin, terms.dot3(tab.kin[b], KIN_W, tab.kin[b], KIN_W))
-    return np.sqrt(spin)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
