@@ -87,6 +87,8 @@ def analyse(
     with guarded(), stage_bar(file.name) as move:
         check_kind(file, "record")
         check_targets(out, tables=tables, figures=figures)
+        if not bearing and train is None:
+            _refuse_alone({"--band": band, "--shaft": shaft_texts, "--speed-tolerance": tolerance}, "--bearing 6205")
         from gearmbs.signals.files.simulated import read_any
         from gearmbs.signals.signal.labels import measured
 
@@ -132,6 +134,13 @@ def analyse(
             hand_over(done.text, out, [])
             raise
     hand_over(done.text, out, files)
+
+
+def _refuse_alone(options: dict[str, Any], needed: str) -> None:
+    """Refuse options that say something of another one which is not given."""
+    for name, value in options.items():
+        if value is not None:
+            raise ValueError(f"{name}: {value} has no effect without {needed.split()[0]}; give {needed} with it")
 
 
 @dataclass(frozen=True)
@@ -307,6 +316,8 @@ def compare(
     """Compare measured states with each other and with the model, as in the paper's section 4."""
     with guarded(), stage_bar("comparison") as move:
         check_targets(out, tables=tables, figures=figures)
+        if not repair:
+            _refuse_alone({"--full-scale": full_scale}, "--repair")
         from gearmbs.signals import compare as compare_signals
         from gearmbs.signals import point_track, repair_vibrometer
         from gearmbs.signals.files.simulated import parse_models, parse_states, read_any

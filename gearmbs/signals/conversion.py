@@ -54,7 +54,7 @@ def convert(
     to : {"displacement", "velocity", "acceleration"}
         What to convert to: m, m/s or m/s^2.
     band : (float or str, float or str)
-        Low and high end of the band in Hz or with units, 0 < low < high; high is capped at half the sampling rate.
+        Low and high end of the band in Hz or with units, 0 < low < high, up to half the sampling rate.
     edges : {"trim", "keep"}
         "trim" (default) fades the record in and out and drops 6 / low seconds at either end: what remains is right.
         "keep" keeps the length by reflecting the record at its ends; over those 6 / low seconds the result is
@@ -78,11 +78,12 @@ def convert(
         raise SignalError(f"{error}; give its low and its high end, as ('10 Hz', '1 kHz')") from None
     if to not in DERIVATIVE:
         raise SignalError(f"to: must be one of {list(DERIVATIVE)}, got {to!r}")
-    if not 0.0 < low < high or low >= rate / 2:
-        raise SignalError(f"band: must be 0 < low < high with low below {rate / 2:g} Hz, got {band}")
+    if not 0.0 < low < high <= rate / 2:
+        raise SignalError(
+            f"band: must be 0 < low < high with high up to {rate / 2:g} Hz, half the sampling rate, got {band}"
+        )
     if edges not in ("keep", "trim"):
         raise SignalError(f"edges: must be 'keep' or 'trim', got {edges!r}")
-    high = min(high, rate / 2)
     n = signal.sizes["time"]
     margin = math.ceil(EDGE_PERIODS * rate / low)
     if edges == "trim" and n <= 2 * margin:

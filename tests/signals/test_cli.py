@@ -91,6 +91,10 @@ def test_compare_writes_bars_for_measured_states(tmp_path):
         (["analyse", "x.csv", "--teeth", "32", "--tacho", "roof"], "roof"),
         (["compare", "--experiment", "x.csv", "--teeth", "32"], "load:state=path"),
         (["compare", "--experiment", "a:healthy=x.csv", "--teeth", "32", "--scope", "some"], "scope"),
+        (["compare", "--experiment", "a:healthy=x.csv", "--band", "1 kHz, 2 kHz"], "--as"),
+        (["compare", "--experiment", "a:healthy=x.csv", "--full-scale", "1 m/s"], "--repair"),
+        (["analyse", "x.csv", "--band", "1 kHz, 2 kHz"], "--bearing"),
+        (["analyse", "x.csv", "--shaft", "0.4"], "--bearing"),
     ],
 )
 def test_wrong_calls_end_with_one_message(tmp_path, monkeypatch, words, said):

@@ -107,6 +107,7 @@ def test_units_that_measure_no_vibration(unit):
     [
         ({"to": "jerk", "band": (10.0, 100.0)}, "to: .*one of"),
         ({"to": "velocity", "band": (100.0, 10.0)}, says("band", "(100.0, 10.0)", "6400 Hz")),
+        ({"to": "velocity", "band": (10.0, 6401.0)}, says("band", "(10.0, 6401.0)", "6400 Hz")),
         ({"to": "velocity", "band": (0.0, 10.0)}, says("band", "(0.0, 10.0)", "6400 Hz")),
         ({"to": "velocity", "band": ("10 mm", "1 kHz")}, says("band", "10 mm", "Hz")),
         ({"to": "velocity", "band": (1.0, 10.0)}, says("1.5625 s", "6 s", "raise band[0]", "edges='keep'")),
@@ -115,6 +116,11 @@ def test_units_that_measure_no_vibration(unit):
 def test_conversion_errors(kwargs, match):
     with pytest.raises(SignalError, match=match):
         convert(make_signal(np.ones(20000), RATE, units="m/s^2"), **kwargs)
+
+
+def test_a_band_may_end_at_half_the_rate():
+    signal = make_signal(np.sin(np.arange(20000.0)), RATE, units="m/s^2")
+    assert convert(signal, "velocity", band=(100.0, 6400.0)).attrs["band"] == (100.0, 6400.0)
 
 
 def test_envelope_of_an_am_tone():

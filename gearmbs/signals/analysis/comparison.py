@@ -102,6 +102,11 @@ def compare(
         raise SignalError(f"scope: must be 'load', 'all' or 'each', got {scope!r}")
     if way not in ("band", "orders"):
         raise SignalError(f"way: must be 'band' or 'orders', got {way!r}")
+    if band is not None and quantity is None:
+        raise SignalError(
+            f"band: {band} is that of a conversion, and nothing is converted; give quantity='acceleration', say "
+            "(--as acceleration), or leave band out"
+        )
     experiment = _signals(experiment, rate=rate, units=units, teeth=teeth, speed=speed, gaps=gaps)
     if quantity is not None:
         # a conversion hides what instruments did, which an analysis remarks on
