@@ -609,11 +609,17 @@ def test_one_heading_above_a_column_that_counts_keeps_two_columns(tmp_path):
     assert_is(named, np.array(whole[::-1], dtype=float), np.array(whole, dtype=float))
 
 
-def test_commas_between_columns_and_in_numbers_are_refused_unless_quoted(tmp_path):
+def test_commas_between_columns_and_in_numbers_are_read_by_their_headings(tmp_path):
     times = [f"{k / RATE:.9f}" for k in range(COUNT)]
     values = [f"{v:.2f}" for v in X]
+    signal = read_signal(written(tmp_path, "Zeit [s],a [g]\n" + commas(times, values)))
+    assert_is(signal, np.array(values, dtype=float))
+    assert any("2 headings" in note for note in signal.attrs["notes"])
+    whole = [str(round(100 * v)) for v in np.abs(X)]
     with pytest.raises(SignalFileError, match=says("2 headings", "4 fields", "semicolons")):
-        read_signal(written(tmp_path, "Zeit [s],a [g]\n" + commas(times, values)))
+        read_signal(written(tmp_path, "a [g],b [g]\n" + rows(whole, whole, whole[::-1], whole)))
+    with pytest.raises(SignalFileError, match=says("line 4", "6 values")):
+        read_signal(written(tmp_path, "Zeit [s],a [g]\n0,01,1,5\n0,02,1,5\n0,03,1,5,7,5\n"))
     quoted = [[f'"{cell}"' for cell in column] for column in (times, values)]
     for text in (commas(times, values, sign=";"), commas(*quoted)):
         sign = ";" if ";" in text else ","

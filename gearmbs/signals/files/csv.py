@@ -37,6 +37,7 @@ from gearmbs.signals.files.text_tables import (
     encoding_of,
     find_layout,
     index_meaning,
+    pointed,
     split_cells,
 )
 from gearmbs.signals.signal.labels import FEWEST_EVEN, role_of
@@ -278,6 +279,21 @@ def _layout(path: Path, packed: bool) -> CsvLayout:
     return find_layout(head, path)
 
 
+class _Pointed(io.TextIOBase):
+    """A text whose rows have decimal points for each second comma."""
+
+    def __init__(self, text: io.TextIOBase) -> None:
+        self.text, self.rest = text, ""
+
+    def read(self, size: int | None = -1) -> str:
+        """Return so many characters of the rows, as whole rows where they are longer; all that are left of -1."""
+        lines = self.text.readlines(-1 if size is None or size < 0 else size)
+        self.rest += "".join(map(pointed, lines))
+        taken = self.rest if size is None or size < 0 else self.rest[:size]
+        self.rest = self.rest[len(taken) :]
+        return taken
+
+
 def _blocks(
     path: Path, packed: bool, layout: CsvLayout, gaps: str | None
 ) -> Iterator[tuple[np.ndarray, pd.DataFrame | None, float]]:
@@ -291,7 +307,7 @@ def _blocks(
             for _ in range(first):
                 text.readline()
             table = pd.read_csv(
-                text,
+                _Pointed(text) if layout.halves else text,
                 sep=r"\s+" if separator is None else separator,
                 decimal=layout.decimal,
                 header=None,
@@ -416,7 +432,7 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
         for number, line in enumerate(text, 1):
             if number <= layout.first or not line.strip() or COMMENT.match(line):
                 continue
-            cells = split_cells(line.split("#")[0], layout.separator)
+            cells = split_cells((pointed(line) if layout.halves else line).split("#")[0], layout.separator)
             if layout.separator == "\t" and len(cells) == width - 1 and layout.empty:
                 cells.append("")
             if len(cells) > width or (refuse and len(cells) < width):

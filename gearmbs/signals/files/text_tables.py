@@ -73,6 +73,8 @@ class CsvLayout:
         Columns that hold dates or times of day as text; `clock` is the first of them.
     index : int or None
         Column that may only number the rows, or hold times.
+    halves : bool
+        Whether each second comma is that of a number (`pointed`).
     """
 
     first: int
@@ -86,6 +88,7 @@ class CsvLayout:
     index: int | None = None
     empty: tuple[int, ...] = ()
     notes: list[str] = field(default_factory=list)
+    halves: bool = False
 
     @property
     def slow(self) -> tuple[int, ...]:
@@ -104,14 +107,19 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
     """
     first, separator, decimal, kinds = _find_numbers(head, path)
     headings = _headings_by_halves(head, first, path) if (separator, decimal) == (",", ".") else 0
+    notes = []
     if headings == 1:
         separator, decimal, kinds = None, ",", kinds[:1]
     elif headings:
-        raise SignalFileError(
-            path,
-            f"has {headings} headings above {len(kinds)} fields in a row, such as {head[first].strip()[:60]!r}: commas "
-            "both between columns and in numbers; write it again with semicolons between columns or decimal points",
-        )
+        seen = f"{headings} headings stand above {len(kinds)} fields in a row, such as {head[first].strip()[:60]!r}"
+        if not _has_fractions(head[first:]):
+            raise SignalFileError(
+                path,
+                f"{seen}: commas both between columns and in numbers, or columns without a name; write it again with "
+                "semicolons between columns, with decimal points, or with a heading for each column",
+            )
+        kinds = kinds[::2]
+        notes.append(f"{seen}: each second comma is read as that of a number, {pointed(head[first]).strip()[:60]!r}.")
     width = len(kinds)
     labels, header_line = _labels(head[:first], separator, width)
     units_row = None
@@ -147,6 +155,8 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         stamps,
         index if index != clock else None,
         empty,
+        notes,
+        headings > 1,
     )
 
 
@@ -230,6 +240,19 @@ def _headings_by_halves(head: list[str], first: int, path: Path) -> int:
     steps = {int(row[0]) - int(before[0]) for before, row in pairwise(rows)}
     counts = len(names) == 1 and len(steps) == 1 and steps != {0}
     return 0 if counts else len(names)
+
+
+def _has_fractions(lines: list[str]) -> bool:
+    """Return whether some pairs of fields are no two whole numbers: these begin with no zero, and are not -0."""
+    rows = [split_cells(line, ",") for line in lines if line.strip() and not COMMENT.match(line)]
+    return any(re.match(r"0\d", cell) for row in rows for cell in row[1::2]) or any(
+        re.fullmatch(r"-0+", cell) for row in rows for cell in row[::2]
+    )
+
+
+def pointed(line: str) -> str:
+    """Return a row of numbers with decimal commas, and commas between them, with decimal points."""
+    return re.sub(r"(\d+)\s*,\s*(\d+)", r"\1.\2", line)
 
 
 def is_whole(cell: str) -> bool:
