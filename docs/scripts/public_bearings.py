@@ -125,13 +125,14 @@ def true_speed(one: Recording) -> float:
 def judged(one: Recording) -> dict[str, Any]:
     """Return what is named of a recording at each told speed."""
     from gearmbs.signals import diagnose_bearing, make_signal
+    from gearmbs.signals.diagnosis.bearing_report import NOT_CERTAIN
 
     signal, true = make_signal(one.values, one.rate, units="m/s^2"), true_speed(one)
     told = {f"{100 * off:+.1f}": true * (1.0 + off) for off in OFFSETS} | {"nominal": one.nominal}
     row: dict[str, Any] = {"group": one.group, "record": one.name, "part": one.part, "rpm": round(60 * true, 1)}
     for name, turns in told.items():
         report = diagnose_bearing(signal, one.bearing, 2 * np.pi * turns, shafts=())
-        open_ = any(finding.grade in ("uncertain", "shifted") for finding in report.findings)
+        open_ = any(finding.grade in NOT_CERTAIN for finding in report.findings)
         row[name] = report.fault or ("not certain" if open_ else None)
     return row
 

@@ -90,6 +90,19 @@ def test_accuses_nothing_in_gears_and_noise(seed):
     assert "No lines of a defect of bearing 6205 stand out" in report.verdict
 
 
+@pytest.mark.parametrize("part", ["outer race", "rolling element"])
+@pytest.mark.parametrize("depth", [0.3, 1.0])
+def test_a_smooth_modulation_at_the_rate_of_a_part_is_not_certain(part, depth):
+    """As a fan or a torque may modulate noise; sharp blows name the part (`test_names_the_part`)."""
+    carrier = 5.0 * np.random.default_rng(5).standard_normal(TIME.size)
+    modulated = carrier * (1.0 + depth * np.cos(2 * np.pi * LINES.orders[part] * SHAFT * TIME))
+    report = diagnose_bearing(record(modulated), "6205", f"{SHAFT} Hz", shafts=[])
+    assert report.fault is None
+    assert [f.part for f in report.findings if f.grade == "smooth"] == [part]
+    assert "Not certain" in report.verdict
+    assert "No lines" not in report.verdict
+
+
 def test_blows_in_step_with_the_shaft_name_no_part():
     """Every fifth turn, as of loose parts: 18/5 turns are near an outer race's 3.585, 27/5 near an inner's 5.415."""
     report = diagnose_bearing(record(2.0 * pulses(SHAFT / 5, jitter=0.002), MESH), "6205", f"{SHAFT} Hz", shafts=[])

@@ -232,9 +232,13 @@ def power_of(envelope: np.ndarray) -> np.ndarray:
 
 
 CLEAR, SIGNS, OPEN, FAINT, MULTIPLES, NONE = "clear", "signs", "open", "faint", "multiples", "none"
-UNCERTAIN, SHIFTED, QUIET = "uncertain", "shifted", "quiet"
+UNCERTAIN, SHIFTED, QUIET, SMOOTH = "uncertain", "shifted", "quiet", "smooth"
 CLEAR_CHANCE, SIGNS_CHANCE, FAINT_CHANCE = -12.0, -6.0, -2.0
 """Decimal logarithm of the chance from which lines are no noise; from the last on they are told but accuse nothing."""
+SINE, BLOWS_CHANCE = 0.09, -4.0
+"""Power of the strongest harmonic by the first line in squared envelopes. A sine that modulates a carrier fully makes
+1/16, for (1 + m cos x)^2 has a second line of m/4 of the first, and no third; the races that are named in 91 recordings
+(CWRU and MFPT) have 0.12 at least. And the decimal logarithm of the chance from which harmonics are no noise."""
 LEAST_RATIO = 10.0
 """Least power of the fundamental by its neighbourhood, as rare as 5e-5 in noise."""
 MOST_SHARE = 0.025
@@ -480,6 +484,15 @@ class _Look:
 
 def _same_place(look: _Look, first: _Look, key: tuple[BearingLines, str]) -> bool:
     return abs(look.of(key).found - first.of(key).found) <= max(s.step for s in look.spectra)
+
+
+def is_smooth(evidence: Evidence) -> bool:
+    """Return whether a family is that of a smooth modulation: blows have harmonics, a sine has hardly any."""
+    first, *higher = evidence.ratios
+    if not higher:
+        return False
+    noise = log_tail(sum(higher), len(higher)) > BLOWS_CHANCE * math.log(10.0)
+    return noise or max(higher) < SINE * first
 
 
 def _share(stronger: int, places: int) -> float:

@@ -25,6 +25,7 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     SHIFTED,
     SIGNS,
     SIGNS_CHANCE,
+    SMOOTH,
     log_tail,
 )
 from gearmbs.signals.diagnosis.bearing_report import CAGE, WORDS, BearingReport, PartFinding
@@ -155,7 +156,7 @@ def _clearest(report: BearingReport, k: int) -> tuple[PartFinding, int]:
 
 def _counts(finding: PartFinding) -> bool:
     """Return whether no cause but the bearing's part is known for its lines."""
-    return not finding.beside and finding.grade not in (SHIFTED, QUIET) and finding.multiple is None
+    return not finding.beside and finding.grade not in (SHIFTED, QUIET, SMOOTH) and finding.multiple is None
 
 
 def _together(found: Sequence[tuple[PartFinding, int]]) -> tuple[int, int, int, float, float, float, float, str]:

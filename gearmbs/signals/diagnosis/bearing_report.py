@@ -115,6 +115,8 @@ WORDS = {
     "cage": "a rolling element or the cage",
 }
 SHOWN = 4
+NOT_CERTAIN = ("uncertain", "shifted", "smooth")
+"""Grades of lines that accuse no part and acquit none."""
 MOST_OFF = 0.1
 """Share beyond which no speed is off by slip or load: a told one is looked for within 6.5 %."""
 ENOUGH_TURNS = 60
@@ -139,12 +141,12 @@ class PartFinding:
         Power of the first sidebands by that of the line; NaN for parts that have none.
     where : str
         Band in which they are clearest.
-    grade : {"clear", "signs", "open", "faint", "multiples", "uncertain", "shifted", "quiet", "none"}
+    grade : {"clear", "signs", "open", "faint", "multiples", "uncertain", "shifted", "quiet", "smooth", "none"}
         "open": lines that may also be another shaft's; "faint": hardly above noise, but as strong at no other place of
         the record; "multiples": no noise, and as strong at no other place, but without the fundamental; "uncertain":
         named at some of the speeds that the record leaves open, while at others another part is or none; "shifted":
-        where they would be if the told speed were wrong; "quiet": as sound bearings make them, too. None of these
-        accuses.
+        where they would be if the told speed were wrong; "quiet": as sound bearings make them, too; "smooth": without
+        the harmonics of blows. None of these accuses.
     beside : bool
         Whether there are lines, but another part, or another cause, explains more of them.
     stronger, places : int
@@ -258,6 +260,13 @@ class PartFinding:
                 f"they modulate is quiet, {self.modulated:.2g} m/s^2: a sound bearing makes as much by {kind}, and "
                 "they name no part."
             )
+        if self.grade == "smooth":
+            return (
+                f"Not certain: a modulation at {self.found:.2f} Hz {place} is where that by {WORDS[self.part]} of "
+                f"bearing {self.bearing} would be ({self.kinematic:.2f} Hz), but without the harmonics of blows: fans, "
+                "pumps and pulsating torques make such, too, or noise hides the harmonics. A longer record, another "
+                "band (band=, --band), load or speed may show them."
+            )
         if self.multiple is not None:
             return (
                 f"Lines {place} at {self.multiple} times the shaft's turns, near those of {WORDS[self.part]} of "
@@ -342,6 +351,8 @@ class BearingReport(Shown):
         """What the record says of the bearings, in words with grounds."""
         if not self.accused:
             names = " and ".join(lines.name for lines in self.bearings)
+            if any(finding.grade in NOT_CERTAIN for finding in self.findings):
+                return " ".join([f"No part of bearing {names} is named for certain.{self._limits()}", *self.remarks])
             return (
                 f"No lines of a defect of bearing {names} stand out. A defect of a rolling element often shows none, "
                 "and an old, spread one may have lost its lines: this acquits the races of a fresh local defect only."

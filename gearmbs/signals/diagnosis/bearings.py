@@ -21,10 +21,12 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     SIGNS,
     SIGNS_CHANCE,
     SLIP,
+    SMOOTH,
     SPEED_SHARE,
     EnvelopeSpectrum,
     Judged,
     find_lines,
+    is_smooth,
     judge,
     needed_length,
     power_of,
@@ -434,6 +436,8 @@ def _finding(
     modulated = _modulated(signal, evidence.found, widest) if loud else math.nan
     if modulated < level:
         grade = QUIET
+    elif loud and part != CAGE and is_smooth(evidence):
+        grade = SMOOTH
     step = None if grade != NONE else _multiple_of_turns(judged, spectra, shaft, slip)
     return PartFinding(
         lines.name, part, str(signal["channel"].values[0]), evidence.kinematic, evidence.found, evidence.ratios,
