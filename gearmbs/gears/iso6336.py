@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.spec import GearSpec, involute
+from gearmbs.units import Quantity, to_si
 
 ITERATIONS = 60
 LARGEST_HELIX_FACTOR = math.radians(30)
@@ -56,9 +57,12 @@ def iso_single_stiffness(pair: PairGeometry, web: tuple[float, float] | None = N
 def iso_theoretical_stiffness(pair: PairGeometry) -> float:
     """Theoretical single stiffness c'_th = 1 / q' of ISO 6336-1, N/(m of face width * m).
 
-    Teeth count as those of the equivalent spur wheels; an internal wheel as a rack.
+    Teeth count as those of the equivalent spur wheels; an internal wheel as a rack. The standard's wheel 1 is the
+    pinion, whichever wheel drives.
     """
     one, two = pair.driver, pair.driven
+    if one.teeth > two.teeth:
+        one, two = two, one
     x1, x2 = one.profile_shift, two.profile_shift
     z1, z2 = one.virtual_teeth, math.inf if two.internal else two.virtual_teeth
     q = 0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2
@@ -133,13 +137,13 @@ class RootSection:
     angle: float
 
 
-def iso_stresses(pair: Mesh, torque: float | None = None, cutter: tuple[int, float] | None = None) -> ToothStresses:
+def iso_stresses(pair: Mesh, torque: Quantity = None, cutter: tuple[int, float] | None = None) -> ToothStresses:
     """Factors and nominal stresses of a pair by ISO 6336-2 and ISO 6336-3, method B.
 
     Parameters
     ----------
     pair : GearPair or Mesh
-    torque : float, optional
+    torque : float or str, optional
         On the driven wheel, N m; default that of the pair's operating point.
     cutter : (int, float), optional
         Teeth and profile shift of the pinion-type cutter of an internal wheel, whose tip radius is then the wheel's
@@ -148,7 +152,8 @@ def iso_stresses(pair: Mesh, torque: float | None = None, cutter: tuple[int, flo
     Notes
     -----
     sigma_H0 = Z_H Z_E Z_eps Z_beta sqrt(F_t (u + 1) / (d_1 b u)) and sigma_F0 = F_t / (b m_n) Y_F Y_S Y_beta Y_B. The
-    factor of deep teeth Y_DT is 1, as for contact ratios up to 2.05 or accuracy grades above 4.
+    factor of deep teeth Y_DT is 1, as for contact ratios up to 2.05 or accuracy grades above 4. Y_B of an external
+    wheel is 1: whether its bore holds a shaft or leaves a thin rim, the wheel does not say.
 
     Raises
     ------
@@ -156,8 +161,8 @@ def iso_stresses(pair: Mesh, torque: float | None = None, cutter: tuple[int, flo
         For a torque that is not positive, or a rim too thin for the standard.
     """
     geometry = pair.geometry
-    load = pair.operating_point.torque if torque is None else torque
-    if not load > 0:
+    load = to_si(pair.operating_point.torque if torque is None else torque, "torque", "torque")
+    if not 0.0 < load < math.inf:
         raise ValueError(f"torque is {load} N m; give a positive load")
     one, two = geometry.driver, geometry.driven
     force = load / two.pitch_radius

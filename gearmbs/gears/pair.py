@@ -407,17 +407,18 @@ class GearPair(PairGeometry, Shown):
 
     @property
     def normal_force(self) -> float:
-        """Sum of normal forces that carries the load torque, N: F_n = T / r_b2."""
+        """Sum of normal forces that carries the load torque, N: F_n = T / (r_b2 cos beta_b)."""
         return self.operating_point.normal_force(self)
 
-    def _force(self, torque: float | None) -> float:
-        return self.normal_force if torque is None else torque / self.driven.base_radius
+    def _force(self, torque: Quantity) -> float:
+        point = self.operating_point
+        return (point if torque is None else replace(point, torque=torque, owner="GearPair")).normal_force(self)
 
-    def penetration(self, torque: float | None = None, pairs: int = 1) -> float:
+    def penetration(self, torque: Quantity = None, pairs: int = 1) -> float:
         """Static penetration when ``pairs`` tooth pairs share a torque on the driven wheel (N m) equally, m."""
         return self.contact_model.penetration(self._force(torque), pairs, self._face_share)
 
-    def mesh_stiffness(self, torque: float | None = None, pairs: int = 1) -> float:
+    def mesh_stiffness(self, torque: Quantity = None, pairs: int = 1) -> float:
         """Tangent stiffness of that many pairs along the line of action under a torque on the driven wheel, N/m."""
         return self.contact_model.tangent_stiffness(self._force(torque), pairs, self._face_share)
 

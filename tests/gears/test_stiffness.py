@@ -136,6 +136,21 @@ def test_iso_6336():
     assert iso_mesh_stiffness(pair) / iso_single_stiffness(pair) == pytest.approx(0.75 * 1.64594 + 0.25, rel=1e-5)
 
 
+def test_iso_6336_does_not_ask_which_wheel_drives():
+    """The standard's wheel 1 is the pinion: a pair that gears up is as stiff as the same one that gears down."""
+    one, two = (GearSpec(z, "3 mm", profile_shift=x) for z, x in ((20, 0.3), (50, -0.1)))
+    down, up = (iso_single_stiffness(GearPair(*wheels).geometry) for wheels in ((one, two), (two, one)))
+    assert up == pytest.approx(down, rel=1e-12)
+
+
+@pytest.mark.parametrize("helix", [0.0, "25 deg"])
+def test_a_torque_that_is_given_yields_as_the_pairs_own(helix):
+    wheels = [GearSpec(z, "3 mm", helix_angle=helix, hand=hand) for z, hand in ((25, "right"), (40, "left"))]
+    pair = GearPair(*wheels, torque=150.0)
+    assert pair.penetration(150.0, 2) == pair.penetration(pairs=2)
+    assert pair.mesh_stiffness("150 N m") == pair.mesh_stiffness()
+
+
 def test_iso_6336_as_the_stiffness_of_a_pair():
     pair = GearPair.paper()
     single = pair.with_iso_stiffness()
