@@ -217,9 +217,16 @@ class Campaign:
     def _compare(self, other_code: str) -> None:
         """Compare this process's code with that of the results so far, before anything is worked on."""
         from gearmbs.campaigns.codes import admit, plan_modules
-        from gearmbs.studies.run.code import code_of
+        from gearmbs.studies.run.code import CodeChanged, code_of
 
-        code = code_of(plan_modules(self.folder))
+        try:
+            code = code_of(plan_modules(self.folder))
+        except CodeChanged as error:
+            raise CampaignError(f"{self.path}: {error}; start the program again") from error
+        except ImportError as error:
+            raise CampaignError(
+                f"{self.path}: {error}; what the plan names has to be there, installed or on the PYTHONPATH"
+            ) from error
         if other_code == "again":
             for unit in self.folder.done():
                 if self.folder.entry(unit)["code"] != code.digest:

@@ -28,11 +28,14 @@ GAIN = 2.0
 def f(x, kind="rolling bearing"):
     """Return a number."""
     if not x > 0:
-        raise ValueError(f"x = {x}; give a positive number")
+        told = f"x = {x}"
+        more = f"{told}; give a positive number"
+        raise ValueError(more)
+    shown = f"{x} m"
     if kind == "rolling bearing":
         raise Stop("late", 0.5 * x)
     assert x < 9, "x is large"
-    return GAIN * x
+    return {shown: GAIN * x}
 '''
 
 
@@ -42,11 +45,12 @@ def f(x, kind="rolling bearing"):
         ('"""A module."""', '"""Another text.\n\nWith two parts."""'),
         ('    """Return a number."""\n', ""),
         ("GAIN = 2.0", "# doubles\nGAIN = 2.0"),
-        ("give a positive number", "must be above zero"),
+        ("{told}; give a positive number", "must be above zero"),
+        ('f"x = {x}"', 'f"{x} is too small"'),
         ('"x is large"', 'f"{x} is above 9"'),
         ("GAIN * x", "(GAIN  *  x)"),
     ],
-    ids=["module", "docstring", "comment", "message", "assertion", "layout"],
+    ids=["module", "docstring", "comment", "message", "message by a name", "assertion", "layout"],
 )
 def test_texts_do_not_count(old, new):
     assert old in SOURCE
@@ -62,9 +66,19 @@ def test_texts_do_not_count(old, new):
         ("0.5 * x", "0.25 * x"),
         ('"late"', '"early"'),
         ("x < 9", "x < 8"),
+        ("{x} m", "{x} cm"),
         ("ValueError", "KeyError"),
     ],
-    ids=["constant", "name with a blank", "condition", "number in an error", "name in an error", "bound", "kind"],
+    ids=[
+        "constant",
+        "name with a blank",
+        "condition",
+        "number in an error",
+        "name in an error",
+        "bound",
+        "name of a result",
+        "kind",
+    ],
 )
 def test_what_may_change_a_number_counts(old, new):
     assert old in SOURCE
@@ -138,6 +152,30 @@ def test_an_edit_in_the_middle_is_refused_by_name(modules, tmp_path, monkeypatch
         campaign.run(workers=0, other_code="all")
 
 
+def test_what_the_driver_cannot_look_at_is_told_in_a_line(modules, tmp_path, monkeypatch):
+    """A source that was edited since the first look, is no Python, or is gone; once it is as it was, it runs."""
+    campaign = made(modules, tmp_path / "c")
+    campaign.work(1, 4)
+    helper = modules / "helper.py"
+    text = helper.read_text()
+    helper.write_text(text.replace("1.0", "2.5"))
+    with pytest.raises(CampaignError, match=says(f"{modules.name}.helper", "edited while", "start")):
+        campaign.run(workers=0)
+    helper.write_text("def offset(:\n")
+    with pytest.raises(CampaignError, match=says("helper.py", "line 1", "installed")):
+        campaign.run(workers=0)
+    helper.write_text(text)
+    model = modules / "model.py"
+    model.rename(modules / "away.py")
+    loaded_anew(modules, monkeypatch)
+    importlib.invalidate_caches()
+    with pytest.raises(CampaignError, match=says(f"{modules.name}.model", "PYTHONPATH")):
+        campaign.run(workers=0)
+    (modules / "away.py").rename(model)
+    importlib.invalidate_caches()
+    assert campaign.run(workers=0).done == 8
+
+
 def test_results_of_other_code_are_not_taken_over(modules, tmp_path, monkeypatch):
     made(modules, tmp_path / "first").run(workers=0)
     assert made(modules, tmp_path / "second", reuse=[str(tmp_path / "first")]).run(workers=0).reused == 8
@@ -169,6 +207,7 @@ def test_an_edit_under_a_worker_makes_it_refuse(modules, tmp_path, monkeypatch):
 
 BEFORE = '''
 import functools
+import warnings
 from math import sin as g
 
 LARGE = 2.0 ** 2
@@ -176,6 +215,15 @@ LARGE = 2.0 ** 2
 
 class K:
     v: float = 2.0
+
+    def key(self, a):
+        """Return what is shown of a number."""
+        if a < 0:
+            raise ValueError(f"a = {a}; give more")
+        if a == 0:
+            warnings.warn(f"a = {a} is {self.v}", stacklevel=2)
+        assert a < 9 or a == "so many", f"a = {a}"
+        return f"{a} m"
 
 
 def around(f):
@@ -202,6 +250,10 @@ def f(a, k=2.0, *, m=1.0):
         ("import sin", "import cos"),
         ("return a\n", "return -a\n"),
         ("2.0 ** 2", "2.0 ** 3"),
+        ("{a} m", "{a} cm"),
+        ("so many", "so few"),
+        ("ValueError", "KeyError"),
+        ("stacklevel=2", "stacklevel=3"),
     ],
 )
 def test_what_is_loaded_is_held_against_its_source(tmp_path, monkeypatch, old, new):
@@ -227,6 +279,13 @@ def test_what_is_loaded_is_held_against_its_source(tmp_path, monkeypatch, old, n
     path = tmp_path / f"{path.stem}_2.py"
     monkeypatch.setitem(sys.modules, path.stem, importlib.import_module(path.stem))
     assert same(plain.replace("Return a number", "Return some number"), 5)
+    for message, other in {
+        "= {a}; give more": "is {a:g}, {a - 1}",
+        "is {self.v}": "is much",
+        '9 or a == "so many", f"a = {a}"': '9 or a == "so many", "a is large"',
+    }.items():
+        assert message in plain
+        assert same(plain.replace(message, other), 5), message
 
 
 @pytest.mark.parametrize("named", [True, False])

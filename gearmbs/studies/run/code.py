@@ -26,6 +26,7 @@ import os
 import platform
 import sys
 import sysconfig
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -34,7 +35,7 @@ from pathlib import Path
 from typing import Any
 
 from gearmbs.files import write_whole
-from gearmbs.studies.run.loaded import as_loaded
+from gearmbs.studies.run.loaded import MESSAGES_FROM, as_loaded
 
 PACKAGE = Path(__file__).parents[2]
 
@@ -55,9 +56,6 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "scikit-sundae", "xarray")
 OPTIONS = ("GEARMBS_COMPILER", "NUMBA_OPT", "NUMBA_LOOP_VECTORIZE", "NUMBA_SLP_VECTORIZE", "NUMBA_ENABLE_AVX",
            "NUMBA_DISABLE_JIT", "NUMBA_BOUNDSCHECK", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")  # fmt: skip
 """Variables of the environment by which kernels become others."""
-
-MESSAGES_FROM = ("warn", "warn_explicit")
-"""Functions whose texts are read by people only."""
 
 MOST_KNOWN = 5000
 """Digests of sources that are remembered between processes."""
@@ -139,7 +137,7 @@ def code_of(modules: Iterable[str] = ()) -> Code:
     CodeChanged
         If a source is not any more what it was when this process looked first.
     ImportError
-        If a module is not there.
+        If a module is not there, or is not Python.
     """
     names = tuple(sorted(set(modules)))
     known = _seen.get(names)
@@ -247,6 +245,10 @@ def _file_of(module: str, required: bool) -> Path | None:
 class _Messages(ast.NodeTransformer):
     """Takes out of a syntax tree what cannot change a number."""
 
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        _mute_named(node)
+        return self.generic_visit(node)
+
     def visit_Raise(self, node: ast.Raise) -> ast.AST:
         if isinstance(node.exc, ast.Call):
             _mute(node.exc)
@@ -257,7 +259,7 @@ class _Messages(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        if getattr(node.func, "attr", getattr(node.func, "id", None)) in MESSAGES_FROM:
+        if _warns(node):
             _mute(node)
         return self.generic_visit(node)
 
@@ -279,6 +281,31 @@ def _mute(call: ast.Call) -> None:
     call.args = [_Muted().visit(arg) for arg in call.args]
     for keyword in call.keywords:
         keyword.value = _Muted().visit(keyword.value)
+
+
+def _warns(node: ast.AST) -> bool:
+    return isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", None)) in MESSAGES_FROM
+
+
+def _mute_named(function: ast.FunctionDef) -> None:
+    """Take the messages out of what a function gives names that only its messages use."""
+    whole = list(ast.walk(function))
+    messages = [n.exc for n in whole if isinstance(n, ast.Raise) and isinstance(n.exc, ast.Call)]
+    waiting = [*messages, *(n for n in whole if _warns(n)), *(n.msg for n in whole if isinstance(n, ast.Assert))]
+    shared = {name for n in whole if isinstance(n, ast.Global | ast.Nonlocal) for name in n.names}
+    assigned = [(n.targets[0], n) for n in whole if isinstance(n, ast.Assign)]
+    given = [(name.id, n) for name, n in assigned if isinstance(name, ast.Name) and name.id not in shared]
+    known, muted = Counter[str](), list[ast.Assign]()
+    used = Counter(n.id for n in whole if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load))
+    while waiting:
+        found = [n for part in waiting if part is not None for n in ast.walk(part) if isinstance(n, ast.Name)]
+        known.update(n.id for n in found if isinstance(n.ctx, ast.Load))
+        # a name in a message may stand for another one
+        new = [n for name, n in given if n not in muted and known[name] == used[name]]
+        muted += new
+        waiting = [n.value for n in new]
+    for node in muted:
+        node.value = _Muted().visit(node.value)
 
 
 def what_counts(source: bytes) -> str:
@@ -321,7 +348,10 @@ class _Memory:
             return raw, []
         key = f"{raw} {_made_by()}"
         if key not in self.known:
-            self.known[key] = self.new[key] = what_counts(content)
+            try:
+                self.known[key] = self.new[key] = what_counts(content)
+            except SyntaxError as error:
+                raise ImportError(f"{path}, line {error.lineno}: {error.msg}", name=name) from error
         return self.known[key], [] if name.startswith("gearmbs") else _imports(name, path, content)
 
     def keep(self) -> None:

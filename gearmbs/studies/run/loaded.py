@@ -8,6 +8,8 @@ bytecode tells that the import has left, where it has.
 from __future__ import annotations
 
 import ast
+import bisect
+import dis
 import importlib.util
 import inspect
 import os
@@ -17,6 +19,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
+
+MESSAGES_FROM = ("warn", "warn_explicit")
+"""Functions whose texts are read by people only."""
 
 CLOCK_TICKS = 0.02
 """Seconds to which the beginning of a process is known; an interpreter takes longer until it imports anything."""
@@ -69,7 +74,7 @@ def _compiled(module: ModuleType, stamp: tuple[int, int, int]) -> bool:
 def _same(module: ModuleType, source: bytes, path: str) -> bool | None:
     """Return whether a module is what a source makes of it; None where that cannot be seen."""
     tree = ast.parse(source)
-    codes = {c.co_qualname: _doing(c) for c in _inner(compile(source, path, "exec"))}
+    codes = {c.co_qualname: _doing(c) for c in _inner(compile(source, path, "exec", dont_inherit=True))}
     for value in vars(module).values():
         functions = vars(value).values() if isinstance(value, type) else [value]
         for function in functions:
@@ -156,10 +161,50 @@ def _inner(code: CodeType) -> Iterator[CodeType]:
 
 
 def _doing(code: CodeType) -> tuple:
-    """Return what a function does, without its lines and its texts of several words."""
-    constants = [
-        _doing(c) if isinstance(c, CodeType) else repr(c)
-        for c in code.co_consts
-        if not (isinstance(c, str) and " " in c)
-    ]
-    return code.co_code, constants, code.co_names, code.co_varnames
+    """Return what a function does, without its lines, and in messages without texts of several words and formatted
+    ones."""
+    whole = list(dis.get_instructions(code))
+    messages = _in_messages(whole)
+    formatted = [i for i in messages if i.opname.startswith(("BUILD_STRING", "FORMAT_", "CONVERT_"))]
+    words = [i for i in messages if i.opname == "LOAD_CONST" and isinstance(i.argval, str) and " " in i.argval]
+    muted = {i.offset for i in words} | {i.offset for i in messages if any(_inside(i, text) for text in formatted)}
+    kept = [i for i in whole if i.offset not in muted]
+    places = [i.offset for i in kept]
+
+    def argument(i: dis.Instruction) -> Any:
+        if i.opcode in (*dis.hasjrel, *dis.hasjabs):
+            # over how many bytes depends on messages
+            return bisect.bisect_left(places, i.argval)
+        return _doing(i.argval) if isinstance(i.argval, CodeType) else repr(i.argval)
+
+    return [(i.opname, argument(i)) for i in kept], code.co_varnames, code.co_flags
+
+
+def _in_messages(code: list[dis.Instruction]) -> list[dis.Instruction]:
+    """Return the instructions of what is raised, told by an assertion or warned of."""
+    spans, found, asserted = [], set[int](), False
+    for i in code:
+        if asserted:
+            # the condition stands before
+            found.add(i.offset)
+            asserted = i.opname != "RAISE_VARARGS"
+        elif i.opname == "LOAD_ASSERTION_ERROR":
+            asserted = True
+        elif i.opname == "RAISE_VARARGS":
+            spans.append(i)
+        elif i.argval in MESSAGES_FROM and i.positions is not None:
+            spans += [c for c in code if c.opname.startswith("CALL") and _begin(c) == _begin(i) != (None, None)]
+    return [i for i in code if i.offset in found or any(_inside(i, span) for span in spans)]
+
+
+def _begin(i: dis.Instruction) -> tuple[int | None, int | None]:
+    """Return line and column in which what an instruction is of begins."""
+    return (None, None) if i.positions is None else (i.positions.lineno, i.positions.col_offset)
+
+
+def _inside(i: dis.Instruction, other: dis.Instruction) -> bool:
+    """Whether what an instruction is of stands, in the source, inside of what another one is of."""
+    if i.positions is None or other.positions is None or None in (*i.positions, *other.positions):
+        return False
+    (first, last, left, right), (start, end, begin, stop) = i.positions, other.positions
+    return (start, begin) <= (first, left) and (last, right) <= (end, stop)
