@@ -6,9 +6,9 @@ from .plans.factors import Choice as Choice
 from .plans.factors import Factor as Factor
 from .plans.factors import Specimens as Specimens
 from .plans.factors import choose as choose
+from .plans.given import load_plan as load_plan
+from .plans.given import make_plan as make_plan
 from .plans.plan import Plan as Plan
-from .plans.plan import load_plan as load_plan
-from .plans.plan import make_plan as make_plan
 from .sensitivity import SobolIndices as SobolIndices
 from .sensitivity import main_effects as main_effects
 from .sensitivity import morris_effects as morris_effects

@@ -10,7 +10,7 @@ import numpy as np
 
 from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.plans.plan import ABOUT
-from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names, say_unfinished
+from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names, say_left_out
 from gearmbs.campaigns.settings import CampaignError, texts, whole
 from gearmbs.campaigns.sobol_bounds import in_scale
 from gearmbs.schema.described import chosen
@@ -75,8 +75,8 @@ def figure(
     """Draw results of a campaign over its factors; see `gearmbs.campaigns.Campaign.figure`."""
     draw = chosen(KINDS, kind, "", CampaignError, "figure")
     table = only_numbers(campaign.folder, campaign.table)
+    left = say_left_out(campaign.folder, table, "figure", stacklevel=4)
     table = table[table["status"] == "done"]
-    say_unfinished(campaign.folder, "figure", stacklevel=4)
     known = result_names(campaign.folder, table)
     wanted = texts(results, "figure: results") if results else varied_results(campaign, 3)
     chosen_factors = texts(factors, "figure: factors") if factors else main_factors(campaign, table)
@@ -89,7 +89,11 @@ def figure(
     from gearmbs.view.figures.style import look
 
     with look():
-        return draw(table, list(wanted), list(chosen_factors), campaign.units)
+        picture = draw(table, list(wanted), list(chosen_factors), campaign.units)
+        # a title of the whole is a text of the figure
+        title = picture.texts[0] if picture.texts else picture.axes[0].title
+        title.set_text("\n".join(filter(None, (title.get_text(), left))))
+    return picture
 
 
 def main_factors(campaign: Campaign, table: pd.DataFrame) -> list[str]:
@@ -320,7 +324,7 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
 def condition_map(
     campaign: Campaign, condition: str, across: str, along: str, bins: int = 8
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return over two factors in which part of the cases a condition holds.
+    """Return over two factors in which part of the cases a condition holds; of cases without results it is not asked.
 
     Parameters
     ----------
@@ -338,7 +342,16 @@ def condition_map(
         Part of the cases and how many there are, rows along the vertical axis.
     edges_across, edges_along : ndarray, shape (bins + 1,)
     """
+    share, counts, edges_x, edges_y, _ = _condition_map(campaign, condition, across, along, bins)
+    return share, counts, edges_x, edges_y
+
+
+def _condition_map(
+    campaign: Campaign, condition: str, across: str, along: str, bins: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, str]:
+    """Return the map, and in words which cases are left out of it."""
     table = campaign.table
+    left = say_left_out(campaign.folder, table, "map", stacklevel=4)
     table = table[table["status"] == "done"]
     columns = {str(name): table[name].to_numpy() for name in table.columns}
     held = satisfied(condition, columns, campaign.plan.unit_of)
@@ -355,23 +368,22 @@ def condition_map(
     np.add.at(counts, (i, j), 1.0)
     np.add.at(hits, (i, j), held.astype(float))
     with np.errstate(all="ignore"):
-        return hits / counts, counts, edges_x, edges_y
+        return hits / counts, counts, edges_x, edges_y, left
 
 
 def condition_figure(campaign: Campaign, condition: str, across: str, along: str, bins: int = 8) -> Picture:
     """Draw a `condition_map`: in which part of the cases a condition holds, over two factors."""
     from gearmbs.view.figures.style import label, new_figure
 
-    share, counts, edges_x, edges_y = condition_map(campaign, condition, across, along, bins)
+    share, counts, edges_x, edges_y, left = _condition_map(campaign, condition, across, along, bins)
     picture = new_figure(5.6, 4.2)
     ax = picture.subplots()
     mesh = ax.pcolormesh(edges_x, edges_y, share, vmin=0.0, vmax=1.0)
     picture.colorbar(mesh, ax=ax, label="part of the cases")
     ax.set_xlabel(label(across, campaign.units.get(across)))
     ax.set_ylabel(label(along, campaign.units.get(along)))
-    ax.set_title(
-        f"{condition}: {np.nansum(share * counts) / counts.sum():.0%} of {counts.sum():.0f} cases", fontsize=10
-    )
+    held = f"{condition}: {np.nansum(share * counts) / counts.sum():.0%} of {counts.sum():.0f} cases"
+    ax.set_title("\n".join(filter(None, (held, left))), fontsize=10)
     logarithmic = {f.name for f in campaign.plan.factors if getattr(f, "scale", "") == "log"}
     if across in logarithmic:
         ax.set_xscale("log")

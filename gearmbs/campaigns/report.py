@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.campaigns.figures import deviation, varied_results
-from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names
+from gearmbs.campaigns.results import factor_names, numeric_results, only_numbers, result_names, say_left_out
 from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
-from gearmbs.campaigns.settings import CampaignError, texts
+from gearmbs.campaigns.settings import CampaignError, CampaignWarning, texts
 from gearmbs.campaigns.sobol_bounds import first_indices, in_scale, probability
 from gearmbs.campaigns.stored.exports import place
 from gearmbs.campaigns.surrogates import PolynomialChaos
@@ -52,6 +53,11 @@ def write_report(campaign: Campaign, path: str | Path, results: str | Sequence[s
     ------
     CampaignError
         If the path is a folder, or for an unknown column.
+
+    Warns
+    -----
+    CampaignWarning
+        If cases are not done or failed; the page says it, too.
     """
     path = place(path, ".html", campaign.path.stem)
     table = only_numbers(campaign.folder, campaign.table)
@@ -59,7 +65,20 @@ def write_report(campaign: Campaign, path: str | Path, results: str | Sequence[s
     results = varied_results(campaign, MOST_RESULTS) if results is None else list(texts(results, "report: results"))
     for name in results:
         chosen(known, name, "report: ", CampaignError, "result")
-    parts = [f"<h1>{html.escape(campaign.path.name)}</h1>", _plan(campaign)]
+    left = say_left_out(campaign.folder, table, "report", stacklevel=4)
+    parts = [f"<h1>{html.escape(campaign.path.name)}</h1>", f"<p><b>{left}</b></p>" if left else "", _plan(campaign)]
+    with warnings.catch_warnings():
+        # said once for all of it
+        warnings.simplefilter("ignore", CampaignWarning)
+        parts += _asked(campaign, table, results)
+    parts.append(_failures(campaign))
+    head = f"<meta charset='utf-8'><title>{html.escape(campaign.path.name)}</title><style>{STYLE}</style>"
+    return write_whole(path, f"<!doctype html><html><head>{head}</head><body>{''.join(parts)}</body></html>\n")
+
+
+def _asked(campaign: Campaign, table: pd.DataFrame, results: list[str]) -> list[str]:
+    """Return what there is to see of some results."""
+    parts = []
     if results:
         parts += ["<h2>What varies</h2>", _all_results(campaign, table, results)]
         parts += [_picture(campaign.figure(kind, results), kind) for kind in ("scatter matrix", "parallel coordinates")]
@@ -68,9 +87,7 @@ def write_report(campaign: Campaign, path: str | Path, results: str | Sequence[s
         parts += [f"<h2>{html.escape(title)}</h2>", _numbers(table[name])]
         parts += [_picture(campaign.figure(kind, name), f"{kind} of {name}") for kind in ("main effects", "tornado")]
         parts.append(_decides(campaign, name))
-    parts.append(_failures(campaign))
-    head = f"<meta charset='utf-8'><title>{html.escape(campaign.path.name)}</title><style>{STYLE}</style>"
-    return write_whole(path, f"<!doctype html><html><head>{head}</head><body>{''.join(parts)}</body></html>\n")
+    return parts
 
 
 def _all_results(campaign: Campaign, table: pd.DataFrame, shown: list[str]) -> str:

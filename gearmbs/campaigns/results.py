@@ -90,12 +90,21 @@ def read_record(folder: Folder, unit: int, index: int) -> xr.Dataset:
         return found.load()
 
 
-def say_unfinished(folder: Folder, what: str, stacklevel: int = 3) -> None:
-    """Warn that something is made of a part of a campaign alone."""
-    done = len(folder.done())
-    if done < folder.unit_count:
-        told = f"{what}: {done} of {folder.unit_count} units are done; what is not is left out"
-        warnings.warn(told, CampaignWarning, stacklevel=stacklevel)
+def left_out(folder: Folder, table: pd.DataFrame, failed: bool = True) -> str:
+    """Return in words how many cases are left out of what is made of a table: of which nothing is done yet, and those
+    that failed unless these are in it. Nothing if none is."""
+    without = int((table["status"] != "done").sum()) if failed else 0
+    waiting = folder.case_count - len(table)
+    counts = ((waiting, "not done yet"), (without, "failed"))
+    told = ", ".join(f"{count} {word}" for count, word in counts if count)
+    return f"{len(table) - without} of {folder.case_count} cases; left out: {told}" if told else ""
+
+
+def say_left_out(folder: Folder, table: pd.DataFrame, what: str, failed: bool = True, stacklevel: int = 3) -> str:
+    """Warn that something is made of a part of a campaign alone; return the words."""
+    if told := left_out(folder, table, failed):
+        warnings.warn(f"{what} of {told}", CampaignWarning, stacklevel=stacklevel)
+    return told
 
 
 def factor_names(folder: Folder) -> list[str]:

@@ -345,13 +345,16 @@ def _of_choice(choice: Choice) -> list[str]:
 
 def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
     """Return a result by case, NaN for cases that failed or are not done."""
-    table = campaign.table
-    if result not in table.columns:
-        from gearmbs.campaigns.results import result_names
+    from gearmbs.campaigns.results import result_names
 
-        chosen(result_names(campaign.folder, table), result, "", CampaignError, "result")
+    table = campaign.table
+    names = result_names(campaign.folder, table)
+    if result not in table.columns:
+        chosen(names, result, "", CampaignError, "result")
     if table[result].dtype.kind not in "biuf":
         raise CampaignError(f"result {result!r} is a column of texts, not of numbers")
+    if result not in names:
+        raise CampaignError(f"result {result!r} is what the plan gives each case; results are {', '.join(names)}")
     values = np.full(campaign.folder.case_count, np.nan)
     values[table["index"].to_numpy()] = table[result].to_numpy(dtype=float)
     return values

@@ -188,6 +188,33 @@ def test_values_that_one_column_holds(values):
     assert plan.columns(plan.points())["x"].tolist() == list(values)
 
 
+@pytest.mark.parametrize("unit", ["1", "m"])
+def test_none_is_a_value(tmp_path, unit):
+    """It stays what it is, with a unit as well, is neither less nor more than a number, and another one."""
+    subject = FunctionSubject("tests.campaigns.models:told", {"p": None, "i": 3}, units={"p": unit})
+    values = ["3 m", None] if unit == "m" else [3.0, None]
+    campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("p", values=values)], "grid", unit=1))
+    campaign.run(workers=0)
+    assert campaign.table.pp.tolist() == [3.0, -1.0]
+    for condition, held in {"p > 2": [0], "2 * p < 9": [0], "not p > 2": [1], "p != 3": [1], "p == 3": [0]}.items():
+        assert campaign.read(["index"], condition)["index"].tolist() == held, condition
+    if unit == "m":
+        assert campaign.read(["index"], "p >= '300 cm'")["index"].tolist() == [0]
+
+
+@pytest.mark.parametrize("ends", [(None, 2), (1.0, float("inf")), ([1, 2], [3, 4])])
+def test_ends_that_are_none(ends):
+    subject = FunctionSubject(nested, {"x": 1.0, "t": {"kind": "a", "size": 1.0}})
+    with pytest.raises(CampaignError, match=says("t.one.size", "range", "numbers")):
+        make_plan(subject, [choose("t", one={"kind": "a", "size": ends})], n=2)
+    with pytest.raises(CampaignError, match=says("x", "range", "numbers")):
+        make_plan(subject, [Specimens(3, {"x": ends})], n=2)
+    with pytest.raises(CampaignError, match=says("specimens", "x", "numbers")):
+        make_plan(subject, [Specimens(3, {"x": ("a", "b")})], n=2)
+    words = choose("t", one={"kind": "a", "size": ("a", "b")}, two={"kind": "a", "size": (1, 2)})
+    assert make_plan(subject, [words, Specimens(3, {"x": (1.0, 2.0)})], n=2).size == 2
+
+
 def several(x: float, how: str) -> dict | xr.Dataset:
     """Return results whose names or records are of some use, or of none."""
     found = xr.Dataset({"index": x, "y": x, "wave": ("t", np.where(np.arange(4) == 2, np.nan, 1.0))})

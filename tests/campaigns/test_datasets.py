@@ -451,6 +451,16 @@ def test_gearboxes_of_a_data_set_share_no_noise_and_no_drift(tmp_path):
     assert "no bearing fault" in card
 
 
+def test_a_campaign_is_in_a_data_set_once(tmp_path):
+    """By whatever path it is given; two of equal plans are two."""
+    (tmp_path / "link").symlink_to(tmp_path)
+    one = ringing(tmp_path / "c")
+    for other in (one, Campaign(tmp_path / "c"), Campaign(tmp_path / "link" / "c")):
+        with pytest.raises(CampaignError, match=says("data set", str(tmp_path / "c"), "once")):
+            write_data_set([one, other], tmp_path / "data")
+    assert not (tmp_path / "data").exists()
+
+
 def test_bearings_with_defects_are_sources_in_all_states():
     plan = data_set_plan(96, gearbox="one stage", specimens=4, duration=0.1, bearing_defects=True)
     columns = plan.columns(plan.points())

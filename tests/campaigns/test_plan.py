@@ -195,6 +195,20 @@ def test_names_of_columns_are_different():
         make_plan(function(), [*ranges(), Factor("x1", 0.0, 1.0)], n=4)
 
 
+def test_what_moves_the_same_is_refused():
+    """A table and an entry of it, of which the last would hold; other entries, and rows with either, are none."""
+    subject = FunctionSubject(models.adding, {"a": {"k": 1.0, "c": 2.0}, "b": 1.0})
+    whole = choose("a", soft={"k": 1.0, "c": 1.0}, hard={"k": 2.0, "c": 1.0})
+    for factors in ([Factor("a.k", 1.0, 2.0), whole], [whole, Specimens(3, {"a.k": (1.0, 2.0)})]):
+        with pytest.raises(CampaignError, match=says("factors", "a.k", "a", "leave")):
+            make_plan(subject, factors, n=4)
+    rows = [{"a": {"k": 1.0, "c": 1.0}}, {"a.k": 2.0}]
+    with pytest.raises(CampaignError, match=says("factors", "a.k", "a", "leave")):
+        make_plan(subject, design="list", options={"rows": [rows[0] | rows[1]]})
+    assert make_plan(subject, design="list", options={"rows": rows}).size == 2
+    assert make_plan(subject, [Factor("a.k", 1.0, 2.0), choose("a.c", one=1.0, two=2.0)], n=4).size == 4
+
+
 def test_a_plan_is_printed_as_what_it_does():
     factors = [
         Factor("operation.torque", "50 N m", "200 N m", scale="log"),

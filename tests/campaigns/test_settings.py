@@ -7,15 +7,20 @@ import warnings
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from gearmbs.campaigns import (
+    BearingSubject,
     Campaign,
     CampaignError,
     CampaignWarning,
+    DeckSubject,
     Factor,
     FunctionSubject,
+    PairSubject,
     Specimens,
     choose,
+    condition_figure,
     make_plan,
 )
 from gearmbs.campaigns.datasets.splits import split_by_group
@@ -93,6 +98,54 @@ def test_numbers_of_one_name_are_told(tmp_path):
     assert set(alone.table.y) == {1.0}
 
 
+ACCELERATION = xr.Dataset({"acceleration": (("channel", "t"), np.eye(3))}, coords={"channel": list("xyz")})
+PERIODIC = xr.Dataset(attrs={"record_status": "periodic", "record_apart": 0.25, "record_deviation": 1e-6})
+
+
+def level(record) -> dict:
+    """Return a number under a name that bearings have."""
+    return {"rms.y": -1.0}
+
+
+def apart(record) -> dict:
+    """Return a number under a name that records of pairs have."""
+    return {"record.apart": -1.0}
+
+
+def last(record) -> dict:
+    """Return a number under a name that decks have."""
+    return {"request_1.F2.last": -1.0}
+
+
+@pytest.mark.parametrize(
+    ("subject", "record", "keep", "own", "name"),
+    [
+        (BearingSubject({}), ACCELERATION, "levels", level, "rms.y"),
+        (PairSubject(), PERIODIC, None, apart, "record.apart"),
+        (DeckSubject("t\nEND\n", {}, end=1.0), {"request_1.F2": np.ones(4)}, "requests", last, "request_1.F2.last"),
+    ],
+)
+def test_numbers_of_a_subject_are_not_written_over(subject, record, keep, own, name):
+    """A function of one's own under the name of what the subject keeps; under another one both are there."""
+    asked = [item for item in (keep, f"{__name__}:{own.__name__}") if item]
+    with pytest.raises(CampaignError, match=says("keep", name, "rename")):
+        subject.reduce(None, record, asked)
+    other = next(f for f in (level, apart, last) if f is not own)
+    kept = subject.reduce(None, record, [*asked[:-1], f"{__name__}:{other.__name__}"]).numbers
+    assert name in kept
+    assert kept[next(iter(other(None)))] == -1.0
+
+
+def test_a_factor_is_no_result(tmp_path):
+    """One that has the name of a result: that is then found under its own."""
+    subject = FunctionSubject("tests.campaigns.models:told", {"p": 5.0, "i": 3})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("p", 0.0, 1.0, name="pp")], n=8, unit=8))
+    campaign.run(workers=0)
+    with pytest.raises(CampaignError, match=says("result 'pp'", "plan", "result.pp")):
+        campaign.sensitivity("pp")
+    assert campaign.sensitivity("result.pp").indices[0][0] == pytest.approx(1.0)
+
+
 def loud(x: float) -> dict:
     """Return a signal that single precision does not hold."""
     return {"y": x, "wave": [x * 1e39, 1.0]}
@@ -129,10 +182,18 @@ def test_groups_that_are_none(groups):
 def test_what_is_made_of_a_part_says_so(tmp_path):
     campaign = small(tmp_path / "c")
     campaign.work(1, 2)
-    with pytest.warns(CampaignWarning, match=says("export", "units", "left out")):
+    told = says("24 of 40", "left out", "16 not done")
+    with pytest.warns(CampaignWarning, match=told):
         campaign.export(tmp_path / "a.csv", "csv")
-    with pytest.warns(CampaignWarning, match=says("figure", "units", "left out")):
-        campaign.figure("main effects", "y")
+    for make in (
+        lambda: campaign.figure("main effects", "y"),
+        lambda: campaign.figure("parallel coordinates", "y"),
+        lambda: condition_figure(campaign, "y > 0", "x1", "x2", 2),
+    ):
+        with pytest.warns(CampaignWarning, match=told):
+            picture = make()
+        titles = [text.get_text() for text in (*picture.texts, *(ax.title for ax in picture.axes))]
+        assert any(re.search(told, title) for title in titles)
     with pytest.warns(CampaignWarning, match=says("y", "no result", "surface")):
         campaign.response_surface("y", 1)
     with pytest.raises(CampaignError, match=says("test", "split_by")):
@@ -142,3 +203,23 @@ def test_what_is_made_of_a_part_says_so(tmp_path):
         warnings.simplefilter("error", CampaignWarning)
         campaign.export(tmp_path / "b", "hf", split_by="point", test=0.3)
         campaign.response_surface("y", 1)
+        assert "left out" not in condition_figure(campaign, "y > 0", "x1", "x2", 2).axes[0].get_title()
+
+
+def test_a_report_of_a_part_says_so_once(tmp_path):
+    """The cases that are not done, and those that failed; a whole one has nothing to say."""
+    campaign = small(tmp_path / "c", "picky")
+    campaign.work(1, 2)
+    with pytest.warns(CampaignWarning) as told:
+        page = campaign.report(tmp_path / "r.html", "y").read_text()
+    assert len(told) == 1
+    failed = len(campaign.failed())
+    assert failed > 0
+    words = f"{24 - failed} of 40 cases; left out: 16 not done yet, {failed} failed"
+    assert words in str(told[0].message)
+    assert f"<b>{words}</b>" in page
+    whole = small(tmp_path / "d")
+    whole.run(workers=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "of 40 cases;" not in whole.report(tmp_path / "s.html", "y").read_text()

@@ -13,7 +13,8 @@ import numpy as np
 from gearmbs.bearings.defects import PARTS
 from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.plans.factors import AnyFactor, Choice, Factor, Specimens
-from gearmbs.campaigns.plans.plan import Plan, make_plan
+from gearmbs.campaigns.plans.given import make_plan
+from gearmbs.campaigns.plans.plan import Plan
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.subjects.tables import DrivetrainSubject
 from gearmbs.schema.described import chosen

@@ -154,16 +154,31 @@ def _kind(values: Any) -> str:
 
 
 def _compared(op: ast.cmpop, left: Any, right: Any) -> Any:
-    """Return what a comparison gives; as the others, == and != are none of texts with numbers."""
+    """Return what a comparison gives; as the others, == and != are none of texts with numbers.
+
+    None is another than everything else, and neither less nor more.
+    """
     if {_kind(left), _kind(right)} == {"texts", "numbers"}:
         raise TypeError
-    return OPERATORS[type(op)](left, right)
+    if isinstance(op, ast.Eq | ast.NotEq):
+        return OPERATORS[type(op)](left, right)
+    both = np.broadcast_arrays(np.asarray(left), np.asarray(right))
+    if all(values.dtype != object for values in both):
+        return OPERATORS[type(op)](left, right)
+    known = ~(_is_none(both[0]) | _is_none(both[1]))
+    found = np.zeros(known.shape, dtype=bool)
+    found[known] = OPERATORS[type(op)](both[0][known], both[1][known])
+    return found
+
+
+def _is_none(values: np.ndarray) -> np.ndarray:
+    return np.frompyfunc(lambda value: value is None, 1, 1)(values).astype(bool)
 
 
 def _real(values: Any) -> Any:
-    """Return numbers to calculate with as floating point ones: products of whole ones would overflow."""
+    """Return numbers to calculate with as floating point ones: products of whole ones would overflow, None is NaN."""
     values = np.asarray(values)
-    return values.astype(float) if values.dtype.kind in "biu" else values
+    return values if values.dtype.kind == "f" or _kind(values) == "texts" else values.astype(float)
 
 
 def _in_units(
@@ -178,7 +193,7 @@ def _in_units(
         if not isinstance(node, ast.Compare):
             continue
         sides = [node.left, *node.comparators]
-        known = [n for side in sides if (n := ast.unparse(side)) in columns and _is_number(columns[n])]
+        known = [n for side in sides if (n := ast.unparse(side)) in columns and _kind(columns[n]) == "numbers"]
         for side in sides if known else ():
             if isinstance(side, ast.Constant) and isinstance(side.value, str):
                 name = names[known[0]]

@@ -358,6 +358,8 @@ class Specimens:
     def in_si(self, subject: Subject) -> Specimens:
         """Return the specimens with their ranges in SI."""
         errors = {path: _range_in_si(r, subject.unit_of(path), path) for path, r in self.errors.items()}
+        if words := next((path for path, ends in errors.items() if _are_words(ends)), None):
+            raise CampaignError(f"specimens: {words} = {self.errors[words]!r}; give the two ends as numbers")
         faults = []
         for table in self.faults:
             table = dict(table)
@@ -489,14 +491,16 @@ def _are_words(ends: Sequence[Any]) -> bool:
 def _range_in_si(ends: Sequence[Any], unit: str, where: str) -> list[Any]:
     """Return both ends of a range in SI; two texts without a unit are none, and stay as they are."""
     low, high = (number_in_si(v, unit, where) for v in ends)
-    if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
+    if not (_are_words(ends) or all(isinstance(v, int | float) and math.isfinite(v) for v in (low, high))):
+        raise CampaignError(f"{where} = {ends!r}: two values are the ends of a range; give two numbers")
+    if not _are_words(ends) and low > high:
         raise CampaignError(f"{where}: {ends[0]} is above {ends[1]}; give the lower end first")
     return [low, high]
 
 
 def number_in_si(value: Any, unit: str, where: str) -> Any:
-    """Return a value of a field in SI; texts of fields without a unit stay as they are."""
-    if unit == "1" or isinstance(value, (bool, list, tuple, dict)):
+    """Return a value of a field in SI; texts of fields without a unit stay as they are, and so does None."""
+    if unit == "1" or value is None or isinstance(value, (bool, list, tuple, dict)):
         return list(value) if isinstance(value, tuple) else value
     return _real(value, unit, where)
 

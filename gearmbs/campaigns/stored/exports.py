@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.results import open_dataset, say_unfinished
+from gearmbs.campaigns.results import open_dataset, say_left_out
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local
 from gearmbs.campaigns.stored.rows import held_out_of_training, split_of_rows
 from gearmbs.campaigns.subjects.base import SignalSpec
@@ -68,8 +68,8 @@ def export(
     Warns
     -----
     CampaignWarning
-        If not all is done, columns have other names in the file, or what is held out leaves an option of a choice
-        without training rows.
+        If cases are left out, since they are not done or failed, columns have other names in the file, or what is held
+        out leaves an option of a choice without training rows.
     """
     if format not in FORMATS:
         raise CampaignError(f"format {format!r} is unknown; choose one of {', '.join(FORMATS)}")
@@ -86,7 +86,8 @@ def export(
     target = place(target, FILES.get(format), campaign.path.stem)
     # one reading: cases that are done meanwhile would put signals beside the numbers of others
     table = campaign.table
-    say_unfinished(campaign.folder, "export", stacklevel=4)
+    # files of one table have the cases that failed with their status
+    say_left_out(campaign.folder, table, "export", failed=format not in FILES, stacklevel=4)
     if format == "csv":
         return [write_whole(target, table.to_csv(index=False))]
     if format in FILES:

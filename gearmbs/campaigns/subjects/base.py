@@ -60,6 +60,18 @@ class Kept:
     numbers: dict[str, float] = field(default_factory=dict)
     signals: dict[str, np.ndarray] = field(default_factory=dict)
 
+    def add(self, numbers: Mapping[str, float], item: str) -> None:
+        """Take the numbers of an entry of ``keep``.
+
+        Raises
+        ------
+        CampaignError
+            If one has the name of another that is kept, of which one would be lost.
+        """
+        if doubled := sorted(self.numbers.keys() & numbers.keys()):
+            raise CampaignError(f"keep: {item!r} gives {', '.join(doubled)}, as another entry does; rename one")
+        self.numbers |= numbers
+
     @property
     def finite(self) -> bool:
         """Whether all of it is a number, signals as they are stored, in single precision."""
@@ -212,26 +224,13 @@ def imported(name: str, what: str) -> Any:
         raise NotImportable(f"{what} {name!r}: cannot be imported ({error}); write module:name") from error
 
 
-def kept_by_functions(keep: Sequence[str], record: Any) -> dict[str, float]:
-    """Return the numbers of those entries of ``keep`` that name functions ``module:name`` of a record."""
-    found: dict[str, float] = {}
+def kept_by_functions(keep: Sequence[str], record: Any) -> Kept:
+    """Return what those entries of ``keep`` leave that name functions ``module:name`` of a record."""
+    kept = Kept()
     for item in keep:
         if ":" in item and not item.startswith("signal:"):
-            given = {str(k): float(v) for k, v in imported(item, "keep")(record).items()}
-            refuse_doubled(found, given, item)
-            found |= given
-    return found
-
-
-def refuse_doubled(found: Mapping[str, float], given: Mapping[str, float], item: str) -> None:
-    """Refuse numbers of an entry of ``keep`` that have the names of others, of which one would be lost.
-
-    Raises
-    ------
-    CampaignError
-    """
-    if doubled := sorted(found.keys() & given.keys()):
-        raise CampaignError(f"keep: {item!r} gives {', '.join(doubled)}, as another entry does; rename one")
+            kept.add({str(k): float(v) for k, v in imported(item, "keep")(record).items()}, item)
+    return kept
 
 
 def check_keep(subject: Subject, keep: Sequence[str]) -> None:

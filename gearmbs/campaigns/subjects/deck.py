@@ -175,12 +175,12 @@ class DeckSubject(Subject):
 
     def reduce(self, thing: dict[str, Any], record: dict[str, np.ndarray], keep: Sequence[str]) -> Kept:
         """Return numbers of every column of the requests."""
-        kept = Kept(numbers=kept_by_functions(keep, record))
+        kept = kept_by_functions(keep, record)
         if "requests" in keep:
             for name, values in record.items():
                 x = np.asarray(values, dtype=float)
                 found = {"last": x[-1], "mean": x.mean(), "rms": x.std(), "min": x.min(), "max": x.max()}
-                kept.numbers |= {f"{name}.{what}": float(value) for what, value in found.items()}
+                kept.add({f"{name}.{what}": float(value) for what, value in found.items()}, "requests")
         return kept
 
 

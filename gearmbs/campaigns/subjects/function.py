@@ -17,7 +17,6 @@ from gearmbs.campaigns.subjects.base import (
     Subject,
     imported,
     kept_by_functions,
-    refuse_doubled,
 )
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import DIMENSIONS, to_si
@@ -72,6 +71,8 @@ class FunctionSubject(Subject):
             place = found
             for table in tables:
                 place = place[table]
+            if place[name] is None:
+                continue
             try:
                 place[name] = float(to_si(place[name], unit, path))
             except (ValueError, TypeError) as error:
@@ -149,7 +150,7 @@ class FunctionSubject(Subject):
                 f"{self.function} returned a {type(record).__name__}, of which no record is kept; return an "
                 "xarray.Dataset, or keep numbers and signals"
             )
-        kept = Kept(numbers=kept_by_functions(keep, record))
+        kept = kept_by_functions(keep, record)
         items = {**record.attrs, **record.data_vars} if hasattr(record, "data_vars") else dict(record)
         if not all(str(name).strip() for name in items):
             raise CampaignError(f"{self.function} returned a result without a name; give it one")
@@ -159,8 +160,7 @@ class FunctionSubject(Subject):
                 for k, v in items.items()
                 if not isinstance(v, str) and np.ndim(getattr(v, "values", v)) == 0
             }
-            refuse_doubled(kept.numbers, own, "numbers")
-            kept.numbers |= own
+            kept.add(own, "numbers")
         for item in keep:
             if item.startswith("signal:"):
                 name = item.removeprefix("signal:")

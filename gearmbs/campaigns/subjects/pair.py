@@ -152,14 +152,14 @@ class PairSubject(Subject):
 
     def reduce(self, thing: Case, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
-        kept = Kept(numbers=kept_by_functions(keep, record))
+        kept = kept_by_functions(keep, record)
         if "harmonics" in keep:
-            kept.numbers |= harmonics(record)
+            kept.add(harmonics(record), "harmonics")
         if "contact" in keep:
-            kept.numbers |= contact_numbers(thing, record)
-        kept.numbers |= record_numbers(record)
+            kept.add(contact_numbers(thing, record), "contact")
+        kept.add(record_numbers(record), ABOUT_RECORD)
         if "indicators" in keep:
-            kept.numbers |= indicators(record)
+            kept.add(indicators(record), "indicators")
         for name, channels in _arrays(keep).items():
             kept.signals[name] = _signal(record, name, channels)
         return kept

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -223,18 +224,19 @@ class DrivetrainSubject(TablesSubject):
 
     def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
-        kept = Kept(numbers=kept_by_functions(keep, record))
+        kept = kept_by_functions(keep, record)
         if "harmonics" in keep:
             levels = record["mesh_rms"].transpose("signal", "mesh", "harmonic")
             for (i, j, k), value in np.ndenumerate(levels.values):
-                kept.numbers[f"{levels.signal.values[i]}.{levels.mesh.values[j]}.{k + 1}"] = float(value)
+                name = f"{levels.signal.values[i]}.{levels.mesh.values[j]}.{k + 1}"
+                kept.add({name: float(value)}, "harmonics")
         if "forces" in keep:
             for mesh in record.mesh.values:
                 for name in ("normal_force", "transmission_error", "pairs_back"):
-                    kept.numbers |= scalars(f"{mesh}.{name}", record[name].sel(mesh=mesh).values)
+                    kept.add(scalars(f"{mesh}.{name}", record[name].sel(mesh=mesh).values), "forces")
             for bearing in record.bearing.values:
                 size = np.linalg.norm(record["bearing_force"].sel(bearing=bearing).values, axis=1)
-                kept.numbers |= scalars(f"{bearing}.force", size)
+                kept.add(scalars(f"{bearing}.force", size), "forces")
         for item in keep:
             if item.startswith("signal:"):
                 name = item.removeprefix("signal:")
@@ -295,14 +297,14 @@ class PlanetarySubject(TablesSubject):
 
     def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
-        kept = Kept(numbers=kept_by_functions(keep, record))
+        kept = kept_by_functions(keep, record)
         if "forces" in keep:
             for planet in record.planet.values:
                 for mesh in record.mesh.values:
                     force = record["force"].sel(mesh=mesh, planet=planet).values
-                    kept.numbers |= scalars(f"{mesh}-planet {planet}.force", force)
-                kept.numbers |= scalars(f"planet {planet}.share", record["share"].sel(planet=planet).values)
-            kept.numbers |= scalars("ring_sensor", record["ring_sensor"].values)
+                    kept.add(scalars(f"{mesh}-planet {planet}.force", force), "forces")
+                kept.add(scalars(f"planet {planet}.share", record["share"].sel(planet=planet).values), "forces")
+            kept.add(scalars("ring_sensor", record["ring_sensor"].values), "forces")
         if "signal:ring_sensor" in keep:
             kept.signals["ring_sensor"] = np.atleast_2d(record["ring_sensor"].values)
         return kept
@@ -417,15 +419,19 @@ class BearingSubject(TablesSubject):
 
     def reduce(self, thing: BearingCase, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
-        kept = Kept(numbers=kept_by_functions(keep, record))
+        kept = kept_by_functions(keep, record)
         for channel in CHANNELS:
             x = np.asarray(record["acceleration"].sel(channel=channel).values, dtype=float)
             if "levels" in keep:
                 rest = x - x.mean()
                 rms = float(rest.std())
-                kept.numbers[f"rms.{channel}"] = rms
-                kept.numbers[f"kurtosis.{channel}"] = float(np.mean(rest**4)) / rms**4 if rms > 0.0 else float("nan")
-                kept.numbers[f"crest.{channel}"] = float(np.abs(rest).max()) / rms if rms > 0.0 else float("nan")
+                still = rms == 0.0
+                levels = {
+                    f"rms.{channel}": rms,
+                    f"kurtosis.{channel}": math.nan if still else float(np.mean(rest**4)) / rms**4,
+                    f"crest.{channel}": math.nan if still else float(np.abs(rest).max()) / rms,
+                }
+                kept.add(levels, "levels")
             if f"signal:{channel}" in keep:
                 kept.signals[channel] = np.atleast_2d(x)
         return kept

@@ -1,0 +1,190 @@
+"""Plans made from what is given, in Python or in a file: checked, in SI."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.campaigns.plans import designs
+from gearmbs.campaigns.plans.factors import (
+    AnyFactor,
+    Specimens,
+    check_kinds,
+    factor_from,
+    number_in_si,
+)
+from gearmbs.campaigns.plans.plan import ALONG, TAKEN, Plan, crossed
+from gearmbs.campaigns.settings import CampaignError, check_settings, texts, whole
+from gearmbs.campaigns.subjects.base import Subject, check_keep, make_subject
+from gearmbs.files import python_scalar
+from gearmbs.schema.described import chosen, read_toml
+
+FILES = ("file", "script", "routines")
+"""Settings of subjects that name files."""
+FAILURE_POLICIES = ("record", "tighter", "stop")
+
+
+def make_plan(
+    base: Any = None,
+    factors: Iterable[AnyFactor] = (),
+    design: str = "sobol",
+    n: int = 0,
+    *,
+    keep: Sequence[str] | None = None,
+    **settings: Any,
+) -> Plan:
+    """Return a checked plan.
+
+    Parameters
+    ----------
+    base : Case or Subject, optional
+        What is simulated, with everything that no factor changes; default the case of the preset.
+    factors : iterable of Factor, Choice, Specimens
+    design : str
+        ``sobol``, ``halton``, ``random`` (these go on where they stopped), ``latin hypercube``, ``grid``, ``list``,
+        ``one at a time``, ``factorial``, ``plackett burman``, ``central composite``, ``box behnken``, ``saltelli``,
+        ``morris``.
+    n : int
+        Points of a sequence or a hypercube, base points of a Saltelli design, trajectories of a Morris design.
+    keep : sequence of str, optional
+        Default: the first of what the subject keeps.
+    **settings
+        Further attributes of `Plan`.
+
+    Raises
+    ------
+    CampaignError
+        For whatever is wrong with it. Corners are checked when a campaign is made.
+
+    Examples
+    --------
+    >>> from gearmbs.campaigns import Factor
+    >>> plan = make_plan(factors=[Factor("operation.torque", "50 N m", "200 N m")], n=8)
+    >>> plan.columns(plan.points())["operation.torque"].size
+    8
+    """
+    from gearmbs.campaigns.subjects.pair import PairSubject
+    from gearmbs.studies import Case
+
+    if not (base is None or isinstance(base, (Case, Subject))):
+        raise CampaignError(f"base = {base!r:.60}; give a Case or a Subject, such as FunctionSubject(...)")
+    subject = base if isinstance(base, Subject) else PairSubject(base)
+    given = (factors,) if isinstance(factors, AnyFactor) else tuple(factors)
+    for factor in given:
+        if not isinstance(factor, AnyFactor):
+            raise CampaignError(f"factors: {factor!r} is none; give Factor, Choice or Specimens")
+    own = tuple(factor.in_si(subject) for factor in given)
+    chosen(designs.DESIGNS, design, "", CampaignError, "design")
+    counted = (*designs.SEQUENCES, *designs.ANALYSES, "latin hypercube")
+    n = whole(n, "n", 0)
+    if design in counted and n < 1:
+        raise CampaignError(f"n = {n!r}: give the number of points of the {design} design")
+    keep = subject.keeps[:1] if keep is None else texts(keep, "keep")
+    check_keep(subject, keep)
+    settings = check_settings(settings, Plan, design)
+    plan = Plan(subject, own, design, n, keep=keep, **settings)
+    if design == "list":
+        plan = replace(plan, options={**plan.options, "rows": _rows_in_si(plan)})
+    _consistent(plan)
+    return plan
+
+
+def _rows_in_si(plan: Plan) -> list[dict[str, Any]]:
+    """Return the rows of a list with texts in SI, numbers of one column all whole or all real."""
+    rows = plan.options.get("rows")
+    if not rows or not all(isinstance(row, Mapping) for row in rows):
+        raise CampaignError("design list: give options={'rows': [{path: value, ...}, ...]}")
+    units = {path: plan.subject.unit_of(path) for row in rows for path in row}
+    found = [{k: number_in_si(python_scalar(v), units[k], k) for k, v in row.items()} for row in rows]
+    for path in units:
+        column = [row.get(path) for row in found]
+        if any(isinstance(v, float) for v in column):
+            for row in found:
+                if isinstance(row.get(path), int) and not isinstance(row[path], bool):
+                    row[path] = float(row[path])
+        if not any(isinstance(v, (list, tuple, dict)) for v in column):
+            check_kinds(column, f"rows: {path}")
+    return found
+
+
+def _consistent(plan: Plan) -> None:
+    """Refuse settings that contradict each other."""
+    names = [name for f in plan.factors for name in f.columns(np.full((1, f.width), 0.5), *_variant(f))]
+    rows = plan.options["rows"] if plan.design == "list" else []
+    signals = [item.removeprefix("signal:") for item in plan.keep if item.startswith("signal:")]
+    kept = [name + ending for name in signals for ending in ("", *ALONG)]
+    taken = sorted({*names, *(name for row in rows for name in row)} & {*TAKEN, *kept})
+    if taken:
+        remedy = "rename the parameter" if rows else "give the factor another one, name='...'"
+        raise CampaignError(f"factors: {', '.join(taken)} is the name of another column or of a signal; {remedy}")
+    doubled = {name for name in names if names.count(name) > 1}
+    if doubled:
+        raise CampaignError(
+            f"factors: {', '.join(sorted(doubled))} stand for several columns; give them names of their own"
+        )
+    paths = [path for f in plan.factors for path in (f.errors if isinstance(f, Specimens) else (f.path,))]
+    doubled = {path for path in paths if paths.count(path) > 1}
+    if doubled:
+        raise CampaignError(f"factors: {', '.join(sorted(doubled))} is set by several of them; give one")
+    for together in (paths, *rows):
+        for whole_of, part in itertools.permutations(together, 2):
+            if part.startswith(f"{whole_of}."):
+                raise CampaignError(
+                    f"factors: {part} is a part of {whole_of}, which is set as a whole as well; give it in each of the "
+                    f"values of {whole_of}, or leave one of the two out"
+                )
+    if plan.design == "list" and plan.factors:
+        raise CampaignError("factors: a list has its rows alone; leave the factors out, or take another design")
+    if plan.design != "list" and not plan.factors:
+        raise CampaignError("factors: give at least one")
+    if plan.constraints and plan.design in designs.ANALYSES:
+        raise CampaignError(
+            f"constraints: points left out would break the {plan.design} design; narrow the ranges instead"
+        )
+    if plan.n and not plan.has_n:
+        raise CampaignError(
+            f"n = {plan.n}: the points of a {plan.design} design follow from factors and options; leave n out"
+        )
+    chosen(FAILURE_POLICIES, plan.on_failure, "", CampaignError, "on_failure")
+
+
+def _variant(factor: AnyFactor) -> tuple:
+    return (np.zeros(1, dtype=int),) if crossed(factor) else ()
+
+
+def load_plan(path: str | Path) -> Plan:
+    """Read a plan in TOML: ``[subject]`` or ``[base]``, ``[[factor]]`` and the attributes of `Plan`.
+
+    Raises
+    ------
+    CampaignError
+        If it cannot be read or is wrong.
+    """
+    path = Path(path)
+    tree = read_toml(path, CampaignError)
+    subject = tree.pop("subject", {})
+    tables = tree.pop("factor", [])
+    if not (isinstance(subject, dict) and isinstance(tables, list) and all(isinstance(t, dict) for t in tables)):
+        raise CampaignError(f"{path}: write [subject] once, and [[factor]] above each factor")
+    kind = subject.pop("kind", "pair")
+    factors = [factor_from(table) for table in tables]
+    if "base" in tree:
+        subject["case"] = tree.pop("base")
+    if "factors" in tree:
+        raise CampaignError(f"{path}: factors is no entry of a plan's file; write [[factor]] above each of them")
+    for key in FILES:
+        # a file beside the plan's, wherever the command is given
+        if isinstance(subject.get(key), str) and (path.parent / subject[key]).is_file():
+            subject[key] = str(path.parent / subject[key])
+    if "reuse" in tree:
+        # a folder beside the plan's file, wherever the command is given
+        tree["reuse"] = [str(path.parent / folder) for folder in texts(tree["reuse"], "reuse")]
+    try:
+        return make_plan(make_subject(kind, subject), factors, **tree)
+    except TypeError as error:
+        raise CampaignError(f"{path}: {error}") from error
