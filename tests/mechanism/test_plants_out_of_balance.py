@@ -148,3 +148,66 @@ def test_a_pendulum_on_a_base_that_is_turned(tilt, angle, spin):
         assert plant.states[0] == "pole: rotation about y"
         assert plant.C[0] == pytest.approx([1, 0, -1, 0], abs=1e-9)
         assert plant.A[1] == pytest.approx([-rate, 0, 0, 0], rel=1e-8, abs=1e-9)
+
+
+CRANK, ROD = 0.1, 0.3
+
+
+def _kinematics(angle):
+    """Return by complex numbers, too, the rates of a rod's angle, of its middle along x and of a block by a crank's."""
+    lean = -np.arcsin(CRANK * np.sin(angle) / ROD)
+    swing = -CRANK * np.cos(angle) / (ROD * np.cos(lean))
+    reach = -CRANK * np.sin(angle)
+    return lean, swing, reach - 0.5 * ROD * np.sin(lean) * swing, reach - ROD * np.sin(lean) * swing
+
+
+def _pushed(angle):
+    """Acceleration of the crank at rest, -V' / I, with the middles of crank and rod at half the height of their pin."""
+    _, swing, middle, way = _kinematics(angle)
+    height = 0.5 * CRANK * np.cos(angle)
+    inertia = 0.01 + (0.5 * CRANK) ** 2 + 0.01 * swing**2 + 0.5 * (middle**2 + height**2) + 2.0 * way**2
+    return -GRAVITY * (1.0 + 0.5) * height / inertia
+
+
+def crank(angle: float, backwards: bool) -> gm.Mechanism:
+    """Return a slider crank at rest, with its joints made from the crank on or from the block on."""
+    m = gm.Mechanism("slider crank", gravity=(0.0, -GRAVITY, 0.0))
+    lean = float(_kinematics(angle)[0])
+    pin = CRANK * np.array([np.cos(angle), np.sin(angle), 0.0])
+    end = np.array([pin[0] + ROD * np.cos(lean), 0.0, 0.0])
+    turned, leaning = (Rotation.from_rotvec((0, 0, a)).as_matrix() for a in (angle, lean))
+    bodies = [
+        m.body("crank", 1.0, (0.01,) * 3, position=0.5 * pin, orientation=turned),
+        m.body("rod", 0.5, (0.01,) * 3, position=0.5 * (pin + end), orientation=leaning),
+        m.body("block", 2.0, (0.01,) * 3, position=end),
+    ]
+    joints = [
+        lambda: m.revolute("main", bodies[0], m.ground, at=(0, 0, 0), axis=(0, 0, 1)),
+        lambda: m.revolute("pin", bodies[1], bodies[0], at=pin, axis=(0, 0, 1)),
+        lambda: m.revolute("wrist", bodies[1], bodies[2], at=end, axis=(0, 0, 1)),
+        lambda: m.translational("guide", bodies[2], m.ground, at=end, axis=(1, 0, 0)),
+    ]
+    for make in reversed(joints) if backwards else joints:
+        make()
+    return m
+
+
+@pytest.mark.filterwarnings("ignore:.*balance")
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_slider_crank_has_one_coordinate_over_a_turn(backwards):
+    """A is a continuous function of the crank's angle, d/d phi of phi'', through dead centres and upright positions."""
+    for angle in np.linspace(0.05, 2.0 * np.pi + 0.05, 16):
+        plant = crank(angle, backwards).linearize([("torque", "main")], [("joint_angle", "main")])
+        assert plant.states == ["crank: rotation about z", "crank: rotation about z, rate"]
+        assert plant.A[1, 0] == pytest.approx(np.imag(_pushed(angle + 1e-30j)) / 1e-30, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.filterwarnings("ignore:.*balance")
+def test_a_ball_joint_has_the_rotations_of_its_body_anywhere():
+    for turn in ((0.3, 0, 0), (0, 1.5, 0.2), (0.5, -0.7, 2.0)):
+        turned = Rotation.from_rotvec(turn).as_matrix()
+        m = gm.Mechanism("pendulum", gravity=(0, 0, -GRAVITY))
+        rod = m.body("rod", POLE, (INERTIA,) * 3, position=turned @ (0, 0, -3.0), orientation=turned)
+        m.spherical("ball", rod, m.ground, at=(0, 0, 0))
+        plant = m.linearize([("torque", "rod", "x")], [("com_position", "rod", "x")])
+        assert plant.states[:3] == [f"rod: rotation about {c}" for c in "xyz"]

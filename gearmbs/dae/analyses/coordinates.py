@@ -32,6 +32,9 @@ Triple = tuple[np.ndarray, np.ndarray, np.ndarray]
 CLEAR = 1e-2
 """Part of the largest by which a joint has to move by itself to be a coordinate: what follows others that closely
 is better told by these."""
+EVEN = 0.1
+"""The same of one that is taken because it comes first, so that coordinates stay what they are along a path: beside a
+dead centre its rates would be ten times those of others, and their squares are in A."""
 SAME = 1e-9
 """Difference of two coordinates, of their size, that is rounding: that of second rates is 1e-13 of it."""
 AS_BEFORE = 1e-4
@@ -72,6 +75,11 @@ class JointCoordinate:
     rotation: bool
     i: Frame
     j: Frame
+
+    @property
+    def between_bodies(self) -> bool:
+        """Whether neither side is the ground."""
+        return min(self.i.body, self.j.body) >= 0
 
     def row(self, configuration: Configuration) -> np.ndarray:
         """Return how it changes with displacements and small rotations of the bodies, shape (2, bodies, 3).
@@ -153,8 +161,10 @@ def spatial(instant: Instant, small: bool, changes: np.ndarray) -> np.ndarray:
 def chosen(instant: Instant, motion: Basis, small: bool, joints: Sequence[JointCoordinate]) -> Chosen:
     """Return coordinates that describe a motion: those of joints, then displacements and small rotations of bodies.
 
-    Of each the ones that others follow best. Chains that turn steadily, in axes that may turn with them, have none of
-    joints, and beside others that are not steady the independent ones.
+    Of joints angles come first, and of these those against the ground, in the order of the joints; of bodies rotations.
+    Each is taken that moves clearly beside those taken, so that along a path they are the same but where one comes
+    close to a dead centre. If these do not do, those are taken that others follow best. Chains that turn steadily, in
+    axes that may turn with them, have none of joints, and beside others that are not steady the independent ones.
 
     Parameters
     ----------
@@ -179,23 +189,54 @@ def chosen(instant: Instant, motion: Basis, small: bool, joints: Sequence[JointC
         anchors[motion.along.anchors] = 1.0
         weight = weight * (np.tile(np.repeat(varies, 3), 2) | (spatial(instant, True, anchors)[:, 0] != 0.0))
     scaled = weight[:, None] * own[0]
-    left = np.eye(n)
+    taken, largest_row = np.zeros((n, 0)), np.abs(scaled).max()
     joints = [one for one in joints if all(frame.body < 0 or free[frame.body] for frame in (one.i, one.j))]
     if joints:
         rows = _of_joints(instant, motion, small, joints)
         lengths = np.where([one.rotation for one in joints], arm, 1.0)
-        upper, order = qr((lengths[:, None] * rows[0]).T, mode="r", pivoting=True)
-        count = int(np.sum(np.abs(np.diag(upper)) > CLEAR * np.abs(scaled).max()))
-        for k in np.sort(order[:count]).tolist():
-            now, first, second = (each[k] for each in rows)
-            same = _of_its_body(joints[k], (now, first, second), own, bodies)
+        first = sorted(range(len(joints)), key=lambda k: (not joints[k].rotation, joints[k].between_bodies))
+        numbers, taken = _independent(lengths[:, None] * rows[0], first, taken, CLEAR * largest_row)
+        for k in numbers:
+            same = _of_its_body(joints[k], tuple(each[k] for each in rows), own, bodies)
             picks.append(joints[k] if same is None else same)
-        directions = np.linalg.qr(rows[0][order[:count]].T)[0]
-        left = left - directions @ directions.T
-    if len(picks) < n:
-        order = qr((scaled @ left).T, mode="r", pivoting=True)[1][: n - len(picks)]
-        picks += np.sort(order).tolist()
+    order = [*range(3 * bodies, 6 * bodies), *range(3 * bodies), *range(6 * bodies, len(scaled))]
+    picks += _independent(scaled, order, taken, 0.0)[0]
     return _read(instant, motion, small, picks)
+
+
+def _independent(
+    rows: np.ndarray, order: Sequence[int], taken: np.ndarray, least: float
+) -> tuple[list[int], np.ndarray]:
+    """Return numbers of rows that are independent of each other and of directions, and the directions with theirs.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (k, n)
+        Scaled to one length.
+    order : sequence of int
+        In which those that are clearly independent are taken.
+    taken : ndarray, shape (n, m)
+        Orthonormal directions.
+    least : float
+        Length of what a row has to have beside the others.
+    """
+    n, found = rows.shape[1], []
+    clear = max(EVEN * np.linalg.norm(rows, axis=1).max(), least)
+    for k in order:
+        if taken.shape[1] == n:
+            break
+        beside = rows[k] - taken @ (taken.T @ rows[k])
+        size = np.linalg.norm(beside)
+        if size > clear:
+            beside -= taken @ (taken.T @ beside)
+            taken = np.column_stack([taken, beside / np.linalg.norm(beside)])
+            found.append(int(k))
+    if taken.shape[1] < n:
+        upper, rest = qr((rows - rows @ taken @ taken.T).T, mode="r", pivoting=True)
+        count = min(int(np.sum(np.abs(np.diag(upper)) > least)), n - taken.shape[1])
+        found += rest[:count].tolist()
+        taken = np.linalg.qr(np.column_stack([taken, rows[rest[:count]].T]))[0]
+    return sorted(found), taken
 
 
 def _read(instant: Instant, motion: Basis, small: bool, picks: Sequence[JointCoordinate | int]) -> Chosen:
