@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -62,7 +63,8 @@ def save(thing: Any, path: str | Path) -> Path | list[Path]:
     Raises
     ------
     ValueError
-        If an object of this kind cannot be written in that form; the message names the endings that will do.
+        If an object of this kind cannot be written in that form, of which the message names the endings that will do;
+        for a path that is none.
     TypeError
         If objects of this kind cannot be written.
 
@@ -74,6 +76,8 @@ def save(thing: Any, path: str | Path) -> Path | list[Path]:
         ...
     ValueError: path is 'wheel.pdf'; a GearSpec is saved as .dxf, .step, .stp or .stl
     """
+    if not isinstance(path, str | os.PathLike) or not str(path):
+        raise ValueError(f"path is {path!r}; give the name of a file")
     path = Path(path)
     with waiting(f"saving {path.name}"):
         return _saved(thing, path)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import sys
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -15,6 +17,17 @@ OF_ADAMS = {
     ".acf": "commands of the solver of ADAMS: `gearmbs adams DECK.adm {name}` carries them out",
 }
 """What files of ADAMS are, by their endings."""
+
+BETWEEN = ("gearmbs", "contextlib", "functools")
+"""Modules whose lines no warning is about: the package, and what stands between two of its functions."""
+
+
+def warn(message: str, category: type[Warning] = UserWarning) -> None:
+    """Warn of what was asked for, at the line outside of the package that asked for it."""
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in BETWEEN:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, category, level)
 
 
 def of_adams(path: str | Path) -> str:

@@ -95,6 +95,17 @@ def test_no_archive_is_called_an_array(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("path", [None, 3, b"plant.npz", "", "plant"])
+def test_a_path_that_is_none_is_refused_for_what_saves_itself(path):
+    """As for all else; of plants and states the message names their endings."""
+    m = gm.Mechanism("disc")
+    m.revolute("pin", m.body("disc", 1.0, (2.0,) * 3), m.ground, axis=(0, 0, 1))
+    plant, state = m.linearize([("torque", "pin")], [("joint_angle", "pin")]), gm.Simulator(m, 1.0).state()
+    for thing, endings in ((plant, ".mat or .npz"), (state, ".npz"), (m, ".adm")):
+        with pytest.raises(ValueError, match=says(repr(path), endings if path == "plant" else "file")):
+            gm.save(thing, path)
+
+
 @pytest.mark.slow
 def test_other_things_are_refused(tmp_path):
     with pytest.raises(TypeError, match=says("int", "saved")):

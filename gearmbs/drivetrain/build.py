@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import partial
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,6 +25,7 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.modal import Mode
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
@@ -431,7 +431,7 @@ class _Builder:
         inertia = sum(p[2] + p[0] * (p[1] - middle) ** 2 * np.diag([1.0, 1.0, 0.0]) for p in pieces)
         return self.m.body(shaft.name, total, inertia, com=(0.0, 0.0, middle), **where)
 
-    def _warn_of_solid_wheels(self, shaft: Shaft, stacklevel: int = 5) -> None:
+    def _warn_of_solid_wheels(self, shaft: Shaft) -> None:
         """Warn where wheels and the shaft through them hold much of the same material."""
         if shaft.mass is not None:
             # a mass from a drawing or a scale leaves open what is in it
@@ -447,11 +447,10 @@ class _Builder:
         if doubled <= COUNTED_TWICE * total:
             return
         names = ", ".join(f"'{name}'" for name, mass in twice.items() if mass > 0.0)
-        warnings.warn(
+        warn(
             f"{shaft.label}: {doubled:.4g} kg of {total:.4g} kg with its wheels ({100.0 * doubled / total:.3g} %) are "
             f"counted twice, as shaft and as wheel {names} without a bore for it; give the wheels bore_radius, the "
-            "shaft's radius there, or give the shaft's own mass",
-            stacklevel=stacklevel,
+            "shaft's radius there, or give the shaft's own mass"
         )
 
     def _counted_twice(self, shaft: Shaft, gear: GearSpec, place: float) -> float:

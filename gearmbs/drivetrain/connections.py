@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
@@ -437,12 +437,11 @@ class TorsionalShaft(Coupling):
                 not self.damping_time,
                 f"{self.label}: damping_ratio is the former name of damping_time; give damping_time alone",
             )
-            warnings.warn(
+            warn(
                 f"{self.label}: damping_ratio is deprecated, for it is damping over stiffness in seconds "
                 f"({self.damping_ratio:g} s) and no ratio: write damping_time; of a mode of f Hz the ratio is pi f "
                 "times that",
                 FutureWarning,
-                stacklevel=4,
             )
             object.__setattr__(self, "damping_time", self.damping_ratio)
             object.__setattr__(self, "damping_ratio", None)

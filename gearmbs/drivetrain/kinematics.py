@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
@@ -26,6 +25,7 @@ from gearmbs.drivetrain.planetary import (
 )
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.units import Quantity, to_si
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -517,7 +517,7 @@ def power_flow(train: Drivetrain) -> PowerFlow:
     return PowerFlow(torques, pushing, senses, drivers, driven_by, members)
 
 
-def warn_of_weak_drives(train: Drivetrain, stacklevel: int = 3) -> None:
+def warn_of_weak_drives(train: Drivetrain) -> None:
     """Warn of drives whose largest torque is less than that of the loads on their shaft, at speed or from rest.
 
     Torques are those of the operating point without losses, see `PowerFlow`. Nothing is said
@@ -541,7 +541,7 @@ def warn_of_weak_drives(train: Drivetrain, stacklevel: int = 3) -> None:
         needed = sense * train.power.drive.get(first.name, 0.0)
         message = _too_weak(train, drives, needed) or _never_starts(train, drives, reached)
         if message is not None:
-            warnings.warn(message, stacklevel=stacklevel)
+            warn(message)
 
 
 def _too_weak(train: Drivetrain, drives: list[Drive], needed: float) -> str | None:
@@ -581,7 +581,7 @@ def _never_starts(train: Drivetrain, drives: list[Drive], reached: set[str]) -> 
     )
 
 
-def warn_of_tables(train: Drivetrain, stacklevel: int = 3) -> None:
+def warn_of_tables(train: Drivetrain) -> None:
     """Warn of loads by points whose curve leaves its points by far, or is asked beyond them at the operating speed.
 
     Warns
@@ -592,10 +592,10 @@ def warn_of_tables(train: Drivetrain, stacklevel: int = 3) -> None:
     for load in train.loads:
         if isinstance(load, TableLoad):
             for words in load.doubts(abs(train.speeds[load.shaft])):
-                warnings.warn(words, stacklevel=stacklevel)
+                warn(words)
 
 
-def warn_of_lost_torques(train: Drivetrain, stacklevel: int = 3) -> None:
+def warn_of_lost_torques(train: Drivetrain) -> None:
     """Warn of torques on shafts whose speed is prescribed, which change nothing but the torque of that drive.
 
     Nothing is said of drag, whose place is there, and of shafts that meshes and elastic couplings lead to.
@@ -618,8 +618,7 @@ def warn_of_lost_torques(train: Drivetrain, stacklevel: int = 3) -> None:
             if part.shaft not in fixed or torque == 0.0 or isinstance(part, Drag):
                 continue
             size = "" if torque is None else f" of {torque:.5g} N m"
-            warnings.warn(
+            warn(
                 f"{part.label}: its torque{size} is on shaft '{part.shaft}', whose speed {holder.label} prescribes: no "
-                "mesh and no motion feels it; put it on a shaft that meshes or couplings drive, or leave it out",
-                stacklevel=stacklevel,
+                "mesh and no motion feels it; put it on a shaft that meshes or couplings drive, or leave it out"
             )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
@@ -16,6 +15,7 @@ from gearmbs.gears.spec import GearSpec
 from gearmbs.schema.described import chosen
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, truth
+from gearmbs.wording import warn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,11 +138,10 @@ def _ideal(
     if stiffness not in ("iso", "iso single", "potential-energy"):
         return kind.with_damping_ratio(pair, stiffness, ratio, backlash=parting, **curves)
     if pair.misalignment:
-        warnings.warn(
+        warn(
             f"{label}: misalignment is {math.degrees(pair.misalignment):.4g} deg, and the stiffness '{stiffness}' of "
             "its ideal mesh is that of parallel wheels, whose whole face carries; leave pair out for the contact of "
-            "the teeth, or give stiffness in N/m",
-            stacklevel=3,
+            "the teeth, or give stiffness in N/m"
         )
     law = pair.with_own_stiffness(stiffness)
     return kind.with_damping_ratio(pair, law.mean_mesh_stiffness, ratio, backlash=parting, **curves)

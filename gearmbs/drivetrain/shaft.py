@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -15,6 +14,7 @@ from gearmbs.flexible import ElasticMaterial, ShaftSection
 from gearmbs.flexible.shaft import ELEMENTS
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_density
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.flexible.material import Damping
@@ -130,7 +130,7 @@ class Shaft(Part):
         if largest >= LONG:
             doubt = f"a length or radius of {largest:g} m; are millimetres meant ('{largest:g} mm')?"
         if doubt:
-            warnings.warn(f"{self.label}: {doubt}", stacklevel=3)
+            warn(f"{self.label}: {doubt}")
         self._check_modes()
 
     def _check_modes(self) -> None:

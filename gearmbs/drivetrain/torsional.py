@@ -24,6 +24,7 @@ from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 from gearmbs.kernels.jit import njit
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
@@ -340,7 +341,7 @@ def mesh_law(train: Drivetrain, mesh: str) -> str:
     return str(getattr(pair, "law", None) or pair.contact_model.law)
 
 
-def warn_of_overdamped_meshes(train: Drivetrain, stacklevel: int = 3) -> None:
+def warn_of_overdamped_meshes(train: Drivetrain) -> None:
     """Warn of meshes whose damping is above critical.
 
     Warns
@@ -350,11 +351,10 @@ def warn_of_overdamped_meshes(train: Drivetrain, stacklevel: int = 3) -> None:
     """
     for name, found in train.mesh_dynamics.items():
         if found.damping_ratio > 1.0:
-            warnings.warn(
+            warn(
                 f"mesh '{name}' is damped {found.damping_ratio:.3g} times critically by its law ({found.law}): its "
                 f"mode at {found.frequency:.4g} Hz does not oscillate, and is missing in modes and Campbell diagrams; "
-                "leave contact out for the stiffness of the wheels and a damping ratio, or give less damping",
-                stacklevel=stacklevel,
+                "leave contact out for the stiffness of the wheels and a damping ratio, or give less damping"
             )
 
 
@@ -437,10 +437,9 @@ def _tilted_stiffness(train: Drivetrain, mesh: str, parallel: float, force: floa
     pair, label = train.pairs[mesh], train.parts[mesh].label
     tilt = math.degrees(pair.geometry.misalignment)
     if force <= 0.0:
-        warnings.warn(
+        warn(
             f"{label}: misalignment is {tilt:.4g} deg, and without load no part of the face carries: its stiffness in "
-            f"the torsional chain is that of parallel wheels, {parallel:.4g} N/m; give the drivetrain a load",
-            stacklevel=2,
+            f"the torsional chain is that of parallel wheels, {parallel:.4g} N/m; give the drivetrain a load"
         )
         return parallel
     warn_of_jam(pair)

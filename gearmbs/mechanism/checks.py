@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import ForceElement
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.parts.point_mass import PointMass
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
@@ -201,11 +201,10 @@ def warn_of_stiff_seats(joints: Mapping[str, Joint], elements: Mapping[str, Any]
             for kind, (share, seat, part) in kinds.items()
         )
         meshes = any(part in elements for _, _, part in kinds.values())
-        warnings.warn(
+        warn(
             f"body '{body.name}': its {body.modal.modes} modes lack {lost}; it is too stiff there. Keep more modes: "
             "all (leave modes= out), or, of all, those that matter (by_participation(torques=True))"
-            + ("; or let the wheel be a Disc of its shaft, which needs fewer" if meshes else ""),
-            stacklevel=4,
+            + ("; or let the wheel be a Disc of its shaft, which needs fewer" if meshes else "")
         )
 
 
@@ -252,11 +251,10 @@ def warn_of_spin(bodies: Mapping[str, Body], solution: Solution) -> None:
         across = np.linalg.norm(turning - np.outer(turning @ body.long_axis, body.long_axis), axis=1)
         fastest = float(across.max(initial=0.0))
         if fastest > body.spin_limit:
-            warnings.warn(
+            warn(
                 f"body '{name}' turned at {fastest:.4g} rad/s across its long axis, more than {body.spin_limit:.4g}: "
                 "its modes lack the stiffening by centrifugal force; reduce it with spin=, or take large beams "
-                "(gearmbs.flexible.add_beam)",
-                stacklevel=4,
+                "(gearmbs.flexible.add_beam)"
             )
 
 
@@ -276,11 +274,10 @@ def warn_of_lost_torques(elements: Mapping[str, Any], solution: Solution) -> Non
             continue
         force, torque = (float(np.abs(part).max(initial=0.0)) for part in solution.load(name))
         if torque > LEVER * force:
-            warnings.warn(
+            warn(
                 f"force '{name}': its torque of up to {torque:.4g} N m on the point mass '{massed[0]}' did nothing, "
                 f"for a point mass does not turn; leave it out, or give an inertia: m.body('{massed[0]}', mass=..., "
-                "inertia=...)",
-                stacklevel=4,
+                "inertia=...)"
             )
 
 

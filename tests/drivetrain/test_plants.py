@@ -112,8 +112,9 @@ def test_a_drivetrain_that_runs_is_linearised_where_it_is():
     train = stage("speed")
     m = train.build()
     solution = m.simulate(0.2, rate=20000, tol=1e-7, rate_scale=train.rate_scale)
-    with pytest.warns(UserWarning, match=says("'stage'", "157.1 rad/s", "phase")):
+    with pytest.warns(UserWarning, match=says("'stage'", "157.1 rad/s", "phase")) as said:
         plant = train.linearize([("motion", "motor", "rate")], ["tacho", ("speed", "in")], at=solution)
+    assert {one.filename for one in said} == {__file__}
     assert plant.point.outputs == pytest.approx([solution.angular_velocity("out")[-1, 2], 50.0 * np.pi], rel=1e-6)
     # slowly the driven shaft follows by the ratio, the other way round
     low = plant.frequency_response(1.0)[0]

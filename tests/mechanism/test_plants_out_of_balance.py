@@ -34,6 +34,7 @@ def test_a_pendulum_that_nothing_holds_is_linearised_in_its_angle(arm):
         plant = m.linearize([("torque", "pin")], [("joint_angle", "pin")])
     weight = POLE * GRAVITY * arm
     assert f"{-weight * np.sin(angle):.4g} N m" in str(told[0].message)
+    assert told[0].filename == __file__
     assert plant.A == pytest.approx(np.array([[0, 1], [-weight * np.cos(angle) / inertia, 0]]), rel=1e-9, abs=1e-9)
     assert plant.C == pytest.approx(np.array([[1.0, 0.0]]), abs=1e-12)
     assert m.linear_modes().eigenvalues[0].imag == pytest.approx(np.sqrt(-plant.A[1, 0]), rel=1e-9)

@@ -70,7 +70,7 @@ def test_a_controller_that_cannot_go_on_is_told(controller, sample_time, words, 
 
     with pytest.warns(UserWarning, match=says(*words)) as told:
         sim = gone_on()
-    assert len(told) == 1
+    assert [one.filename for one in told] == [__file__]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sim.advance(0.012)
@@ -84,8 +84,9 @@ def test_a_run_from_a_state_with_controllers_says_that_it_has_none():
     sim = controlled()
     sim.advance(0.0104)
     state, m = sim.state(), two_discs()
-    with pytest.warns(UserWarning, match=says("state", "'load'", "control(...)")):
+    with pytest.warns(UserWarning, match=says("state", "'load'", "control(...)")) as told:
         m.simulate(0.011, initial=state)
+    assert told[0].filename == __file__
 
     class Ramp(PI):
         def __call__(self, t):

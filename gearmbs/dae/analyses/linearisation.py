@@ -17,7 +17,6 @@ is what is left, with U2 = T^T M T_u and so on: T', T_u' of axes that turn, see 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -37,6 +36,7 @@ from gearmbs.dae.analyses.kinematics import ROUNDING, Instant
 from gearmbs.dae.analyses.steady import Basis, GivenInputs, Linearised, turning_basis, weights
 from gearmbs.dae.analyses.turning import Turning, leaves_rest, turning
 from gearmbs.dae.problem import ModelError
+from gearmbs.wording import warn
 
 DEPENDENT = 1e-10
 """Pivot, of the largest, below which constraints count as dependent."""
@@ -258,22 +258,20 @@ def _driven(lin: Linearised, place: Triple | None) -> tuple[list[np.ndarray], li
     return pushed, [value + moved @ now + sped @ first, rate + sped @ now, np.zeros_like(value)]
 
 
-def warn_of_varying(reduced: Reduced, stacklevel: int) -> None:
+def warn_of_varying(reduced: Reduced) -> None:
     """Warn of bodies whose linearised equations have coefficients that vary with time, or are going to."""
     if reduced.unbalanced:
-        warnings.warn(
+        warn(
             f"{reduced.unbalanced}: it is not in balance here and moves off, and its equations change on the way. The "
             "eigenvalues are those of this instant, and depend on the coordinates, which are joints' own where they "
-            "can be; take the equilibrium (at='equilibrium'), or add the load that holds it",
-            stacklevel=stacklevel,
+            "can be; take the equilibrium (at='equilibrium'), or add the load that holds it"
         )
     for names in reduced.varying:
         shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
-        warnings.warn(
+        warn(
             f"{shown}: in this motion the coefficients of the linearised equations vary with time, also in axes that "
             "turn with a body; the eigenvalues are those of this instant and no modes of the motion. Take a position "
-            "of rest, or speeds and positions at which it turns steadily, and supports alike all round; or simulate",
-            stacklevel=stacklevel,
+            "of rest, or speeds and positions at which it turns steadily, and supports alike all round; or simulate"
         )
 
 

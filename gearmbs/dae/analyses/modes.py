@@ -9,7 +9,6 @@ with as many x as degrees of freedom; its eigenvalues are the finite ones of the
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -19,6 +18,7 @@ import numpy as np
 from gearmbs.dae.analyses.coordinates import JointCoordinate
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.turning import angular_velocities, spinning_modes
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
@@ -156,7 +156,7 @@ def linear_modes(place: System | Instant, joints: Sequence[JointCoordinate] = ()
         instant.released = True
     instant.y = instant.settle(instant.y)
     reduced = reduce(instant, joints=joints)
-    warn_of_varying(reduced, stacklevel=4)
+    warn_of_varying(reduced)
     _warn_of_turning_modes(instant, reduced)
     found = spectrum(reduced)
     values, vectors = found.values, found.vectors
@@ -215,10 +215,9 @@ def _warn_of_turning_modes(instant: Instant, reduced: Reduced) -> None:
             reason = "has modes of several waves round about"
         else:
             continue
-        warnings.warn(
+        warn(
             f"{names[k]} spins and {reason}: modal coordinates that turn with it have their frequencies as seen from "
-            "the body; whirl and critical speeds of a shaft by its sections are found by gearmbs.flexible.Rotor",
-            stacklevel=3,
+            "the body; whirl and critical speeds of a shaft by its sections are found by gearmbs.flexible.Rotor"
         )
 
 

@@ -396,7 +396,7 @@ def check_format(path: str | Path) -> Path:
     """
     path = path_of(path, "plant: save")
     if path.suffix not in FORMATS:
-        raise ModelError(f"{path.name}: a plant is written as {' or '.join(FORMATS)}")
+        raise ModelError(f"path is {str(path)!r}; a plant is written as {' or '.join(FORMATS)}")
     return path
 
 
@@ -603,7 +603,7 @@ def linear_plant(
     instant.released = True
     instant.y = instant.settle(instant.y)
     reduced = reduce(instant, joints=joints, balance=True)
-    warn_of_varying(reduced, stacklevel=3)
+    warn_of_varying(reduced)
     own = np.array([k for k in range(len(names)) if k not in (*inputs, *outputs)], dtype=int)
     u, y = np.array(inputs, dtype=int), np.array(outputs, dtype=int)
     asked = [Asked(names[k], "") for k in u]

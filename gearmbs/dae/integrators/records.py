@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -19,6 +18,7 @@ from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
 from gearmbs.kernels.bound import trying
 from gearmbs.kernels.pointers import direct
+from gearmbs.wording import warn
 
 START_STEPS = 20
 """Steps, the longest of which is taken for the size of steps at the start: after some ten they have grown to it."""
@@ -62,7 +62,7 @@ def warn_of_unresolved(
             told = unresolved(problem, t[i], h, unknown, y[i, unknown], j, worst)
     part.moved[:] = 0.0
     if told:
-        warnings.warn(told, stacklevel=2)
+        warn(told)
     return told
 
 

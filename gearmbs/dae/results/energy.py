@@ -7,7 +7,6 @@ for the powers are found by integrating over every second of them.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED
 from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_V, POSE_W
 from gearmbs.dae.results.frames import Evaluated, frame_motion
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.dae.equations.bodies.inertia import ModalInertia
@@ -28,7 +28,7 @@ COARSE = 0.01
 powers, a cubic spline errs 16 times less with all of them, so that works are right to about a thousandth."""
 
 
-def energy_balance(found: Evaluated, frictions: Collection[int] = (), stacklevel: int = 2) -> xr.Dataset:
+def energy_balance(found: Evaluated, frictions: Collection[int] = ()) -> xr.Dataset:
     """Return the energies and works of a solution over time, from its first output.
 
     Parameters
@@ -37,8 +37,6 @@ def energy_balance(found: Evaluated, frictions: Collection[int] = (), stacklevel
         Sampled finely enough for its powers to be integrated: several outputs a period of the fastest force.
     frictions : collection of int
         Numbers of the force elements that are friction of joints.
-    stacklevel : int
-        Of the warning.
 
     Returns
     -------
@@ -81,11 +79,10 @@ def energy_balance(found: Evaluated, frictions: Collection[int] = (), stacklevel
     coarse = max(_coarseness(t, power, works[name]) for name, power in powers.items()) / turned_over
     out.attrs |= {"relative_imbalance": largest / turned_over, "relative_coarseness": coarse}
     if coarse > COARSE:
-        warnings.warn(
+        warn(
             f"energy balance: works over every second output differ by {100.0 * coarse:.3g} % of the work from those "
             f"over all {t.size}: the outputs are too far apart for the powers to be integrated; do not trust works, "
-            "dissipation and imbalance, and give simulate a higher rate, or every_step=True",
-            stacklevel=stacklevel,
+            "dissipation and imbalance, and give simulate a higher rate, or every_step=True"
         )
     return out
 

@@ -5,7 +5,6 @@ With it what else a solution says by time: full turns between outputs, the state
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -19,6 +18,7 @@ from gearmbs.dae.model.system import turns_of_one
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult
 from gearmbs.dae.state import State
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.members import Members
@@ -256,11 +256,10 @@ def warn_of_doubtful_turns(t: np.ndarray, angle: np.ndarray, speed: np.ndarray, 
     doubtful = np.flatnonzero(off > np.pi)
     if doubtful.size:
         k = int(doubtful[0])
-        warnings.warn(
+        warn(
             f"{label}: its full turns cannot be counted surely from t = {t[k]:.6g} to {t[k + 1]:.6g} s, where it turns "
             f"{abs(steps[k]) / (2 * np.pi):.3g} times between two outputs and its speed changes; simulate with a "
-            "higher rate",
-            stacklevel=4,
+            "higher rate"
         )
 
 

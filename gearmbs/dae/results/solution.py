@@ -562,7 +562,7 @@ class Solution(Measured, Shown):
         frictions = [
             k for k, name in enumerate(self.system.force_names) if getattr(elements.get(name), "kind", "") == "friction"
         ]
-        return energy_balance(self.evaluated, frictions, stacklevel=3)
+        return energy_balance(self.evaluated, frictions)
 
     def __len__(self) -> int:
         return self.t.size

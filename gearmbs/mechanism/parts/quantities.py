@@ -6,7 +6,6 @@ import functools
 import inspect
 import math
 import re
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar, cast
 
@@ -17,6 +16,7 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.dae.problem import ModelError
 from gearmbs.units import NUMBER, Given, to_si
+from gearmbs.wording import warn
 
 # What a modeller wrote with units, kept by the names of bodies, joints and forces, for showing it again.
 
@@ -289,9 +289,8 @@ def inertia_matrix(value: float | Sequence[float] | np.ndarray, field: str) -> n
             "products, or the point they are about"
         )
     if moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
-        warnings.warn(
+        warn(
             f"{field}: principal moments {moments} kg m^2; the largest exceeds the sum of the others, as in no body: "
-            "correct the moments, the signs of products, or the point they are about",
-            stacklevel=4,
+            "correct the moments, the signs of products, or the point they are about"
         )
     return 0.5 * (out + out.T)

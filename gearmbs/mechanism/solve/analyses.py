@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +20,7 @@ from gearmbs.mechanism.parts.quantities import quantities
 from gearmbs.mechanism.solve.points import joint_coordinates
 from gearmbs.mechanism.solve.simulate import just_inside
 from gearmbs.progress import waiting
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
@@ -82,7 +82,7 @@ def frozen_friction(mechanism: Mechanism) -> str | None:
 def _warn_of_friction(mechanism: Mechanism) -> None:
     remark = frozen_friction(mechanism)
     if remark is not None:
-        warnings.warn(remark, stacklevel=4)
+        warn(remark)
 
 
 def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from inspect import signature
@@ -13,19 +12,19 @@ import numpy as np
 from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.state import Memory, State
 from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.wording import warn
 
 RESOLVED = 1e-12
 """Least sample time of a controller, and time between inputs that are set, as part of the end of the run: some thousand
 times what tells two times apart there, 2e-16 of it, so that they lie where they are meant."""
 
 
-def warn_of_unmet(names: Iterable[str], stacklevel: int = 3) -> None:
+def warn_of_unmet(names: Iterable[str]) -> None:
     """Warn that a state has controllers of inputs which nobody has given again, so that these are held."""
     listed = ", ".join(map(repr, names))
-    warnings.warn(
+    warn(
         f"state: it has the memory of controllers of {listed}, and none is given: what they set stays as it is; give "
-        "them again with control(...) before advance",
-        stacklevel=stacklevel,
+        "them again with control(...) before advance"
     )
 
 
@@ -97,10 +96,9 @@ class Control:
             if self.remembers:
                 why = f"it samples each {self.period:g} s, in the state each {theirs:g} s"
                 remedy = f"take sample_time={theirs:g}"
-            warnings.warn(
+            warn(
                 f"control: the controller of {self.name!r} does not go on as in the state: {why}; {remedy}, or set "
-                "what it remembers yourself",
-                stacklevel=4,
+                "what it remembers yourself"
             )
         self.count = max(0, int((t - self.start) / self.period) - 1)
         while self.next < t:

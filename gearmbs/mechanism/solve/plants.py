@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told, has_phase
 from gearmbs.mechanism.solve.points import instant_at, joint_coordinates, point_of
 from gearmbs.progress import waiting
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
@@ -337,7 +337,7 @@ def _plant(
     size = instant.y.size
     stacked = [np.array([pair[k] for pair in pairs]).reshape(-1, size).T for k in (0, 1)]
     reduced = reduce(instant, Inputs(*stacked), joint_coordinates(mechanism), balance=True)
-    warn_of_varying(reduced, stacklevel=5)
+    warn_of_varying(reduced)
     _warn_of_running_teeth(mechanism, instant)
     kinds = instant.system.model.differential_states
     names = [name for name, differential in zip(instant.system.state_names, kinds, strict=True) if differential]
@@ -400,12 +400,11 @@ def _warn_of_running_teeth(mechanism: Mechanism, instant: Instant) -> None:
             if max(spins, default=0.0) > TURNS:
                 running.append(f"{name!r} (at {max(spins):.4g} rad/s)")
     if running:
-        warnings.warn(
+        warn(
             f"teeth run in {', '.join(running)}, at another stiffness in each phase of the mesh: A is that of this "
             "instant, and shafts that turn freely have poles of some rad/s and of either sign in place of zeros. Take "
             "the mesh at rest under its load (at='equilibrium', of a drivetrain at='loaded'), or an IdealMesh of its "
-            "mean stiffness, or compare several instants",
-            stacklevel=5,
+            "mean stiffness, or compare several instants"
         )
 
 

@@ -11,7 +11,6 @@ with the sensitivities s of the unknowns: solutions are made of both sides, and 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -27,7 +26,7 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.simulate import prepared, simulate
-from gearmbs.wording import any_of, did_you_mean
+from gearmbs.wording import any_of, did_you_mean, warn
 
 TIGHTER = 0.1
 """Part of the usual tolerance at which a run is differentiated where none is given. Derivatives bend where the rates of
@@ -254,8 +253,5 @@ def direction_of(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEPro
     places = np.flatnonzero(change)
     start = (plus.y0 - minus.y0) / width
     if not places.size and not start.any():
-        warnings.warn(
-            f"parameter {name!r} changes no number of the model, nor its start: all derivatives by it are zero",
-            stacklevel=3,
-        )
+        warn(f"parameter {name!r} changes no number of the model, nor its start: all derivatives by it are zero")
     return Direction(name, start, places, change[places])

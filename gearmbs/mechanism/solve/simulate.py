@@ -289,7 +289,7 @@ def simulate(
     )  # fmt: skip
     if initial is not None:
         if initial.controllers:
-            warn_of_unmet(initial.controllers, stacklevel=4)
+            warn_of_unmet(initial.controllers)
         # events in what is left of the last step would be missed
         history = None if stops else initial.history_for(problem, name, tol)
         options |= starting_options(name, history)
