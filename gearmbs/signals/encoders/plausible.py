@@ -3,7 +3,7 @@
 A pair of equal wheels turns with one ratio whatever its teeth are, and two discs of one count show that ratio whatever
 the count is told to be. The mesh itself knows better: where it stands out of marks and noise it does so at an order and
 at multiples of it. If these are others than the told ones, one of the numbers is wrong. Where the marks hide it, they
-know themselves: those of a disc that is told for twice its lines repeat after half a turn of the told ones.
+tell themselves: those of a disc recur with its own turn, whatever is told.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from itertools import pairwise
 import numpy as np
 import scipy.fft
 
-from gearmbs.signals.encoders.marks import ECCENTRIC, SIDEBANDS, encoder_marks
 from gearmbs.signals.encoders.orders import Deviations, Gearing, folded
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 
@@ -32,11 +31,26 @@ MULTIPLES = 3
 CANDIDATES = 12
 WIDTH = 1.5
 """Lines of the spectrum by which an order may seem to be off."""
-TIMES = (2, 3, 4)
-"""Counts that are told for so many times the true one: both edges of a pulse, or of two tracks, are counted so."""
-REPEATED, FEWEST_ORDERS = 0.1, 16
-"""Share of the errors' power between the multiples of an order, by that at them, from which on marks repeat: medians of
-sixteen orders each, exponentially distributed, are so far apart by chance once in some hundred thousand discs."""
+LEAST_MARKS = 5e-4
+"""Pitches, RMS: a mesh stands out of smaller errors; in simulations without noise they are those of splines."""
+LARGE_HARMONICS, BESIDE_MESH = 6, 1
+"""Mesh harmonics that are left out where marks are looked for, with the orders to either side of them."""
+MOST_LEFT_OUT = 0.5
+"""Share of the orders that the told mesh and its sidebands may take: of few lines all orders are theirs."""
+FEWEST_LAG = 16
+"""Pulses after which, at the earliest, marks of a disc recur."""
+TURNS_SEEN = 3.0
+"""Recurrences that a train must hold to show one."""
+RECURS = 0.5
+"""Correlation from which marks recur: of marks as large as all else, and no other motion, together."""
+SAME_RECURRENCE = 0.85
+"""Part of the best correlation from which another one is as good: of two equal ones the shorter is the turn."""
+NOT_AT_ALL = 0.5
+"""Part of the best correlation below which marks do not recur after the told turn."""
+LOUDEST = 0.99
+"""Share of a spectrum above which lines are cut off: those of a mesh, its sidebands and a supply are fewer."""
+TICKS = 3.0
+"""Steps of the counter's clock, RMS, below which intervals show how the clock rounds them, which recurs, too."""
 
 
 def doubted_numbers(
@@ -102,46 +116,79 @@ def doubted_numbers(
     return _words(found, told, gearing, lines, turns * count)
 
 
-def repeating_marks(trains: Sequence[PulseTrain], mesh: Sequence[float]) -> str | None:
-    """Return what the marks of some discs say against the told lines: that they repeat after a part of a turn; or None.
+def repeating_marks(trains: Sequence[PulseTrain], mesh: Sequence[float], ratio: float = 1.0) -> str | None:
+    """Return what the marks of some discs say against the told lines: that they recur after another count; or None.
 
     Parameters
     ----------
     trains : sequence of PulseTrain
     mesh : sequence of float
         Told mesh order of each shaft, about whose multiples nothing is taken for marks.
+    ratio : float
+        Speed of the first shaft by that of the second, whose wheels have errors of their own.
     """
-    found = [_repetitions(train, order) for train, order in zip(trains, mesh, strict=True)]
+    mates = (ratio, 1.0 / ratio)
+    found = [_recurrence(train, order, mate) for train, order, mate in zip(trains, mesh, mates, strict=False)]
     words = [
-        f"marks of the {train.name!r} repeat {times} times in a turn of {train.lines} lines (between, errors have "
-        f"{share:.2g} of their power)"
-        for train, (times, share) in zip(trains, found, strict=True)
-        if times > 1
+        f"marks of the {train.name!r} recur after {count} pulses, of which {train.lines} are told for a turn"
+        for train, count in zip(trains, found, strict=True)
+        if count is not None
     ]
     if not words:
         return None
-    counts = " and ".join(str(train.lines // times) for train, (times, _) in zip(trains, found, strict=True))
+    # both turn in the told ratio, so that both are told wrongly alike
+    share = next(count / train.lines for train, count in zip(trains, found, strict=True) if count is not None)
+    counts = " and ".join(str(count or round(share * train.lines)) for train, count in zip(trains, found, strict=True))
     return f"CHECK THE LINES AND TEETH: {'; '.join(words)}; discs of {counts} lines would explain it."
 
 
-def _repetitions(train: PulseTrain, mesh: float) -> tuple[int, float]:
-    """Return how often marks repeat in a told turn, 1 if they do not, and what share of their power does not.
+def _recurrence(train: PulseTrain, mesh: float, mate: float) -> int | None:
+    """Return after how many pulses marks recur, if that is not the told count of lines.
 
-    Errors of marks have no reason to repeat, so that all orders of their disc have some; where more lines are told than
-    there are, orders of the told turn that are none of the true one have noise alone.
+    Second differences of the times by the interval around them show the marks and hardly the motion. What recurs with
+    the teeth and with the mate's turns, by the told numbers, is left out.
     """
-    power = np.abs(scipy.fft.rfft(encoder_marks(train).errors)) ** 2
-    orders = np.arange(ECCENTRIC + 1, (train.lines + 1) // 2)
-    orders = orders[np.abs((orders + 0.5 * mesh) % mesh - 0.5 * mesh) > SIDEBANDS]
-    for times in sorted((n for n in TIMES if train.lines % n == 0), reverse=True):
-        # those of half as many repetitions stand between, too
-        classes = [power[orders[orders % times == k]] for k in range(times)]
-        if min(each.size for each in classes) < FEWEST_ORDERS:
-            continue
-        at, *between = (float(np.median(each)) for each in classes)
-        if max(between) < REPEATED * at:
-            return times, max(between) / at
-    return 1, 1.0
+    if train.referenced:
+        return None
+    _, times, there = train.every()
+    interval = 0.5 * (times[2:] - times[:-2])
+    bent = times[2:] - 2.0 * times[1:-1] + times[:-2]
+    bent[~(there[2:] & there[1:-1] & there[:-2])] = 0.0
+    if np.sqrt(np.mean(bent**2)) < TICKS * _tick(np.diff(times)):
+        return None
+    values = bent / interval
+    size, most = values.size, int(values.size / TURNS_SEEN)
+    if most <= max(train.lines, 2 * FEWEST_LAG):
+        return None
+    power = np.abs(scipy.fft.rfft(values, 2 * size)) ** 2
+    order = np.arange(power.size) * (train.lines / (2.0 * size))
+    for k in range(1, LARGE_HARMONICS + 1):
+        power[np.abs(order - folded(k * mesh, train.lines)) <= BESIDE_MESH] = 0.0
+    power = np.minimum(power, np.quantile(power, LOUDEST))
+    # of independent errors second differences have six times the variance
+    marks = math.sqrt(float(power[power > 0.0].mean()) / (6.0 * size))
+    if marks < LEAST_MARKS or np.mean(power == 0.0) > MOST_LEFT_OUT:
+        return None
+    alike = scipy.fft.irfft(power)[: most + 1] / (1.0 - np.arange(most + 1) / size)
+    alike = alike / alike[0] if alike[0] > 0.0 else alike
+    lags = np.arange(FEWEST_LAG, most + 1)
+    turn = train.lines * mate
+    if abs(train.lines / turn - round(train.lines / turn)) * turn > 1.0:
+        lags = lags[np.abs((lags + 0.5 * turn) % turn - 0.5 * turn) > 1.0]
+    best = float(alike[lags].max())
+    if best < RECURS:
+        return None
+    count = int(lags[np.argmax(alike[lags] >= SAME_RECURRENCE * best)])
+    told = float(alike[train.lines])
+    if count == train.lines or (count > train.lines and told >= NOT_AT_ALL * best):
+        return None
+    return count
+
+
+def _tick(intervals: np.ndarray) -> float:
+    """Return the step of the clock that intervals were counted by, s: their least difference."""
+    steps = np.diff(np.unique(intervals))
+    return float(steps.min(initial=math.inf)) if steps.size else math.inf
 
 
 def _spectrum(first: Deviations, second: Deviations, begin: float, turns: float, limit: float) -> np.ndarray:

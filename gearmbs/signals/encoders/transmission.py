@@ -296,7 +296,7 @@ def _lines_of(
     values = lines((first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh)
     mesh = [o.order for o in orders if o.harmonic]
     trains = (run.driver, run.driven)
-    doubt = repeating_marks(trains, (float(gearing.mesh), float(gearing.on_second(gearing.mesh))))
+    doubt = repeating_marks(trains, (float(gearing.mesh), float(gearing.on_second(gearing.mesh))), scale)
     # marks that repeat are told for lines of a mesh otherwise
     doubt = doubt or doubted_numbers(first, second, begin, end, gearing, (run.driver.lines, run.driven.lines))
     return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)), doubt, window)

@@ -346,26 +346,29 @@ def test_another_count_of_lines_is_told_by_the_mesh(told, remedy):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("times", "turns"), [(1, 12), (2, 24), (3, 36), (4, 36)])
+@pytest.mark.parametrize(("told", "turns"), [(256, 12), (512, 24), (768, 36), (1024, 36), (128, 12), (250, 12)])
 @pytest.mark.parametrize("error", [0.01, 0.003])
-def test_more_lines_than_there_are_are_told_by_the_marks(times, turns, error):
-    """Errors of 1 % hide the mesh, which would tell; the marks of a disc repeat after its own turn."""
+def test_more_or_fewer_lines_than_there_are_are_told_by_the_marks(told, turns, error):
+    """Errors of 1 % hide the mesh, which would tell; the marks of a disc recur after its own turn."""
     curve, radius = paper_error()
     lag = closed(curve.error)
     angles = coupled(lambda turned: lag(29 * turned), TEETH, radius, turns, rate=20e3)
     trains = [
-        pulse_train(
-            encoder(a, 256, marks=mark_errors(256, error, k), jitter="50 ns", seed=k).times, 256 * times, name=name
-        )
+        pulse_train(encoder(a, 256, marks=mark_errors(256, error, k), jitter="50 ns", seed=k).times, told, name=name)
         for k, (a, name) in enumerate(zip(angles, ("driver", "driven"), strict=True))
     ]
     found = transmission_error_from_pulses(CoupledRun(*trains), TEETH, base_radius=radius)
-    if times == 1:
+    if told == 256:
         assert found.doubt is None
     else:
         assert found.verdict.startswith("CHECK THE LINES AND TEETH")
-        assert f"repeat {times} times" in found.verdict
         assert "256 and 256 lines" in found.verdict
+
+
+def test_half_the_lines_are_told_by_the_marks_of_one_disc():
+    train = encoder(free(seconds=0.8), 1024, marks=mark_errors(1024, 0.01, 3), jitter="50 ns", seed=1)
+    assert "discs of 1024 lines" in repeating_marks([pulse_train(train.times, 512)], [29.0])
+    assert repeating_marks([pulse_train(train.times, 1024)], [29.0]) is None
 
 
 @pytest.mark.parametrize("lines", [64, 100, 360, 1024])
