@@ -6,7 +6,7 @@ import pytest
 import gearmbs as gm
 from gearmbs.studies.run.simulation import case_mechanism
 from tests.mechanism.agreement import assert_all_names_agree
-from tests.mechanism.test_stepping import PAIR, planets, rolling_train, slider_crank
+from tests.mechanism.test_stepping import PAIR, flexible_pair, planets, rolling_train, slider_crank
 
 
 def controlled():
@@ -58,3 +58,28 @@ def test_every_name_at_a_point_is_that_of_the_solution(model, formulation):
             told = assert_all_names_agree(m, sim, solution, k)
             assert told["com_acceleration"] == len(m.bodies)
             assert told["output"] == len(m.outputs)
+
+
+@pytest.mark.filterwarnings("ignore:shaft", "ignore:teeth run")
+def test_a_plant_tells_of_a_body_that_deforms_what_a_simulator_tells():
+    """Its frame, and not the material at its centre, which a torque there turns the other way in the first moment."""
+    m, options = flexible_pair()
+    wheel = m.bodies["shaft 2"]
+    m.torque("push", wheel, m.input("push", "N m"))
+    wheel.marker(wheel.com, name="middle")
+    m.output("speed", ("angular_velocity", "shaft 2", "z"))
+    m.output("place", ("com_position", "shaft 2", "y"))
+    sim = gm.Simulator(m, 3e-3, **{**options, "tol": 1e-9})
+    sim.advance(2e-3)
+    state, told = sim.state(), {}
+    plant = m.linearize(["push"], ["speed", "place", "WZ(middle)"], at=state)
+    assert isinstance(sim.get("output", "speed"), float)
+    assert plant.point.outputs[:2] == pytest.approx([sim.get("output", name) for name in ("speed", "place")])
+    for push in (-1.0, 1.0):
+        sim.restore(state)
+        sim.set("push", push)
+        sim.advance(2e-3 + 2e-6)
+        told[push] = sim.get("output", "speed")
+    first = (plant.C @ plant.B)[:, 0]
+    assert (told[1.0] - told[-1.0]) / 4e-6 == pytest.approx(first[0], rel=1e-4)
+    assert first[0] * first[2] < 0.0

@@ -145,3 +145,32 @@ def test_two_outputs_cannot_tell_turns_that_nothing_counts():
     sparse = m.simulate(5.0, t_eval=[0.0, 4.5])
     with pytest.warns(UserWarning, match=says("joint 'pin'", "4.5", "higher rate")):
         sparse.joint_angle("pin")
+
+
+@pytest.mark.parametrize("lump", [False, True])
+@pytest.mark.parametrize("at", ["state", "solution"])
+def test_a_plant_begins_at_the_turns_that_have_been_made(at, lump):
+    """J w' = -c a - d a^3 after almost two turns; of what the model does not count a solution knows the turns."""
+    m = Mechanism("hard")
+    wheel = m.body("wheel", mass=1.0, inertia=(2.0, 2.0, 2.0), angular_velocity=(0.0, 0.0, 30.0))
+    m.revolute("pin", wheel, m.ground, axis=(0, 0, 1))
+    i, j = wheel.marker(name="s.I"), m.ground.marker(name="s.J")
+    m.torsion_spring("coil", i, j, stiffness=3.0)
+    m.axis_torque("hard", i, j, "-0.05*AZ(s.I, s.J)**3")
+    m.torque("drive", wheel, m.input("u", "N m"))
+    m.output("energy", "AZ(s.I, s.J)**2")
+    m.lump = lump
+    sim = gm.Simulator(m, 1.0, tol=1e-9)
+    for t in np.linspace(0.0, 0.4, 41)[1:]:
+        sim.advance(t)
+    angle = sim.get("joint_angle", "pin")
+    assert angle > 3.0 * np.pi
+    if at == "state":
+        plant = m.linearize(["u"], ["energy"], at=sim.state())
+    else:
+        plant = m.linearize(["u"], ["energy", ("joint_angle", "pin"), "AZ(pin.I, pin.J)**2"], at=sim.solution())
+        assert plant.point.outputs[1:] == pytest.approx([angle, angle**2], rel=1e-9)
+        assert plant.C[2] == pytest.approx(plant.C[0], rel=1e-9)
+    assert plant.A[1, 0] == pytest.approx(-(3.0 + 0.15 * angle**2) / 2.0, rel=1e-9)
+    assert plant.C[0, 0] == pytest.approx(2.0 * angle, rel=1e-9)
+    assert plant.point.outputs[0] == pytest.approx(sim.get("output", "energy"), rel=1e-9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.dae.equations.expressions import ExpressionError
@@ -12,7 +13,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.inputs import Input, Output
 from gearmbs.mechanism.parts.joints import JOINTS, Joint, kinds_with_angle, kinds_with_displacement
-from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.parts.modal import ModalBody, centre_marker
 from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
@@ -445,7 +446,11 @@ class PlantNames:
             return where
         body = where if isinstance(where, Body) else m.bodies.get(where) if of_body else None
         if body is not None:
-            return own_marker(body, f"{body.name} plant centre", body.marker, body.com)
+            name = f"{body.name} plant centre"
+            if isinstance(body, ModalBody):
+                # the material there deforms, and what a solution tells of the body is its frame
+                return own_marker(body, name, partial(centre_marker, body))
+            return own_marker(body, name, body.marker, body.com)
         found = self._named(where, None)
         if found is None:
             there = [

@@ -18,12 +18,13 @@ from gearmbs.dae.analyses.response import response_of
 from gearmbs.dae.analyses.turning import skew, turning
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
+from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.checks import check_mechanism, warn_of_stiff_seats
 from gearmbs.mechanism.parts.bodies import Marker, markers_kept
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told, has_phase
-from gearmbs.mechanism.solve.points import instant_at, joint_coordinates, point_of
+from gearmbs.mechanism.solve.points import instant_at, joint_coordinates, point_of, turns_of
 from gearmbs.progress import waiting
 from gearmbs.wording import warn
 
@@ -123,7 +124,12 @@ def linearize(
             if count > 1:
                 raise ModelError(f"inputs: {name!r} is there {count} times; give it once")
         whole, told = _with_outputs(mechanism, names, outputs)
+        # outputs begin where the model has counted to, and so does all of a model that was integrated as less
+        whole.turns = {**mechanism.turns, **point.turns}
         instant = instant_at(whole, point)
+        if isinstance(at, Solution) and (more := turns_of(at, point, instant)):
+            whole.turns |= more
+            instant = instant_at(whole, point)
         held = _held(instant, told)
         if held:
             # expressions look at the accelerations of the operating point

@@ -16,7 +16,7 @@ from gearmbs.dae.analyses.statics import static_equilibrium as _static_equilibri
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.unknowns import FORMULATIONS
 from gearmbs.dae.model.model import Configuration, Model
-from gearmbs.dae.problem import ModelError, Number
+from gearmbs.dae.problem import Counted, ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
@@ -54,6 +54,8 @@ class Point:
         Of an equilibrium, in which nothing moves whatever its motions do: all unknowns of the I3 formulation.
     numbers : dict of str to list of ndarray
         What stands in the places of inputs and parameters.
+    turns : dict
+        Angles through full turns, rad, by what `Mechanism.turns` has them by.
     state : State or None
         The state it was made from.
     """
@@ -66,6 +68,7 @@ class Point:
     rdata: np.ndarray | None = None
     unknowns: dict[str, float] | None = None
     numbers: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
     state: State | None = None
 
 
@@ -121,7 +124,8 @@ def _of_equilibrium(mechanism: Mechanism, at: StaticResult) -> Point:
     states = dict(zip(instant.system.state_names, instant.y[z].tolist(), strict=True))
     numbers = _numbers(instant.problem.numbers, instant.rdata)
     tables = instant.system, instant.idata, instant.rdata
-    return Point(instant.t, instant.configuration(), states, *tables, unknowns, numbers)
+    turns = _turns(instant.problem.counted, instant.rdata, instant.t)
+    return Point(instant.t, instant.configuration(), states, *tables, unknowns, numbers, turns)
 
 
 def _of_state(mechanism: Mechanism, state: State) -> Point:
@@ -153,8 +157,28 @@ def _of_solution(system: System, problem: Any, members: Any, state: State) -> Po
     # what was not changed on the way is the mechanism's own, which may be another one than that of the run
     changed = {name: one for name, one in problem.numbers.items() if np.isin(one.cells(), state.reals[0]).any()}
     numbers = _numbers(changed, rdata)
-    point = Point(state.t, now._configuration(0), states, numbers=numbers, state=state)
+    turns = _turns(problem.counted, rdata, state.t)
+    point = Point(state.t, now._configuration(0), states, numbers=numbers, turns=turns, state=state)
     return point if members is not None else replace(point, system=system, idata=idata, rdata=rdata)
+
+
+def _turns(counted: Counted | None, rdata: np.ndarray, t: float) -> dict[tuple[str, str, str], float]:
+    """Return the angles that a table of numbers counts, at a time."""
+    if counted is None:
+        return {}
+    angles = counted.values(np.array([t]), rdata[counted.places][None, :])[0].tolist()
+    return dict(zip(counted.angles, angles, strict=True))
+
+
+def turns_of(solution: Solution, point: Point, instant: Instant) -> dict[tuple[str, str, str], float]:
+    """Return angles that an instant counts and its point does not know, as a solution counts them from its start on."""
+    counted, row, found = instant.problem.counted, int(np.searchsorted(solution.t, point.t)), {}
+    for function, i, j in counted.angles if counted is not None and row < solution.t.size else ():
+        if (function, i, j) not in point.turns:
+            # not markers made for the outputs of the plant
+            with suppress(ModelError):
+                found[function, i, j] = float(solution.evaluate(f'{function}("{i}", "{j}")')[row])
+    return found
 
 
 def _numbers(known: Mapping[str, Number], rdata: np.ndarray) -> dict[str, list[np.ndarray]]:

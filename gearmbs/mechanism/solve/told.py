@@ -113,7 +113,8 @@ class Told(OwnAttributes):
             made = m.measures(self._now()).named_output(*names)
             with markers_kept((m.ground, *m.bodies.values())):
                 try:
-                    return made.of(self._got(*made.asked))
+                    told = made.of(self._got(*made.asked))
+                    return float(told) if isinstance(told, np.ndarray) and told.ndim == 0 else told
                 except ModelError as error:
                     raise ModelError(f"output {made.name!r}: {error}") from None
                 except KeyError as error:
