@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -123,3 +125,23 @@ def test_what_turns_a_point_mass_is_refused_at_its_line(given, message):
         parse_deck(HEAD + point + given + "END\n").to_mechanism()
     # the same with nothing that turns it
     run(point + given.replace("REVOLUTE", "SPHERICAL").replace("TX=4", "TX=0"))
+
+
+@pytest.mark.parametrize(
+    ("extra", "acts"),
+    [
+        ("", False),
+        ("MARKER/31, PART=3\nREQUEST/1, D, I=31, J=1\nGRAPHICS/1, ELLIPSOID, CM=31, XS=1, YS=1, ZS=1\n", False),
+        ("MARKER/31, PART=3\nSFORCE/2, TRANSLATIONAL, I=31, J=20, FUNCTION=1\n", True),
+    ],
+)
+def test_an_empty_part_rests_unless_something_acts_on_it(extra, acts):
+    text = PLATE.format(extra="") + "PART/3, QG=1,2,3\n" + extra
+    if acts:
+        with pytest.raises(DeckError, match=says("PART_3", "inertia")):
+            run(text)
+        return
+    found = run(text)
+    np.testing.assert_allclose(found.part(3)[:, :3], np.tile([1.0, 2.0, 3.0], (21, 1)), atol=1e-12)
+    np.testing.assert_allclose(found.part(2), run(PLATE.format(extra="")).part(2), atol=1e-8)
+    assert any(re.search(says("PART/3", "rests"), str(message)) for message in found.messages)

@@ -256,8 +256,27 @@ class Builder:
             angular_velocity=start.angular_velocity,
         )
         self.model.sources[body.name] = part
-        if part.planar:
+        if self.rests(part):
+            self.remark(WARNING, part, "has no mass, and nothing acts on it: it rests where it is", " ")
+            hold(self.mechanism, body, "fixed")
+        elif part.planar:
             hold(self.mechanism, body, "planar")
+
+    def rests(self, part: st.Part) -> bool:
+        """Return whether a part has neither inertia nor speed, and nothing that could move it names a marker of it."""
+        if part.mass or any(part.ip or ()) or any((part.vx, part.vy, part.vz, part.wx, part.wy, part.wz)):
+            return False
+        return not any(owner == ("PART", part.id) for owner in self._acted_on)
+
+    @cached_property
+    def _acted_on(self) -> set[tuple[str, int | None]]:
+        """What the markers are on that forces, constraints, curves and solids that touch name."""
+        touching = {ref for s in self.deck.of(st.Contact).values() for ref in (*s.igeom, *s.jgeom)}
+        passive = (st.Marker, st.Request, st.Part, st.Graphics)
+        acting = [s for kind, group in self.deck.items.items() if kind not in passive for s in group.values()]
+        acting += [s for s in self.deck.of(st.Graphics).values() if s.id in touching]
+        refs = {getattr(s, name, None) for s in acting for name in MARKER_FIELDS}
+        return {marker.owner() for marker in self.deck.of(st.Marker).values() if marker.id in refs}
 
     def add_point_mass(self, s: st.PointMass) -> None:
         """POINT_MASS."""
