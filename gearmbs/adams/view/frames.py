@@ -95,17 +95,14 @@ def along(axis: str, direction: np.ndarray) -> np.ndarray:
 def aligned(a: np.ndarray, axis: str, sign: float, onto: str) -> np.ndarray:
     """Return a frame with an axis along one of another frame, or against it.
 
-    Along it the axes are exchanged in a circle; against it the third axis stays as it is, or, if it is the same axis,
-    the next one.
+    Along it the axes are exchanged in a circle; against it the other two are exchanged with each other, too.
     """
     i, j = "xyz".index(axis), "xyz".index(onto)
-    if sign > 0:
-        return np.column_stack([a[:, (k + j - i) % 3] for k in range(3)])
-    kept = 3 - i - j if i != j else (i + 1) % 3
-    columns = np.empty((3, 3))
-    columns[:, kept], columns[:, i] = a[:, kept], -a[:, j]
-    last = 3 - i - kept
-    columns[:, last] = np.cross(columns[:, (last + 1) % 3], columns[:, (last + 2) % 3])
+    columns = np.column_stack([a[:, (k + j - i) % 3] for k in range(3)])
+    if sign < 0:
+        first, second = (k for k in range(3) if k != i)
+        columns[:, [first, second]] = columns[:, [second, first]]
+        columns[:, i] *= -1.0
     return columns
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import LARGEST_TEXT, Evaluator, text_of
 from gearmbs.adams.view.model import Database, Item
+from gearmbs.adams.view.vocabulary import kinds_of
 
 
 class Values(Protocol):
@@ -230,8 +231,8 @@ def _default(values: Values, ev: Evaluator, args: list[Any], frame: Item | None)
 
 
 def _children(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[Item]:
-    kind = text_of(args[1]).lower()
-    return [one for one in _item(values, ev, args[0]).children.values() if kind in ("all", one.kind)]
+    kinds = kinds_of(text_of(args[1]), ev.line)
+    return [one for one in _item(values, ev, args[0]).children.values() if one.kind in kinds]
 
 
 def _counted(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
@@ -239,8 +240,9 @@ def _counted(values: Values, ev: Evaluator, args: list[Any], frame: Item | None)
 
 
 def _ancestor(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> Any:
-    kind, one = text_of(args[1]).lower(), values.db.items.get(_item(values, ev, args[0]).parent.lower())
-    while one is not None and one.kind != kind:
+    kinds = kinds_of(text_of(args[1]), ev.line)
+    one = values.db.items.get(_item(values, ev, args[0]).parent.lower())
+    while one is not None and one.kind not in kinds:
         one = values.db.items.get(one.parent.lower())
     return "" if one is None else one
 
@@ -342,17 +344,17 @@ def _on_axis(values: Values, ev: Evaluator, args: list[Any], frame: Item | None)
     return _given(values, r + ev.number(args[1]) * a[:, k], frame)
 
 
-def _axis_point(k: int) -> Run:
+def _direction(k: int) -> Run:
+    """An axis of a frame as a vector in the global one."""
+
     def run(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
-        a, r = _pose(values, ev, args[0])
-        distance = ev.number(args[1]) if len(args) > 1 else 1.0
-        return _given(values, r + distance * a[:, k], frame)
+        return [float(x) for x in _pose(values, ev, args[0])[0][:, k]]
 
     return run
 
 
 for _k, _name in enumerate(("LOC_X_AXIS", "LOC_Y_AXIS", "LOC_Z_AXIS")):
-    FUNCTIONS[_name] = Function(1, 2, _axis_point(_k), placing=True)
+    FUNCTIONS[_name] = Function(1, 1, _direction(_k), placing=True)
 
 
 def _mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
@@ -363,12 +365,10 @@ def _mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) 
 
 
 def _inline(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
-    # coordinates of one frame, at the same distance along the direction in another
+    # coordinates in one frame as the direction in another
     a, r = _pose(values, ev, args[1])
     b, s = _pose(values, ev, args[2])
-    point = _triple(ev, args[0])
-    seen = b.T @ (a @ point + r - s)
-    return _given(values, b @ (float(np.linalg.norm(point)) * frames.unit(seen, "LOC_INLINE")) + s, frame)
+    return [float(x) for x in frames.unit(b.T @ (a @ _triple(ev, args[0]) + r - s), "LOC_INLINE")]
 
 
 def _cylindrical(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
@@ -428,7 +428,7 @@ def _ori_plane(values: Values, ev: Evaluator, args: list[Any], frame: Item | Non
 
 
 def _ori_align(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
-    a = _pose(values, ev, args[0])[0]
+    a = _rotation(values, ev, args[0]) if isinstance(args[0], list) else _pose(values, ev, args[0])[0]
     named = text_of(args[1]).strip().lower()
     if not (len(named) in (2, 3) and named[0] in "xyz" and named[-1] in "xyz" and named[1:-1] in ("", "+", "-")):
         raise ev.error(f"ORI_ALIGN_AXIS: {named[:20]!r}; give two axes, such as zx or z-x")

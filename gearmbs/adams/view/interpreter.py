@@ -19,7 +19,7 @@ from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.lexer import BARE, EXPRESSION, TEXT, Command, Value, ViewError, commands
 from gearmbs.adams.view.model import PARTS, Item
 from gearmbs.adams.view.values import Stored, fixed, is_ground
-from gearmbs.adams.view.vocabulary import Row, resolve
+from gearmbs.adams.view.vocabulary import Row, kinds_of, resolve
 
 MOST_COMMANDS = 300_000
 """Commands that are carried out; the largest public models have some 10 000."""
@@ -248,7 +248,7 @@ class Interpreter(Editor):
 
     def _members(self, found: list[Any], given: Mapping[str, Any]) -> list[Any]:
         members: list[Any] = []
-        kind = text_of(self._now(given["type"])[0]).lower() if "type" in given else ""
+        kinds = kinds_of(text_of(self._now(given["type"])[0])) if "type" in given else None
         for one in found:
             pattern = text_of(one)
             if "*" in pattern:
@@ -257,7 +257,7 @@ class Interpreter(Editor):
             elif pattern:
                 item = one if isinstance(one, Item) else self.database.find(pattern)
                 members.append(item if item is not None else one)
-        return [one for one in members if not kind or not isinstance(one, Item) or one.kind == kind]
+        return [one for one in members if kinds is None or not isinstance(one, Item) or one.kind in kinds]
 
     def _command(self, command: Command) -> None:
         if self._called(command):

@@ -90,6 +90,31 @@ ROWS = [node.row for node in (lambda walk: walk(walk, ROOT))(
 """All rows."""
 
 
+CLASSES = {"body": {"part", "point_mass", "flexible_body"}, "all": {row.kind for row in ROWS}} | {
+    word: {row.kind for row in ROWS if row.kind and word in row.words[::2]}
+    for word in "constraint joint primitive_joint force geometry measure data_element rigid_body".split()
+}
+"""Kinds of objects by what types of View are called that are no kinds themselves."""
+UNSEEN = frozenset("analysis dialog_box library toolbar window button color view page plot plot_curve file".split())
+"""Types of objects of the interface, and of results: there is none."""
+
+
+def kinds_of(word: str, line: int = 0) -> set[str]:
+    """Return the kinds of objects that are of a type of View.
+
+    Raises
+    ------
+    ViewError
+        If none is known by this name: what is done with all of a type would be done with none.
+    """
+    name = word.strip().lower()
+    known = {row.kind for row in ROWS if row.kind}
+    if name in CLASSES or name in known or name in UNSEEN:
+        return CLASSES.get(name, {name})
+    named = did_you_mean(name[:40], sorted(known | CLASSES.keys()), before="; ")
+    raise ViewError(f"type = {word[:40]} is not known here{named}; give part, marker, joint, force or another", line)
+
+
 def resolve(words: tuple[str, ...], line: int) -> Row | None:
     """Return the row of a command whose words may be shortened, None of one that is ignored.
 

@@ -75,11 +75,20 @@ def evaluated(values, text, frame=None):
         ("DY(.m.P.B, .m.P.A, .m.P.A)", 0.0),
         ("LOC_RELATIVE_TO({0, 0, 1}, .m.P.A)", [11.0, 19.0, 30.0]),
         ("LOC_ON_AXIS(.m.P.A, 2, 'z')", [11.0, 18.0, 30.0]),
+        ("LOC_X_AXIS(.m.P.A)", [1.0, 0.0, 0.0]),
+        ("LOC_Z_AXIS(.m.P.A)", [0.0, -1.0, 0.0]),
+        ("LOC_INLINE({1, 0, 0}, .m.P, .m.ground)", (np.array([10.0, 21.0, 30.0]) / np.sqrt(1441.0)).tolist()),
         ("LOC_ALONG_LINE(.m.P.A, .m.P.C, 0)", [11.0, 20.0, 30.0]),
         ("LOC_LOCAL({11, 20, 31}, .m.P.A)", [0.0, 1.0, 0.0]),
         ("LOC_MIRROR({0, 0, 5}, .m.P.B, 'xy')", [0.0, 0.0, 55.0]),
         ("ORI_RELATIVE_TO({0, 0, 0}, .m.P.A)", [0.0, 90.0, 0.0]),
         ("ORI_ALL_AXES({{0, 0, 0}, {0, 1, 0}, {-1, 0, 0}}, 'xy')", [90.0, 0.0, 0.0]),
+        # examples of View's manual
+        ("ORI_ALIGN_AXIS(.m.ground, 'z-z')", [90.0, 180.0, 0.0]),
+        ("ORI_ALIGN_AXIS_EUL({8, 10, 0}, 'z-z')", [-172.0, 170.0, 90.0]),
+        ("ORI_FRAME_MIRROR({6, 14, 0}, .m.ground, 'xz', 'xz')", [174.0, 14.0, 180.0]),
+        ("ORI_MIRROR({{10, 8, 0}}, .m.ground, 'xy', 'xy')", [-170.0, 8.0, 180.0]),
+        ("LOC_SPHERICAL(10, 8d, 90d)", [10 * np.cos(np.radians(8)), 10 * np.sin(np.radians(8)), 0.0]),
     ],
 )
 def test_values(values, text, value):
@@ -154,6 +163,7 @@ def test_long_sums_and_deep_brackets(values):
         ("__import__('os')", ("__IMPORT__",)),
         ("LOC_RELATIVE_TO({1, 2}, .m.P.A)", ("three",)),
         ("ORI_ALONG_AXIS(.m.P.A, .m.P.A, 'z')", ("direction",)),
+        ("DB_CHILDREN(.m, 'joints')", ("joints", "joint")),
     ],
 )
 def test_what_has_no_value_is_named(values, text, words):

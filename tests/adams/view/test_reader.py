@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, parse_view, read_deck, read_view, run_deck
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.view.interpreter import Interpreter
 
 from ...says import says
 from .files import CHAIN, PENDULUM, WHOLE
@@ -311,3 +312,26 @@ def test_files_beside_are_read(tmp_path):
     assert by_name(read_view(tmp_path / "outer.cmd"), st.Marker, "INNER").qp == (1.0, 2.0, 3.0)
     with pytest.raises(DeckError, match=says("inner.cmd", "folder")):
         parse_view(PENDULUM + "file command read file_name = inner.cmd\n")
+
+
+@pytest.mark.parametrize(
+    ("type_", "count"), [("joint", 2), ("constraint", 3), ("revolute", 2), ("motion", 1), ("force", 1), ("point", 0)]
+)
+def test_loops_over_objects_of_a_type(type_, count):
+    """Types are kinds of objects, or what View calls several kinds; one that is not known is no empty loop."""
+    text = PENDULUM + (
+        "constraint create joint revolute joint_name = .swing.SECOND i_marker_name = .swing.ROD.cm &\n"
+        "   j_marker_name = .swing.ground.PIVOT\n"
+        "constraint create motion_generator motion_name = .swing.MO joint_name = .swing.HINGE &\n"
+        '   type_of_freedom = rotational function = "0"\n'
+        "variable create variable_name = .swing.n integer_value = 0\n"
+        f"for variable_name = one object_names = .swing.* type = {type_}\n"
+        "variable modify variable_name = .swing.n integer_value = (eval(.swing.n + 1))\nend\n"
+    )
+    run = Interpreter()
+    run.run(text)
+    assert not run.errors
+    assert run.values.variable(run.database.find(".swing.n")) == count
+    run = Interpreter()
+    run.run(text.replace(f"type = {type_}", "type = hinges"))
+    assert re.search(says("hinges"), str(run.errors[0]))
