@@ -52,6 +52,7 @@ def _mass(m: Deckmaker, item: Item) -> list[str | None]:
     at = m.values.ref(item, "inertia_marker", ("marker",))
     arguments: list[str | None] = [f"MASS = {number(given)}"]
     if marker is None and given > 0.0:
+        m.remark(item, "no center_of_mass_marker is given: its centre of mass is taken to be at its origin")
         arguments.append(f"CM = {m.new_marker(item, item, *m.values.pose(item))}")
     elif marker is not None:
         arguments.append(f"CM = {m.id(marker)}")
@@ -160,11 +161,13 @@ def make_coupler(m: Deckmaker, item: Item) -> None:
     scales = m.values.numbers(item, "motion_multipliers")
     if scales is None:
         scales = []
-        for k, name in enumerate(("first", "second", "third")[:count]):
+        for name in ("first", "second", "third")[:count]:
             turning = m.values.number(item, f"{name}_angular_scale_factor")
             plain = m.values.number(item, f"{name}_scale_factor")
-            scales.append(turning if turning is not None else plain if plain is not None else 1.0)
-            del k
+            if turning is None and plain is None:
+                raise ViewError(f"give motion_multipliers, or {name}_scale_factor or {name}_angular_scale_factor")
+            # an angle, in the model's unit
+            scales.append(turning * m.radian if turning is not None else plain or 0.0)
     m.add(item, f"COUPLER/{m.id(item)}", joints, f"TYPE = {', '.join(words[:count])}", f"SCALES = {listed(scales)}")
 
 

@@ -335,3 +335,29 @@ def test_loops_over_objects_of_a_type(type_, count):
     run = Interpreter()
     run.run(text.replace(f"type = {type_}", "type = hinges"))
     assert re.search(says("hinges"), str(run.errors[0]))
+
+
+def coupled(scales):
+    """Return the scales of a coupler of the pendulum's hinge with a slide."""
+    text = PENDULUM + (
+        "part create rigid_body name_and_position part_name = .swing.RACK location = 0, 0, 0\n"
+        "part create rigid_body mass_properties part_name = .swing.RACK mass = 1 ixx = 1 iyy = 1 izz = 1\n"
+        "marker create marker_name = .swing.RACK.M location = 0, 0, 0\n"
+        "constraint create joint translational joint_name = .swing.SLIDE i_marker_name = .swing.RACK.M &\n"
+        "   j_marker_name = .swing.ground.PIVOT\n"
+        "constraint create complex_joint coupler coupler_name = .swing.CO joint_name = .swing.HINGE, .swing.SLIDE &\n"
+        f"   type_of_freedom = rot_trans {scales}\n"
+    )
+    view = parse_view(text)
+    assert any(re.search(says("RACK", "center_of_mass_marker"), d.message) for d in view.deck.diagnostics)
+    return [one.scales for one in view.deck.of(st.Coupler).values()], view.deck.unsupported
+
+
+def test_scales_of_couplers():
+    """Angular scale factors are angles in the model's unit, multipliers are numbers."""
+    found, missing = coupled("first_angular_scale_factor = 90 second_scale_factor = -0.5")
+    assert np.allclose(found, [[np.pi / 2.0, -0.5]]) and not missing
+    found, missing = coupled("motion_multipliers = 90, -0.5")
+    assert np.allclose(found, [[90.0, -0.5]]) and not missing
+    found, missing = coupled("first_scale_factor = 2")
+    assert not found and re.search(says("second_scale_factor"), missing[0].message)
