@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from gearmbs.adams import parse_deck, run_deck
 
@@ -108,3 +109,39 @@ def test_a_box_tips_where_its_weight_leaves_the_base(height, tips):
     result = run_deck(parse_deck(box(np.arctan(0.5), 0.9, 0.9, 0.05, height)), end=0.25, steps=25, tol=1e-7)
     tilt = abs(result.request(1)[-1, 7])
     assert tilt > 0.05 if tips else tilt < 1e-2
+
+
+TURNED = """angles
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/11, PART=1
+MARKER/12, PART=1, REULER=90D,90D,0
+PART/2, MASS=1, CM=20, IP=1,1,1, WZ=1
+MARKER/20, PART=2
+JOINT/1, REVOLUTE, I=20, J=11
+SFORCE/1, ROTATIONAL, I=20, J=11, FUNCTION=-4*{angle}
+REQUEST/1, D, I=20, J=11
+{requests}END
+"""
+SYSTEMS = ("123", "231", "312", "132", "213", "321", "121", "131", "212", "232", "313", "323")
+
+
+@pytest.mark.parametrize("angle", ["PSI(20,11)", "ORIENT(12,1,20,11)"])
+def test_angles_where_the_first_and_the_third_axis_are_parallel(angle):
+    """All of a turn is the first angle then, in results and in a torque that swings; any angles give the axes."""
+    requests = "".join(
+        f"REQUEST/{k + 2}, F2=ORIENT({k + 1},1,20,11)\\F3=ORIENT({k + 1},2,20,11)\\F4=ORIENT({k + 1},3,20,11)\n"
+        for k in range(12)
+    )
+    requests += requests.replace("20,11", "11,12").replace("REQUEST/", "REQUEST/5")
+    found = run_deck(parse_deck(TURNED.format(angle=angle, requests=requests)), end=1.0, steps=4, tol=1e-10)
+    turned = 0.5 * np.sin(2.0 * found.t)
+    np.testing.assert_allclose(found.request(1)[:, 5], turned, atol=1e-7)
+    np.testing.assert_allclose(found.request(1)[:, 6:8], 0.0, atol=1e-12)
+    about_z = Rotation.from_rotvec(np.column_stack([0.0 * turned, 0.0 * turned, turned])).as_matrix()
+    tilted = Rotation.from_euler("ZXZ", [90.0, 90.0, 0.0], degrees=True).as_matrix().T
+    for k, system in enumerate(SYSTEMS):
+        for number, axes in ((k + 2, about_z), (int(f"5{k + 2}"), tilted)):
+            angles = found.request(number)[:, 1:4]
+            made = Rotation.from_euler(system.translate(str.maketrans("123", "XYZ")), angles).as_matrix()
+            np.testing.assert_allclose(made, np.broadcast_to(axes, made.shape), atol=1e-7)

@@ -42,6 +42,16 @@ def test_one_that_hangs_and_swings_is_not(error):
     assert not remarks(-100, error, torque=500)
 
 
+def test_one_that_only_turns_where_it_is_is_not():
+    text = DECK.partition("UNITS")[0] + (
+        "UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND\nPART/1, GROUND\nMARKER/1, PART=1\n"
+        "PART/2, MASS=1, CM=2, IP=1,2,3, WX=1, WY=2\nMARKER/2, PART=2\nJOINT/1, SPHERICAL, I=2, J=1\nEND\n"
+    )
+    result = run_deck(parse_deck(text), end=1.0, steps=2, tol=1e-9, check=True)
+    assert result.success
+    assert not [m for m in result.messages if "a hundredth of ERROR" in m]
+
+
 def test_it_can_be_left_away():
     assert not remarks(100, 1e-2, check=False)
 

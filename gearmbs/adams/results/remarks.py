@@ -43,7 +43,9 @@ LONGER = 20
 APART = 0.01
 """Distance of two runs, of the largest displacement of a part, that is remarked."""
 STILL = 1e-6
-"""Largest displacement, of the largest coordinate, up to which nothing moves."""
+"""Largest displacement, of the largest coordinate of a part or a marker, up to which nothing moves."""
+NOWHERE = 1e-15
+"""Metres, the size of a proton: no part moves by less."""
 CHEAP = 2_000_000
 """Work of a second run that is not asked for, at most: about a second or two."""
 EXPECTED = 3
@@ -366,7 +368,11 @@ def doubt(
     if not names:
         return None
     one, other = (np.stack([s.com_position(name) for name in names], axis=1) for s in (solution, second))
-    moved = max(float(np.linalg.norm(one - one[0], axis=2).max()), STILL * float(np.abs(one).max()))
+    sized = [m.global_position() for body in model.mechanism.bodies.values() for m in body.markers]
+    size = max(float(np.abs(one).max()), max((float(np.abs(at).max()) for at in sized), default=0.0))
+    moved = max(float(np.linalg.norm(one - one[0], axis=2).max()), STILL * size)
+    if moved < NOWHERE:
+        return None
     apart = np.linalg.norm(one - other, axis=2)
     off = np.flatnonzero(apart.max(axis=1) > APART * moved)
     if off.size == 0:

@@ -26,6 +26,9 @@ from gearmbs.mechanism.language.syntax import (
 
 EULER_SEQUENCES = ("123", "231", "312", "132", "213", "321", "121", "131", "212", "232", "313", "323")
 """Body-fixed sequences of ORIENT's systems 1 to 12."""
+PARALLEL = 1e-8
+"""Sine of the angle between the first and the third axis up to which rounding, or the integrator's error, would say how
+their turns are divided."""
 
 
 # ADAMS functions of several arguments: each is a function of the lowering and the call.
@@ -58,18 +61,29 @@ def _euler(low: Lowering, sequence: str, component: int, i: int, j: int) -> int:
 
     third = c if c != a else 3 - a - m
     even = (a, m, third) in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-    if c != a:
-        if component == 1:
-            return b.binary(op.ATAN2, signed(not even, cosine(m, c)), cosine(c, c))
-        if component == 2:
-            length = b.binary(op.HYPOT, cosine(a, a), cosine(a, m))
-            return b.binary(op.ATAN2, signed(even, cosine(a, c)), length)
-        return b.binary(op.ATAN2, signed(not even, cosine(a, m)), cosine(a, a))
-    if component == 1:
-        return b.binary(op.ATAN2, cosine(m, a), signed(not even, cosine(third, a)))
+    # the sine of the second angle, or its cosine where the three axes differ
+    across = (cosine(m, a), cosine(third, a)) if c == a else (cosine(a, a), cosine(a, m))
+    apart = b.binary(op.HYPOT, *across)
     if component == 2:
-        return b.binary(op.ATAN2, b.binary(op.HYPOT, cosine(m, a), cosine(third, a)), cosine(a, a))
-    return b.binary(op.ATAN2, cosine(a, m), signed(even, cosine(a, third)))
+        return (
+            b.binary(op.ATAN2, apart, cosine(a, a)) if c == a else b.binary(op.ATAN2, signed(even, cosine(a, c)), apart)
+        )
+    if component == 1:
+        angle = (
+            b.binary(op.ATAN2, across[0], signed(not even, across[1]))
+            if c == a
+            else b.binary(op.ATAN2, signed(not even, cosine(m, c)), cosine(c, c))
+        )
+        instead = b.binary(op.ATAN2, signed(even, cosine(third, m)), cosine(m, m))
+    else:
+        angle = (
+            b.binary(op.ATAN2, cosine(a, m), signed(even, cosine(a, third)))
+            if c == a
+            else b.binary(op.ATAN2, signed(not even, across[1]), across[0])
+        )
+        instead = b.constant(0.0)
+    # where the first and the third axis are parallel, the first angle has the whole turn
+    return b.select(b.binary(op.SUB, apart, b.constant(PARALLEL)), instead, instead, angle)
 
 
 def _sequence_angle(sequence: str, component: int, sign: int, low: Lowering, call: Call) -> int:

@@ -356,8 +356,11 @@ def coupled(scales):
 def test_scales_of_couplers():
     """Angular scale factors are angles in the model's unit, multipliers are numbers."""
     found, missing = coupled("first_angular_scale_factor = 90 second_scale_factor = -0.5")
-    assert np.allclose(found, [[np.pi / 2.0, -0.5]]) and not missing
+    assert np.allclose(found, [[np.pi / 2.0, -0.5]])
+    assert not missing
     found, missing = coupled("motion_multipliers = 90, -0.5")
-    assert np.allclose(found, [[90.0, -0.5]]) and not missing
+    assert np.allclose(found, [[90.0, -0.5]])
+    assert not missing
     found, missing = coupled("first_scale_factor = 2")
-    assert not found and re.search(says("second_scale_factor"), missing[0].message)
+    assert not found
+    assert re.search(says("second_scale_factor"), missing[0].message)
