@@ -23,6 +23,7 @@ from gearmbs.gears.modifications import (
     RootRelief,
     TipRelief,
     ToothDeviations,
+    turned_by_helix,
 )
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import Crack, pair_stiffness
@@ -77,6 +78,9 @@ class ChippedCorner(Fault):
     tooth: int = 0
     end: int = 1
 
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        return "length", self.length if self.length > 0 else gear.face_width
+
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear
         if not 0 < self.length <= gear.face_width:
@@ -126,7 +130,7 @@ class RootCrack(Fault):
     depth : float or str
         Length of the crack.
     angle : float or str
-        Between crack and the tooth's middle line.
+        Between crack and the tooth's middle line, above 0 up to 90 deg, which is straight across the tooth.
     tooth : int
     """
 
@@ -140,6 +144,11 @@ class RootCrack(Fault):
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         if not self.depth > 0:
             raise ValueError(f"RootCrack.depth is {self.depth} m; it must be positive")
+        if not 0.0 < self.angle <= 0.5 * math.pi:
+            raise ValueError(
+                f"RootCrack.angle is {math.degrees(self.angle):.4g} deg, by which no crack goes into the tooth; give "
+                "above 0 up to 90 deg (a plain number is in radians: write '70 deg')"
+            )
         crack = Crack(self.depth, self.angle)
         driver = self.wheel == "driver"
         own = deviations.compliance_roll_length
@@ -184,6 +193,9 @@ class Pit(Fault):
     tooth: int = 0
     flank: Flank = "drive"
 
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        return "width", 0.5 * self.width if self.width > 0 else gear.face_width
+
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         for name in ("depth", "height", "width"):
             value = getattr(self, name)
@@ -196,7 +208,7 @@ class Pit(Fault):
         if not hollow.max() > 0:
             raise ValueError(
                 f"Pit.radius {centre} m or Pit.position {self.position} m puts the pit off the flank or between its "
-                "sections; move or enlarge it"
+                "points; move or enlarge it"
             )
         for flank in deviations.flanks(self.flank):
             deviations.shape[flank, self.tooth % deviations.gear.teeth] += hollow
@@ -256,6 +268,9 @@ class Eccentricity(Fault):
     amount: Quantity = 20e-6
     phase: Quantity = 0.0
 
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        return "amount", turned_by_helix(gear)
+
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         if not self.amount >= 0:
             raise ValueError(f"Eccentricity.amount is {self.amount} m; it must not be negative")
@@ -279,6 +294,9 @@ class Wobble(Fault):
 
     angle: Quantity = "0.05 deg"
     phase: Quantity = 0.0
+
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        return "angle", min(gear.face_width, turned_by_helix(gear))
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         lean = math.tan(self.angle) * deviations.section
@@ -370,6 +388,9 @@ class Waviness(Fault):
     phase: Quantity = 0.0
     flank: Flank = "both"
 
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        return "waves", turned_by_helix(gear, self.waves)
+
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear
         step = abs(deviations.roll_length[1] - deviations.roll_length[0]) / gear.base_radius
@@ -382,7 +403,7 @@ class Waviness(Fault):
             )
         for flank in deviations.flanks(self.flank):
             wave = np.sin(self.waves * deviations.normal_angle(flank) + self.phase)
-            deviations.shape[flank] += self.amount * wave[:, None, :]
+            deviations.shape[flank] += self.amount * wave
 
 
 @dataclass(frozen=True, kw_only=True)

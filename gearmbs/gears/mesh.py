@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from gearmbs._display import Written, html_table
 from gearmbs.contact.law_kinds import LAW_KINDS
 from gearmbs.gears.geometry import PairGeometry
-from gearmbs.gears.modifications import Fault
+from gearmbs.gears.modifications import STEPS_A_DETAIL, Fault
 from gearmbs.units import Given, Quantity, shown, to_si, truth
 from gearmbs.wording import any_of
 
@@ -250,7 +250,7 @@ class ContactModel(Written):
         Normal force of one tooth pair over its whole face.
     friction : FlankFriction
     slices : int, optional
-        Slices along the face; default by `face_slices`: 1, 11 or 41.
+        Slices along the face; default by `face_slices`: 1, 11, 41 or more.
     load : {"slices", "adams"}
         How a tooth pair carries its load. ``slices``: pressure distributed over the face. ``adams``: one force at the
         centroid of the overlap with the depth found there, as ADAMS does for solids.
@@ -300,16 +300,20 @@ class ContactModel(Written):
         """Slices along the face in use: those asked for, or else as many as the gap's variation needs.
 
         One for spur wheels on parallel axes with opposite faces, where every section sees the same gap; `TILTED_SLICES`
-        where misalignment or an axial shift make it vary along the face; `FAULTY_SLICES` where a fault does; at least
-        `HELICAL_SLICES` and `SLICES_PER_OVERLAP` for each whole of the overlap ratio of helical wheels.
+        where misalignment or an axial shift make it vary along the face; at least `FAULTY_SLICES` where a fault does,
+        and `STEPS_A_DETAIL` over the length in which it changes the flanks; at least `HELICAL_SLICES` and
+        `SLICES_PER_OVERLAP` for each whole of the overlap ratio of helical wheels.
         """
         if self.slices is not None:
             return self.slices
-        if any(fault.along_face for fault in faults):
-            return FAULTY_SLICES
+        least = 1 if geometry.uniform_along_face else TILTED_SLICES
         if geometry.driver.helix_angle:
-            return max(HELICAL_SLICES, math.ceil(SLICES_PER_OVERLAP * geometry.overlap_ratio))
-        return 1 if geometry.uniform_along_face else TILTED_SLICES
+            least = max(HELICAL_SLICES, math.ceil(SLICES_PER_OVERLAP * geometry.overlap_ratio))
+        for fault in faults:
+            if fault.along_face:
+                detail = fault.face_detail(geometry.wheels[fault.wheel == "driven"])[1]
+                least = max(least, FAULTY_SLICES, math.ceil(STEPS_A_DETAIL * geometry.common_face_width / detail))
+        return least
 
     def tips_may_bottom(self, geometry: PairGeometry) -> bool:
         """Whether contact of tips with roots is looked for."""

@@ -23,6 +23,11 @@ from gearmbs.units import Quantity, shown, to_si, truth
 
 PROFILE_POINTS = 65
 FACE_SECTIONS = 33
+"""Sections along the face where flanks vary along it, at least."""
+MOST_SECTIONS = 257
+"""The same at most: 100 teeth have 27 MB of them."""
+STEPS_A_DETAIL = 3
+"""Sections, and slices of the contact, over the length in which a flank changes: a parabola is then good to 1.4 %."""
 COMPLIANCE_POINTS = 65
 
 
@@ -54,9 +59,8 @@ class ToothDeviations:
         Lengths of roll on this wheel, m.
     """
 
-    def __init__(self, gear: GearSpec, rotation: int, along_face: bool, compliance_roll_length: np.ndarray) -> None:
-        z = gear.teeth
-        nz = FACE_SECTIONS if along_face else 2
+    def __init__(self, gear: GearSpec, rotation: int, sections: int, compliance_roll_length: np.ndarray) -> None:
+        z, nz = gear.teeth, sections
         self.gear = gear
         self.drive = 0 if rotation > 0 else 1
         start = gear.form_roll_length if gear.internal else 0.0
@@ -81,20 +85,20 @@ class ToothDeviations:
         return choices[which]
 
     def normal_angle(self, flank: int) -> np.ndarray:
-        """Direction of the outward normal in the wheel's frame, rad, shape (z, ns)."""
+        """Direction of the outward normal in the wheel's frame, rad, shape (z, nz, ns)."""
         side = 1 - 2 * flank
-        middle = 2 * math.pi * np.arange(self.gear.teeth)[:, None] / self.gear.teeth
+        middle = 2 * math.pi * np.arange(self.gear.teeth) / self.gear.teeth
+        lead = self.gear.twist_tangent / self.gear.base_radius * self.section
         turned = self.gear.sign * self.roll_length / self.gear.base_radius
-        tangent = middle + side * (self.gear.base_half_angle - turned)
+        tangent = middle[:, None, None] + lead[:, None] + side * (self.gear.base_half_angle - turned)
         return tangent + side * 0.5 * math.pi
 
     def shift(self, x: np.ndarray | float, y: np.ndarray | float) -> None:
         """Displace the whole toothing by (x, y) in the wheel's frame, m; arrays run along the face."""
         x = np.broadcast_to(np.asarray(x, dtype=float), self.section.shape)
         y = np.broadcast_to(np.asarray(y, dtype=float), self.section.shape)
-        lead = (self.gear.twist_tangent / self.gear.base_radius * self.section)[None, :, None]
         for flank in (0, 1):
-            angle = self.normal_angle(flank)[:, None, :] + lead
+            angle = self.normal_angle(flank)
             self.shape[flank] -= x[:, None] * np.cos(angle) + y[:, None] * np.sin(angle)
 
     def shorten(self, tooth: int, radius: np.ndarray) -> None:
@@ -196,6 +200,10 @@ class Fault(Written):
                         f"{type(self).__name__}.{name} is {tooth}; the {self.wheel} wheel has teeth 0 to {count - 1}"
                     )
 
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        """Field by which flanks vary along the face, and length in which they change, m; infinite if they do not."""
+        return "", gear.face_width if self.along_face else math.inf
+
     @property
     def severity(self) -> float:
         """Size of the fault, by its own main parameter."""
@@ -217,6 +225,41 @@ class Fault(Written):
             The pair it is in.
         """
         raise TypeError(f"{type(self).__name__} does not say what it does to a tooth")
+
+
+def turned_by_helix(gear: GearSpec, waves: int = 1) -> float:
+    """Length along the face in which a helix turns the flank's normal by a radian of a wave, m; infinite for spurs."""
+    turned = waves * abs(gear.twist_tangent) / gear.base_radius
+    return 1.0 / turned if turned > 0.0 else math.inf
+
+
+def face_sections(faults: Iterable[Fault], wheels: tuple[GearSpec, GearSpec]) -> int:
+    """Sections along the face that the flanks with these faults need; two where none varies along it.
+
+    Raises
+    ------
+    ValueError
+        For details that `MOST_SECTIONS` do not resolve; the message names the field, its value and what would do.
+    """
+    most = 2
+    for fault in faults:
+        gear = wheels[fault.wheel == "driven"]
+        field, detail = fault.face_detail(gear)
+        if detail == math.inf:
+            continue
+        steps = STEPS_A_DETAIL * gear.face_width / detail
+        if steps > MOST_SECTIONS - 1:
+            least, value = STEPS_A_DETAIL * gear.face_width / (MOST_SECTIONS - 1), getattr(fault, field)
+            if not isinstance(value, int):
+                value = f"{len(value)} rows" if isinstance(value, tuple) else shown(value, "mm", ".4g")
+            raise ValueError(
+                f"{type(fault).__name__}.{field} is {value}: it changes the flanks within "
+                f"{shown(detail, 'mm', '.3g')} along a face of {shown(gear.face_width, 'mm', '.4g')}, and sections "
+                f"resolve {shown(least, 'mm', '.3g')} and more; make the fault coarser or the face narrower"
+            )
+        # a multiple of the fewest, so that what falls on those still does
+        most = max(most, (FACE_SECTIONS - 1) * max(1, math.ceil(steps / (FACE_SECTIONS - 1))) + 1)
+    return most
 
 
 def _require_removal(relief: Fault, amount: Quantity) -> None:
@@ -367,6 +410,9 @@ class EndRelief(Fault):
         super().__post_init__()
         _require_removal(self, self.amount)
 
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        return "length", self.length if self.length > 0 else gear.face_width
+
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         if self.ends not in (-1, 0, 1):
             raise ValueError(f"EndRelief.ends is {self.ends}; choose 0 (both), 1 or -1")
@@ -418,6 +464,9 @@ class FlankMap(Fault):
         if not bool(np.isfinite(table).all()):
             raise ValueError(f"{place} holds a number that is not finite; give finite numbers")
         object.__setattr__(self, "amounts", table)
+
+    def face_detail(self, gear: GearSpec) -> tuple[str, float]:
+        return "amounts", gear.face_width / (len(self.amounts) - 1)
 
     @property
     def severity(self) -> float:

@@ -18,7 +18,7 @@ from gearmbs.contact import layout as L
 from gearmbs.contact.law_kinds import LAW_KINDS
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import ContactModel, Mesh
-from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, Fault, ToothDeviations
+from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, Fault, ToothDeviations, face_sections
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 
@@ -193,11 +193,11 @@ def most_pairs(geometry: PairGeometry, gr: np.ndarray) -> int:
 def tooth_deviations(pair: Mesh) -> tuple[ToothDeviations, ToothDeviations]:
     """Deviations of all teeth of both wheels, with every fault applied."""
     geometry, rotation = pair.geometry, pair.operating_point.rotation
-    along_face = any(fault.along_face for fault in pair.faults)
+    sections = face_sections(pair.faults, geometry.wheels)
     roll_length = compliance_roll_lengths(geometry)
     both = (
-        ToothDeviations(geometry.wheels[0], rotation, along_face, roll_length),
-        ToothDeviations(geometry.wheels[1], rotation, along_face, geometry.mate_roll_length(0, roll_length)),
+        ToothDeviations(geometry.wheels[0], rotation, sections, roll_length),
+        ToothDeviations(geometry.wheels[1], rotation, sections, geometry.mate_roll_length(0, roll_length)),
     )
     for fault in pair.faults:
         fault.apply(both[fault.wheel == "driven"], geometry)

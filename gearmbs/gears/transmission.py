@@ -12,7 +12,7 @@ import numpy as np
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.mesh import Mesh, varying_along_face
-from gearmbs.gears.modifications import FACE_SECTIONS
+from gearmbs.gears.modifications import face_sections
 from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity, to_si
@@ -142,9 +142,9 @@ class StaticMesh:
         if not any(fault.along_face for fault in self.pair.faults):
             return np.zeros(0)
         low, high = self.geometry.common_face
-        half = 0.5 * self.geometry.axial_shift
+        half, count = 0.5 * self.geometry.axial_shift, face_sections(self.pair.faults, self.geometry.wheels)
         faces = [
-            middle + gear.face_width * np.linspace(-0.5, 0.5, FACE_SECTIONS)
+            middle + gear.face_width * np.linspace(-0.5, 0.5, count)
             for middle, gear in zip((-half, half), self.geometry.wheels)
         ]
         sections = np.unique(np.concatenate(faces))

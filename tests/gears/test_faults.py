@@ -100,6 +100,10 @@ def test_every_fault_has_a_name_a_size_and_an_effect(kind, wheel):
         (ChippedCorner, "length", "50 mm", ("0.05 m", "0.02 m")),
         (BrokenTooth, "lost", 1.2, ("1.2", "give", "1")),
         (RootCrack, "depth", 0.0, ("0.0 m", "positive")),
+        (RootCrack, "angle", "-70 deg", ("-70 deg", "give", "90 deg")),
+        (RootCrack, "angle", 70.0, ("4011 deg", "radians", "'70 deg'")),
+        (EndRelief, "length", "0.1 mm", ("0.1 mm", "20 mm", "coarser")),
+        (Pit, "width", "0.2 mm", ("0.2 mm", "20 mm", "coarser")),
         (Pit, "depth", -1e-6, ("-1e-06 m", "positive")),
         (Pit, "radius", "80 mm", ("0.08 m", "enlarge")),
         (Wear, "depth", -1e-6, ("-1e-06 m", "negative")),
@@ -281,6 +285,46 @@ def test_shapes_stand_where_they_were_put():
     # wear: nothing where nothing slides, all of it where most does
     worn = removed(Wear(depth="20 um"), [pitch, start + 1e-9], [0.0])[:, 0]
     assert worn == pytest.approx([0.0, 20 * micron], abs=0.7 * micron)
+
+
+@pytest.mark.parametrize(("wheel", "hand"), [("driver", "right"), ("driven", "left")])
+def test_a_helix_turns_the_wave_along_the_face(wheel, hand):
+    """Where helical flanks touch their normal is the same: a wave over its direction moves all of them alike."""
+    helix, other = {"helix_angle": "25 deg", "face_width": "60 mm"}, {"right": "left", "left": "right"}[hand]
+    one, two = GearSpec(25, "3 mm", hand=hand, **helix), GearSpec(40, "3 mm", hand=other, **helix)
+    plain = GearPair(one, two, backlash="0.2 mm")
+    sections = np.linspace(-29e-3, 29e-3, 31)
+
+    def touching(pair, angle, driven):
+        rows = StaticMesh(pair).gaps(angle, driven, sections)
+        return rows[(rows[:, 0] == 1) & (rows[:, 5] == 0)].copy()
+
+    for kind, amount in ((Waviness(wheel=wheel, amount="1 um", waves=20), 1e-6), (Eccentricity(wheel=wheel), 20e-6)):
+        means = []
+        for angle in (0.0, 0.03, 0.05):
+            driven = StaticMesh(plain).touching_angle(angle)
+            found, bare = (touching(p, angle, driven) for p in (plain.with_faults(kind), plain))
+            bears = np.abs(bare[:, 4]) < 1e-9
+            assert len(found) == len(bare)
+            assert bears.sum() > 20
+            moved = found[bears, 4] - bare[bears, 4]
+            assert np.ptp(moved) < 0.03 * amount
+            means.append(moved.mean())
+        assert 0.05 * amount < np.abs(means).max() < 1.01 * amount
+
+
+def test_short_details_of_a_wide_face_have_sections_and_slices_of_their_own():
+    wheels = [GearSpec(z, "3 mm", face_width="100 mm") for z in (25, 40)]
+    pair = GearPair(*wheels, faults=[EndRelief(amount="20 um", length="3 mm")])
+    deviations = tooth_deviations(pair)[0]
+    relief = 20e-6 * np.maximum(0.0, 1 - (50e-3 - np.abs(deviations.section)) / 3e-3) ** 2
+    assert deviations.shape[0, 0, :, 0] == pytest.approx(relief, abs=1e-12)
+    assert pair.face_slices * 1e-3 >= 100e-3 > 100 * np.diff(deviations.section)[0]
+    # of the paper's face they are as many as ever
+    assert GearPair.paper(faults=[EndRelief(), Pit()]).face_slices == 41
+    crowned = GearPair(*(GearSpec(z, "3 mm", face_width="100 mm", helix_angle="30 deg", hand=hand)
+                         for z, hand in ((25, "right"), (40, "left"))), faults=[Crowning()])  # fmt: skip
+    assert crowned.face_slices == crowned.with_changes(faults=()).face_slices > 100
 
 
 def test_chipped_corner_shortens_one_end():
