@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gearmbs.gears import GearPair, GearSpec, Material
+from gearmbs.gears import GearPair, GearSpec, Material, loaded_transmission_error
 from gearmbs.gears.faults import RootCrack
 from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness
 from gearmbs.gears.stiffness import (
@@ -126,6 +126,28 @@ def test_mesh_stiffness_over_the_cycle():
     assert curve.mean == pytest.approx(pair.contact_ratio * curve.single.mean(), rel=1e-2)
     # symmetric pair: the single stiffness is the same entering and leaving
     assert curve.single == pytest.approx(curve.single[::-1], rel=1e-6)
+
+
+def test_helical_sections_pass_the_path_one_after_the_other():
+    def pair(helix):
+        return GearPair(*(GearSpec(z, "3 mm", helix_angle=helix, face_width="10 mm", hand=hand)
+                          for z, hand in ((25, "right"), (40, "left"))))  # fmt: skip
+
+    helical = pair("20 deg")
+    curve = mesh_stiffness(helical, 400)
+    cosine = math.cos(helical.driver.base_helix_angle)
+    begin, path = helical.first_roll_lengths[0], np.linspace(0.0, helical.path_of_contact, 1001)
+    alone = np.trapezoid(pair_stiffness(helical, begin + path), path) / helical.driver.base_pitch
+    assert curve.mean == pytest.approx(cosine * alone, rel=1e-4)
+    assert curve.single_phase[-1] == helical.total_contact_ratio
+    assert curve.single[[0, -1]] == pytest.approx(0.0)
+    # what the contact itself says of the same energies under next to no load
+    found = loaded_transmission_error(helical.with_potential_energy_stiffness(), 1.0, 24).stiffness
+    wanted = curve.stiffness.min(), curve.stiffness.max(), curve.mean
+    assert (found.min(), found.max(), found.mean()) == pytest.approx(wanted, rel=0.015)
+    # of hardly any helix it is the spur pair's
+    spur, nearly = mesh_stiffness(pair(0.0), 100), mesh_stiffness(pair("0.001 deg"), 100)
+    assert np.median(np.abs(nearly.stiffness / spur.stiffness - 1.0)) < 1e-4
 
 
 def test_iso_6336():
