@@ -35,6 +35,7 @@ from gearmbs.bearings.kinds import KINDS, LOOSEST, BearingError, require
 from gearmbs.bearings.laws_kernel import (
     BALL_EXPONENT,
     ROLLER_EXPONENT,
+    STEEL,
     PointContact,
     groove_contact,
     in_series,
@@ -108,8 +109,8 @@ class Bearing(Described):
     width: Length = None
     dynamic_rating: Force = None
     static_rating: Force = None
-    youngs_modulus: Annotated[Quantity, Measure("pressure", above=0)] = 2.07e11
-    poisson_ratio: Annotated[Quantity, Measure(low=0, below=0.5)] = 0.3
+    youngs_modulus: Annotated[Quantity, Measure("pressure", above=0)] = STEEL[0]
+    poisson_ratio: Annotated[Quantity, Measure(low=0, below=0.5)] = STEEL[1]
     density: Annotated[Quantity, Measure("density", above=0)] = 7800.0
     designation: str = ""
     estimated: tuple[str, ...] = ()
@@ -258,7 +259,7 @@ class Bearing(Described):
     def contact_stiffness(self) -> tuple[float, float]:
         """K of one contact with the inner and with the outer ring, N/m^n."""
         if self.rollers:
-            one = line_contact(self.roller_length)
+            one = line_contact(self.roller_length, self.youngs_modulus, self.poisson_ratio)
             return one, one
         return self.inner_contact.stiffness, self.outer_contact.stiffness
 
@@ -356,7 +357,15 @@ def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, 
     return (1.0, 0.0) if axial <= e * radial else (x, y)
 
 
-def equivalent_load(bearing: Bearing, radial: float, axial: float = 0.0) -> float:
+def _newtons(load: Quantity, name: str) -> Quantity:
+    """Return a load as a number if it is a text with a unit, and as it is if not."""
+    try:
+        return to_si(load, "force", name) if isinstance(load, str) else load
+    except ValueError as error:
+        raise BearingError(str(error)) from None
+
+
+def equivalent_load(bearing: Bearing, radial: Quantity, axial: Quantity = 0.0) -> float:
     """Return the dynamic equivalent radial load P = max(F_r, X F_r + Y F_a), N; signs of the loads do not count.
 
     Raises
@@ -364,6 +373,7 @@ def equivalent_load(bearing: Bearing, radial: float, axial: float = 0.0) -> floa
     BearingError
         For loads that are not finite, and as `load_factors`.
     """
+    radial, axial = _newtons(radial, "radial"), _newtons(axial, "axial")
     for name, value in (("radial", radial), ("axial", axial)):
         require(math.isfinite(value), f"{name} is {float(value)!r} N; give a finite load")
     radial, axial = abs(radial), abs(axial)
@@ -371,12 +381,12 @@ def equivalent_load(bearing: Bearing, radial: float, axial: float = 0.0) -> floa
     return max(radial, x * radial + y * axial)
 
 
-def rating_life(bearing: Bearing, load: float, *, reliability: float = 0.9, life_factor: float = 1.0) -> float:
+def rating_life(bearing: Bearing, load: Quantity, *, reliability: float = 0.9, life_factor: float = 1.0) -> float:
     """Return the life in revolutions, L_na = a_1 a_ISO (C/P)^p 10^6, p = 3 for balls and 10/3 for rollers.
 
     Parameters
     ----------
-    load : float
+    load : float or str
         Equivalent load P, N.
     reliability : float
         Share of bearings that reach it, 0.9 to 0.9995; a_1 is the standard's from 95 % up.
@@ -388,6 +398,7 @@ def rating_life(bearing: Bearing, load: float, *, reliability: float = 0.9, life
     BearingError
         For a load or life factor that is not positive and finite, and another reliability.
     """
+    load = _newtons(load, "load")
     require(0.0 < load < math.inf, f"load is {load!r} N; give a positive equivalent load")
     require(
         0.0 < life_factor < math.inf, f"life_factor is {life_factor!r}; give a positive a_ISO, 1 if it is not known"

@@ -104,6 +104,8 @@ SUFFIX = re.compile(
 precision."""
 APART = re.compile(r"[CE]|2?HRS|MT\d+|GJN|WT|LHT\d+|V[LAT]\d+|TN|S[0-4]|X?\dK|[25]K|2AS|NS7S?|Q\d+|L\d+|P[456]|")
 """The same of those written apart only: design, grease, heat treatment, quality."""
+HYBRID = re.compile(r"(?<![A-Z0-9])HC(?=\d|P|[^A-Z0-9]|$)\d?")
+"""Elements of ceramics, with a number for which, that is no class of clearance: "/HC5", "/HC5C3"."""
 MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO)\s*")
 
 
@@ -206,7 +208,14 @@ def _named_class(designation: str, suffixes: str, changes: dict[str, Any]) -> st
     BearingError
         For a class that is not tabulated, and for two, unless the clearance is given.
     """
-    found = {f"C{one['name'] or one['short']}{one['half'] or ''}" for one in CLASSES.finditer(suffixes)}
+    if HYBRID.search(suffixes) and not {"youngs_modulus", "density"} <= changes.keys():
+        warnings.warn(
+            f"designation {designation!r}: its elements are ceramic by HC, and are taken as steel; give density= (3200 "
+            "kg/m^3) and a youngs_modulus= for elements and rings (of silicon nitride on steel 2.46e11 Pa)",
+            stacklevel=4,
+        )
+    bare = HYBRID.sub("", suffixes)
+    found = {f"C{one['name'] or one['short']}{one['half'] or ''}" for one in CLASSES.finditer(bare)}
     if "clearance" in changes or not found:
         return None
     if len(found) > 1:
@@ -235,7 +244,7 @@ def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> N
     UserWarning
         Of suffixes written apart that are not known, unless the clearance is given.
     """
-    onto, *apart = re.split(r"[^A-Z0-9]+", suffixes.rstrip())
+    onto, *apart = re.split(r"[^A-Z0-9]+", HYBRID.sub("", suffixes).rstrip())
     letters = CLASSES.sub("", onto)
     if letters and SUFFIX.fullmatch(letters) is None:
         raise BearingError(

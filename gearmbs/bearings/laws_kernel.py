@@ -39,6 +39,8 @@ BALL_EXPONENT = 1.5
 ROLLER_EXPONENT = 10.0 / 9.0
 PALMGREN = 3.84e-5
 """mm of approach per contact for Q = 1 N on a line of 1 mm: delta = 3.84e-5 Q^0.9/L^0.8, mm and N, steel."""
+STEEL = 2.07e11, 0.3
+"""Young's modulus, Pa, and Poisson's ratio of that steel, and of bearings where none are given."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class PointContact:
 
 
 def groove_contact(
-    diameter: float, curvature: float, slope: float, youngs_modulus: float = 2.07e11, poisson_ratio: float = 0.3
+    diameter: float, curvature: float, slope: float, youngs_modulus: float = STEEL[0], poisson_ratio: float = STEEL[1]
 ) -> PointContact:
     """Return the contact of a ball with a groove.
 
@@ -130,16 +132,21 @@ def in_series(first: float, second: float, exponent: float) -> float:
     return float((first**power + second**power) ** -exponent)
 
 
-def line_contact(length: float) -> float:
-    """Return K of Q = K delta^(10/9) for one contact of a steel roller by Palmgren, N/m^(10/9).
+def line_contact(length: float, youngs_modulus: float = STEEL[0], poisson_ratio: float = STEEL[1]) -> float:
+    """Return K of Q = K delta^(10/9) for one contact of a roller by Palmgren, N/m^(10/9).
+
+    The approach of other materials than steel goes with (Q/E')^0.9, E' = E/(1 - nu^2), so that K goes with E'.
 
     Parameters
     ----------
     length : float
         Effective length, m.
+    youngs_modulus, poisson_ratio : float
+        Of roller and ring, Pa.
     """
+    by_steel = youngs_modulus / (1.0 - poisson_ratio**2) / (STEEL[0] / (1.0 - STEEL[1] ** 2))
     # delta [m] = 1e-3 * 3.84e-5 Q^0.9 / (1e3 L)^0.8
-    return float((1e3 * (1e3 * length) ** 0.8 / PALMGREN) ** ROLLER_EXPONENT)
+    return float(by_steel * (1e3 * (1e3 * length) ** 0.8 / PALMGREN) ** ROLLER_EXPONENT)
 
 
 ITERATIONS = 60

@@ -301,7 +301,7 @@ class BearingState:
     stiffness : ndarray, shape (5, 5)
         d load/d displacement.
     element_loads : ndarray, shape (Z,)
-        Normal force of each element on the inner ring, N.
+        Normal force of each element on the inner ring, N; of four-point bearings the sum of both contacts' vectors.
     element_angles : ndarray, shape (Z,)
         Where each element is, rad from x.
     contact_angles : ndarray, shape (Z,)
@@ -383,7 +383,7 @@ class BearingStatics:
 
         Parameters
         ----------
-        load : sequence of 3 or 5 floats
+        load : sequence of 3 or 5 floats or str
             Forces on the inner ring, N; with five also moments, N m. With three the tilt stays as in ``start``, and
             the moments are what that takes.
         cage_angle : float, optional
@@ -404,10 +404,7 @@ class BearingStatics:
         UserWarning
             If an angular contact bearing carries an axial load against its sense, on the other shoulder of its grooves.
         """
-        wanted = np.asarray(load, dtype=float)
-        require(
-            wanted.shape in ((3,), (5,)) and bool(np.all(np.isfinite(wanted))), f"load is {load!r}; give 3 or 5 numbers"
-        )
+        wanted = _numbers(load, "load", ("force", "torque"))
         place = self._first(wanted) if start is None else self._five(start, "start")
         place = self._carried(place, wanted, cage_angle)
         found, stiffness = self._load(place, cage_angle)
@@ -516,9 +513,7 @@ class BearingStatics:
         return place
 
     def _five(self, values: npt.ArrayLike, field: str) -> np.ndarray:
-        numbers = np.asarray(values, dtype=float)
-        good = numbers.shape in ((3,), (5,)) and bool(np.all(np.isfinite(numbers)))
-        require(good, f"{field} is {values!r}; give 3 or 5 numbers")
+        numbers = _numbers(values, field, ("length", "angle"))
         return np.concatenate([numbers, np.zeros(5 - numbers.size)])
 
     def _load(
@@ -569,6 +564,23 @@ class BearingStatics:
             if loads[j] > 0.0:
                 contact[j] = np.arctan2(force[2], radial)
         return BearingState(place, load, stiffness, loads, angles, contact)
+
+
+def _numbers(values: Any, field: str, dimensions: tuple[str, str]) -> np.ndarray:
+    """Return three or five numbers, given as such or as texts with a unit; the last two have another dimension."""
+    asked = f"{field} is {values!r}; give 3 or 5 numbers"
+    if isinstance(values, list | tuple) and len(values) in (3, 5) and any(isinstance(value, str) for value in values):
+        kinds = (dimensions[0],) * 3 + (dimensions[1],) * 2
+        try:
+            values = [to_si(value, kind, field) for value, kind in zip(values, kinds)]
+        except (TypeError, ValueError) as error:
+            raise BearingError(str(error)) from None
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise BearingError(asked) from None
+    require(numbers.shape in ((3,), (5,)) and bool(np.all(np.isfinite(numbers))), asked)
+    return numbers
 
 
 def _frames(place: np.ndarray, speed: float) -> np.ndarray:

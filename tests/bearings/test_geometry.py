@@ -71,6 +71,16 @@ def test_palmgrens_line():
     assert line_contact(1e-3 * length) * (1e-3 * delta) ** (10.0 / 9.0) == pytest.approx(force)
 
 
+@pytest.mark.parametrize("name", ["6205", "NU206"])
+def test_stiffness_of_any_elements_goes_with_their_modulus(name):
+    known = {} if name == "6205" else {"elements": 13, "dynamic_rating": "44 kN"}
+    steel = Bearing.from_designation(name, **known)
+    ceramic = steel.changed(youngs_modulus="310 GPa", poisson_ratio=0.26)
+    share = 310 / (1 - 0.26**2) / (207 / (1 - 0.3**2))
+    assert ceramic.stiffness == pytest.approx(share * steel.stiffness)
+    assert (ceramic.rating, ceramic.rating_at_rest) == (steel.rating, steel.rating_at_rest)
+
+
 @pytest.mark.parametrize(
     ("name", "dynamic", "static"),
     [
@@ -86,6 +96,10 @@ def test_ratings_are_those_in_catalogues(name, dynamic, static):
 
 def test_life():
     bearing = Bearing.from_designation("6205", dynamic_rating=14e3)
+    assert rating_life(bearing, "1.4 kN") == rating_life(bearing, 1400.0)
+    assert equivalent_load(bearing, "1 kN", "800 N") == equivalent_load(bearing, 1000.0, 800.0)
+    with pytest.raises(BearingError, match=says("load", "'1 mm'", "N")):
+        rating_life(bearing, "1 mm")
     assert rating_life(bearing, 1400.0) == pytest.approx(1e9)
     assert rating_life(bearing, 1400.0, reliability=0.99) == pytest.approx(0.25e9)
     assert equivalent_load(bearing, 1000.0) == 1000.0
@@ -102,6 +116,16 @@ def test_life():
     assert rating_life(rollers, rollers.rating / 2) == pytest.approx(1e6 * 2 ** (10 / 3))
     with pytest.raises(BearingError, match="no axial load"):
         equivalent_load(rollers, 100.0, 50.0)
+
+
+@pytest.mark.parametrize(("text", "clearance"), [("6205/HC5", 0.0), ("6205/HC5C3WT", 20.5e-6), ("6205HC5-C3", 20.5e-6)])
+def test_ceramic_elements_are_no_class_of_clearance(text, clearance):
+    with pytest.warns(UserWarning, match=says("HC", "steel", "density=", "youngs_modulus=")):
+        assert Bearing.from_designation(text).clearance == pytest.approx(clearance)
+    own = Bearing.from_designation(text, youngs_modulus="246 GPa", density=3200.0)
+    assert own.clearance == pytest.approx(clearance)
+    # a seal named 2RSH, and a class
+    assert Bearing.from_designation("6205-2RSHC3").clearance == pytest.approx(20.5e-6)
 
 
 @pytest.mark.parametrize("text", ["6205", "6205-2RS", "6205-2Z/C3", "SKF 6205", "6205 C4"])

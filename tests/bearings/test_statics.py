@@ -245,8 +245,18 @@ def test_large_ball_and_leaning_ring():
 def test_a_load_it_cannot_carry():
     with pytest.raises(BearingError, match=says("carry", "direction")):
         BearingStatics(ROLLERS).under([500.0, 0.0, 100.0])
-    with pytest.raises(BearingError, match="give 3 or 5 numbers"):
-        BearingStatics(ROLLERS).under([500.0])
+    for load in ([500.0], ["500 N"] * 6, "500 N", [None, 0.0, 0.0]):
+        with pytest.raises(BearingError, match="give 3 or 5 numbers"):
+            BearingStatics(ROLLERS).under(load)
+    with pytest.raises(BearingError, match=says("load", "'5 N'", "N*m")):
+        BearingStatics(DEEP).under(["500 N", 0.0, 0.0, "5 N", 0.0])
+
+
+def test_loads_and_places_as_texts():
+    statics = BearingStatics(DEEP)
+    state = statics.under(["0.5 kN", 0.0, "100 N", "200 N mm", 0.0])
+    assert np.array_equal(state.load, statics.under([500.0, 0.0, 100.0, 0.2, 0.0]).load)
+    assert np.array_equal(statics.at(["5 um", 0, 0]).load, statics.at([5e-6, 0.0, 0.0]).load)
 
 
 def test_deflection_curve_has_the_slope_of_its_stiffness():
