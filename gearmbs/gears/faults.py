@@ -50,6 +50,8 @@ __all__ = [
     "Wobble",
 ]
 
+MOST_WOBBLE = math.radians(2.0)
+"""Lean of a toothing, up to which it is as good as a shift of its sections, which is what is made of it."""
 POINTS_A_WAVE = 10
 """Points of the profile that a wave along the flank must be resolved by."""
 
@@ -140,6 +142,9 @@ class RootCrack(Fault):
     depth: Quantity = 2e-3
     angle: Quantity = "70 deg"
     tooth: int = 0
+
+    def check_sizes(self, gear: GearSpec) -> None:
+        """Refuse none: how much a tooth can be cracked is known where its outline is."""
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         if not self.depth > 0:
@@ -284,6 +289,7 @@ class Wobble(Fault):
     Parameters
     ----------
     angle : float or str
+        At most 2 deg to either side.
     phase : float or str
         Direction, in the wheel's frame, in which the toothing leans at its +z end.
     """
@@ -299,6 +305,11 @@ class Wobble(Fault):
         return "angle", min(gear.face_width, turned_by_helix(gear))
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
+        if not abs(self.angle) <= MOST_WOBBLE:
+            raise ValueError(
+                f"Wobble.angle is {math.degrees(self.angle):.4g} deg; give up to {math.degrees(MOST_WOBBLE):.0f} deg "
+                "(a plain number is in radians)"
+            )
         lean = math.tan(self.angle) * deviations.section
         deviations.shift(lean * math.cos(self.phase), lean * math.sin(self.phase))
 

@@ -16,7 +16,7 @@ import numpy as np
 from gearmbs._display import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.spec import GearSpec, convert_fields
-from gearmbs.units import Quantity, shown, to_si, truth
+from gearmbs.units import Given, Quantity, shown, to_si, truth
 
 # Deviations of the tooth flanks of one wheel, to which every fault adds its own; packed into the contact tables.
 
@@ -26,6 +26,8 @@ FACE_SECTIONS = 33
 """Sections along the face where flanks vary along it, at least."""
 MOST_SECTIONS = 257
 """The same at most: 100 teeth have 27 MB of them."""
+MOST_LONG = 3.0
+"""Length of a fault, by the face width or ten modules, at most: a relief longer than its flank still has a meaning."""
 STEPS_A_DETAIL = 3
 """Sections, and slices of the contact, over the length in which a flank changes: a parabola is then good to 1.4 %."""
 COMPLIANCE_POINTS = 65
@@ -199,6 +201,30 @@ class Fault(Written):
                     raise ValueError(
                         f"{type(self).__name__}.{name} is {tooth}; the {self.wheel} wheel has teeth 0 to {count - 1}"
                     )
+
+    def check_sizes(self, gear: GearSpec) -> None:
+        """Refuse sizes that its wheel's teeth do not have: a number without its unit, or with another one.
+
+        Raises
+        ------
+        ValueError
+            Naming the field, its value and what it may be at most.
+        """
+        for name in self.units:
+            value = getattr(self, name)
+            length = name in ("length", "height", "width")
+            most = MOST_LONG * max(gear.face_width, 10.0 * gear.module) if length else gear.module
+            if value is not None and (length or name in ("amount", "depth")):
+                self._check_size(name, value, most, "mm" if length else "um")
+
+    def _check_size(self, name: str, value: float, most: float, unit: str) -> None:
+        if not abs(value) <= most:
+            given = isinstance(value, Given)
+            raise ValueError(
+                f"{type(self).__name__}.{name} is {shown(value, 'mm') if given else f'{value:g} m'}, and its wheel has "
+                f"no room for more than {shown(most, 'mm', '.4g')}; "
+                + ("give less" if given else f"a plain number is in m, write '{value:g} {unit}'")
+            )
 
     def face_detail(self, gear: GearSpec) -> tuple[str, float]:
         """Field by which flanks vary along the face, and length in which they change, m; infinite if they do not."""
@@ -464,6 +490,9 @@ class FlankMap(Fault):
         if not bool(np.isfinite(table).all()):
             raise ValueError(f"{place} holds a number that is not finite; give finite numbers")
         object.__setattr__(self, "amounts", table)
+
+    def check_sizes(self, gear: GearSpec) -> None:
+        self._check_size("amounts", max((value for row in self.amounts for value in row), key=abs), gear.module, "um")
 
     def face_detail(self, gear: GearSpec) -> tuple[str, float]:
         return "amounts", gear.face_width / (len(self.amounts) - 1)

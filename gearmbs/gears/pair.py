@@ -136,7 +136,9 @@ class GearPair(PairGeometry, Shown):
                 raise ValueError(f"GearPair.faults holds {fault!r}; give faults of gearmbs.gears.faults")
         super().__post_init__()
         for fault in self.faults:
-            fault.check_teeth(self.wheels[fault.wheel == "driven"].teeth)
+            gear = self.wheels[fault.wheel == "driven"]
+            fault.check_teeth(gear.teeth)
+            fault.check_sizes(gear)
         if self.root_contact and self.driver.helix_angle:
             raise ValueError(
                 "GearPair.root_contact is True: tips meet roots of spur wheels only; leave it away for helical ones"
