@@ -71,6 +71,8 @@ class Support(Written):
                               else quantity(value, unit, f"{label}: {what}"))  # fmt: skip
             if part.shape not in ((), (2,), (2, 2)):
                 raise FlexibleError(f"{label}: {what} has shape {part.shape}; give one number, two, or a 2x2 matrix")
+            if not np.all(np.isfinite(part)):
+                raise FlexibleError(f"{label}: {what} is {value!r}; give finite numbers, in {unit}")
             matrix[:2, :2] = part if part.ndim == 2 else np.diag(np.broadcast_to(part, 2))
         k[2, 2] = quantity(self.axial, "N/m", f"{label}: axial")
         k[3, 3] = k[4, 4] = quantity(self.rotational, "N*m", f"{label}: rotational")

@@ -47,6 +47,11 @@ def _is_count(value: Any) -> bool:
 
 
 Length = Annotated[Quantity, Measure("length", 0)]
+# the longest shafts, of ships, have half of the length, the thickest drums half of the diameter, and the rotors of the
+# largest generators are 19 m across: beyond, mm are meant
+ShaftLength = Annotated[Quantity, Measure("length", above=0, below=200)]
+ShaftDiameter = Annotated[Quantity, Measure("length", 0, below=10)]
+DiscSize = Annotated[Quantity, Measure("length", 0, below=20)]
 Inertia = Annotated[Quantity, Measure("inertia", 0)]
 
 
@@ -68,11 +73,11 @@ class ShaftSection(Described):
 
     error: ClassVar[type[ValueError]] = FlexibleError
 
-    length: Annotated[Quantity, Measure("length", above=0)]
-    outer: Length
-    inner: Length = 0.0
-    outer_end: Length = None
-    inner_end: Length = None
+    length: ShaftLength
+    outer: ShaftDiameter
+    inner: ShaftDiameter = 0.0
+    outer_end: ShaftDiameter = None
+    inner_end: ShaftDiameter = None
     material: ElasticMaterial | None = None
 
     def __post_init__(self) -> None:
@@ -106,9 +111,9 @@ class Disc(Described):
     error: ClassVar[type[ValueError]] = FlexibleError
 
     at: Length
-    outer: Length = None
-    width: Length = None
-    inner: Length = 0.0
+    outer: DiscSize = None
+    width: DiscSize = None
+    inner: DiscSize = 0.0
     mass: Annotated[Quantity, Measure("mass", 0)] = None
     polar: Inertia = None
     diametral: Inertia = None
