@@ -26,6 +26,7 @@ import math
 import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from numbers import Real
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -46,6 +47,7 @@ from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_material, to_si
 
 Length = Annotated[Quantity, Measure("length", above=0)]
+Boundary = Annotated[Quantity, Measure("length", above=0, below=10)]
 Force = Annotated[Quantity, Measure("force", above=0)]
 GROOVE = Measure(above=0.5, below=1, remedy="a groove is wider than its ball: give 0.505 to 0.6")
 ELEMENT_SIZE = Measure("length", above=0, below=1)
@@ -104,9 +106,9 @@ class Bearing(Described):
     outer_curvature: Annotated[Quantity, GROOVE] = 0.525
     clearance: Annotated[Quantity, Measure("length")] = 0.0
     roller_length: Length = None
-    bore: Length = None
-    outside_diameter: Length = None
-    width: Length = None
+    bore: Boundary = None
+    outside_diameter: Boundary = None
+    width: Boundary = None
     dynamic_rating: Force = None
     static_rating: Force = None
     youngs_modulus: Annotated[Quantity, Measure("pressure", above=0)] = STEEL[0]
@@ -136,6 +138,17 @@ class Bearing(Described):
             f"{1e3 * pitch:.4g} mm, where {math.floor(math.pi / math.asin(d / pitch))} do",
         )
         angle = self.contact_angle
+        within, beyond = (pitch + side * d * math.cos(angle) for side in (-1.0, 1.0))
+        require(
+            self.bore is None or self.bore < within,
+            f"Bearing.bore is {1e3 * (self.bore or 0.0):.4g} mm, and the elements run on {1e3 * within:.4g} mm; a bore "
+            "is smaller than its inner race",
+        )
+        require(
+            self.outside_diameter is None or self.outside_diameter > beyond,
+            f"Bearing.outside_diameter is {1e3 * (self.outside_diameter or 0.0):.4g} mm, and the elements run in "
+            f"{1e3 * beyond:.4g} mm; an outer ring is larger than its race",
+        )
         require(abs(self.clearance) < LOOSEST * d, f"Bearing.clearance is {self.clearance:g} m; give it in '... um'")
         if self.rollers:
             require(
@@ -148,6 +161,17 @@ class Bearing(Described):
             )
         if KINDS[self.kind].angle == "none":
             require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of {self.kind}s it is 0")
+        for name, given, usual in (
+            ("dynamic_rating", self.dynamic_rating, dynamic_rating),
+            ("static_rating", self.static_rating, static_rating),
+        ):
+            if given is not None:
+                own = usual(self)
+                require(
+                    own / OFF_RATING <= given <= own * OFF_RATING,
+                    f"Bearing.{name} is {given:g} N, and elements like these carry about {own:.3g} N; a plain number "
+                    f"is in N, write '{given:g} kN' if that is meant",
+                )
 
     @classmethod
     def from_designation(cls, designation: str, *, estimate: bool = False, **changes: Any) -> Bearing:
@@ -302,6 +326,8 @@ class Bearing(Described):
         return f"<table><caption>{self.designation or 'bearing'}</caption>{cells}</table>"
 
 
+OFF_RATING = 20.0
+"""Rating of a catalogue by that of the standard's formula, or the reverse, that no steel and no second row explains."""
 STANDARD_GROOVE = 0.52
 """Radius of the inner ring's groove, in ball diameters, that ISO 281 and ISO 76 state their ratings for."""
 PRESSURE = 4.2e9
@@ -405,7 +431,8 @@ def rating_life(bearing: Bearing, load: Quantity, *, reliability: float = 0.9, l
     )
     shares = (0.9, 0.95, 0.96, 0.97, 0.98, 0.99, 0.992, 0.994, 0.996, 0.998, 0.999, 0.9992, 0.9994, 0.9995)
     factors = (1.0, 0.64, 0.55, 0.47, 0.37, 0.25, 0.22, 0.19, 0.16, 0.12, 0.093, 0.087, 0.080, 0.077)
-    require(shares[0] <= reliability <= shares[-1], f"reliability is {reliability!r}; give 0.9 up to 0.9995")
+    told = isinstance(reliability, Real) and not isinstance(reliability, bool)
+    require(told and shares[0] <= reliability <= shares[-1], f"reliability is {reliability!r}; give 0.9 up to 0.9995")
     a_1 = float(np.interp(reliability, shares, factors))
     return a_1 * life_factor * 1e6 * (bearing.rating / load) ** life_exponent(bearing)
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 OUTER, INNER, ELEMENT = "outer", "inner", "element"
 PARTS = (OUTER, INNER, ELEMENT)
+SMALL = 0.05
+"""Deviation of size or form, of the diameter of an element, at most."""
 
 
 Part = Annotated[str, OneOf(PARTS)]
@@ -52,6 +54,15 @@ class Defect(Described):
 
     def check(self, bearing: Bearing) -> None:
         """Raise BearingError if the defect does not fit the bearing."""
+
+    def check_small(self, name: str, value: float, bearing: Bearing) -> None:
+        """Raise BearingError for a deviation that is no small one beside the elements: another unit is meant."""
+        most = SMALL * bearing.element_diameter
+        require(
+            abs(value) <= most,
+            f"{type(self).__name__}.{name} is {1e3 * value:.4g} mm; give at most {1e3 * most:.3g} mm, a twentieth of "
+            "an element's diameter (a plain number is in m)",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,6 +221,10 @@ class Waviness(SurfaceDefect):
         top = self.order if self.highest is None else self.highest
         require(self.order <= top <= 500, f"Waviness.highest is {top}; give one from the order up to 500")
 
+    def check(self, bearing: Bearing) -> None:
+        super().check(bearing)
+        self.check_small("amplitude", self.amplitude, bearing)
+
     def finest(self, bearing: Bearing) -> float:
         top = self.highest or self.order
         return 0.5 * np.pi * surface_radius(bearing, self.part) / top
@@ -243,6 +258,7 @@ class OffSize(Defect):
     seed: Whole = 0
 
     def check(self, bearing: Bearing) -> None:
+        self.check_small("amount", self.amount, bearing)
         if self.element is not None:
             require(
                 self.element < bearing.elements,

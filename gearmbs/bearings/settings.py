@@ -41,8 +41,8 @@ class BearingSettings(Described):
     preload: Annotated[Quantity, Measure("force", 0)] = 0.0
     sense: Annotated[int, OneOf((1, -1))] = 1
     centrifugal: bool = False
-    smooth: Annotated[Quantity, Measure("length", 0)] = 0.0
-    rolling_friction: Share = 0.0
+    smooth: Annotated[Quantity, Measure("length", 0, below=1e-3, remedy="give 0 or some um, such as '2 um'")] = 0.0
+    rolling_friction: Annotated[Quantity, Measure(low=0, below=0.5, remedy="give a share such as 0.0015")] = 0.0
     viscous_friction: Share = 0.0
     slow_speed: Annotated[Quantity, Measure("angular speed", above=0)] = 1.0
     slices: Annotated[int, Measure(low=1, high=99, whole=True)] = 15

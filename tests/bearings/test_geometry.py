@@ -100,6 +100,10 @@ def test_life():
     assert equivalent_load(bearing, "1 kN", "800 N") == equivalent_load(bearing, 1000.0, 800.0)
     with pytest.raises(BearingError, match=says("load", "'1 mm'", "N")):
         rating_life(bearing, "1 mm")
+    with pytest.raises(BearingError, match=says("reliability", "'95 %'", "give")):
+        rating_life(bearing, 1400.0, reliability="95 %")
+    # a second row and the best steel are no slip of a unit
+    assert bearing.changed(dynamic_rating="40 kN", static_rating="20 kN").rating == 40e3
     assert rating_life(bearing, 1400.0) == pytest.approx(1e9)
     assert rating_life(bearing, 1400.0, reliability=0.99) == pytest.approx(0.25e9)
     assert equivalent_load(bearing, 1000.0) == 1000.0
@@ -168,6 +172,11 @@ def test_an_uncertain_bearing_asks():
         ({"kind": "tapered roller"}, "effective length"),
         ({"inner_curvature": 0.4}, says("Bearing.inner_curvature", "wider", "ball")),
         ({"clearance": "9 mm"}, "give it in"),
+        ({"bore": 25}, says("Bearing.bore", "25 m", "plain")),
+        ({"bore": "35 mm"}, says("Bearing.bore", "35 mm", "31.1 mm", "smaller")),
+        ({"outside_diameter": "42 mm"}, says("Bearing.outside_diameter", "42 mm", "46.98 mm", "larger")),
+        ({"dynamic_rating": 14.0}, says("Bearing.dynamic_rating", "14 N", "'14 kN'")),
+        ({"static_rating": "7.8 MN"}, says("Bearing.static_rating", "N")),
         ({"density": float("nan")}, says("Bearing.density", "nan", "give")),
     ],
 )

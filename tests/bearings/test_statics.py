@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from gearmbs.bearings import Bearing, BearingError, BearingStatics, Misalignment, OffSize, stiffness_matrix
+from gearmbs.bearings import Bearing, BearingError, BearingStatics, Misalignment, OffSize, Waviness, stiffness_matrix
 from tests.says import says
 
 K = 1e10
@@ -250,6 +250,24 @@ def test_a_load_it_cannot_carry():
             BearingStatics(ROLLERS).under(load)
     with pytest.raises(BearingError, match=says("load", "'5 N'", "N*m")):
         BearingStatics(DEEP).under(["500 N", 0.0, 0.0, "5 N", 0.0])
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        ({"defects": OffSize(amount=2)}, ("OffSize.amount", "0.397 mm", "plain")),
+        ({"defects": Waviness(amplitude="5 mm")}, ("Waviness.amplitude", "5 mm", "0.397 mm")),
+        ({"smooth": "2 mm"}, ("smooth", "0.002 m", "'2 um'")),
+        ({"rolling_friction": 15}, ("rolling_friction", "15", "0.0015")),
+    ],
+)
+def test_sizes_that_are_meant_in_other_units(settings, told):
+    with pytest.raises(BearingError, match=says(*told)):
+        BearingStatics(DEEP, **settings)
+    # what is meant
+    BearingStatics(
+        DEEP, defects=[OffSize(amount="2 um"), Waviness(amplitude="5 um")], smooth="2 um", rolling_friction=0.0015
+    )
 
 
 def test_loads_and_places_as_texts():
