@@ -31,6 +31,12 @@ DIRECTIONS = {"lateral": (0, 1, 3, 4), "torsional": (5,), "axial": (2,), "all": 
 
 SAME = 1e-7
 """Relative distance below which eigenvalues are equal."""
+AT_REST = 3e-7
+"""Frequency of a motion, by that of a node between its own elements, that is rounding of none: rigid motions of shafts
+have up to 2e-8, on supports of 1e15 N/m, too."""
+SHIFT = 1e-8
+"""Shift below zero from which critical speeds are looked for, by the square of that frequency: rigid motions have no
+stiffness to divide by."""
 
 
 @dataclass(frozen=True)
@@ -220,6 +226,12 @@ class Rotor:
         """Positions of the stations, m."""
         return self._matrices[5]
 
+    @property
+    def _local(self) -> float:
+        """Stiffness by mass of a degree of freedom between its elements, half of them have more, 1/s^2."""
+        m, _, _, k, _, _ = self._matrices
+        return float(np.median(np.diag(k) / np.diag(m)))
+
     def modes(self, speed: Quantity = 0.0, count: int = 12) -> WhirlModes:
         """Return the slowest modes at a speed; motions without a frequency are left out.
 
@@ -240,8 +252,7 @@ class Rotor:
         damping = c + speed * g
         a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(m, k), -np.linalg.solve(m, damping)]])
         values, vectors = scipy.linalg.eig(a)
-        floor = 1e-6 * np.sqrt(np.abs(k).max() / np.abs(m).max())
-        floor = max(floor, 1e-3)
+        floor = AT_REST * np.sqrt(self._local)
         growing = values.real[(np.abs(values.imag) <= floor) & (values.real > floor)]
         if growing.size:
             warnings.warn(
@@ -276,14 +287,24 @@ class Rotor:
 
         With q exp(i order W t) they are eigenvalues: K q = W^2 (order^2 M - i order G) q. Damping does not shift them,
         but motions that it lets not oscillate are left out: those whose damping ratio q* C q / (2 order W q* M q) is 1
-        or more.
+        or more. So are rigid motions.
+
+        Raises
+        ------
+        FlexibleError
+            For an order that is not positive.
         """
+        if not 0.0 < order < np.inf:
+            raise FlexibleError(f"order is {order!r}; give a positive number, 1 of unbalance")
         m, c, g, k, _, _ = self._matrices
-        values, vectors = scipy.linalg.eig(np.linalg.solve(k, order**2 * m - 1j * order * g))
+        inertia, shift = order**2 * m - 1j * order * g, SHIFT * self._local / order**2
+        values, vectors = scipy.linalg.eig(np.linalg.solve(k + shift * inertia, inertia))
         whirls = (np.abs(values.imag) < 1e-6 * np.abs(values)) & (values.real > 0.0)
         real, shapes = values.real[whirls], vectors[:, whirls]
         there = real > 1e-12 * real.max(initial=0.0)
-        speeds, shapes = 1.0 / np.sqrt(real[there]), shapes[:, there]
+        squares, shapes = 1.0 / real[there] - shift, shapes[:, there]
+        there = squares > (AT_REST / order) ** 2 * self._local
+        speeds, shapes = np.sqrt(squares[there]), shapes[:, there]
         lost, held = (np.einsum("ia,ij,ja->a", shapes.conj(), matrix, shapes).real for matrix in (c, m))
         return np.sort(speeds[lost < 2.0 * order * speeds * held])[:count]
 

@@ -150,6 +150,39 @@ def test_masses_of_sections_cones_and_discs():
     np.testing.assert_allclose(one.com, [0, 0, 0.5], atol=1e-12)
 
 
+def two_discs(kind, *supports):
+    discs = [Disc(at, mass=5.0, polar=2 * j, diametral=j) for at, j in ((0.0, 0.025), (0.5, 0.05))]
+    return Rotor(Shaft([ShaftSection(0.5, 0.03)], discs, {"A": 0.0, "B": 0.5}), supports, kind)
+
+
+@pytest.mark.parametrize("kind", ["torsional", "axial"])
+def test_free_rotors_are_critical_at_their_frequencies(kind):
+    """What does not turn with the whirl has no gyroscopic moments, and rigid motions are no critical speeds."""
+    rotor = two_discs(kind)
+    frequencies = rotor.modes(0.0, 3).frequencies
+    np.testing.assert_allclose(rotor.critical_speeds(3), frequencies, rtol=1e-6)
+    np.testing.assert_allclose(rotor.critical_speeds(3, order=2.0), frequencies / 2, rtol=1e-6)
+    with pytest.raises(FlexibleError, match=says("order", "-1.0", "give")):
+        rotor.critical_speeds(order=-1.0)
+
+
+@pytest.mark.parametrize("supports", [(), (Support("A", 1e8),), (Support("A", PINNED),)])
+def test_critical_speeds_of_rotors_with_rigid_motions_are_where_whirl_meets_the_speed(supports):
+    rotor = two_discs("lateral", *supports)
+    found = rotor.critical_speeds(3)
+    assert len(found) == 3
+    for speed in found:
+        assert np.abs(rotor.modes(speed, 8).frequencies / speed - 1.0).min() < 1e-6
+
+
+@pytest.mark.parametrize("stiffness", [1e9, 1e12, PINNED])
+def test_slow_modes_on_stiff_supports_are_there(stiffness):
+    shaft = Shaft([ShaftSection(6.0, 0.02)], (), {"A": 0.0, "B": 6.0})
+    rotor = Rotor(shaft, [Support("A", stiffness), Support("B", stiffness)])
+    slowest = (np.pi / 6.0) ** 2 * 0.005 * np.sqrt(2.1e11 / 7850.0)
+    np.testing.assert_allclose(rotor.modes(0.0, 2).frequencies, slowest, rtol=1e-4)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
