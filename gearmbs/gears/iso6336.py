@@ -26,13 +26,13 @@ def iso_mesh_stiffness(pair: PairGeometry) -> float:
     return iso_single_stiffness(pair) * (0.75 * pair.contact_ratio + 0.25)
 
 
-def iso_single_stiffness(pair: PairGeometry, web: tuple[float, float] | None = None) -> float:
+def iso_single_stiffness(pair: PairGeometry, web: tuple[Quantity, Quantity] | None = None) -> float:
     """Single stiffness c' of ISO 6336-1 (method B, high load), N/(m of face width * m).
 
     Parameters
     ----------
     pair : PairGeometry
-    web : (float, float), optional
+    web : (float or str, float or str), optional
         Thickness of the web and of the rim, m, of a wheel that is no solid disc: the factor
         ``C_R = 1 + ln(b_s / b) / (5 exp(s_R / (5 m_n)))``, within the standard's limits 0.2 <= b_s / b <= 1.2 and
         s_R >= m_n.
@@ -41,13 +41,25 @@ def iso_single_stiffness(pair: PairGeometry, web: tuple[float, float] | None = N
     -----
     c' = c'_th C_M C_R C_B cos beta with C_M = 0.8 and C_B = (1 + 0.5 (1.2 - h_fP / m_n)) (1 - 0.02 (20 - alpha_n)),
     where h_fP is the dedendum of the basic rack.
+
+    Raises
+    ------
+    ValueError
+        For a web or a rim that is not positive, or thicker than the larger wheel is.
     """
     one, two = pair.driver, pair.driven
     depth = 0.5 * (one.dedendum / one.module + one.profile_shift + two.dedendum / two.module + two.profile_shift)
     blank = 1.0
     if web is not None:
-        share = min(max(web[0] / pair.narrower_face_width, 0.2), 1.2)
-        blank = 1 + math.log(share) / (5 * math.exp(max(web[1] / one.module, 1.0) / 5))
+        thick, rim = (to_si(value, "length", "web") for value in web)
+        most = max(one.outer_radius, two.outer_radius)
+        if not (0.0 < thick <= most and 0.0 < rim <= most):
+            raise ValueError(
+                f"web is {web!r}, {thick * 1e3:g} and {rim * 1e3:g} mm; give the thickness of the web and of the "
+                f"rim, up to {most * 1e3:.4g} mm (plain numbers are in m: write '30 mm')"
+            )
+        share = min(max(thick / pair.narrower_face_width, 0.2), 1.2)
+        blank = 1 + math.log(share) / (5 * math.exp(max(rim / one.module, 1.0) / 5))
     rack = (1 + 0.5 * (1.2 - depth)) * (1 - 0.02 * (20 - math.degrees(one.pressure_angle)))
     moduli = [w.material.youngs_modulus for w in (one, two)]
     material = 2 * moduli[0] * moduli[1] / sum(moduli) / ISO_STEEL_MODULUS

@@ -84,6 +84,9 @@ def test_helical_example_of_the_standard():
     assert iso_single_stiffness(pair) / unit / steel == pytest.approx(12.370472, abs=2e-6)
     assert iso_mesh_stiffness(pair) == iso_single_stiffness(pair) * (0.75 * pair.contact_ratio + 0.25)
     assert iso_single_stiffness(pair, web=(0.03, 0.024)) < iso_single_stiffness(pair)
+    assert iso_single_stiffness(pair, web=("30 mm", "24 mm")) == iso_single_stiffness(pair, web=(0.03, 0.024))
+    with pytest.raises(ValueError, match=says("web", "30000", "24000 mm", "'30 mm'")):
+        iso_single_stiffness(pair, web=(30, 24))
     width = 0.1 / math.cos(one.base_helix_angle)
     lines = np.array([pair.contact_line_length(phase) for phase in np.linspace(0, 1, 4000, endpoint=False)]) / width
     assert (lines.mean(), lines.min(), lines.max()) == pytest.approx((1.5493, 1.5071, 1.5840), abs=1e-4)
