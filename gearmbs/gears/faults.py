@@ -26,7 +26,7 @@ from gearmbs.gears.modifications import (
     turned_by_helix,
 )
 from gearmbs.gears.spec import GearSpec
-from gearmbs.gears.stiffness import Crack, pair_stiffness
+from gearmbs.gears.stiffness import Crack, check_crack, pair_stiffness
 from gearmbs.units import Quantity
 
 __all__ = [
@@ -147,13 +147,7 @@ class RootCrack(Fault):
         """Refuse none: how much a tooth can be cracked is known where its outline is."""
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        if not self.depth > 0:
-            raise ValueError(f"RootCrack.depth is {self.depth} m; it must be positive")
-        if not 0.0 < self.angle <= 0.5 * math.pi:
-            raise ValueError(
-                f"RootCrack.angle is {math.degrees(self.angle):.4g} deg, by which no crack goes into the tooth; give "
-                "above 0 up to 90 deg (a plain number is in radians: write '70 deg')"
-            )
+        check_crack(self.depth, self.angle, "RootCrack")
         crack = Crack(self.depth, self.angle)
         driver = self.wheel == "driver"
         own = deviations.compliance_roll_length

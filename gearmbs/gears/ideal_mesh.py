@@ -18,7 +18,7 @@ from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import convert_fields
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, ForceElement, Setting
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity, shown, to_si
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.parts.bodies import Marker
@@ -88,6 +88,12 @@ class IdealMesh(Written):
                     raise ValueError(f"IdealMesh.{name} needs four finite numbers or more over a mesh cycle")
                 if not (name == "error" or values.min() > 0):
                     raise ValueError(f"IdealMesh.{name} holds {values.min():g}; give positive ones")
+                most = self.pair.driver.module
+                if name == "error" and np.abs(values).max() > most:
+                    raise ValueError(
+                        f"IdealMesh.error reaches {np.abs(values).max():g} m; give numbers in m, up to the module of "
+                        f"{shown(most, 'mm', '.4g')}"
+                    )
                 object.__setattr__(self, name, values)
 
     @classmethod

@@ -15,6 +15,7 @@ from gearmbs._display import Written, html_table
 from gearmbs.contact.law_kinds import LAW_KINDS
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.modifications import STEPS_A_DETAIL, Fault
+from gearmbs.gears.spec import WIDEST_FACE, Material
 from gearmbs.units import Given, Quantity, shown, to_si, truth
 from gearmbs.wording import any_of
 
@@ -31,6 +32,8 @@ DAMPING_RATIO = 0.07
 of steel gears without the measurement behind it, which has not been found; 0.07 itself is what models of gears in the
 literature take. It is a convention, no measurement of the gears at hand: their own ratio, if known, is the one to
 give, and amplitudes at a resonance are in inverse proportion to it."""
+DEEPEST = 0.02
+"""Penetration of full damping, m, at most: a tenth of the largest module, and 200 times ADAMS's 0.1 mm."""
 RATIO_DEPTH = 2e-6
 """Penetration, m, at which the damping by a ratio is fully on: what a tooth pair yields under 25 to 30 N/mm, less than
 gears carry; below it damping falls to nothing, so that flanks meet without a blow."""
@@ -75,6 +78,11 @@ class ContactLaw(Written):
                 raise ValueError(f"ContactLaw.{name} is {value}; it must be positive and finite")
         if not (math.isfinite(self.damping) and self.damping >= 0):
             raise ValueError(f"ContactLaw.damping is {self.damping}; it must not be negative")
+        if self.damping > 0.0 and not LAW_KINDS[self.kind].damps_by_factor and self.depth > DEEPEST:
+            raise ValueError(
+                f"ContactLaw.depth is {shown(self.depth, 'mm', '.4g')}, which no teeth yield, so that nothing would be "
+                f"damped; give up to {shown(DEEPEST, 'mm')} (a plain number is in m: write '{self.depth:g} mm')"
+            )
         if self.exponent < 1:
             raise ValueError(
                 f"ContactLaw.exponent is {self.exponent}; below 1 the stiffness is infinite at first touch"
@@ -157,7 +165,13 @@ class ContactLaw(Written):
         -0.9: F = K x^(10/9), independent of the flanks' curvature.
         """
         width = to_si(face_width, "length", "ContactLaw.face_width")
-        modulus = to_si(youngs_modulus, "Pa", "ContactLaw.youngs_modulus") / (1 - poisson_ratio**2)
+        if not 0.0 < width <= WIDEST_FACE:
+            raise ValueError(
+                f"ContactLaw.face_width is {width:g} m; give that of a wheel (a plain number is in m: write "
+                f"'{width:g} mm')"
+            )
+        solid = Material(youngs_modulus, poisson_ratio)
+        modulus = solid.youngs_modulus / (1 - solid.poisson_ratio**2)
         relative = modulus / (206e9 / (1 - 0.3**2))
         k = ((width * 1e3) ** 0.8 / 3.84e-5) ** (10 / 9) * relative * 1e3 ** (10 / 9)
         c = to_si(damping, "N*s/m", "ContactLaw.damping")
@@ -416,6 +430,12 @@ class OperatingPoint(Written):
     def normal_force(self, geometry: PairGeometry) -> float:
         """Sum of normal forces that carries the load torque, N: F_n = T / (r_b2 cos beta_b)."""
         return self.torque / (geometry.driven.base_radius * math.cos(geometry.driven.base_helix_angle))
+
+
+def require_points(points: Any) -> None:
+    """Refuse what is no number of points over a mesh cycle."""
+    if isinstance(points, bool) or not isinstance(points, Integral) or points < 1:
+        raise ValueError(f"points is {points!r}; give a whole number from 1 up")
 
 
 class Mesh(Protocol):

@@ -331,6 +331,10 @@ class GearPair(PairGeometry, Shown):
             real = isinstance(damping_ratio, (int, float)) and not isinstance(damping_ratio, bool)
             if not (real and 0.0 <= damping_ratio < math.inf):
                 raise ValueError(f"damping_ratio is {damping_ratio!r}; give a number that is not negative")
+            if damping_ratio > 1.0:
+                raise ValueError(
+                    f"damping_ratio is {damping_ratio!r}, more than critical; give up to 1, such as 0.07 for 7 %"
+                )
             share = self._pairs_in_mesh * self._face_share
             damping = 2.0 * damping_ratio * math.sqrt(law.stiffness * self.reduced_mass / share)
             depth = RATIO_DEPTH if depth is None else depth

@@ -30,9 +30,10 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from gearmbs.gears.geometry import PairGeometry
-from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.mesh import Mesh, require_points
 from gearmbs.gears.modifications import COMPLIANCE_POINTS
 from gearmbs.gears.spec import GearSpec
+from gearmbs.units import Quantity, to_si
 
 POINTS = 200  # stations of the beam from root to tip
 FACE_POINTS = 2001
@@ -65,11 +66,30 @@ class Crack:
     depth : float
         Length of the crack, m.
     angle : float
-        Between crack and the tooth's middle line, rad.
+        Between crack and the tooth's middle line, rad; above 0 up to 90 deg.
+
+    Raises
+    ------
+    ValueError
+        For a depth that is not positive, and a crack that does not go into the tooth.
     """
 
     depth: float
     angle: float = math.radians(70)
+
+    def __post_init__(self) -> None:
+        check_crack(self.depth, self.angle, "Crack")
+
+
+def check_crack(depth: float, angle: float, owner: str) -> None:
+    """Refuse what is no crack into a tooth; ``owner`` is what the message calls the fields' owner."""
+    if not depth > 0:
+        raise ValueError(f"{owner}.depth is {depth} m; it must be positive")
+    if not 0.0 < angle <= 0.5 * math.pi:
+        raise ValueError(
+            f"{owner}.angle is {math.degrees(angle):.4g} deg, by which no crack goes into the tooth; give above 0 up "
+            "to 90 deg (a plain number is in radians: write '70 deg')"
+        )
 
 
 def rack_root(gear: GearSpec, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
@@ -368,7 +388,7 @@ def flattening(gear: GearSpec, depth: np.ndarray, half_width: np.ndarray) -> np.
     return per * (np.log(2 * depth / np.minimum(half_width, depth)) - nu / (2 * (1 - nu)))
 
 
-def contact_half_width(pair: PairGeometry, roll_length: np.ndarray, load: float) -> np.ndarray:
+def contact_half_width(pair: PairGeometry, roll_length: np.ndarray, load: Quantity) -> np.ndarray:
     """Half width of Hertz's contact of two flanks, a^2 = 4 F' R / (pi E*), m.
 
     Parameters
@@ -377,15 +397,18 @@ def contact_half_width(pair: PairGeometry, roll_length: np.ndarray, load: float)
     roll_length : ndarray
         Contact on wheel 1, m. The lengths of roll are the flanks' radii of curvature: 1/R = 1/s_1 + 1/s_2, or
         1/s_1 - 1/s_2 in an internal wheel 2.
-    load : float
+    load : float or str
         F', N/m.
     """
+    pressed = to_si(load, "N/m", "load")
+    if not 0.0 <= pressed < math.inf:
+        raise ValueError(f"load is {load!r}; give a load per face width that is not negative, such as '300 N/mm'")
     soft = sum((1 - w.material.poisson_ratio**2) / w.material.youngs_modulus for w in pair.wheels)
     # flanks that are cut to the base circle begin with no radius at all
     least = FLATTEST * pair.driver.base_pitch
     one, two = (np.maximum(s, least) for s in (roll_length, pair.mate_roll_length(0, roll_length)))
     curvature = np.maximum(1 / one + pair.sign / two, FLATTEST / pair.driver.base_pitch)
-    return np.sqrt(4 * max(load, LEAST_SPECIFIC_LOAD) * soft / (math.pi * curvature))
+    return np.sqrt(4 * max(pressed, LEAST_SPECIFIC_LOAD) * soft / (math.pi * curvature))
 
 
 def compliance_roll_lengths(pair: PairGeometry) -> np.ndarray:
@@ -399,7 +422,7 @@ def pair_stiffness(
     cracks: tuple[Crack | None, Crack | None] = (None, None),
     root_angles: tuple[float | None, float | None] = (None, None),
     rim_supports: int | None = None,
-    load: float = SPECIFIC_LOAD,
+    load: Quantity = SPECIFIC_LOAD,
     sainsot: bool = False,
 ) -> np.ndarray:
     """Stiffness of one tooth pair by the potential-energy method, N/m.
@@ -415,7 +438,7 @@ def pair_stiffness(
         Per wheel, see `tooth_compliance`.
     rim_supports : int, optional
         Of an internal wheel 2, see `tooth_compliance`.
-    load : float
+    load : float or str
         Normal force per face width, N/m, of the flattening.
     sainsot : bool
         Whether the bodies are Sainsot's rings and the contact is Yang's and Lin's constant, as usual in the literature.
@@ -470,7 +493,7 @@ def mesh_stiffness(
     points: int = 400,
     root_angles: tuple[float | None, float | None] = (None, None),
     rim_supports: int | None = None,
-    load: float = SPECIFIC_LOAD,
+    load: Quantity = SPECIFIC_LOAD,
     sainsot: bool = False,
 ) -> MeshStiffness:
     """Time-varying mesh stiffness of perfect wheels by the potential-energy method.
@@ -499,6 +522,7 @@ def mesh_stiffness(
             "Crack, or loaded_transmission_error(pair, cycles=...).stiffness",
             stacklevel=2,
         )
+    require_points(points)
     geometry = pair.geometry
     begin = geometry.first_roll_lengths[0]
     pitch, path, overlap = geometry.driver.base_pitch, geometry.contact_ratio, geometry.overlap_ratio

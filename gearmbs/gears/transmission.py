@@ -11,7 +11,7 @@ from numbers import Integral
 import numpy as np
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
-from gearmbs.gears.mesh import Mesh, varying_along_face
+from gearmbs.gears.mesh import Mesh, require_points, varying_along_face
 from gearmbs.gears.modifications import face_sections
 from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting
@@ -404,6 +404,9 @@ def _over_phases(mesh: StaticMesh, phase: np.ndarray, at: Callable[[float], tupl
 
 
 def _phases(pair: Mesh, points: int, slices: int | None, start: float, cycles: int) -> np.ndarray:
+    require_points(points)
+    if not math.isfinite(start):
+        raise ValueError(f"start is {start!r}; give a finite driver angle, in its pitch angles")
     if cycles < 1 or cycles != int(cycles):
         raise ValueError(f"cycles is {cycles!r}; give a whole number of mesh cycles from 1 up")
     _check_slices(pair, slices, 4)

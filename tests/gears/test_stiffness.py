@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gearmbs.gears import GearPair, GearSpec, Material, loaded_transmission_error
+from gearmbs.gears import ContactLaw, GearPair, GearSpec, IdealMesh, Material, loaded_transmission_error
 from gearmbs.gears.faults import RootCrack
 from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness
 from gearmbs.gears.stiffness import (
@@ -239,6 +239,39 @@ def test_pair_with_potential_energy_stiffness_carries_the_load():
     error = loaded_transmission_error(pair, 100.0, 50)
     curve = mesh_stiffness(pair, 50)
     assert error.error.max() == pytest.approx(pair.normal_force / curve.stiffness.min(), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda pair: Crack(-1e-3), ("Crack.depth", "-0.001 m", "positive")),
+        (lambda pair: Crack(1e-3, 70), ("Crack.angle", "4011 deg", "'70 deg'")),
+        (lambda pair: mesh_stiffness(pair, 0), ("points", "0", "give")),
+        (lambda pair: mesh_stiffness(pair, load=-5.0), ("load", "-5.0", "'300 N/mm'")),
+        (lambda pair: loaded_transmission_error(pair, points=2.5), ("points", "2.5", "give")),
+        (lambda pair: loaded_transmission_error(pair, start=math.inf), ("start", "inf", "give")),
+        (lambda pair: ContactLaw.impact(depth=0.1), ("ContactLaw.depth", "100 mm", "'0.1 mm'")),
+        (lambda pair: ContactLaw.hertz_line(face_width=20), ("ContactLaw.face_width", "20 m", "'20 mm'")),
+        (lambda pair: ContactLaw.hertz_line(poisson_ratio=1.0), ("poisson_ratio", "1.0", "give")),
+        (lambda pair: pair.with_own_stiffness(damping_ratio=7), ("damping_ratio", "7", "0.07")),
+        (lambda pair: IdealMesh(pair, 4e8, error=[1, 2, 3, 4]), ("IdealMesh.error", "4 m", "3.065 mm")),
+    ],
+)
+def test_numbers_of_other_units_and_none_are_refused(call, told):
+    with pytest.raises(ValueError, match=says(*told)):
+        call(GearPair.paper())
+
+
+def test_numbers_of_other_units_as_they_are_meant():
+    pair = GearPair.paper()
+    assert mesh_stiffness(pair, 5, load="300 N/mm").mean == mesh_stiffness(pair, 5).mean
+    assert ContactLaw.impact(depth="0.1 mm").depth == ContactLaw.impact().depth
+    # undamped, any depth; of steel as its formula has it
+    assert ContactLaw.linear("1e5 N/mm", depth=0.1).damping == 0.0
+    steel = ContactLaw.hertz_line("20 mm", "206 GPa", 0.3).stiffness
+    assert steel * (3.84e-8 * 100**0.9 / 20**0.8) ** (10 / 9) == pytest.approx(100.0)
+    assert pair.with_own_stiffness(damping_ratio=1.0).contact.damping > 0.0
+    assert IdealMesh(pair, 4e8, error=[1e-6, 2e-6, 0.0, -1e-6]).error[1] == 2e-6
 
 
 def test_mesh_stiffness_tells_that_it_leaves_cracks_out():
