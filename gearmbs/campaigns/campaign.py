@@ -172,7 +172,7 @@ class Campaign:
         page: bool | str | Path = False,
     ) -> CampaignStatus:
         from gearmbs.campaigns.page import LivePage
-        from gearmbs.campaigns.work import work_unit
+        from gearmbs.campaigns.work import end_guards, work_unit
         from gearmbs.studies.run.engine import Refused, WorkerDied, run_jobs
 
         minutes = _of_minutes(minutes)
@@ -207,6 +207,8 @@ class Campaign:
             ) from died
         except Refused as refused:
             raise CampaignError(f"{refused}; what is done is in the folder") from refused
+        finally:
+            end_guards()
         return self.status()
 
     def _heal(self, units: Iterable[int] | None) -> None:

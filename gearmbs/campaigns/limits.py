@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import faulthandler
-import multiprocessing
 import signal
 import threading
 import time
@@ -22,7 +21,7 @@ class TimeLimitReached(RuntimeError):
 
 @contextlib.contextmanager
 def limited(
-    seconds: float | None, memory: float | None, wall: float | None = None
+    seconds: float | None, memory: float | None, wall: float | None = None, *, mortal: bool = False
 ) -> Iterator[Callable[[float], None]]:
     """Bound what is done inside; yield a progress function that checks the time.
 
@@ -36,8 +35,10 @@ def limited(
         system cannot tell how much that is. Threads of one process wait for each other, since the bound of one would
         be that of its neighbours.
     wall : float, optional
-        Seconds by the clock. In a main thread what sleeps or waits is interrupted, too; a worker process that is deep
-        in compiled code and hears no signal is ended a little later.
+        Seconds by the clock. In a main thread what sleeps or waits is interrupted, too.
+    mortal : bool
+        Whether this process may be ended, `last` after its start, where what it does is deep in compiled code and hears
+        no signal, or goes on whatever exception it meets.
 
     Raises
     ------
@@ -52,13 +53,18 @@ def limited(
         if late is not None and time.monotonic() > late:
             raise TimeLimitReached(f"more than {wall:g} s by the clock, at {100 * fraction:.0f} % of the run")
 
-    with _timer(seconds), _clock(wall), _memory(memory):
+    with _timer(seconds), _clock(wall, mortal), _memory(memory):
         yield check
 
 
 def later(seconds: float) -> float:
     """Return a limit a little above one that is checked between steps, which can say how far a run has come."""
     return 1.1 * seconds + 0.1
+
+
+def last(seconds: float) -> float:
+    """Return when a process is ended that has not heard of its limit."""
+    return 2.0 * later(seconds) + 1.0
 
 
 @contextlib.contextmanager
@@ -78,19 +84,18 @@ def _timer(seconds: float | None) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _clock(seconds: float | None) -> Iterator[None]:
+def _clock(seconds: float | None, mortal: bool) -> Iterator[None]:
     if seconds is None or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
         yield
         return
-    own = multiprocessing.parent_process() is not None
-    if own:
-        faulthandler.dump_traceback_later(2.0 * later(seconds) + 1.0, exit=True)
+    if mortal:
+        faulthandler.dump_traceback_later(last(seconds), exit=True)
     try:
         message = f"more than {seconds:g} s by the clock"
         with _alarm(signal.SIGALRM, signal.ITIMER_REAL, later(seconds), message):
             yield
     finally:
-        if own:
+        if mortal:
             faulthandler.cancel_dump_traceback_later()
 
 

@@ -10,6 +10,7 @@ see `gearmbs.campaigns.surroundings`, makes it refuse the unit, which goes back.
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
 import os
 import pickle
 import select
@@ -19,6 +20,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -27,7 +29,7 @@ from typing import Any
 import gearmbs
 from gearmbs.campaigns.codes import admit, plan_modules
 from gearmbs.campaigns.folder import Folder, sealed
-from gearmbs.campaigns.limits import TimeLimitReached, later, limited
+from gearmbs.campaigns.limits import TimeLimitReached, last, limited
 from gearmbs.campaigns.reuse import Reuse
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
@@ -36,7 +38,7 @@ from gearmbs.campaigns.surroundings import DISK, MOST_TRIED, Lacking, carries_ou
 from gearmbs.files import whole_file, write_whole
 from gearmbs.studies.run.claims import Claim, Claimed, claimed
 from gearmbs.studies.run.code import CodeChanged, running_code
-from gearmbs.studies.run.engine import Refused
+from gearmbs.studies.run.engine import Refused, deaf
 
 DEATHS = 2
 """A case whose own process has died so often is recorded as the cause."""
@@ -44,8 +46,8 @@ DEATHS = 2
 GUARD_AFTER = 2
 """Attempts of a unit that came to no end, after which its cases run in a process of their own."""
 
-STARTING = 30.0
-"""Seconds that a process of its own may take beyond the limit of its case, until it can begin."""
+SILENT = 30.0
+"""Seconds beyond its last that a process of its own is given to end itself, which one that is stopped does not."""
 
 _folders: dict[str, Folder] = {}
 
@@ -70,10 +72,15 @@ class CaseRunner:
     folder : Folder
     code : str
         Digest of the code, a part of each case's key.
+    mortal : bool
+        Whether this process may be ended with a case that does not end by itself.
     """
 
-    def __init__(self, folder: Folder, code: str) -> None:
+    def __init__(self, folder: Folder, code: str, mortal: bool = False) -> None:
         self.folder, self.plan, self.subject, self.code = folder, folder.plan, folder.plan.subject, code
+        self.mortal = mortal
+        # processor seconds of other processes than this one
+        self.elsewhere = 0.0
 
     def prepare(self, row: dict[str, Any]) -> tuple[Any, CaseResult]:
         """Return the thing that a row stands for and a result with its key; None and the failure if it is
@@ -112,7 +119,7 @@ class CaseRunner:
     def _attempt(self, thing: Any, result: CaseResult, row: dict[str, Any]) -> None:
         plan = self.plan
         try:
-            with limited(plan.time_limit, plan.memory_limit, plan.longest) as check:
+            with limited(plan.time_limit, plan.memory_limit, plan.longest, mortal=self.mortal) as check:
                 record = self.subject.run(thing, check, plan.keep)
                 kept = self.subject.reduce(thing, record, plan.keep)
             check_signals(self.folder.specs, kept.signals)
@@ -180,7 +187,8 @@ class CaseRunner:
 class GuardedRunner(CaseRunner):
     """Carries out cases in a child process, whose death is that of one case.
 
-    For units that did not come to an end before: the guilty case is found, and its neighbours are not harmed.
+    For units that did not come to an end before: the guilty case is found, and its neighbours are not harmed; and for
+    limits by the clock where this process must not be ended.
     """
 
     def __init__(self, folder: Folder, code: str) -> None:
@@ -189,62 +197,68 @@ class GuardedRunner(CaseRunner):
 
     def run(self, row: dict[str, Any]) -> CaseResult:
         """Carry out a case in the child; one whose process dies twice is recorded as the cause."""
+        longest = self.plan.longest
         for _ in range(DEATHS):
             child = self._start()
             assert child.stdin is not None
             assert child.stdout is not None
+            begun = time.monotonic()
             try:
                 pickle.dump(row, child.stdin)
                 child.stdin.flush()
-                longest = self.plan.longest
-                if (
-                    longest is not None
-                    and not select.select([child.stdout], [], [], 2.0 * later(longest) + STARTING)[0]
-                ):
-                    self._end()
-                    told = f"more than {longest:g} s by the clock"
-                    return self.ended(row, Outcome(TIME, told, "Raise wall_limit."))
-                kind, value = pickle.load(child.stdout)
+                if longest is not None and not select.select([child.stdout], [], [], last(longest) + SILENT)[0]:
+                    child.kill()
+                kind, value, spent = pickle.load(child.stdout)
             except (EOFError, OSError, pickle.UnpicklingError):
                 code = child.wait()
                 self._child = None
+                if longest is not None and time.monotonic() - begun > longest:
+                    # it has ended itself, or was ended
+                    told = f"more than {longest:g} s by the clock, and heard no interruption"
+                    return self.ended(row, Outcome(TIME, told, "Raise wall_limit."))
                 cause = f"signal {-code}" if code < 0 else f"exit status {code}"
                 continue
+            except BaseException:
+                # nobody waits for the case any more
+                child.kill()
+                raise
+            self.elsewhere += spent
             if kind == "error":
                 raise value
             return value
         told = f"the process of this case died {DEATHS} times ({cause})"
         return self.ended(row, Outcome(DIED, told, "It may need more memory than there is."))
 
-    def _end(self) -> None:
-        assert self._child is not None
-        self._child.kill()
-        self._child.wait()
-        self._child = None
-
     def _start(self) -> subprocess.Popen:
         if self._child is None:
             command = [sys.executable, "-m", "gearmbs.campaigns.work", str(self.folder.path), self.code]
             # modules of the user are found where this process finds them
             environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-            self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+            with deaf():
+                self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+            # it says when it can begin, from when on time counts; one that cannot is found by the first case
+            assert self._child.stdout is not None
+            self._child.stdout.readline()
         return self._child
 
     def close(self) -> None:
         """End the child."""
         if self._child is not None:
             assert self._child.stdin is not None
-            self._child.stdin.close()
+            with suppress(OSError):
+                self._child.stdin.close()
             self._child.wait()
             self._child = None
 
 
 def serve(path: str | Path, code: str) -> None:
     """Carry out the cases that come through standard input until it is closed."""
-    source, sink = sys.stdin.buffer, sys.stdout.buffer
-    # what a simulation prints must not get into the answers
-    sys.stdout = sys.stderr
-    runner = CaseRunner(Folder(path), code)
+    # what a simulation prints, by whatever means, must not get into the answers
+    source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    runner, before = CaseRunner(Folder(path), code, mortal=True), 0.0
+    sink.write(b"\n")
+    sink.flush()
     while True:
         try:
             row = pickle.load(source)
@@ -254,7 +268,8 @@ def serve(path: str | Path, code: str) -> None:
             answer: tuple[str, Any] = ("result", runner.run(row))
         except (OSError, Refused) as error:
             answer = ("error", error)
-        pickle.dump(answer, sink)
+        spent, before = time.process_time() - before, time.process_time()
+        pickle.dump((*answer, spent), sink)
         sink.flush()
 
 
@@ -303,6 +318,26 @@ def work_unit(path: str, mix: bool, unit: int, _report: Callable[[float], None] 
         raise RuntimeError(f"unit {unit}: {type(error).__name__}: {error}") from error
 
 
+_guards: list[GuardedRunner] = []
+"""The one whose child goes on from unit to unit: it takes some seconds to start."""
+
+
+def _guard(folder: Folder, code: str, stays: bool) -> GuardedRunner:
+    """Return a runner with a child, of which the main thread keeps one."""
+    if not stays:
+        return GuardedRunner(folder, code)
+    if not any(guard.folder is folder and guard.code == code for guard in _guards):
+        end_guards()
+        _guards.append(GuardedRunner(folder, code))
+    return _guards[0]
+
+
+def end_guards() -> None:
+    """End the child that this process keeps."""
+    while _guards:
+        _guards.pop().close()
+
+
 _admitted: set[tuple[str, str, bool, int]] = set()
 
 
@@ -321,10 +356,12 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
     code = _code(folder, mix)
     started, clock, cpu = time.time(), time.monotonic(), time.process_time()
     rows = folder.cases(unit)
-    # a thread that sleeps can only be interrupted with its process
-    threaded = folder.plan.longest is not None and threading.current_thread() is not threading.main_thread()
-    guarded = claim.attempts >= GUARD_AFTER or threaded
-    runner = (GuardedRunner if guarded else CaseRunner)(folder, code)
+    # a worker process ends with a case that does not heed its limit; for others, and threads that sleep, a child does
+    mortal, main = multiprocessing.parent_process() is not None, threading.current_thread() is threading.main_thread()
+    limited_by_clock = folder.plan.longest is not None
+    guarded = claim.attempts >= (1 if limited_by_clock else GUARD_AFTER) or (limited_by_clock and not (mortal and main))
+    runner = _guard(folder, code, main) if guarded else CaseRunner(folder, code, mortal)
+    before = runner.elsewhere
     reuse = Reuse.of(folder)
     results: list[CaseResult] = []
     lacking: list[Lacking] = []
@@ -347,12 +384,13 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
         if lacking:
             _look(runner, unit, rows, results, lacking[0])
     finally:
-        runner.close()
+        if runner not in _guards:
+            runner.close()
     digests = store(folder, unit, rows, results)
     if _code(folder, mix) != code:
         raise CodeChanged("the code was edited while the unit was done")
     about = {
-        "processor_seconds": round(time.process_time() - cpu, 4),
+        "processor_seconds": round(time.process_time() - cpu + runner.elsewhere - before, 4),
         "wall_seconds": round(time.monotonic() - clock, 4),
         "started": started,
         "attempts": claim.attempts,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import signal
@@ -49,6 +50,9 @@ def moody(x1: float, x2: float, x3: float, mood: str = "good") -> dict:
             pass
     if mood == "asleep":
         time.sleep(1e6)
+    while mood == "deaf":
+        with contextlib.suppress(BaseException):
+            time.sleep(1e6)
     if mood == "hungry":
         return {"y": float(np.ones(1 << 31).sum())}
     if mood == "deadly":

@@ -271,10 +271,24 @@ def test_results_that_are_no_numbers_are_counted(tmp_path):
 
 
 def test_a_case_that_sleeps_is_ended_by_the_clock(tmp_path):
-    campaign = moody(tmp_path, wall_limit=0.2, asleep=1)
+    """Also one that goes on whatever interrupts it; its processor time is told wherever it was spent."""
+    campaign = moody(tmp_path, wall_limit=0.2, asleep=1, deaf=1)
     status = campaign.run(workers=0)
+    assert (status.done, status.failed) == (11, 2)
+    failed = campaign.failed().set_index("mood")
+    assert set(failed["status"]) == {"time limit"}
+    assert "more than 0.2 s by the clock" in failed.message["asleep"]
+    assert "heard no interruption" in failed.message["deaf"]
+    assert status.processor_seconds > status.simulation_seconds
+
+
+@pytest.mark.slow
+def test_a_worker_is_replaced_whose_case_heeds_no_limit(tmp_path):
+    campaign = moody(tmp_path, wall_limit=0.2, deaf=1)
+    status = campaign.run(workers=1)
     assert (status.done, status.failed) == (10, 1)
-    assert "more than 0.2 s by the clock" in campaign.failed().message[0]
+    assert list(campaign.failed().mood) == ["deaf"]
+    assert (campaign.table[campaign.table.mood == "good"].status == "done").all()
 
 
 @pytest.mark.slow
