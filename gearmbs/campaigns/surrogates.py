@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.campaign import Campaign
 
 HIGHEST = 6
+WELL = 0.9
+"""Part of the variance of points left out below which a sum is said to be a poor one: what is left, which is no one's,
+is then as large as the intervals of a hundred points."""
+
 POINTS_A_TERM = 2.0
 """Points for each coefficient at least: with fewer the errors at points left out say little."""
 
@@ -51,7 +55,8 @@ class PolynomialChaos:
     r_squared, q_squared : float
         Part of the variance it explains, of its points and of each point by the sum fitted to all others.
     confidence : ndarray, shape (2, d)
-        Half widths of the 95 % intervals of first and total indices, by resampling of the points.
+        Half widths of the 95 % intervals of the sum's first and total indices, by resampling of the points. Those of
+        the result are q_squared times its indices at least, and 1 - q_squared more at most.
     count : int
         Points.
     """
@@ -125,6 +130,11 @@ def fit_chaos(
     CampaignError
         If there are too few points, or the result is the same everywhere.
 
+    Warns
+    -----
+    CampaignWarning
+        If it explains little of the variance: the intervals are those of the sum alone.
+
     Examples
     --------
     >>> u = np.random.default_rng(0).random((200, 2))
@@ -140,6 +150,13 @@ def fit_chaos(
         raise CampaignError("polynomial chaos: the result is the same everywhere; it depends on none of the factors")
     y, power = in_scale(y)
     best = best_chaos(u, y, few, degree=degree, together=together)
+    if best.q_squared < WELL:
+        warnings.warn(
+            f"polynomial chaos: the sum explains {max(best.q_squared, 0.0):.0%} of the variance of points that it was "
+            "not fitted to; its intervals tell nothing of the rest. Draw more points, or take a saltelli design",
+            CampaignWarning,
+            stacklevel=2,
+        )
     x = chaos_columns(u, best.degrees, few)
     generator, drawn = np.random.default_rng(seed), []
     for _ in range(RESAMPLES):

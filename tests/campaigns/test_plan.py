@@ -303,6 +303,38 @@ def test_one_at_a_time_with_ranges_of_options():
     assert columns["fault.teeth.tooth"][0] == 5
 
 
+def test_a_unit_that_goes_by_what_varies_is_refused():
+    """N/mm^1.3 is no unit of a stiffness with another exponent; numbers in SI are taken for each as they are."""
+    exponent, stiffness = Factor("contact.exponent", 1.3, 1.5), ("2e5 N/mm^1.3", "3e5 N/mm^1.3")
+    rows = [{"contact.stiffness": stiffness[0], "contact.exponent": 1.5}]
+    for given in (
+        {"factors": [exponent, Factor("contact.stiffness", *stiffness)]},
+        {"factors": [exponent, Factor("contact.stiffness", values=stiffness)]},
+        {"design": "list", "options": {"rows": rows}},
+    ):
+        with pytest.raises(CampaignError, match=says("contact.stiffness", "N/m^1.3", "contact.exponent", "numbers")):
+            make_plan(SHORT, **{"design": "grid", **given})
+    assert make_plan(SHORT, [Factor("contact.stiffness", *stiffness)], "grid").size == 2
+    assert make_plan(SHORT, [exponent, Factor("contact.stiffness", 1e9, 2e9)], "grid").size == 4
+    rows = [{"contact.stiffness": 1e9, "contact.exponent": 1.5}]
+    assert make_plan(SHORT, design="list", options={"rows": rows}).size == 1
+
+
+def test_two_kinds_of_specimens_are_drawn_apart():
+    """With one seed the errors and the order of both would be the same."""
+
+    def both(seed):
+        drawn = [Specimens(8, {f"x{k}": (0.0, 1.0)}, seed=k * seed, name=f"kind {k}") for k in (1, 2)]
+        plan = make_plan(function(), drawn, "random", n=64)
+        columns = table(plan)
+        rows = [plan.data({name: values[k] for name, values in columns.items()}) for k in range(64)]
+        return np.corrcoef([row["x1"] for row in rows], [row["x2"] for row in rows])[0, 1]
+
+    with pytest.raises(CampaignError, match=says("specimens", "kind 1", "kind 2", "seed")):
+        both(0)
+    assert abs(both(1)) < 0.3
+
+
 def test_errors_of_specimens_are_of_fields_of_their_own():
     """Of two that set a field one would be lost without a word."""
     errors = Specimens(3, {"x1": (1.0, 2.0)})
@@ -310,7 +342,7 @@ def test_errors_of_specimens_are_of_fields_of_their_own():
         make_plan(function(), [Factor("x1", 10.0, 20.0), errors], n=4)
     with pytest.raises(CampaignError, match=says("x1", "several")):
         make_plan(function(), [errors, Specimens(2, {"x1": (3.0, 4.0)}, name="part")], n=4)
-    plan = make_plan(function(), [errors, Specimens(2, {"x2": (3.0, 4.0)}, name="part")], n=4)
+    plan = make_plan(function(), [errors, Specimens(2, {"x2": (3.0, 4.0)}, seed=1, name="part")], n=4)
     assert {"specimen", "part"} <= table(plan).keys()
 
 

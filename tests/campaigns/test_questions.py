@@ -302,6 +302,17 @@ def test_chaos_of_a_polynomial_is_exact():
 
 
 @pytest.mark.slow
+def test_a_sum_that_explains_little_says_so():
+    """Its intervals are not those of the result; one that explains it all has nothing to say."""
+    points = sequence("random", 64, 3, 1)
+    with pytest.warns(CampaignWarning, match=says("polynomial chaos", "%", "saltelli")):
+        found = fit_chaos(points, _values(points), NAMES)
+    assert found.q_squared < 0.9
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit_chaos(points, points @ [1.0, 2.0, 3.0], NAMES)
+
+
 def test_one_factor_studies(tmp_path):
     factors = [Factor(name, -1.0, 1.0, levels=5) for name in ("x1", "x2")]
     campaign = Campaign(tmp_path / "c", make_plan(function(), factors, "one at a time", unit=16))

@@ -132,6 +132,9 @@ def test_bearings_with_and_without_a_spall(tmp_path):
 
 
 def test_wrong_paths_and_signals_are_named():
+    for path in ("wheels.gear.teeth.0", "wheels.gear.teeth.0.x"):
+        with pytest.raises(CampaignError, match=says(path, "wheels.gear.teeth", "'0'", "table")):
+            make_plan(DrivetrainSubject(STAGE), [Factor(path, 1.0, 2.0)], n=4)
     with pytest.raises(CampaignError, match=says("file", "'load'")):
         make_plan(DrivetrainSubject(STAGE), [Factor("load.brake.torque", 1.0, 2.0)], n=4)
     plan = make_plan(DrivetrainSubject(STAGE), [Factor("loads.brake.torque", 1.0, 2.0)], n=4, keep=["signal:tacho"])

@@ -13,6 +13,7 @@ import numpy as np
 from gearmbs.campaigns.plans import designs
 from gearmbs.campaigns.plans.factors import (
     AnyFactor,
+    Factor,
     Specimens,
     check_kinds,
     factor_from,
@@ -79,6 +80,7 @@ def make_plan(
         if not isinstance(factor, AnyFactor):
             raise CampaignError(f"factors: {factor!r} is none; give Factor, Choice or Specimens")
     own = tuple(factor.in_si(subject) for factor in given)
+    _check_units(subject, {f.path: (f.low, f.high, *f.values) for f in given if isinstance(f, Factor)}, _set_by(own))
     chosen(designs.DESIGNS, design, "", CampaignError, "design")
     counted = (*designs.SEQUENCES, *designs.ANALYSES, "latin hypercube")
     n = whole(n, "n", 0)
@@ -94,12 +96,28 @@ def make_plan(
     return plan
 
 
+def _set_by(factors: Iterable[AnyFactor]) -> list[str]:
+    """Return the paths of the fields that factors set."""
+    return [path for f in factors for path in (f.errors if isinstance(f, Specimens) else (f.path,))]
+
+
+def _check_units(subject: Subject, values: Mapping[str, Iterable[Any]], varied: Sequence[str]) -> None:
+    """Refuse quantities with a unit that is another one for other values of what varies as well."""
+    for path, given in values.items():
+        if (other := subject.unit_follows(path)) in varied and any(isinstance(value, str) for value in given):
+            raise CampaignError(
+                f"{path}: its unit is {subject.unit_of(path)} for the base's {other} alone, which varies as well; give "
+                "numbers in SI, or each pair by a plan of its own"
+            )
+
+
 def _rows_in_si(plan: Plan) -> list[dict[str, Any]]:
     """Return the rows of a list with texts in SI, numbers of one column all whole or all real."""
     rows = plan.options.get("rows")
     if not rows or not all(isinstance(row, Mapping) for row in rows):
         raise CampaignError("design list: give options={'rows': [{path: value, ...}, ...]}")
     units = {path: plan.subject.unit_of(path) for row in rows for path in row}
+    _check_units(plan.subject, {path: [row.get(path) for row in rows] for path in units}, list(units))
     found = [{k: number_in_si(python_scalar(v), units[k], k) for k, v in row.items()} for row in rows]
     for path in units:
         column = [row.get(path) for row in found]
@@ -127,7 +145,7 @@ def _consistent(plan: Plan) -> None:
         raise CampaignError(
             f"factors: {', '.join(sorted(doubled))} stand for several columns; give them names of their own"
         )
-    paths = [path for f in plan.factors for path in (f.errors if isinstance(f, Specimens) else (f.path,))]
+    paths = _set_by(plan.factors)
     doubled = {path for path in paths if paths.count(path) > 1}
     if doubled:
         raise CampaignError(f"factors: {', '.join(sorted(doubled))} is set by several of them; give one")
@@ -138,6 +156,11 @@ def _consistent(plan: Plan) -> None:
                     f"factors: {part} is a part of {whole_of}, which is set as a whole as well; give it in each of the "
                     f"values of {whole_of}, or leave one of the two out"
                 )
+    drawn = [f for f in plan.factors if isinstance(f, Specimens)]
+    if alike := [f.name for f in drawn if [other.seed for other in drawn].count(f.seed) > 1]:
+        raise CampaignError(
+            f"specimens: {', '.join(alike)} have one seed, and would be drawn alike; give each a seed of its own"
+        )
     if plan.design == "list" and plan.factors:
         raise CampaignError("factors: a list has its rows alone; leave the factors out, or take another design")
     if plan.design != "list" and not plan.factors:

@@ -137,6 +137,10 @@ class Subject(ABC):
             If there is no such field.
         """
 
+    def unit_follows(self, path: str) -> str:
+        """Return the path of the field by which the unit of another one goes, "" where it is the same always."""
+        return ""
+
     def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
         """Return the SI unit of an entry of a table that stands in a field, as the depth of a fault."""
         return "1"

@@ -119,6 +119,10 @@ class PairSubject(Subject):
             raise CampaignError(f"{path}: unknown; fields of {section} are {', '.join(known)}")
         return units_of_fields(holder).get(name, "1")
 
+    def unit_follows(self, path: str) -> str:
+        """Return the exponent, by which the unit of the stiffness goes."""
+        return "contact.exponent" if path == "contact.stiffness" else ""
+
     def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
         """Return the SI unit of a parameter of a fault of a tooth."""
         return tooth_fault_unit(table, key) if path == "fault.teeth" else "1"

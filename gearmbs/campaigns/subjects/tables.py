@@ -65,8 +65,11 @@ class TablesSubject(Subject):
         for k, section in enumerate(sections):
             if not isinstance(place, Mapping) or section not in place:
                 where = ".".join(sections[:k]) or "the file"
-                raise CampaignError(f"{path}: {where} has no {section!r}; it has {', '.join(map(str, place))}")
+                known = f"it has {', '.join(map(str, place))}" if isinstance(place, Mapping) else "it is no table"
+                raise CampaignError(f"{path}: {where} has no {section!r}; {known}")
             place = place[section]
+        if not isinstance(place, Mapping):
+            raise CampaignError(f"{path}: {'.'.join(sections)} has no {name!r}; it is no table")
         return si_unit(place.get(name)) or "1"
 
     def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
