@@ -320,6 +320,34 @@ def test_a_unit_that_goes_by_what_varies_is_refused():
     assert make_plan(SHORT, design="list", options={"rows": rows}).size == 1
 
 
+@pytest.mark.parametrize("scale", ["linear", "log"])
+@pytest.mark.parametrize("base", [1, 2, 5, 7])
+def test_one_at_a_time_of_whole_numbers_stands_at_the_base(scale, base):
+    """In the range or beside it; a base that is no whole number has no place on one."""
+    subject = FunctionSubject(models.adding, {"a": base, "b": 1.0})
+    factors = [Factor("a", 1, 5, whole=True, scale=scale), Factor("b", 0.0, 2.0)]
+    assert table(make_plan(subject, factors, "one at a time"))["a"].tolist() == [base, 1, 5, base, base]
+    subject.parameters["a"] = base + 0.5
+    with pytest.raises(CampaignError, match=says("a", f"{base + 0.5}", "whole")):
+        make_plan(subject, factors, "one at a time").points()
+
+
+def test_values_of_a_grid_are_different():
+    """Five of three whole numbers would weigh some of them twice; as many as there are have all of them."""
+    for factor, options in (
+        (Factor("x1", 1, 3, whole=True, levels=5), {}),
+        (Factor("x1", 1, 3, whole=True), {"levels": 5}),
+        (Factor("x1", 1, 5, whole=True, scale="log", levels=5), {}),
+        (Factor("x1", values=[1.0, 2.0, 1.0]), {}),
+    ):
+        for design in ("grid", "one at a time"):
+            with pytest.raises(CampaignError, match=says("factor 'x1'", "twice", "levels", "values")):
+                make_plan(function(), [factor], design, options=options)
+    plan = make_plan(function(), [Factor("x1", 1, 3, whole=True, levels=3)], "grid")
+    assert table(plan)["x1"].tolist() == [1, 2, 3]
+    assert make_plan(function(), [Factor("x1", values=[1.0, 2.0, 1.0])], n=8).size == 8
+
+
 def test_two_kinds_of_specimens_are_drawn_apart():
     """With one seed the errors and the order of both would be the same."""
 

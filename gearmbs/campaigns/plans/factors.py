@@ -123,7 +123,9 @@ class Factor:
         low, high = float(self.low), float(self.high)
         if self.whole:
             drawn = low * ((high + 1.0) / low) ** x if self.scale == "log" else low + x * (high - low + 1.0)
-            return {self.name: np.minimum(np.floor(drawn), high).astype(np.int64)}
+            # a base may lie outside of the range
+            found = np.where((x >= 0.0) & (x <= 1.0), np.minimum(np.floor(drawn), high), np.floor(drawn))
+            return {self.name: found.astype(np.int64)}
         if self.scale == "log":
             return {self.name: _within(low * np.exp(x * math.log(high / low)), x, low, high)}
         return {self.name: _within(low + x * (high - low), x, low, high)}
@@ -149,9 +151,17 @@ class Factor:
         number = _real(value, unit, self.path)
         if self.scale == "log" and number <= 0.0:
             raise CampaignError(f"{self.path}: the base has {number:g}, which has no place on a logarithmic range")
+        low, high = self.low, self.high
+        if self.whole:
+            if not float(number).is_integer():
+                raise CampaignError(
+                    f"{self.path}: the base has {number:g}, which is no whole number, as its range is of"
+                )
+            # the middle of its part of the coordinate
+            number, high = number + 0.5, high + 1.0
         if self.scale == "log":
-            return math.log(number / self.low) / math.log(self.high / self.low)
-        return (number - self.low) / (self.high - self.low)
+            return math.log(number / low) / math.log(high / low)
+        return (number - low) / (high - low)
 
     def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
         """Set the field in nested data."""

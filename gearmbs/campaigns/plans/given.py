@@ -156,6 +156,14 @@ def _consistent(plan: Plan) -> None:
                     f"factors: {part} is a part of {whole_of}, which is set as a whole as well; give it in each of the "
                     f"values of {whole_of}, or leave one of the two out"
                 )
+    for f in plan.factors if plan.design in ("grid", "one at a time") else ():
+        if isinstance(f, Factor):
+            found = f.columns(designs.end_to_end(plan.count(f))[:, None])[f.name].tolist()
+            if len(set(found)) < len(found):
+                raise CampaignError(
+                    f"factor {f.path!r}: its {len(found)} values are {', '.join(map(str, found))}, some of them twice; "
+                    "give it fewer levels, or values that are different"
+                )
     drawn = [f for f in plan.factors if isinstance(f, Specimens)]
     if alike := [f.name for f in drawn if [other.seed for other in drawn].count(f.seed) > 1]:
         raise CampaignError(
