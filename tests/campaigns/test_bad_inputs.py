@@ -146,6 +146,21 @@ def test_functions_of_which_nothing_is_kept_are_named():
     assert subject.reduce({}, xr.Dataset({"y": ("t", np.zeros(3))}), ["record"]).numbers == {}
     with pytest.raises(CampaignError, match=says("nested", "dict", "Dataset")):
         subject.reduce({}, {"y": np.zeros(3)}, ["record"])
+    with pytest.raises(CampaignError, match=says("nested", "c = (1+2j)", "number")):
+        subject.reduce({}, {"y": 1.0, "c": 1 + 2j}, ["numbers"])
+    for own, words in ((plural, ("y = [1.0, 2.0]", "number")), (single, ("2.0", "dictionary"))):
+        with pytest.raises(CampaignError, match=says(own.__name__, *words)):
+            subject.reduce({}, {"y": 1.0}, ["numbers", f"{__name__}:{own.__name__}"])
+
+
+def plural(record) -> dict:
+    """Return what is no number."""
+    return {"y": [1.0, 2.0]}
+
+
+def single(record) -> float:
+    """Return a number without a name."""
+    return 2.0
 
 
 def unruly(x: float) -> dict:

@@ -233,8 +233,28 @@ def kept_by_functions(keep: Sequence[str], record: Any) -> Kept:
     kept = Kept()
     for item in keep:
         if ":" in item and not item.startswith("signal:"):
-            kept.add({str(k): float(v) for k, v in imported(item, "keep")(record).items()}, item)
+            found = imported(item, "keep")(record)
+            if not isinstance(found, Mapping):
+                raise CampaignError(f"keep: {item!r} returned {found!r:.60}; return a dictionary of numbers")
+            kept.add(as_numbers(found, item), item)
     return kept
+
+
+def as_numbers(found: Mapping[Any, Any], item: str) -> dict[str, float]:
+    """Return what a function has returned as numbers by name.
+
+    Raises
+    ------
+    CampaignError
+        Naming what is none.
+    """
+    numbers = {}
+    for name, value in found.items():
+        try:
+            numbers[str(name)] = float(value)
+        except (TypeError, ValueError):
+            raise CampaignError(f"{item} returned {name} = {value!r:.60}, which is no number; return one") from None
+    return numbers
 
 
 def check_keep(subject: Subject, keep: Sequence[str]) -> None:

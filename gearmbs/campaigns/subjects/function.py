@@ -15,6 +15,7 @@ from gearmbs.campaigns.subjects.base import (
     Kept,
     SignalSpec,
     Subject,
+    as_numbers,
     imported,
     kept_by_functions,
 )
@@ -155,12 +156,10 @@ class FunctionSubject(Subject):
         if not all(str(name).strip() for name in items):
             raise CampaignError(f"{self.function} returned a result without a name; give it one")
         if "numbers" in keep:
-            own = {
-                str(k): float(v)
-                for k, v in items.items()
-                if not isinstance(v, str) and np.ndim(getattr(v, "values", v)) == 0
+            single = {
+                k: v for k, v in items.items() if not isinstance(v, str) and np.ndim(getattr(v, "values", v)) == 0
             }
-            kept.add(own, "numbers")
+            kept.add(as_numbers(single, self.function), "numbers")
         for item in keep:
             if item.startswith("signal:"):
                 name = item.removeprefix("signal:")
