@@ -93,6 +93,13 @@ def texts(value: Any, name: str) -> tuple[str, ...]:
         raise CampaignError(f"{name} = {value!r}; give a text or a list of texts") from None
 
 
+def by_name(value: Any, name: str) -> dict[str, Any]:
+    """Return a table, an empty one where none is given."""
+    if not (value is None or isinstance(value, Mapping)):
+        raise CampaignError(f"{name} = {value!r:.60}; give a table, values by their names")
+    return {str(key): item for key, item in (value or {}).items()}
+
+
 def whole(value: Any, name: str, least: int) -> int:
     """Return a whole number that is not below the least."""
     try:

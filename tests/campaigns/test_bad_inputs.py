@@ -25,6 +25,7 @@ from gearmbs.campaigns import (
     choose,
     condition_map,
     make_plan,
+    make_subject,
 )
 from gearmbs.campaigns.folder import make_folder
 from gearmbs.studies import Case
@@ -252,7 +253,7 @@ def test_results_keep_their_names(tmp_path):
     assert status.not_numbers == 1
     messages = campaign.failed().message.tolist()
     assert "result.index" in messages[0]
-    assert "TypeError" in messages[1]
+    assert "about = {'a': 1}" in messages[1]
     assert campaign.table["result.index"][0] == 0.0
     # a number and a signal of one name stand beside each other
     again = Campaign(tmp_path / "d", make_plan(subject, [Factor("x", 1.0, 2.0)], n=2, keep=["numbers", "signal:y"]))
@@ -557,10 +558,38 @@ def test_ranges_held_out(tmp_path):
     assert "split: withheld" in (tmp_path / "o" / "README.md").read_text()
 
 
-@pytest.mark.parametrize("settings", [{"draws": 2.5}, {"draws": "5"}, {"draws": 5, "errors": {"fault.backlash": 1e-4}}])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"draws": 2.5},
+        {"draws": "5"},
+        {"draws": 5, "errors": {"fault.backlash": 1e-4}},
+        {"draws": 5, "errors": ["fault.backlash"]},
+        {"draws": 5, "faults": {"kind": "wear"}},
+        {"draws": 5, "faults": ["wear"]},
+    ],
+)
 def test_bad_specimens(settings):
-    with pytest.raises(CampaignError, match=r"draws = |give its two"):
+    with pytest.raises(CampaignError, match=r"draws = |give its two|errors = |faults = "):
         Specimens(**settings)
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "words"),
+    [
+        ("function", {}, ("function", "missing", "module:name")),
+        ("function", {"function": "m:f", "versoin": 2}, ("versoin", "version")),
+        ("function", {"function": "m:f", "parameters": [1, 2]}, ("parameters = [1, 2]", "names")),
+        ("function", {"function": "m:f", "units": ["m"]}, ("units = ['m']", "names")),
+        ("drivetrain", {}, ("file", "tables")),
+        ("drivetrain", {"tables": 3}, ("tables = 3", "names")),
+        ("deck", {"file": "no.adm", "parameters": {}, "end": 1.0}, ("no.adm", "No such file")),
+        ("deck", {"text": "t", "parameters": 3, "end": 1.0}, ("parameters = 3", "names")),
+    ],
+)
+def test_subjects_described_wrongly(kind, settings, words):
+    with pytest.raises(CampaignError, match=says(*words)):
+        make_subject(kind, settings)
 
 
 def test_a_base_without_a_place_on_a_logarithmic_range():

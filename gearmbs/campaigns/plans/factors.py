@@ -348,6 +348,10 @@ class Specimens:
     name: str = "specimen"
 
     def __post_init__(self) -> None:
+        if not isinstance(self.errors, Mapping):
+            raise CampaignError(f"specimens: errors = {self.errors!r:.60}; give ranges by the paths of fields")
+        if isinstance(self.faults, str | Mapping) or not all(isinstance(fault, Mapping) for fault in self.faults):
+            raise CampaignError(f"specimens: faults = {self.faults!r:.60}; give a list of tables")
         object.__setattr__(self, "faults", tuple(self.faults))
         object.__setattr__(self, "draws", whole_number(self.draws, "specimens: draws", 1))
         object.__setattr__(self, "seed", whole_number(self.seed, "specimens: seed", 0))

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, by_name
 from gearmbs.campaigns.subjects.base import Kept, Subject, kept_by_functions
 
 PLACE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}")
@@ -65,6 +65,7 @@ class DeckSubject(Subject):
         skip_unsupported: bool = False,
         name: str = "model.adm",
     ) -> None:
+        parameters = by_name(parameters, "parameters")
         places = set(PLACE.findall(text)) | set(PLACE.findall(script or ""))
         others = set(parameters) - places
         self.variables: dict[str, int] = {}
@@ -97,9 +98,9 @@ class DeckSubject(Subject):
         **more: Any,
     ) -> DeckSubject:
         """Return the subject of a deck in a file, with a script in another; what else it takes goes on."""
-        commands = None if script is None else Path(script).read_text(encoding="utf-8", errors="replace")
+        commands = None if script is None else _text_of(Path(script))
         path = Path(path)
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = _text_of(path)
         return cls(text, parameters, end=end, steps=steps, script=commands, name=str(path.resolve()), **more)
 
     def settings(self) -> dict[str, Any]:
@@ -182,6 +183,13 @@ class DeckSubject(Subject):
                 found = {"last": x[-1], "mean": x.mean(), "rms": x.std(), "min": x.min(), "max": x.max()}
                 kept.add({f"{name}.{what}": float(value) for what, value in found.items()}, "requests")
         return kept
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise CampaignError(f"deck: {path}: cannot be read ({error.strerror or error})") from error
 
 
 def _digest(path: Path) -> str:

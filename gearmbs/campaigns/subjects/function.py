@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.settings import CampaignError, whole
+from gearmbs.campaigns.settings import CampaignError, by_name, whole
 from gearmbs.campaigns.subjects.base import (
     Kept,
     SignalSpec,
@@ -19,6 +19,7 @@ from gearmbs.campaigns.subjects.base import (
     imported,
     kept_by_functions,
 )
+from gearmbs.schema.described import check_keys
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import DIMENSIONS, to_si
 
@@ -56,9 +57,9 @@ class FunctionSubject(Subject):
         signals: dict[str, Sequence[float]] | None = None,
     ) -> None:
         self.function, self.version = _name_of(function), str(version)
-        self.units = dict(units or {})
-        self.signal_sizes = {name: _size(name, size) for name, size in (signals or {}).items()}
-        self.parameters = {str(name): _tree(name, value) for name, value in (parameters or {}).items()}
+        self.units = by_name(units, "units")
+        self.signal_sizes = {name: _size(name, size) for name, size in by_name(signals, "signals").items()}
+        self.parameters = {name: _tree(name, value) for name, value in by_name(parameters, "parameters").items()}
         for path, unit in self.units.items():
             self._found(path)
             _check_unit(path, unit)
@@ -104,8 +105,10 @@ class FunctionSubject(Subject):
     @classmethod
     def from_settings(cls, settings: dict[str, Any]) -> FunctionSubject:
         """Return the subject of a plan."""
-        rest = {k: v for k, v in settings.items() if k not in ("function", "parameters")}
-        return cls(settings["function"], settings.get("parameters"), **rest)
+        check_keys(settings, ("function", "parameters", "units", "version", "signals"), "subject", CampaignError)
+        if "function" not in settings:
+            raise CampaignError("subject: function is missing; give module:name")
+        return cls(**settings)
 
     def modules(self) -> list[str]:
         """Return the name of the function's module, too."""

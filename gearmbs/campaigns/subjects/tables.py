@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, by_name
 from gearmbs.campaigns.subjects.base import (
     FAILED,
     Kept,
@@ -38,7 +38,7 @@ class TablesSubject(Subject):
     """
 
     def __init__(self, tables: Mapping[str, Any]) -> None:
-        self.tables = copy.deepcopy(dict(tables))
+        self.tables = copy.deepcopy(by_name(tables, "tables"))
 
     @classmethod
     def from_file(cls, path: str | Path) -> TablesSubject:
@@ -52,6 +52,9 @@ class TablesSubject(Subject):
     @classmethod
     def from_settings(cls, settings: dict[str, Any]) -> TablesSubject:
         """Return the subject of a plan, which holds the tables or names their file."""
+        check_keys(settings, ("file", "tables"), "subject", CampaignError)
+        if not settings:
+            raise CampaignError("subject: give the file that holds its tables, or these")
         return cls.from_file(settings["file"]) if "file" in settings else cls(settings["tables"])
 
     def base(self) -> dict[str, Any]:
