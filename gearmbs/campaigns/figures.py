@@ -86,6 +86,8 @@ def figure(
         chosen([name for name in table.columns if name not in known], name, "", CampaignError, "factor")
     if not wanted:
         raise CampaignError("figure: none of the results varies")
+    if not chosen_factors:
+        raise CampaignError(f"figure: none of the factors varies over {len(table)} cases; name them, or run more")
     from gearmbs.view.figures.style import look
 
     with look():

@@ -349,6 +349,8 @@ def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
 
     table = campaign.table
     names = result_names(campaign.folder, table)
+    if not names:
+        raise CampaignError(f"result {result!r}: none of {len(table)} cases has any; see failed()")
     if result not in table.columns:
         chosen(names, result, "", CampaignError, "result")
     if table[result].dtype.kind not in "biuf":

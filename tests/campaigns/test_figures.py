@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import Campaign, CampaignError, DrivetrainSubject, Factor, PairSubject, choose, make_plan
+from gearmbs.campaigns import (
+    Campaign,
+    CampaignError,
+    DrivetrainSubject,
+    Factor,
+    FunctionSubject,
+    PairSubject,
+    choose,
+    make_plan,
+)
 from gearmbs.campaigns.figures import KINDS, varied_results
 from gearmbs.campaigns.plans.conditions import satisfied
 from gearmbs.campaigns.sensitivity import coordinates
@@ -200,6 +209,26 @@ def test_main_effects_are_means_over_the_values(campaign):
 def test_a_tornado_has_the_strongest_factor_on_top(campaign):
     (ax,) = campaign.figure("tornado", "steady").axes
     assert [text.get_text() for text in ax.get_yticklabels()][-1] == "x1"
+
+
+def never(x1: float, x2: float, x3: float) -> dict:
+    """Be impossible."""
+    raise ValueError("x1: no such thing")
+
+
+def test_what_there_is_nothing_of_is_told(tmp_path):
+    """A single case, of which one factor may be named; and cases that all failed."""
+    one = Campaign(tmp_path / "one", make_plan(function("several"), ranges(), n=1))
+    one.run(workers=0)
+    for kind in KINDS:
+        with pytest.raises(CampaignError, match=says("figure", "factors", "varies", "1")):
+            one.figure(kind, "y")
+    assert one.figure("tornado", "y", "x1").axes
+    subject = FunctionSubject(never, dict.fromkeys(("x1", "x2", "x3"), 0.0))
+    none = Campaign(tmp_path / "none", make_plan(subject, ranges(), n=2))
+    none.run(workers=0)
+    with pytest.raises(CampaignError, match=says("result 'y'", "2", "failed()")):
+        none.sensitivity("y")
 
 
 def test_unknown_figures_are_refused(campaign):
