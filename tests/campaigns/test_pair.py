@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, load_plan, make_plan
+from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, content_key, load_plan, make_plan
 from gearmbs.campaigns.figures import varied_results
 from gearmbs.campaigns.subjects.pair import record_numbers
 from gearmbs.studies import Case, run_case
@@ -150,6 +150,32 @@ def test_a_deck_in_a_plans_file(tmp_path):
     (tmp_path / "p.toml").write_text(text.replace("[[factor]]", "[[factors]]"))
     with pytest.raises(CampaignError, match=r"write \[\[factor\]\] above each"):
         load_plan(tmp_path / "p.toml")
+
+
+def test_files_that_a_deck_names_count(tmp_path):
+    """Another matrix, or other commands in a file of them, are another case; files that are as they were are none."""
+    matrix = "MATRIX/1, FILE=m.mat, NAME=A\nUNITS"
+    subject = DeckSubject(
+        DECK.replace("UNITS", matrix),
+        {"mass": 1.0},
+        script="a\nb\nFILE/COMMAND=more\n",
+        name=str(tmp_path / "m.adm"),
+        skip_unsupported=True,
+    )
+
+    def key():
+        return content_key("deck", subject.canonical(subject.check({"mass": 2.0}, "c")))
+
+    (tmp_path / "m.mat").write_text("one")
+    (tmp_path / "more.acf").write_text("a\nsimulate/dynamics, end=1, steps=10\n")
+    first = key()
+    (tmp_path / "m.mat").write_text("another")
+    second = key()
+    (tmp_path / "more.acf").write_text("a\nsimulate/dynamics, end=2, steps=10\n")
+    assert len({first, second, key()}) == 3
+    (tmp_path / "m.mat").write_text("one")
+    (tmp_path / "more.acf").write_text("a\nsimulate/dynamics, end=1, steps=10\n")
+    assert key() == first
 
 
 @pytest.mark.slow

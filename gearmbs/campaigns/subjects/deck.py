@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -148,7 +150,7 @@ class DeckSubject(Subject):
         return {"deck": deck, "text": text, "script": script, "values": values}
 
     def canonical(self, thing: dict[str, Any]) -> Any:
-        """Return the digest of the template, the values and the span."""
+        """Return the digest of the template, the values, the span, and digests of the files that it names."""
         digest = hashlib.sha256(self.text.encode()).hexdigest()
         found = {"deck": digest, "values": thing["values"], "end": self.end, "steps": self.steps}
         if self.script is not None:
@@ -157,6 +159,10 @@ class DeckSubject(Subject):
             found["routines"] = self.routines_digest
         if self.skip_unsupported:
             found["skip_unsupported"] = True
+        if files := _named_files(thing["deck"]):
+            found["files"] = files
+        if thing["script"] is not None and (commands := _included(thing["script"], self.name)):
+            found["commands"] = commands
         return found
 
     def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
@@ -197,6 +203,38 @@ def _digest(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise CampaignError(f"deck: routines {path}: cannot be read ({error.strerror or error})") from error
+
+
+@lru_cache(maxsize=256)
+def _digest_as_written(path: Path, _written: tuple[int, int, int]) -> str:
+    return _digest(path)
+
+
+def _named_files(deck: Any) -> list[str]:
+    """Return digests of the files that a deck reads, as modal neutral files and meshes, in the order of the deck."""
+    from gearmbs.adams.parse.files import named_file
+
+    found = []
+    for statement in deck:
+        name = getattr(statement, "mnf_file", None) or getattr(statement, "data_file", None)
+        # what may not be read, or is not there, is refused where it is needed
+        with suppress(ValueError, OSError):
+            if name:
+                path = named_file("FILE", name, deck.file)
+                about = path.stat()
+                found.append(_digest_as_written(path, (about.st_mtime_ns, about.st_size, about.st_ino)))
+    return found
+
+
+def _included(script: str, name: str) -> str:
+    """Return a digest of what a script does with the commands of other files, "" if it takes none."""
+    from gearmbs.adams import parse_script
+    from gearmbs.adams.parse.commands import FileCommand
+
+    commands = parse_script(script, str(Path(name).with_suffix(".acf"))).commands
+    if not any(isinstance(command, FileCommand) and command.command for command in commands):
+        return ""
+    return hashlib.sha256(repr(commands).encode()).hexdigest()
 
 
 def _constant_variables(text: str, names: set[str]) -> dict[str, int]:
