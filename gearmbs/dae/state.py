@@ -373,9 +373,9 @@ class State:
             y, yp = arrays["y"], arrays["yp"]
             told = t, y.tobytes(), yp.tobytes()
             return cls(t, y, yp, names, t_model, sizes, integers, reals, history, held, told)
-        except ModelError:
+        except (ModelError, OSError):
             raise
-        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        except Exception as error:  # whatever zip and numpy meet in an archive that is damaged
             why = f"it has no {error}" if isinstance(error, KeyError) else str(error)
             raise ModelError(f"{path}: not a whole file of a state, as State.save writes it ({why})") from None
 

@@ -173,6 +173,7 @@ PLANT = two_discs().linearize(["load", ("torque", "pin a")], [("joint_angle", "p
         (lambda m: gm.Simulator(m, 1.0).set("LOAD", 1.0), ("'LOAD'", "did you mean load?")),
         (lambda m: gm.Simulator(m, 1.0).control("load", lambda t: 0.0, 0.1), ("'load'", "(t)", "simulator")),
         (lambda m: m.simulate(1.0, inputs={"load": (lambda t: None, 0.1)}), ("controller", "'load'", "None")),
+        (lambda m: m.simulate(1.0, inputs={"load": (lambda t, s: 1.0, 0.1)}), ("'load'", "(t, s)", "(t)")),
         (lambda m: copy.copy(gm.Simulator(m, 1.0)), ("simulator", "initial=sim.state()")),
         (lambda m: copy.deepcopy(gm.Simulator(m, 1.0)), ("simulator", "initial=sim.state()")),
         (lambda m: pickle.dumps(gm.Simulator(m, 1.0)), ("simulator", "initial=")),

@@ -28,17 +28,17 @@ def warn_of_unmet(names: Iterable[str]) -> None:
     )
 
 
-def check_takes(name: str, function: Callable[..., Any]) -> None:
-    """Raise a ModelError if a function that is to control an input does not take a time and a simulator."""
+def check_takes(label: str, function: Callable[..., Any], *wanted: str) -> None:
+    """Raise a ModelError if a function that is to give an input its values does not take what it is called with."""
     try:
         takes = signature(function)
     except ValueError:
         # some functions in C do not tell
         return
     try:
-        takes.bind(0.0, None)
+        takes.bind(*wanted)
     except TypeError:
-        raise ModelError(f"control: the controller of {name!r} takes {takes}; let it take (t, simulator)") from None
+        raise ModelError(f"{label} takes {takes}; let it take ({', '.join(wanted)})") from None
 
 
 @dataclass
@@ -146,7 +146,7 @@ class Sampled:
         name = getattr(name, "name", name)
         if not callable(function):
             raise ModelError(f"control: {function!r} for {name!r} cannot be called; give a function of t and simulator")
-        check_takes(name, function)
+        check_takes(f"control: the controller of {name!r}", function, "t", "simulator")
         other = next((one.name for one in self._controls if self.number(one.name) is number), None)
         if other is not None:
             told = f", under its name {other!r}" if other != name else ""

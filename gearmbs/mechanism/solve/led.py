@@ -11,7 +11,7 @@ import numpy as np
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.parts.quantities import quantities
-from gearmbs.mechanism.solve.controllers import RESOLVED
+from gearmbs.mechanism.solve.controllers import RESOLVED, check_takes
 from gearmbs.mechanism.solve.simulator import REFUSED, Simulator
 from gearmbs.progress import time_bar
 
@@ -106,6 +106,7 @@ def _begin(sim: Simulator, name: str, given: Any) -> Table | None:
     """Set an input that is constant or has a function; return the table of another one."""
     if isinstance(given, Sequence) and not isinstance(given, str):
         if len(given) == 2 and callable(given[0]):
+            check_takes(f"inputs: the function of {name!r}", given[0], "t")
             sim.control(name, _of_time(given[0]), given[1])
             return None
         if len(given) in (2, 3):
