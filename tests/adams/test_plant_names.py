@@ -7,6 +7,7 @@ import pytest
 
 import gearmbs as gm
 from gearmbs.adams import build_mechanism, parse_deck
+from gearmbs.flexible import Shaft, ShaftSection
 from gearmbs.mechanism import Mechanism, make_input
 from gearmbs.mechanism.language.syntax import Units
 from tests.drivetrain.support import stage
@@ -131,3 +132,16 @@ def test_a_drivetrain_has_its_loads_and_sensors_in_the_deck():
     assert re.search(rf"SFORCE[^!]*VARVAL\({number}\)", text)
     assert re.search(rf"PINPUT/\d+\n, VARIABLES = (\d+, )*{number}\b", text)
     assert "braking" in build_mechanism(parse_deck(text)).inputs
+
+
+def test_the_frame_of_a_body_that_deforms_is_left_out_of_a_deck(tmp_path):
+    """A deck has markers at nodes; what is measured at one is there, and so is the rest of the deck."""
+    m = gm.Mechanism("bar")
+    bar = Shaft([ShaftSection(0.4, 0.01)], seats={"A": 0.0, "B": 0.4}).modal_model().slowest(2).add_to(m)
+    seat = (bar.markers or [bar.marker((0.0, 0.0, 0.0), name="end")])[0].name
+    m.output("frame", ("angular_velocity", bar.name, "z"))
+    m.output("seat", ("marker_velocity", seat, "y"))
+    text = gm.save(m, tmp_path / "bar.adm").read_text()
+    assert f"output 'frame' is left out: output ('angular_velocity', '{bar.name}', 'z'): '{bar.name}' deforms" in text
+    assert "output 'seat'" not in text
+    assert "POUTPUT" in text

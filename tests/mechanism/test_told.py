@@ -83,3 +83,13 @@ def test_a_plant_tells_of_a_body_that_deforms_what_a_simulator_tells():
     first = (plant.C @ plant.B)[:, 0]
     assert (told[1.0] - told[-1.0]) / 4e-6 == pytest.approx(first[0], rel=1e-4)
     assert first[0] * first[2] < 0.0
+
+
+@pytest.mark.filterwarnings("ignore:crank")
+def test_a_plant_takes_the_outputs_by_name():
+    m, end, options = crank("SI2")
+    sim = gm.Simulator(m, end, **{**options, "tol": 1e-8})
+    sim.advance(0.1)
+    plant = m.linearize(["push"], list(m.outputs), at=sim.state())
+    assert plant.outputs == ["force", "way"]
+    assert plant.point.outputs == pytest.approx([sim.get("output", name) for name in m.outputs], rel=1e-6)

@@ -8,14 +8,21 @@ from typing import Any
 from gearmbs.adams.write.text import Plant, WriterContext, upper
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.solve.plant_names import PlantNames, Told
 
 
 class _Texts(PlantNames):
-    """Reads outputs as expressions of the language, accelerations included."""
+    """Reads outputs as expressions of the language, accelerations included, of what has markers in a deck."""
 
     def _expression(self, text: str) -> Told:
         return Told(text, "", text)
+
+    def _centre(self, body: Body) -> Marker:
+        if isinstance(body, ModalBody):
+            raise ModelError(f"'{body.name}' deforms, and a deck has no marker that is its frame; measure at a marker")
+        return super()._centre(body)
 
 
 def plant_in(mechanism: Mechanism) -> Plant:

@@ -262,8 +262,8 @@ class PlantNames:
             "marker_position": self._vector("marker_position", "D", "m"),
             "marker_velocity": self._vector("marker_velocity", "V", "m/s"),
             "marker_acceleration": self._vector("marker_acceleration", "ACC", "m/s^2"),
-            "reaction": self._reaction, "load": self._load, "state": self._state,
-            "transmission_error": self._error,
+            "reaction": self._reaction, "reaction_force": self._reaction_force, "load": self._load,
+            "state": self._state, "transmission_error": self._error,
         }  # fmt: skip
         return self._read("output", item, known)
 
@@ -375,6 +375,10 @@ class PlantNames:
             told.append(Told(f"reaction {one.name} {WRENCH[k]}", "N" if k < 3 else "N m", text))
         return told
 
+    def _reaction_force(self, joint: Any, component: str | None = None) -> list[Told]:
+        parts = self._reaction(joint)[: len(AXES)]
+        return parts if component is None else [parts[_one_of("component", component, AXES)]]
+
     def _load(self, element: Any, component: str | None = None) -> list[Told]:
         m = self.mechanism
         name = element if isinstance(element, str) else getattr(element, "name", element)
@@ -446,11 +450,7 @@ class PlantNames:
             return where
         body = where if isinstance(where, Body) else m.bodies.get(where) if of_body else None
         if body is not None:
-            name = f"{body.name} plant centre"
-            if isinstance(body, ModalBody):
-                # the material there deforms, and what a solution tells of the body is its frame
-                return own_marker(body, name, partial(centre_marker, body))
-            return own_marker(body, name, body.marker, body.com)
+            return self._centre(body)
         found = self._named(where, None)
         if found is None:
             there = [
@@ -460,6 +460,13 @@ class PlantNames:
             what = "body or marker" if of_body else "marker"
             raise ModelError(f"there is no {what} {where!r}; {_there(where, there)}")
         return found
+
+    def _centre(self, body: Body) -> Marker:
+        name = f"{body.name} plant centre"
+        if isinstance(body, ModalBody):
+            # the material there deforms, and what a solution tells of the body is its frame
+            return own_marker(body, name, partial(centre_marker, body))
+        return own_marker(body, name, body.marker, body.com)
 
     def _named(self, name: str | None, number: int | None) -> Marker | None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):

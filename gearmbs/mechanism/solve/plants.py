@@ -75,7 +75,7 @@ def linearize(
           ``("marker_position", marker, component)``, ``("marker_velocity", ...)``, ``("marker_acceleration", ...)``;
           component "x", "y" or "z" of the global frame, all three when left out
         * ``("reaction", joint, component)``, ``("load", element, component)``: on I's body at marker I, component "fx",
-          "fy", "fz", "tx", "ty" or "tz"
+          "fy", "fz", "tx", "ty" or "tz"; ``("reaction_force", joint, component)`` with "x", "y" or "z"
         * ``("state", name)``, ``("transmission_error", mesh)``
     at : {"initial", "equilibrium"}, StaticResult, State or Solution
         Operating point: the initial position and velocity, the equilibrium reached from there, one found before, a
