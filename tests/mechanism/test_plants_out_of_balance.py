@@ -212,3 +212,22 @@ def test_a_ball_joint_has_the_rotations_of_its_body_anywhere():
         m.spherical("ball", rod, m.ground, at=(0, 0, 0))
         plant = m.linearize([("torque", "rod", "x")], [("com_position", "rod", "x")])
         assert plant.states[:3] == [f"rod: rotation about {c}" for c in "xyz"]
+
+
+def test_what_has_come_to_rest_has_the_coordinates_of_its_equilibrium():
+    """A double pendulum that still swings by 1e-7 rad/s, as simulations leave it."""
+    m = gm.Mechanism("double", gravity=(0, 0, -GRAVITY))
+    creeping = (0, 1e-7, 0)
+    upper = m.body("upper", 1.0, (INERTIA,) * 3, position=(0, 0, -0.3), angular_velocity=creeping,
+                   velocity=np.cross(creeping, (0, 0, -0.3)))  # fmt: skip
+    lower = m.body("lower", 0.5, (INERTIA,) * 3, position=(0, 0, -0.8), angular_velocity=creeping,
+                   velocity=np.cross(creeping, (0, 0, -0.8)))  # fmt: skip
+    m.revolute("shoulder", upper, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    m.revolute("elbow", lower, upper, at=(0, 0, -0.6), axis=(0, 1, 0))
+    asked = [("torque", "elbow")], [("joint_angle", "elbow")]
+    rest = m.linearize(*asked, at="equilibrium")
+    assert rest.states[:2] == ["upper: rotation about y", "elbow: angle"]
+    for at in ("initial", m.simulate(0.2, rate=10)):
+        plant = m.linearize(*asked, at=at)
+        assert plant.states == rest.states
+        np.testing.assert_allclose(plant.A, rest.A, rtol=0, atol=1e-5)

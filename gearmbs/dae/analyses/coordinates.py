@@ -21,7 +21,7 @@ from scipy.linalg import qr
 
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.steady import LOOK, Basis, Linearised, along, largest, path_rates
-from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.model.system import accelerations
 from gearmbs.dae.problem import ModelError
@@ -35,6 +35,8 @@ is better told by these."""
 EVEN = 0.1
 """The same of one that is taken because it comes first, so that coordinates stay what they are along a path: beside a
 dead centre its rates would be ten times those of others, and their squares are in A."""
+STILL = 1e-6
+"""Speed, rad/s, up to which a body counts as one at rest, whose joints are the same in axes that turn with it."""
 SAME = 1e-9
 """Difference of two coordinates, of their size, that is rounding: that of second rates is 1e-13 of it."""
 AS_BEFORE = 1e-4
@@ -183,7 +185,8 @@ def chosen(instant: Instant, motion: Basis, small: bool, joints: Sequence[JointC
     sizes = arm / instant.system.model.modal_sizes[:, 0]
     weight = np.concatenate([np.ones(3 * bodies), np.full(3 * bodies, arm), sizes])
     own, varies = _of_bodies(instant, motion, small), _varying(instant, motion)
-    free = np.full(bodies, True) if not small else varies
+    still = np.linalg.norm(instant.pose()[:, POSE_W:], axis=1) <= STILL
+    free = np.full(bodies, True) if not small else varies | still
     if motion.along is not None:
         anchors = np.zeros((len(motion.now), 1))
         anchors[motion.along.anchors] = 1.0

@@ -342,7 +342,8 @@ def _plant(
     pairs = [columns.of(one) for one in given]
     size = instant.y.size
     stacked = [np.array([pair[k] for pair in pairs]).reshape(-1, size).T for k in (0, 1)]
-    reduced = reduce(instant, Inputs(*stacked), joint_coordinates(mechanism), balance=True)
+    joints = joint_coordinates(mechanism)
+    reduced = reduce(instant, Inputs(*stacked), joints, balance=True)
     warn_of_varying(reduced)
     _warn_of_running_teeth(mechanism, instant)
     kinds = instant.system.model.differential_states
@@ -367,7 +368,7 @@ def _plant(
     change = np.eye(len(a))
     coordinates = reduced.coordinates
     if coordinates is None:
-        coordinates = chosen(instant, reduced.motion, reduced.turning, ())
+        coordinates = chosen(instant, reduced.motion, reduced.turning, joints)
         change[:n, :n] = change[n : 2 * n, n : 2 * n] = coordinates.rows[0]
     titles, units = coordinates.titles, coordinates.units
     back = np.linalg.inv(change)
