@@ -34,6 +34,7 @@ from gearmbs.signals.conversion import convert
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.order_tracking import order_track
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, refined_speed, remark_plausibility
+from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.signal import rate_of, unit_dimension, units_of
 from gearmbs.signals.spectra import envelope, spectrum
 
@@ -311,6 +312,7 @@ def _speed(signal: xr.DataArray, found: Shaft | float | None, notes: list[str]) 
         return None, "not known"
     if isinstance(found, Shaft):
         return found.speed, found.origin
+    notes += remark_sweep(signal, found)
     told = refined_speed(signal, found)
     if told is None:
         notes.append("No line of the shaft stands out near the given speed; orders are taken at exactly that speed.")

@@ -314,6 +314,8 @@ class BearingReport(Shown):
         the record, bearing, part and grade.
     speed_remark : str, optional
         What is wrong with the told speed.
+    swept : list of str
+        What is said where one speed is told and the lines of the record move.
     """
 
     source: str
@@ -329,6 +331,7 @@ class BearingReport(Shown):
     notes: list[str] = field(default_factory=list)
     stability: pd.DataFrame = field(default_factory=pd.DataFrame)
     speed_remark: str | None = None
+    swept: list[str] = field(default_factory=list)
 
     @property
     def accused(self) -> list[PartFinding]:
@@ -351,7 +354,7 @@ class BearingReport(Shown):
         """What the record says of the bearings, in words with grounds."""
         if not self.accused:
             names = " and ".join(lines.name for lines in self.bearings)
-            if any(finding.grade in NOT_CERTAIN for finding in self.findings):
+            if self.swept or any(finding.grade in NOT_CERTAIN for finding in self.findings):
                 return " ".join([f"No part of bearing {names} is named for certain.{self._limits()}", *self.remarks])
             return (
                 f"No lines of a defect of bearing {names} stand out. A defect of a rolling element often shows none, "
@@ -375,7 +378,7 @@ class BearingReport(Shown):
     def remarks(self) -> list[str]:
         """What stands in the record but accuses nothing, in words."""
         found = [remark for finding in self.findings if (remark := finding.remark()) is not None]
-        return found if self.speed_remark is None else [self.speed_remark, *found]
+        return [*self.swept, *([] if self.speed_remark is None else [self.speed_remark]), *found]
 
     def _limits(self) -> str:
         """Return what limits an acquittal: few turns, and speeds at which nothing stands out if none is told."""

@@ -41,6 +41,7 @@ from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.separation import level_lines, prewhiten
 from gearmbs.signals.rotation.shaft import shaft_phase
+from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, unit_dimension, units_of
 from gearmbs.signals.spectra import kurtogram
@@ -275,6 +276,7 @@ def diagnose_bearing(
         notes=notes,
         stability=_stability(weighed.answers),
         speed_remark=weighed.remark,
+        swept=[] if timed else remark_sweep(signal, math.tau * told),
     )
 
 

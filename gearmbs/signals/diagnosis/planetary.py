@@ -35,6 +35,7 @@ from gearmbs.signals.diagnosis.planetary_averages import PLANET, RING, SUN, Plan
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
+from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.given import given_speed
 from gearmbs.signals.signal.signal import rate_of
@@ -267,6 +268,7 @@ def diagnose_planetary(
     lines = planetary_lines(planetary, planets)
     if sensor_angle is None and phase is None and speed is None and "angle" in signal.coords:
         sensor_angle = 0.0
+    timed = phase is not None or (speed is None and "angle" in signal.coords)
     phase = _phase(signal, lines, speed, member) if phase is None else phase
     span = float(phase.values[-1] - phase.values[0]) / math.tau
     carrier = abs(span) / float(phase["time"].values[-1] - phase["time"].values[0])
@@ -275,6 +277,7 @@ def diagnose_planetary(
             f"signal: holds {abs(span):.3g} turns of the carrier, lines of a planetary set need {LEAST_TURNS}; "
             f"give a record of {LEAST_TURNS / carrier:.3g} s or more at this speed"
         )
+    swept = [] if timed else remark_sweep(signal, math.tau * carrier)
     rate = rate_of(signal)
     if 2.5 * lines.mesh * carrier > rate:
         raise SignalError(
@@ -303,7 +306,7 @@ def diagnose_planetary(
         turns=turns,
         lines=lines,
         findings=findings,
-        notes=[*(str(note) for note in signal.attrs.get("notes", ())), *_hidden(lines)],
+        notes=[*(str(note) for note in signal.attrs.get("notes", ())), *swept, *_hidden(lines)],
     )
 
 

@@ -25,6 +25,7 @@ from gearmbs.signals.rotation.speed import (
     own_lines_missing,
     prominence,
 )
+from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.given import is_curve, speed_curve, unit_factor
 from gearmbs.signals.signal.signal import rate_of
 from gearmbs.signals.spectra import periodograms
@@ -296,6 +297,8 @@ def mesh_shaft(
         phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
         shaft = Shaft(phase, estimate.speed, "estimated from the mesh line", estimate)
     remark_plausibility(signal, shaft.speed, found is None, notes)
+    if (found is None or isinstance(found, float)) and (shaft.estimate is None or shaft.estimate.phase is None):
+        notes += remark_sweep(signal, shaft.speed)
     return shaft, signal
 
 

@@ -1,0 +1,55 @@
+"""Run-ups for which one speed is told are told to be run-ups; steady records are not."""
+
+import numpy as np
+import pytest
+
+from gearmbs.signals import analyse, diagnose_bearing, make_signal
+from gearmbs.signals.rotation.sweep import moving_lines
+
+RATE, SECONDS = 12800.0, 5.0
+PART = np.arange(int(RATE * SECONDS)) / (RATE * SECONDS)
+
+
+def record(rpm, teeth=29, seed=0):
+    """A mesh with a sideband and the first orders of a shaft, in noise; the speed over the part of the record."""
+    turned = 2 * np.pi * np.cumsum(np.broadcast_to(rpm, PART.shape)) / 60.0 / RATE
+    mesh = (1 + 0.3 * np.cos(turned)) * np.cos(teeth * turned) + 0.5 * np.cos(2 * teeth * turned)
+    noise = 0.3 * np.random.default_rng(seed).standard_normal(PART.size)
+    return make_signal(mesh + 0.3 * np.cos(turned) + 0.2 * np.cos(2 * turned) + noise, RATE, units="m/s^2")
+
+
+@pytest.mark.parametrize(("rpm", "way"), [
+    (900 + 1500 * PART, "up"), (2400 * np.exp(-PART), "down"), (1500 + 60 * PART, "up"),
+    (900 + 1500 * np.clip(5 * PART - 4, 0, 1), "up"),
+])  # fmt: skip
+def test_lines_that_move_are_seen(rpm, way):
+    assert moving_lines(record(rpm)) == way
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("rpm", [1650.0, 1650 * (1 + 0.005 * np.cos(11 * PART))])
+def test_steady_lines_do_not_move(rpm, seed):
+    """Nor lines that grow, nor knocks that ring down, nor noise."""
+    steady = record(rpm, seed=seed)
+    grown = make_signal(steady.values[:, 0] * (0.2 + 2 * PART), RATE)
+    at = RATE * SECONDS * PART % 17000
+    knocks = np.exp(-at / 900) * np.sin(0.3 * at) + 0.05 * np.random.default_rng(seed).standard_normal(at.size)
+    assert [moving_lines(one) for one in (steady, grown, make_signal(knocks, RATE))] == [None] * 3
+    assert moving_lines(make_signal(knocks[:4000], RATE)) is None
+
+
+@pytest.mark.parametrize("teeth", [None, 29])
+def test_a_run_up_with_one_speed_is_told(teeth):
+    said = analyse(record(1500 + 300 * PART), teeth, speed="1650 rpm").notes
+    assert any(note.startswith("CHECK THE SPEED: lines of the record move up") for note in said)
+    steady = analyse(record(1650.0), teeth, speed="1650 rpm").notes
+    followed = analyse(record(1500 + 300 * PART), teeth, speed=[(0, "1500 rpm"), (SECONDS, "1800 rpm")]).notes
+    assert not any("move" in note for note in (*steady, *followed))
+
+
+def test_a_run_up_with_one_speed_acquits_no_bearing():
+    doubted = diagnose_bearing(record(900 + 1500 * PART), "6205", "1650 rpm")
+    assert doubted.verdict.startswith("No part of bearing 6205 is named for certain")
+    assert "CHECK THE SPEED" in doubted.verdict
+    steady = diagnose_bearing(record(1650.0), "6205", "1650 rpm")
+    assert "CHECK THE SPEED" not in steady.verdict
