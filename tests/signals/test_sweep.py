@@ -53,3 +53,17 @@ def test_a_run_up_with_one_speed_acquits_no_bearing():
     assert "CHECK THE SPEED" in doubted.verdict
     steady = diagnose_bearing(record(1650.0), "6205", "1650 rpm")
     assert "CHECK THE SPEED" not in steady.verdict
+
+
+@pytest.mark.parametrize("teeth", [None, 29])
+@pytest.mark.parametrize(("told", "true"), [(44100.0, "48000 Hz"), (51200.0, "48000 Hz"), (48000.0, None)])
+def test_mixed_up_rates_are_told_by_a_told_speed(told, true, teeth):
+    steady = record(1650.0)
+    shaft = sum(0.2 * np.cos(2 * np.pi * 27.5 * k * RATE * SECONDS * PART / RATE + k) for k in (1, 3, 4, 5))
+    wrong = make_signal(steady.values[:, 0] + shaft, RATE * told / 48000.0, units="m/s^2")
+    said = " ".join(analyse(wrong, teeth, speed="1650 rpm").notes)
+    if true is None:
+        assert "CHECK" not in said
+    else:
+        assert "CHECK THE SPEED" in said
+        assert f"{RATE:g} Hz, told as {wrong.attrs['sampling_rate']:g} Hz" in said

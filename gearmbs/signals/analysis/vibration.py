@@ -33,6 +33,7 @@ from gearmbs.signals.analysis.report import (
 from gearmbs.signals.conversion import convert
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.order_tracking import order_track
+from gearmbs.signals.rotation.rate import MIXED, other_rate
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, refined_speed, remark_plausibility
 from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.signal import rate_of, unit_dimension, units_of
@@ -220,6 +221,8 @@ LEAST_FALL = 16.0
 here 0.4 of the record."""
 LEAST_BAND = 16
 """Envelopes are taken in bands of at least this part of half the sampling rate: a narrow one holds only slow lines."""
+FAMILY = 3
+"""Lines at orders of one shaft, at least, that tell another speed than the given one: of two one is chance."""
 SPEED_DIFFERS = 1e-3
 """Share from which a report says in words that lines of the shaft are beside the given speed."""
 NO_SPEED = "the speed is not known; give speed='1500 rpm' (--speed), a curve or a tacho"
@@ -316,6 +319,14 @@ def _speed(signal: xr.DataArray, found: Shaft | float | None, notes: list[str]) 
     told = refined_speed(signal, found)
     if told is None:
         notes.append("No line of the shaft stands out near the given speed; orders are taken at exactly that speed.")
+        for ratio in MIXED:
+            other = refined_speed(signal, ratio * found)
+            if other is not None and len(other[1]) >= FAMILY and (words := other_rate(signal, other[0] / found)):
+                notes.append(
+                    f"CHECK THE SPEED: lines at orders {', '.join(map(str, other[1]))} of "
+                    f"{other[0] * 30 / math.pi:.1f} rpm stand out, {other[0] / found:.3f} times the given speed.{words}"
+                )
+                break
         return found, "as given"
     refined, orders = told
     lines = f"the line at order {orders[0]}" if len(orders) == 1 else f"lines at orders {', '.join(map(str, orders))}"

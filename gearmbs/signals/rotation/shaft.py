@@ -12,6 +12,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.phase import phase_from_line, phase_from_speed, phase_from_tacho
+from gearmbs.signals.rotation.rate import other_rate
 from gearmbs.signals.rotation.speed import (
     MIN_QUALITY,
     MIN_SCORE_DB,
@@ -436,7 +437,7 @@ def _remark_other(
     notes.append(
         f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
         f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
-        f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
+        f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed).{other_rate(signal, ratio)}"
     )
     return True
 

@@ -1,0 +1,28 @@
+"""What the lines of a record say against its sampling rate: if it is told wrongly, all are off by one factor."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from gearmbs.signals.signal.signal import rate_of
+
+MIXED = (44.1 / 48.0, 48.0 / 44.1, 48.0 / 51.2, 51.2 / 48.0, 50.0 / 51.2, 51.2 / 50.0, 0.5, 2.0, 0.25, 4.0, 0.1, 10.0)
+"""Told rates by true ones: of sound cards, of vibration and of plain numbers, of channels that were decimated."""
+ALIKE = 0.01
+"""Share by which a ratio may be off, as told speeds are; two of these are 2 % apart at least."""
+
+
+def other_rate(signal: xr.DataArray, ratio: float) -> str:
+    """Return which sampling rate would explain that lines stand at some times their frequency; empty if none does.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+    ratio : float
+        Frequencies in the record by those expected.
+    """
+    near = min(MIXED, key=lambda mixed: abs(ratio / mixed - 1.0))
+    if abs(ratio / near - 1.0) > ALIKE:
+        return ""
+    rate = rate_of(signal)
+    return f" A sampling rate of {rate / near:.6g} Hz, told as {rate:g} Hz, would make it so, too: look it up (--rate)."
