@@ -154,3 +154,141 @@ def test_channels_in_tables_and_groups_of_hdf5(tmp_path, layout):
     assert signal.attrs["sampling_rate"] == pytest.approx(RATE)
     np.testing.assert_allclose(signal.values[:, 1], 2.0 * SHAKES, atol=1e-6)
     assert units_of(signal) == ["m/s^2" if layout == "groups" else "unknown"] * 2
+
+
+def stored(path, attrs=(), **datasets):
+    """Write datasets, each as values or with attributes, into an HDF5 file."""
+    with h5py.File(path, "w") as file:
+        for name, given in datasets.items():
+            values, own = given if isinstance(given, tuple) else (given, {})
+            file.create_dataset(name, data=values).attrs.update({"sampling_rate": RATE, **dict(attrs)} | own)
+    return path
+
+
+def test_counts_in_hdf5_are_scaled_as_netcdf_says_or_told(tmp_path):
+    counts = np.round(1000.0 * SHAKES).astype(np.int16)
+    scaled = read_signal(stored(tmp_path / "a.h5", acc=(counts, {"scale_factor": 1e-3, "add_offset": 2.0})))
+    np.testing.assert_allclose(scaled.values[:, 0], SHAKES + 2.0, atol=5e-4)
+    told = read_signal(stored(tmp_path / "b.h5", acc=(counts, {"gain": 1e-3})))
+    assert any("CHECK THE SCALE" in note and "gain" in note for note in told.attrs["notes"])
+    plain = read_signal(stored(tmp_path / "c.h5", acc=(SHAKES, {"gain": 1e-3})))
+    assert "notes" not in plain.attrs
+
+
+def test_columns_of_a_matrix_in_hdf5_have_the_names_and_units_that_it_lists(tmp_path):
+    both = np.stack([SHAKES, 2.0 * SHAKES])
+    path = stored(tmp_path / "a.h5", data=(both, {"channels": ["case", "ring"], "units": ["g", "mm/s"]}))
+    signal = read_signal(path)
+    assert (signal["channel"].values.tolist(), units_of(signal)) == (["case", "ring"], ["g", "mm/s"])
+    np.testing.assert_array_equal(signal.values, both.T)
+
+
+def test_times_in_hdf5_have_units_and_contradict_other_rates(tmp_path):
+    with h5py.File(tmp_path / "ms.h5", "w") as file:
+        file.create_dataset("time", data=1e3 * TIME).attrs["units"] = "ms"
+        file["acc"] = SHAKES
+    assert read_signal(tmp_path / "ms.h5").attrs["sampling_rate"] == pytest.approx(RATE)
+    path = stored(tmp_path / "two.h5", acc=(SHAKES, {"sampling_rate": 2.0 * RATE}))
+    with h5py.File(path, "a") as file:
+        file["time"] = TIME
+    with pytest.raises(SignalFileError, match=says("10000 Hz", "5000 Hz", "--rate")):
+        read_signal(path)
+    assert read_signal(path, rate=RATE).attrs["sampling_rate"] == RATE
+
+
+def test_a_rate_that_the_times_of_an_mdf_file_contradict_is_refused(tmp_path):
+    path = logged(tmp_path / "log.mf4")
+    with pytest.raises(SignalFileError, match=says("5000 Hz", "rate=2500")):
+        read_signal(path, rate=2500.0)
+    assert read_signal(path, rate=RATE).attrs["sampling_rate"] == RATE
+
+
+def test_an_mdf_file_over_angles_is_no_record(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(SHAKES, TIME, unit="g", name="case")])
+        file.groups[0].channels[file.masters_db[0]].sync_type = 2
+        path = file.save(tmp_path / "angle.mf4", overwrite=True)
+    with pytest.raises(SignalFileError, match=says("no samples over time")):
+        read_signal(path)
+
+
+def waveforms(path, **channels):
+    nptdms = pytest.importorskip("nptdms")
+    known = {"wf_increment": 1.0 / RATE, "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(path) as file:
+        file.write_segment([
+            nptdms.ChannelObject("g", name, SHAKES, properties=known | own) for name, own in channels.items()
+        ])  # fmt: skip
+    return path
+
+
+@pytest.mark.parametrize("late", [{"wf_start_offset": 0.3}, {"wf_start_time": np.datetime64("2024-01-01T00:00:07")}])
+def test_channels_of_tdms_begin_together(tmp_path, late):
+    first = {"wf_start_time": np.datetime64("2024-01-01T00:00:00")} if "wf_start_time" in late else {}
+    with pytest.raises(SignalFileError, match=says("a at 0 s", "channels=")):
+        read_signal(waveforms(tmp_path / "a.tdms", a=first, b=late))
+    assert read_signal(tmp_path / "a.tdms", channels=["b"]).sizes["time"] == TIME.size
+    together = read_signal(waveforms(tmp_path / "b.tdms", a=late, b={"NI_UnitDescription": "m/s^2"} | late))
+    assert units_of(together) == ["unknown", "m/s^2"]
+
+
+def test_a_spectrum_in_tdms_is_no_record(tmp_path):
+    with pytest.raises(SignalFileError, match=says("no samples")):
+        read_signal(waveforms(tmp_path / "a.tdms", a={"wf_xunit_string": "Hz"}))
+
+
+def universal(path, system=None, step=1.0 / RATE, **own):
+    """Write one dataset 58 as other programs do, behind a system of units."""
+    pyuff = pytest.importorskip("pyuff")
+    known = {
+        "type": 58,
+        "binary": 1,
+        "id1": "case",
+        "func_type": 1,
+        "rsp_node": 1,
+        "rsp_dir": 0,
+        "ref_node": 0,
+        "ref_dir": 0,
+        "data": SHAKES,
+        "x": step * np.arange(TIME.size),
+        "abscissa_spacing": 1,
+        "abscissa_spec_data_type": 17,
+        "abscissa_axis_lab": "Time",
+        "abscissa_axis_units_lab": "s",
+        "ordinate_spec_data_type": 12,
+        "ordinate_axis_lab": "case",
+        "ordinate_axis_units_lab": "NONE",
+        "orddenom_spec_data_type": 0,
+        "z_axis_spec_data_type": 0,
+    }
+    units = {
+        "type": 164,
+        "units_code": system,
+        "units_description": "",
+        "temp_mode": 1,
+        "length": 1.0,
+        "force": 1.0,
+        "temp": 1.0,
+        "temp_offset": 273.15,
+    }
+    path.write_bytes(b"")
+    pyuff.UFF(str(path)).write_sets([*([units] if system else []), known | own], mode="add")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("system", "unit"), [(None, "m/s^2"), (1, "m/s^2"), (5, "mm/s^2"), (7, "in/s^2"), (9, "unknown")]
+)
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_samples_of_uff_are_in_the_units_of_its_system(tmp_path, system, unit):
+    assert units_of(read_signal(universal(tmp_path / "a.uff", system))) == [unit]
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_the_abscissa_of_uff_has_a_unit_and_is_time(tmp_path):
+    path = universal(tmp_path / "a.uff", step=1e3 / RATE, abscissa_axis_units_lab="ms")
+    assert read_signal(path).attrs["sampling_rate"] == pytest.approx(RATE)
+    over = {"func_type": 0, "abscissa_spec_data_type": 18, "abscissa_axis_units_lab": "Hz"}
+    with pytest.raises(SignalFileError, match=says("no time history")):
+        read_signal(universal(tmp_path / "b.uff", **over))

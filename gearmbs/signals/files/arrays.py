@@ -16,11 +16,11 @@ import xarray as xr
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.named_arrays import assemble
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.signal.labels import is_clock
 from gearmbs.signals.signal.record import (
     Record,
-    assemble,
     metadata_json,
     rate_candidates,
     rate_from_times,
@@ -34,6 +34,10 @@ BLOCK = 1 << 17
 MAGIC = b"\x89HDF\r\n\x1a\n"
 NAMELESS = frozenset(("data", "value", "values", "samples", "signal", "y"))
 """Datasets of one channel that are named by their groups."""
+SCALED = frozenset(("scale_factor", "add_offset"))
+FACTORS = frozenset("scale offset gain slope intercept sensitivity calibration factor lsb resolution".split())
+"""Attributes by which counts of a converter may have to be multiplied, divided or shifted."""
+COLUMN_NAMES = frozenset("channels channel_names channelnames names columns column_names labels".split())
 USER_BLOCK = 512
 """Bytes that MATLAB 7.3 puts before the HDF5 data."""
 
@@ -130,6 +134,7 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
     labels: dict[str, str] = {}
     order: dict[str, int] = {}
     scalars: dict[str, Any] = {}
+    notes: list[str] = []
     try:
         with h5py.File(path, "r") as file:
             scalars.update({k: _value(v) for k, v in file.attrs.items()})
@@ -154,11 +159,20 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
                 if item.size == 1:
                     scalars.setdefault(key, item[()].item() if item.shape == () else item[...].ravel()[0].item())
                     return
-                arrays[key] = item[...]
+                arrays[key] = _scaled(item, notes)
                 for owner in (item.parent, item):
                     for attr, value in owner.attrs.items():
                         if attr.lower() in ("units", "unit"):
-                            units[key] = str(_value(value))
+                            units.update(_units_of(key, _value(value)))
+                names = _names_of(item)
+                if names is not None:
+                    table = arrays.pop(key)
+                    columns = table if table.shape[0] == len(names) else table.T
+                    arrays.update(zip(names, columns, strict=True))
+                    units.update(
+                        {n: units.get(f"{key}_{i + 1}", units.get(key, UNKNOWN_UNITS)) for i, n in enumerate(names)}
+                    )
+                    return
                 labels[key] = str(_value(item.attrs.get("channel", key)))
                 order[key] = int(_value(item.attrs.get("channel_index", len(order))))
 
@@ -168,7 +182,49 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
     if scalars.get("layout") == LAYOUT:
         arrays = {key: arrays[key] for key in sorted(arrays, key=lambda key: order[key])}
         return _own(path, arrays, units, labels, scalars)
-    return assemble(path, arrays, scalars, units, channels, rate)
+    record = assemble(path, arrays, scalars, units, channels, rate)
+    record.notes += notes
+    return record
+
+
+def _scaled(item: Any, notes: list[str]) -> np.ndarray:
+    """Return the values of a dataset as the conventions of NetCDF scale them; remark on other factors of counts."""
+    values = item[...]
+    attrs = {name.lower(): _value(value) for name, value in item.attrs.items()}
+    if SCALED & set(attrs):
+        fill = attrs.get("_fillvalue")
+        plain = values.astype(float)
+        plain[values == fill] = np.nan
+        return plain * float(attrs.get("scale_factor", 1.0)) + float(attrs.get("add_offset", 0.0))
+    factors = sorted(name for name in attrs if name in FACTORS and attrs[name] not in (0, 1))
+    if factors and values.dtype.kind in "iu":
+        listed = ", ".join(f"{name} = {attrs[name]}" for name in factors)
+        notes.append(
+            f"CHECK THE SCALE: {item.name} holds whole numbers and the attributes {listed}, which are not applied, for "
+            "nothing says how; write scale_factor and add_offset, as NetCDF has them, or scale the samples yourself."
+        )
+    return values
+
+
+def _texts(value: Any) -> list[str]:
+    """Return a list of texts in an attribute; of anything else none."""
+    listed = value.ravel().tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "OSU" else []
+    return [str(_value(each)) for each in listed]
+
+
+def _units_of(key: str, value: Any) -> dict[str, str]:
+    """Return the unit of a dataset, or that of each of its columns."""
+    each = _texts(value)
+    return {f"{key}_{i + 1}": unit for i, unit in enumerate(each)} if each else {key: str(value)}
+
+
+def _names_of(item: Any) -> list[str] | None:
+    """Return the names of the columns of a matrix that an attribute lists, or None."""
+    for attr, value in item.attrs.items():
+        names = _texts(_value(value)) if attr.lower() in COLUMN_NAMES else []
+        if item.ndim == 2 and len(names) == min(item.shape) and len(set(names)) == len(names) > 1:
+            return names
+    return None
 
 
 def _fields(table: np.ndarray) -> dict[str, np.ndarray]:

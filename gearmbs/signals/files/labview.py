@@ -26,6 +26,10 @@ GROUP = "signal"
 BLOCK = 1 << 17
 LEAD_IN = 28
 INCOMPLETE = 0xFFFFFFFFFFFFFFFF
+OF_FREQUENCY = ("hz", "khz", "rpm")
+"""Units of the abscissa of what is no record over time."""
+SAME_START = 0.5
+"""Samples by which channels of one record may begin at other times."""
 
 
 def read_lvm(path: Path, rate: float | None = None) -> Record:
@@ -198,6 +202,7 @@ def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list
         for group in file.groups()
         for c in group.channels()
         if len(c) and np.issubdtype(c.dtype, np.number) and not np.issubdtype(c.dtype, np.complexfloating)
+        if str(c.properties.get("wf_xunit_string", "")).strip().lower() not in OF_FREQUENCY
     ]
     plain_names = [c.name for _, c in found]
     names = [c.name if plain_names.count(c.name) == 1 else f"{group}/{c.name}" for group, c in found]
@@ -221,10 +226,32 @@ def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list
     ]
 
 
+def _unit_of(channel: Any) -> str:
+    """Return the unit of a channel, under either name that LabVIEW writes."""
+    told = (str(channel.properties.get(name) or "").strip() for name in ("unit_string", "NI_UnitDescription"))
+    return next(filter(None, told), UNKNOWN_UNITS)
+
+
 def _is_slow(channel: Any) -> bool:
     """Return whether a channel may have fewer samples than those it stands beside."""
-    unit = str(channel.properties.get("unit_string") or UNKNOWN_UNITS)
-    return role_of(channel.name, unit) in SLOW_ROLES
+    return role_of(channel.name, _unit_of(channel)) in SLOW_ROLES
+
+
+def _check_starts(path: Path, starts: dict[str, float], rate: float | None) -> None:
+    """Refuse channels that begin at different times (s): row by row their samples are not of one instant."""
+    first, last = min(starts.values()), max(starts.values())
+    if rate is not None and (last - first) * rate > SAME_START:
+        listed = ", ".join(f"{name} at {start - first:g} s" for name, start in starts.items())
+        raise SignalFileError(
+            path, f"its channels begin at different times: {listed}; choose with channels=[...] (--channel)"
+        )
+
+
+def _start_of(channel: Any) -> float:
+    """Return when a channel begins, s: its own time and what it is offset by."""
+    stamp = channel.properties.get("wf_start_time")
+    begin = 0.0 if stamp is None else float(np.datetime64(stamp, "us").astype("int64")) * 1e-6
+    return begin + float(channel.properties.get("wf_start_offset", 0.0))
 
 
 def _stretch(channel: Any, start: int, stop: int, count: int) -> np.ndarray:
@@ -244,12 +271,20 @@ def _record(
     speed = float(root["speed"]) if isinstance(root.get("speed"), (int, float)) else None
     longest = max(len(c) for c in kept)
     slow = [name for name, c in zip(names, kept, strict=True) if len(c) < longest]
+    starts = {
+        name: _start_of(channel)
+        for name, channel in zip(names, kept, strict=True)
+        if name not in slow and "wf_increment" in channel.properties
+    }
     notes += [SLOW_SAID.format(name=name, size=longest) for name in slow]
     for name, channel in zip(names, kept):
         if name in slow:
             continue
         rates[name], said = _rate(path, file, channel, root, given)
         notes += [note for note in said if note not in notes]
+    rate = same_rate(path, rates)
+    if starts:
+        _check_starts(path, starts, rate)
     if speed is None:
         speed, said = speed_of({**root, **dict(file[kept[0].group_name].properties)})
         notes += said
@@ -257,8 +292,8 @@ def _record(
     return Record(
         values,
         list(names),
-        [str(c.properties.get("unit_string") or UNKNOWN_UNITS) for c in kept],
-        same_rate(path, rates),
+        [_unit_of(c) for c in kept],
+        rate,
         float(kept[0].properties.get("wf_start_offset", 0.0)),
         speed,
         None if teeth is None else check_teeth(json.loads(str(teeth))),

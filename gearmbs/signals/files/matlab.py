@@ -20,8 +20,9 @@ import numpy as np
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.named_arrays import assemble
 from gearmbs.signals.files.table import Content, Format, begins_with
-from gearmbs.signals.signal.record import Record, assemble
+from gearmbs.signals.signal.record import Record
 from gearmbs.signals.signal.signal import check_teeth
 
 if TYPE_CHECKING:

@@ -14,6 +14,11 @@ from gearmbs.signals.signal.labels import SLOW_ROLES, role_of
 from gearmbs.signals.signal.record import Record, rate_from_times
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 
+UNEVEN = 0.01
+"""Share by which a given rate may be off the mean of uneven times."""
+TIME = 1
+"""Kind of a master channel of times; others are angles and distances."""
+
 
 class _Channel(NamedTuple):
     name: str
@@ -58,10 +63,25 @@ def read_mdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
         np.stack([np.interp(base, c.times, c.values) if c.name in slow else c.values for c in kept], axis=1),
         [c.name for c in kept],
         [c.unit for c in kept],
-        rate if rate is not None else rate_from_times(base, path),
+        _rate(path, base, rate),
         float(base[0]),
         notes=[f"{name} has times of its own; between them it is interpolated." for name in slow],
     )
+
+
+def _rate(path: Path, times: np.ndarray, given: float | None) -> float:
+    """Return the rate of even times; of uneven ones that which is given, if it is their mean rate."""
+    try:
+        return rate_from_times(times, path)
+    except SignalFileError:
+        mean = (times.size - 1) / float(times[-1] - times[0])
+        if given is None:
+            raise
+        if abs(given / mean - 1.0) > UNEVEN:
+            raise SignalFileError(
+                path, f"its times, which are not even, have a mean rate of {mean:g} Hz, the call says rate={given:g}"
+            ) from None
+        return given
 
 
 def _numeric(path: Path) -> list[_Channel]:
@@ -69,8 +89,11 @@ def _numeric(path: Path) -> list[_Channel]:
     found = []
     with _library(path).MDF(path) as file:
         for group, entry in enumerate(file.groups):
+            master = file.masters_db.get(group)
+            if master is not None and getattr(entry.channels[master], "sync_type", TIME) not in (0, TIME):
+                continue
             for index in range(len(entry.channels)):
-                if index == file.masters_db.get(group):
+                if index == master:
                     continue
                 got = file.get(group=group, index=index)
                 if got.samples.ndim != 1 or got.samples.dtype.kind not in "fiub" or got.samples.size < 2:

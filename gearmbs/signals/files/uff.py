@@ -21,7 +21,7 @@ import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Content, Format
-from gearmbs.signals.signal.record import Record
+from gearmbs.signals.signal.record import SECONDS, Record
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth, nice_rate
 
 START = re.compile(rb"^\s*-1[ \t]*\r?\n[ \t]*\d+[a-z]?\b")
@@ -33,6 +33,10 @@ LINE_WIDTH = 80
 SIX_DIGITS = 5000
 TIME_RESPONSE = 1
 DATA_TYPES = {"m": 8, "m/s": 11, "m/s^2": 12, "N": 13}
+NOT_TIME = (18, 19, 20)
+"""Kinds of abscissas that are none of time: frequency, turns a minute, orders."""
+LENGTHS = {1: "m", 2: "ft", 3: "m", 4: "ft", 5: "mm", 6: "cm", 7: "in", 8: "mm", 10: "mm"}
+"""Unit of length of the systems of units that dataset 164 names; 9 is the user's own."""
 SI_UNITS = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N"}
 
 
@@ -56,9 +60,12 @@ def read_uff(path: Path, channels: Sequence[str] | None) -> Record:
             file58 = pyuff.UFF(str(full))
             kinds = [int(k) for k in file58.get_set_types()]
             sets = [file58.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+            systems = {int(file58.read_sets(i)["units_code"]) for i, kind in enumerate(kinds) if kind == 164}
         except Exception as exc:
             raise SignalFileError(path, f"cannot be read as UFF ({exc})") from exc
-    histories = [s for s in sets if s["func_type"] in (0, TIME_RESPONSE) and not np.iscomplexobj(s["data"])]
+    histories = [
+        s for s in sets if s["func_type"] in (0, TIME_RESPONSE) and not np.iscomplexobj(s["data"]) and _is_over_time(s)
+    ]
     if not histories:
         raise SignalFileError(path, f"holds no time history (dataset 58, function type 1); its datasets are {kinds}")
     notes = []
@@ -68,6 +75,10 @@ def read_uff(path: Path, channels: Sequence[str] | None) -> Record:
         s["data"] = s["data"][: s["num_pts"]]
         if not len(s["data"]):
             raise SignalFileError(path, f"history {index} holds no samples")
+        if not _json(s["id2"]) and not float(s["abscissa_inc"] or 0.0) > 0.0 and s["abscissa_spacing"]:
+            raise SignalFileError(
+                path, f"history {index} has the step {s['abscissa_inc']:g} between samples; write the true one"
+            )
         if not s["abscissa_spacing"]:
             raise SignalFileError(path, f"history {index} is unevenly sampled; resample it first")
     names = _names(histories)
@@ -84,7 +95,7 @@ def read_uff(path: Path, channels: Sequence[str] | None) -> Record:
     return Record(
         np.stack([np.asarray(s["data"], dtype=float) for _, s in kept], axis=1),
         [n for n, _ in kept],
-        [_unit(s) for _, s in kept],
+        [_unit(s, systems) for _, s in kept],
         rate,
         t0,
         extra.get("speed"),
@@ -176,19 +187,35 @@ def _names(histories: list[dict]) -> list[str]:
     return [n if raw.count(n) == 1 else f"{n}_{raw[:i].count(n) + 1}" for i, n in enumerate(raw)]
 
 
+def _is_over_time(s: dict) -> bool:
+    """Return whether a set is over time, and not over frequency, speed or orders."""
+    return int(s.get("abscissa_spec_data_type", 0)) not in NOT_TIME and _abscissa_unit(s) not in ("hz", "khz", "rpm")
+
+
+def _abscissa_unit(s: dict) -> str:
+    label = str(s.get("abscissa_axis_units_lab", "")).strip().lower()
+    return "" if label == "none" else label
+
+
 def _clock(s: dict) -> tuple[float, float]:
     exact = _json(s["id2"])
     if "rate" in exact:
         return float(exact["rate"]), float(exact["t0"])
+    second = SECONDS.get(_abscissa_unit(s), 1.0)
     step = float(s["abscissa_inc"])
-    return nice_rate(1.0 / step, step, SIX_DIGITS), float(s["abscissa_min"])
+    return nice_rate(1.0 / (second * step), second * step, SIX_DIGITS), second * float(s["abscissa_min"])
 
 
-def _unit(s: dict) -> str:
+def _unit(s: dict, systems: set[int]) -> str:
+    """Return the unit of the samples: its label's, or that of the quantity in the system of units of the file."""
     label = str(s.get("ordinate_axis_units_lab", "")).strip()
     if label and label.upper() != "NONE":
         return label
-    return SI_UNITS.get(int(s.get("ordinate_spec_data_type", 0)), UNKNOWN_UNITS)
+    unit = SI_UNITS.get(int(s.get("ordinate_spec_data_type", 0)), UNKNOWN_UNITS)
+    if not systems or systems == {1}:
+        return unit
+    (length,) = {LENGTHS.get(system) for system in systems} if len(systems) == 1 else {None}
+    return length + unit[1:] if length is not None and unit in ("m", "m/s", "m/s^2") else UNKNOWN_UNITS
 
 
 def _json(text: Any) -> dict:
