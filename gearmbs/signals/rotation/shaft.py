@@ -199,6 +199,11 @@ class Shaft(NamedTuple):
     range: tuple[float, float] | None = None
     """Lowest and highest speed, rad/s, where it varies."""
 
+    @property
+    def tacho(self) -> bool:
+        """Whether the angle is that of a tacho, which moves with the lines if the sampling rate is wrong."""
+        return self.origin.startswith("from the tacho")
+
 
 class Known(NamedTuple):
     """What the caller knows of the shaft; fields as the settings of `analyse`."""
@@ -306,7 +311,8 @@ def mesh_shaft(
 def _compare(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, notes: list[str]) -> None:
     """Say so where the mesh line contradicts a nearly steady speed from a channel, a tacho or an angle."""
     found = _estimate(signal, counts, (shaft.speed * (1.0 - SPEED_TOLERANCE), shaft.speed * (1.0 + SPEED_TOLERANCE)))
-    if _remark_other(signal, counts, shaft.speed, found, notes):
+    hint = " Or the tacho has another number of pulses a turn (pulses_per_rev=, --pulses)." if shaft.tacho else None
+    if _remark_other(signal, counts, shaft.speed, found, notes, hint):
         return
     gmf = shaft.speed * counts[0] / math.tau
     if _turns(signal, shaft.speed) >= FOLLOWED_TURNS and line_near(signal, gmf, SPEED_TOLERANCE) is None:
@@ -398,7 +404,12 @@ def _estimate(
 
 
 def _remark_other(
-    signal: xr.DataArray, counts: tuple[int, ...], nominal: float, found: SpeedEstimate | None, notes: list[str]
+    signal: xr.DataArray,
+    counts: tuple[int, ...],
+    nominal: float,
+    found: SpeedEstimate | None,
+    notes: list[str],
+    hint: str | None = None,
 ) -> bool:
     """Say so where the record, left to itself, shows another mesh frequency more clearly than near the given speed.
 
@@ -437,7 +448,8 @@ def _remark_other(
     notes.append(
         f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
         f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
-        f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed).{other_rate(signal, ratio)}"
+        f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
+        f"{other_rate(signal, ratio) if hint is None else hint}"
     )
     return True
 
