@@ -29,6 +29,7 @@ from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
 from gearmbs.signals.encoders.visible import MOST_HARMONICS, Order, visible_orders
 from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.rotation.phase import MOST_MISSING
 from gearmbs.signals.signal.signal import check_teeth
 from gearmbs.units import Quantity, to_si
 
@@ -218,6 +219,8 @@ def _check_trains(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrai
     """Refuse trains of other discs, of another ratio, or without mark 0 where runs are combined."""
     for name in freed:
         trains = [*freed[name], *(getattr(run, name) for run in runs)]
+        for train in trains:
+            _check_gaps(train)
         counts = {train.lines for train in trains}
         if len(counts) > 1:
             raise SignalError(f"runs: trains of the {name} have {sorted(counts)} lines; give those of one disc")
@@ -235,6 +238,20 @@ def _check_trains(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrai
                 f"{float(gearing.ratio):.6g} times; check teeth, lines ({run.driver.lines}, {run.driven.lines}) and "
                 "which of the trains is the driver's"
             )
+
+
+def _check_gaps(train: PulseTrain) -> None:
+    """Refuse a train with a gap so long that nothing numbers the pulses behind it."""
+    interval = np.diff(train.times) / np.diff(train.numbers)
+    beside = np.maximum(np.r_[0.0, interval[:-1]], np.r_[interval[1:], 0.0])
+    longest = int(np.argmax(interval / beside))
+    pitches = float(interval[longest] / beside[longest])
+    if pitches > MOST_MISSING:
+        raise SignalError(
+            f"runs: {train.name!r} has no pulses from {train.times[longest]:.6g} to {train.times[longest + 1]:.6g} s, "
+            f"about {pitches:.3g} pitches, behind which nothing says their numbers; give the record before the gap, or "
+            "that behind it"
+        )
 
 
 def _check_free(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrain]], gearing: Gearing) -> list[str]:

@@ -365,6 +365,20 @@ def test_more_or_fewer_lines_than_there_are_are_told_by_the_marks(told, turns, e
         assert "256 and 256 lines" in found.verdict
 
 
+def test_a_gap_behind_which_nothing_numbers_the_pulses_is_refused():
+    error, radius = paper_error()
+    lag = closed(error.error)
+    angles = coupled(lambda turned: lag(29 * turned), TEETH, radius, 12, rate=20e3)
+    trains = [encoder(a, 128, name=name, jitter="50 ns", seed=k) for k, (a, name) in enumerate(zip(angles, "ab"))]
+    for lost, refused in ((300, True), (6, False)):
+        cut = [pulse_train(np.delete(t.times, np.arange(700, 700 + lost)), 128, name=t.name) for t in trains]
+        if refused:
+            with pytest.raises(SignalError, match=says("'a' has no pulses", "before the gap")):
+                transmission_error_from_pulses(CoupledRun(*cut), TEETH, base_radius=radius)
+        else:
+            transmission_error_from_pulses(CoupledRun(*cut), TEETH, base_radius=radius)
+
+
 def test_half_the_lines_are_told_by_the_marks_of_one_disc():
     train = encoder(free(seconds=0.8), 1024, marks=mark_errors(1024, 0.01, 3), jitter="50 ns", seed=1)
     assert "discs of 1024 lines" in repeating_marks([pulse_train(train.times, 512)], [29.0])
