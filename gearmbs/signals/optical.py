@@ -403,6 +403,10 @@ def turn_floor(
     return out
 
 
+PIXELS = ("px", "pix", "pixel", "pixels")
+"""As programs that follow points write the unit of their tracks."""
+
+
 @takes_data()
 def point_track(
     signal: xr.DataArray, scale: Quantity, *, direction: Sequence[float] | None = None, name: str = "camera"
@@ -429,7 +433,8 @@ def point_track(
     length = to_si(scale, "length", "scale")
     if not 0.0 < length < math.inf:
         raise SignalError(f"scale: must be the positive length of a pixel in m, got {scale!r}")
-    if (unit := next(filter(_known_unit, units_of(signal)), None)) is not None:
+    others = (unit for unit in units_of(signal) if unit.lower() not in PIXELS and _known_unit(unit))
+    if (unit := next(others, None)) is not None:
         raise SignalError(
             f"units: the track is in {unit}, not in pixels; leave point_track (--pixel) out, or set its unit to 'pixel'"
         )

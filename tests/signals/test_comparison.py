@@ -209,3 +209,12 @@ def test_units_must_agree():
 def test_records_that_differ_as_by_a_unit_are_told(factor, told):
     report = compare({"healthy": tone(BASE["healthy"]), "misaligned": tone(BASE["misaligned"], factor)})
     assert report.summary()[0].startswith("CHECK THE UNITS") == told
+
+
+@pytest.mark.parametrize(("faster", "told"), [(1.25, True), (1.02, False)])
+def test_records_of_other_speeds_are_told(faster, told):
+    worn = make_signal(
+        tone((1.1, 1.5, 0.3)).values, faster * RATE, channels=["acc"], units="m/s^2", speed=faster * OMEGA, teeth=TEETH
+    )
+    notes = compare({"healthy": tone(BASE["healthy"]), "worn": worn}).notes
+    assert any(note.startswith("CHECK THE SPEED: worn at load all") for note in notes) == told

@@ -23,6 +23,7 @@ from gearmbs.signals import (
     speckle,
     time_synchronous_average,
     turn_floor,
+    with_metadata,
     write_signal,
 )
 from gearmbs.signals.rotation.phase import phase_from_speed
@@ -187,6 +188,7 @@ def test_a_camera_sees_displacement(rate):
     two = make_signal({"x": pixels.values[:, 0], "y": 0.5 * pixels.values[:, 0]}, rate, units="pixel")
     along = point_track(two, 20e-6, direction=(0, 2))
     assert np.allclose(along.values, 0.5 * track.values)
+    assert np.allclose(point_track(with_metadata(two, units="px"), 20e-6, direction=(0, 2)).values, along.values)
     with pytest.raises(SignalError, match=says("units", "m", "pixel")):
         point_track(true, "20 um")
     with pytest.raises(SignalError, match=says("scale", "0")):

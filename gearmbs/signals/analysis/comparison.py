@@ -139,12 +139,32 @@ def compare(
                 notes += [
                     f"{state} at load {load}: {note}" for note in sorted(told, key=lambda n: not n.startswith(LOUD))
                 ]
+    notes = _other_speeds(found["experiment"], reference) + notes
     data = _tabulate(found["experiment"], loads, states, "experiment")
     if model is not None:
         data = _with_model(data, _tabulate(found["model"], loads, states, "model"), reference, scope)
     data = data.rename(rms="experiment")
     data.attrs.update(reference=reference, scope=scope, way=way, half_width=half_width)
     return ComparisonReport(data, reference, left_out, notes)
+
+
+SAME_SPEED = 0.05
+"""Share by which the mesh frequencies of records of one load may differ: speeds of drives change by 3 % at most with
+their load, and a level that grows as the square of the speed by 1 dB, from which it counts as a change, at 6 %."""
+
+
+def _other_speeds(found: Mapping[tuple[str, str], xr.Dataset], reference: str) -> list[str]:
+    """Say which records ran at another speed than the reference at their load."""
+    said = []
+    for (load, state), data in found.items():
+        gmf, other = float(found[load, reference]["gmf"]), float(data["gmf"])
+        if abs(other / gmf - 1.0) > SAME_SPEED:
+            said.append(
+                f"CHECK THE SPEED: {state} at load {load} has its mesh at {other:.2f} Hz, {reference} at {gmf:.2f} Hz: "
+                "levels change with the speed, and what is told of the state is not the state's alone. Compare records "
+                "of one speed."
+            )
+    return said
 
 
 def _signals(cases: Mapping[str, Any], **known: Any) -> dict[str, dict[str, xr.DataArray]]:
