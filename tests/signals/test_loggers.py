@@ -203,6 +203,18 @@ def test_a_rate_that_the_times_of_an_mdf_file_contradict_is_refused(tmp_path):
     assert read_signal(path, rate=RATE).attrs["sampling_rate"] == RATE
 
 
+def test_samples_that_an_mdf_file_lost_are_told(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(np.delete(SHAKES, 4000), np.delete(TIME, 4000), unit="g", name="case")])
+        path = file.save(tmp_path / "lost.mf4", overwrite=True)
+    with pytest.raises(SignalFileError, match=says("not uniform", "rate=")):
+        read_signal(path)
+    assert any("0.0004 s" in note for note in read_signal(path, rate=RATE).attrs["notes"])
+    with pytest.raises(SignalFileError, match=says("4999.5 Hz", "rate=2500")):
+        read_signal(path, rate=2500.0)
+
+
 def test_an_mdf_file_over_angles_is_no_record(tmp_path):
     asammdf = pytest.importorskip("asammdf")
     with asammdf.MDF(version="4.10") as file:

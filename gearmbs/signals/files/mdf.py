@@ -59,20 +59,21 @@ def read_mdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
             path, f"holds records at different times: {listed}; choose with channels=[...] (--channel)"
         )
     slow = [c.name for c in kept if not np.array_equal(c.times, base)]
+    rate, said = _rate(path, base, rate)
     return Record(
         np.stack([np.interp(base, c.times, c.values) if c.name in slow else c.values for c in kept], axis=1),
         [c.name for c in kept],
         [c.unit for c in kept],
-        _rate(path, base, rate),
+        rate,
         float(base[0]),
-        notes=[f"{name} has times of its own; between them it is interpolated." for name in slow],
+        notes=[*said, *(f"{name} has times of its own; between them it is interpolated." for name in slow)],
     )
 
 
-def _rate(path: Path, times: np.ndarray, given: float | None) -> float:
-    """Return the rate of even times; of uneven ones that which is given, if it is their mean rate."""
+def _rate(path: Path, times: np.ndarray, given: float | None) -> tuple[float, list[str]]:
+    """Return the rate of even times; of uneven ones that which is given, if it is their mean rate, with a remark."""
     try:
-        return rate_from_times(times, path)
+        return rate_from_times(times, path), []
     except SignalFileError:
         mean = (times.size - 1) / float(times[-1] - times[0])
         if given is None:
@@ -81,7 +82,11 @@ def _rate(path: Path, times: np.ndarray, given: float | None) -> float:
             raise SignalFileError(
                 path, f"its times, which are not even, have a mean rate of {mean:g} Hz, the call says rate={given:g}"
             ) from None
-        return given
+        steps = np.diff(times)
+        return given, [
+            f"CHECK THE RATE: the times are not even, steps of {steps.min():.4g} to {steps.max():.4g} s; samples are "
+            f"taken as even at the given {given:g} Hz. Steps of twice the usual one are lost samples: resample then."
+        ]
 
 
 def _numeric(path: Path) -> list[_Channel]:
