@@ -438,7 +438,7 @@ def _finding(
     modulated = _modulated(signal, evidence.found, widest) if loud else math.nan
     if modulated < level:
         grade = QUIET
-    elif loud and part != CAGE and is_smooth(evidence):
+    elif grade in (CLEAR, SIGNS) and part != CAGE and is_smooth(evidence):
         grade = SMOOTH
     step = None if grade != NONE else _multiple_of_turns(judged, spectra, shaft, slip)
     return PartFinding(
