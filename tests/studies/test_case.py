@@ -211,7 +211,7 @@ WRONG = [
         {"fault": {"teeth": {"kind": "wear", "teeth": [3, 77]}}},
         says("0", "77", "28", "wheel has teeth"),
     ),
-    ({"fault": {"teeth": {"kind": "pitting", "depth": "30 mm"}}}, says("30 mm", "tooth is thick")),
+    ({"fault": {"teeth": {"kind": "pitting", "depth": "30 mm"}}}, says("fault.teeth[0].depth", "30 mm", "3.065 mm")),
     ({"fault": {"teeth": "root cracks"}}, says("teeth", "root crack")),
     ({"fault": {"teeth": {"kind": "wear", "deptt": 1}}}, says("deptt", "depth")),
     (

@@ -16,7 +16,6 @@ from gearmbs.schema.described import check_keys
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
-    from gearmbs.gears.modifications import ToothDeviations
     from gearmbs.gears.pair import GearPair
 
 
@@ -83,20 +82,9 @@ def check_each_fault(pair: GearPair, tables: Sequence[Mapping[str, Any]]) -> Non
     for place, table in enumerate(tables):
         fault = tooth_fault(table)
         try:
-            _check_size(tooth_deviations(pair.with_changes(faults=(fault,))), pair)
+            tooth_deviations(pair.with_changes(faults=(fault,)))
         except ValueError as error:
             raise ValueError(_at(place, fault, error)) from None
-
-
-def _check_size(deviations: tuple[ToothDeviations, ToothDeviations], pair: GearPair) -> None:
-    """Refuse flanks that are displaced by more than a tooth is thick."""
-    for gear, deviation in zip(pair.wheels, deviations, strict=True):
-        most = max(float(abs(part).max(initial=0.0)) for part in (deviation.offset, deviation.shape))
-        if most > gear.tooth_thickness:
-            raise ValueError(
-                f"a flank would be displaced by {1e3 * most:.4g} mm, more than a tooth is thick "
-                f"({1e3 * gear.tooth_thickness:.4g} mm); give less (a plain number is in m)"
-            )
 
 
 def _placed(value: Any, place: int) -> faults.Fault:
