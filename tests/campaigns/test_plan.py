@@ -195,6 +195,15 @@ def test_names_of_columns_are_different():
         make_plan(function(), [*ranges(), Factor("x1", 0.0, 1.0)], n=4)
 
 
+@pytest.mark.parametrize(
+    ("base", "wanted"), [(None, {"k": 1.0}), (2.0, {"k": 1.0}), ({"k": 2.0}, {"k": 1.0}), ([], [{"k": 1.0}])]
+)
+def test_a_table_is_one_of_several_in_a_list_alone(base, wanted):
+    plan = make_plan(FunctionSubject(models.adding, {"a": base, "b": 1.0}), [choose("a", one={"k": 1.0})], "grid")
+    columns = table(plan)
+    assert plan.data({name: values[0] for name, values in columns.items()}) == {"a": wanted, "b": 1.0}
+
+
 def test_what_moves_the_same_is_refused():
     """A table and an entry of it, of which the last would hold; other entries, and rows with either, are none."""
     subject = FunctionSubject(models.adding, {"a": {"k": 1.0, "c": 2.0}, "b": 1.0})

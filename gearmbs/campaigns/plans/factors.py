@@ -311,9 +311,7 @@ class Choice:
                 value = float(row[f"{self.name}.{key}"])
                 low, high = table[key]
                 chosen[key] = int(value) if isinstance(low, int) and isinstance(high, int) else value
-            # a table takes the place of a table, and is one of several elsewhere, as faults are
-            alone = isinstance(get_path(data, self.path), Mapping)
-            set_path(data, self.path, chosen if alone else [chosen])
+            set_path(data, self.path, [chosen] if _holds_several(data, self.path) else chosen)
         else:
             set_path(data, self.path, table)
 
@@ -454,6 +452,14 @@ def get_path(data: Mapping[str, Any], path: str) -> Any:
     for section in sections:
         data = data.get(section, {})
     return data.get(name)
+
+
+def _holds_several(data: Mapping[str, Any], path: str) -> bool:
+    """Whether a field of nested data is a list, as that of faults is, which may not be there where there are none."""
+    *sections, name = path.split(".")
+    for section in sections:
+        data = data.get(section, {})
+    return name not in data or isinstance(data[name], list | tuple)
 
 
 def set_path(data: dict[str, Any], path: str, value: Any) -> None:
