@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 import sys
 from pathlib import Path
 
@@ -13,6 +12,8 @@ SCRIPTS = HERE / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
 import api_pages  # noqa: E402
+import offline  # noqa: E402
+import thumbnails  # noqa: E402
 
 import gearmbs  # noqa: E402
 
@@ -51,7 +52,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
-    "sphinx-mathjax-offline",
     "sphinx.ext.viewcode",
     "numpydoc",
     "sphinx_copybutton",
@@ -77,27 +77,29 @@ autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
+mathjax_path = "mathjax/tex-chtml.js"
+
+templates_path = ["_templates"]
 html_theme = "furo"
 html_title = f"gearmbs {release}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_copy_source = False
+html_split_index = True
+short = [f"sidebar/{part}.html" for part in ("brand", "search", "scroll-start", "ideas", "scroll-end")]
+html_sidebars = {"_generated/objects/**": short, "_modules/**": short}
 html_theme_options = {"navigation_with_keys": True}
 pygments_style = "default"
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 
 
-def refuse_servers(app, failed) -> None:
-    """Raise an error if a page needs a script from a server: the site is to be read without a network."""
-    for page in () if failed else Path(app.outdir).rglob("*.html"):
-        found = re.search(r'<script[^>]+src="(https?://[^"]+)', page.read_text(encoding="utf-8"))
-        if found:
-            raise RuntimeError(f"{page.name} loads {found[1]}; give the script with the site")
-
-
 def setup(app) -> None:
     """Write the API pages and let autodoc see through compiled functions and docstrings' vertical bars."""
     api_pages.write(HERE / "_generated")
     api_pages.unwrap_compiled()
+    app.connect("env-before-read-docs", thumbnails.drawn_first)
+    app.connect("doctree-read", thumbnails.draw)
     app.connect("autodoc-process-docstring", api_pages.escape_bars, priority=100)
-    app.connect("build-finished", refuse_servers)
+    app.connect("build-finished", offline.carry_mathjax)
+    app.connect("build-finished", offline.refuse_servers)

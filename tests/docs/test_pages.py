@@ -10,14 +10,11 @@ import pytest
 import typer
 
 from gearmbs.cli import app
-from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.studies import load_case
 from gearmbs.studies.planetary import load_planetary
-from tests.docs.support import DOCS, FENCE, ROOT, blocks, links, notebooks, pages, run_blocks
+from tests.docs.support import DOCS, FENCE, ROOT, blocks, links, pages, run_blocks
 
 ALL = [ROOT / "README.md", *pages()]
-QUICK = ("own_dae.md", "own_mechanism.md", "measured.md", "adams.md", "adams_contact.md")
-WITH_EXAMPLES = [p for p in pages() if any(b.language == "python" for b in blocks(p))]
 
 
 def name_of(path) -> str:
@@ -70,10 +67,7 @@ def test_commands_exist_with_their_options(path):
                 assert {w for w in rest if w.startswith("--")} <= known, line
 
 
-def test_pages_are_of_one_kind():
-    """A page is a notebook or has plain examples, since the two are run in different ways; none has doctests."""
-    for path in notebooks():
-        assert not any(b.language == "python" for b in blocks(path)), path
+def test_no_page_has_doctests():
     assert not [p for p in ALL if ">>> " in p.read_text(encoding="utf-8")]
 
 
@@ -108,31 +102,18 @@ def test_readme_picture_is_small():
     assert (DOCS / "images" / "paper.png").stat().st_size < 200_000
 
 
-def _examples(path, folder):
-    cases = [block.code for block in blocks(path) if block.language == "toml"]
-    # the first is the one that the page works with
-    for code in reversed(cases):
-        (folder / "case.toml").write_text(code, encoding="utf-8")
-        if "[planetary]" in code:
-            load_planetary(folder / "case.toml").mechanism()
+@pytest.mark.parametrize("path", [p for p in ALL if any(b.language == "toml" for b in blocks(p))], ids=name_of)
+def test_case_files_of_pages_are_read(path, tmp_path):
+    for number, block in enumerate(b for b in blocks(path) if b.language == "toml"):
+        file = tmp_path / f"{number}.toml"
+        file.write_text(block.code, encoding="utf-8")
+        if "[planetary]" in block.code:
+            load_planetary(file).mechanism()
         else:
-            load_case(folder / "case.toml")
-    known = dict(INTEGRATORS)
-    try:
-        run_blocks(path, "python")
-    finally:
-        # what a page enters into the table is of the page
-        INTEGRATORS.clear()
-        INTEGRATORS.update(known)
+            load_case(file)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("path", [p for p in WITH_EXAMPLES if p.name in QUICK], ids=name_of)
-def test_quick_examples(path, in_folder):
-    _examples(path, in_folder)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("path", [p for p in WITH_EXAMPLES if p.name not in QUICK], ids=name_of)
-def test_examples(path, in_folder):
-    _examples(path, in_folder)
+def test_examples_of_pages_are_run_by_the_build():
+    """Each page with code of Python is a notebook, which the build of the documentation runs; an error in one ends it."""
+    assert not [name_of(p) for p in pages() if any(b.language == "python" for b in blocks(p))]
+    assert "nb_execution_raise_on_error = True" in (DOCS / "conf.py").read_text(encoding="utf-8")

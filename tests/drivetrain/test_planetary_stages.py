@@ -238,14 +238,18 @@ def planets_of(name, teeth, module, radius, **others):
     return PlanetaryStage(name=name, gears=stage_of, sun="", carrier="", ring="")
 
 
-def test_ratios_of_published_turbine_gearboxes():
+def published_turbine():
     # Nejad, Guo, Gao, Moan: Development of a 5 MW reference gearbox for offshore wind turbines. Wind Energy 19 (2016)
     one = planets_of("one", (19, 17, 56), 0.045, 0.863, face_width=0.491, profile_shifts=(0.617, 0.802, -0.501))
     two = planets_of("two", (18, 36, 93), 0.021, 0.584, face_width=0.550, profile_shifts=(0.389, 0.504, 0.117))
     wheels = {"face_width": 0.36, "helix_angle": "10 deg", "bore_radius": 0.01}
     fast = (GearSpec(95, 0.014, profile_shift=0.669, hand="right", **wheels),
             GearSpec(24, 0.014, profile_shift=0.480, hand="left", **wheels))  # fmt: skip
-    train = turbine(one, two, fast)
+    return turbine(one, two, fast)
+
+
+def test_ratios_of_published_turbine_gearboxes():
+    train = published_turbine()
     table = train.kinematics
     assert abs(table.ratio("high", "rotor")) == pytest.approx(96.354, abs=5e-4)
     rotor = 12.1 / 60.0

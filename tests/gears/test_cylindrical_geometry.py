@@ -67,12 +67,17 @@ def test_fouling_of_a_large_ring():
     assert (free, needed) == pytest.approx((0.25355, 0.24671), abs=1e-5)
 
 
-def test_helical_example_of_the_standard():
+def helical_example():
     one = GearSpec(
         17, "8 mm", profile_shift=0.145, face_width=0.1, helix_angle="15.8 deg", dedendum=(1.4 - 0.145) * 8e-3
     )
     two = GearSpec(103, "8 mm", hand="left", face_width=0.1, helix_angle="15.8 deg", dedendum=1.4 * 8e-3)
-    pair = at_distance(one, two, 0.5)
+    return at_distance(one, two, 0.5)
+
+
+def test_helical_example_of_the_standard():
+    pair = helical_example()
+    one, two = pair.driver, pair.driven
     assert math.degrees(one.transverse_pressure_angle) == pytest.approx(20.7197, abs=1e-4)
     assert math.degrees(one.base_helix_angle) == pytest.approx(14.8245, abs=1e-4)
     assert math.degrees(pair.working_pressure_angle) == pytest.approx(21.0661, abs=1e-4)
