@@ -15,7 +15,7 @@ MATHJAX = (
     "sre/mathmaps/base.json",
     "sre/mathmaps/en.json",
 )
-"""Of MathJax: the reader of TeX with its output as text and its fonts, and what reads formulas aloud in English; 3 of 24 MB."""
+"""Of MathJax: the reader of TeX, output as text with its fonts, and what reads formulas aloud; 3 of 24 MB."""
 
 
 def carry_mathjax(app, failed) -> None:

@@ -1,7 +1,7 @@
 """Pictures of the front page and of the gallery: each the figure of a page that this build executes, made small.
 
-Pages with a card on another page are read first, so that the figure is there when the card is. The figure is the first of the cell
-with the tag ``card``, otherwise the first of the page.
+Pages with a card on another page are read first, so that the figure is there when the card is. The figure is the
+first of the cell with the tag ``card``, otherwise the first of the page.
 """
 
 from __future__ import annotations

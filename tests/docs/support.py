@@ -29,11 +29,6 @@ def pages() -> list[Path]:
     return sorted(p for p in DOCS.rglob("*.md") if not {"_build", "_generated"} & set(p.parts))
 
 
-def notebooks() -> list[Path]:
-    """Return the pages that are executed as notebooks."""
-    return [p for p in pages() if p.read_text(encoding="utf-8").startswith("---\nfile_format: mystnb")]
-
-
 def blocks(path: Path) -> Iterator[Block]:
     """Yield the fenced blocks of a page."""
     text = path.read_text(encoding="utf-8")

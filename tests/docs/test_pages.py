@@ -114,6 +114,6 @@ def test_case_files_of_pages_are_read(path, tmp_path):
 
 
 def test_examples_of_pages_are_run_by_the_build():
-    """Each page with code of Python is a notebook, which the build of the documentation runs; an error in one ends it."""
+    """Pages with code of Python are notebooks, which the build of the documentation runs; an error in one ends it."""
     assert not [name_of(p) for p in pages() if any(b.language == "python" for b in blocks(p))]
     assert "nb_execution_raise_on_error = True" in (DOCS / "conf.py").read_text(encoding="utf-8")

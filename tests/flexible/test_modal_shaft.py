@@ -272,8 +272,8 @@ def test_stiffening_by_spin_holds_against_a_rigid_turn_what_the_mass_weighs(case
 
 
 BLADE = [(3, 4.7973, 23.3203), (6, 7.3604, 26.8091), (12, 13.1702, 37.6031)]
-"""Wright, Smith, Thresher and Wang (1982): speed and flapwise frequencies of a uniform blade clamped at the axis, in units
-of sqrt(EI/m)/L^2."""
+"""Wright, Smith, Thresher and Wang (1982): speed and flapwise frequencies of a uniform blade clamped at the axis, in
+units of sqrt(EI/m)/L^2."""
 
 
 def blade_frequencies(spin):
