@@ -84,6 +84,7 @@ html_theme = "furo"
 html_title = f"gearmbs {release}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_copy_source = False
 html_split_index = True
 short = [f"sidebar/{part}.html" for part in ("brand", "search", "scroll-start", "ideas", "scroll-end")]
@@ -98,8 +99,10 @@ def setup(app) -> None:
     """Write the API pages and let autodoc see through compiled functions and docstrings' vertical bars."""
     api_pages.write(HERE / "_generated")
     api_pages.unwrap_compiled()
+    app.connect("html-page-context", offline.level_headings, priority=900)
     app.connect("env-before-read-docs", thumbnails.drawn_first)
     app.connect("doctree-read", thumbnails.draw)
     app.connect("autodoc-process-docstring", api_pages.escape_bars, priority=100)
     app.connect("build-finished", offline.carry_mathjax)
+    app.connect("build-finished", offline.lighten_sources)
     app.connect("build-finished", offline.refuse_servers)

@@ -32,6 +32,24 @@ def carry_mathjax(app, failed) -> None:
             shutil.copyfile(source / part, target / part)
 
 
+UNSTYLED = re.compile(r'<span class="(?:n|p|w|o)">([^<]*)</span>')
+"""Names, punctuation, blanks and operators of a source: the style gives them no colour worth their marks."""
+
+
+def lighten_sources(app, failed) -> None:
+    """Take the marks of uncoloured words from the pages of sources, half of what they hold."""
+    for page in () if failed else Path(app.outdir, "_modules").rglob("*.html"):
+        page.write_text(UNSTYLED.sub(r"\1", page.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def level_headings(*given) -> None:
+    """Give the captions of the sidebar, which the theme makes headings, the level that screen readers ask for."""
+    context = given[3]
+    tree = context.get("furo_navigation_tree")
+    if tree:
+        context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+
+
 def refuse_servers(app, failed) -> None:
     """Raise an error if a page needs a script from a server: the site is to be read without a network."""
     for page in () if failed else Path(app.outdir).rglob("*.html"):
