@@ -206,6 +206,7 @@ def overview() -> pd.DataFrame:
             continue
         apart = [abs((ours - theirs) / (theirs or 1.0)) for _, theirs, ours in source.rows()]
         spread = (len(apart), f"{np.median(apart):.1e}", f"{max(apart):.1e}")
-        rows.append((source.who, source.what, source.year, source.where, *spread))
-    columns = ["source", "what", "year", "where", "numbers", "middle difference", "largest"]
+        rows.append((source.who, source.what, source.year, *spread, source.where))
+    columns = ["source", "what", "year", "numbers", "middle difference", "largest", "where"]
+    pd.set_option("display.max_colwidth", None)
     return pd.DataFrame(rows, columns=columns).set_index("source")
