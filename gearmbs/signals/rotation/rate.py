@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import xarray as xr
 
 from gearmbs.signals.signal.signal import rate_of
 
-MIXED = (44.1 / 48.0, 48.0 / 44.1, 48.0 / 51.2, 51.2 / 48.0, 50.0 / 51.2, 51.2 / 50.0, 0.5, 2.0, 0.25, 4.0, 0.1, 10.0)
+MULTIPLES = (0.5, 2.0, 0.25, 4.0, 0.1, 10.0)
+MIXED = (44.1 / 48.0, 48.0 / 44.1, 48.0 / 51.2, 51.2 / 48.0, 50.0 / 51.2, 51.2 / 50.0, *MULTIPLES)
 """Told rates by true ones: of sound cards, of vibration and of plain numbers, of channels that were decimated."""
+CLOCKS = (44100.0, 48000.0, 50000.0, 51200.0)
+"""Hz, of converters; other usual rates are these halved or doubled a few times."""
+EXACT = 1e-6
+"""Octaves by which a rate may be off these: headers round to so many digits."""
 ALIKE = 0.01
 """Share by which a ratio may be off, as told speeds are; two of these are 2 % apart at least."""
 
@@ -25,4 +32,7 @@ def other_rate(signal: xr.DataArray, ratio: float) -> str:
     if abs(ratio / near - 1.0) > ALIKE:
         return ""
     rate = rate_of(signal)
+    octaves = [math.log2(rate / near / clock) for clock in CLOCKS]
+    if near not in MULTIPLES and min(abs(octave - round(octave)) for octave in octaves) > EXACT:
+        return ""
     return f" A sampling rate of {rate / near:.6g} Hz, told as {rate:g} Hz, would make it so, too: look it up (--rate)."
