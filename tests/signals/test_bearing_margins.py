@@ -112,10 +112,8 @@ def test_a_wrong_speed_acquits_no_cage(share):
     assert "CHECK THE SPEED" not in diagnose_bearing(cage, "6205", rpm(share)).verdict
 
 
-@pytest.mark.parametrize(("part", "factor"), [
-    *((part, factor) for part in ("outer race", "inner race", "rolling element") for factor in (2.0, 0.5, 4.0, 0.25)),
-    ("outer race", 44.1 / 48.0), ("inner race", 48.0 / 44.1),
-])  # fmt: skip
+@pytest.mark.parametrize("factor", [2.0, 0.5, 4.0, 0.25])
+@pytest.mark.parametrize("part", ["outer race", "inner race", "rolling element"])
 @pytest.mark.parametrize("running", [RUNNING, 0.0 * RUNNING], ids=["orders", "quiet"])
 def test_a_wrong_sampling_rate_acquits_nobody(part, factor, running):
     """Where another rate is told all lines stand elsewhere, those of the shaft and of the mesh, too."""

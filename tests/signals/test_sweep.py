@@ -47,6 +47,14 @@ def test_a_run_up_with_one_speed_is_told(teeth):
     assert not any("move" in note for note in (*steady, *followed))
 
 
+@pytest.mark.parametrize("share", [1.0, 1.02, 0.9, 2.0])
+def test_a_run_up_whose_mesh_is_elsewhere_is_told(share):
+    curve = [(0.0, f"{900 * share} rpm"), (SECONDS, f"{2400 * share} rpm")]
+    report = analyse(record(900 + 1500 * PART), 29, speed=curve)
+    assert any(note.startswith("CHECK THE SPEED") for note in report.notes) == (share != 1.0)
+    assert (report.harmonics["orders"].values[0, 0] > 0.69) == (share == 1.0)
+
+
 def test_a_run_up_with_one_speed_acquits_no_bearing():
     doubted = diagnose_bearing(record(900 + 1500 * PART), "6205", "1650 rpm")
     assert doubted.verdict.startswith("No part of bearing 6205 is named for certain")

@@ -31,7 +31,7 @@ from gearmbs.signals.errors import SignalError
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.optical import instrument_faults
 from gearmbs.signals.rotation.angular import angular_resample, samples_per_revolution, time_synchronous_average
-from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, mesh_shaft
+from gearmbs.signals.rotation.shaft import Known, Shaft, compare_with_mesh, known_shaft, mesh_shaft
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
 from gearmbs.signals.signal.labels import measured
@@ -264,6 +264,8 @@ def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOpti
         by_orders = sidebands.sel(sideband=0).values
     followed = _in_angle(signal, shaft, counts[0], harmonics, notes)
     source, scale = (signal, 1.0) if followed is None else (followed, shaft.speed / math.tau)
+    if followed is not None:
+        compare_with_mesh(make_signal(followed.values, scale * rate_of(followed)), counts, shaft, notes)
     bands = _band_levels(source, gmf / scale, harmonics, options.half_width, tell)
     tell("lines")
     spectral = line_spectrum(source) if followed is None else spectrum(source, scaling="rms", segment=float(LINE_TURNS))

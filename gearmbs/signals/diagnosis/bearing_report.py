@@ -117,7 +117,7 @@ WORDS = {
 SHOWN = 4
 NOT_CERTAIN = ("uncertain", "shifted", "smooth")
 """Grades of lines that accuse no part and acquit none."""
-MOST_OFF = 0.07
+MOST_OFF = 0.1
 """Share beyond which no speed is off by slip or load: a told one is looked for within 6.5 %."""
 ENOUGH_TURNS = 60
 """Turns below which an acquittal says that it is of a short record: blows that four of four records of 40 turns show

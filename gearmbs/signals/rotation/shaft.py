@@ -293,7 +293,7 @@ def mesh_shaft(
         shaft = found
         notes += shaft.phase.attrs.get("notes", ())
         if shaft.range is None:
-            _compare(signal, teeth, shaft, notes)
+            compare_with_mesh(signal, teeth, shaft, notes)
     else:
         estimate = followed_comb(signal, teeth, known.speed_range)
         if estimate.doubt:
@@ -308,8 +308,11 @@ def mesh_shaft(
     return shaft, signal
 
 
-def _compare(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, notes: list[str]) -> None:
-    """Say so where the mesh line contradicts a nearly steady speed from a channel, a tacho or an angle."""
+def compare_with_mesh(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, notes: list[str]) -> None:
+    """Say so where the mesh line contradicts a speed from a channel, a tacho, a curve or an angle.
+
+    Where the speed varies the signal is that over the angle, sampled as at the mean speed.
+    """
     found = _estimate(signal, counts, (shaft.speed * (1.0 - SPEED_TOLERANCE), shaft.speed * (1.0 + SPEED_TOLERANCE)))
     hint = " Or the tacho has another number of pulses a turn (pulses_per_rev=, --pulses)." if shaft.tacho else None
     if _remark_other(signal, counts, shaft.speed, found, notes, hint):
@@ -320,10 +323,12 @@ def _compare(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, notes:
     elif found is not None and found.phase is not None:
         off = found.speed / shaft.speed - 1.0
         if abs(off) * gmf > LINES_OFF * found.resolution:
+            alone = "" if shaft.range else f", or give speed='{found.speed * 30 / math.pi:.2f} rpm' alone"
+            mean = "on average " if shaft.range else ""
             notes.append(
-                f"CHECK THE SPEED: the mesh line is at {found.speed * 30 / math.pi:.2f} rpm, {100 * off:+.2f} % off "
-                f"the {shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}, by which orders and averages are taken. "
-                f"Calibrate it, or give speed='{found.speed * 30 / math.pi:.2f} rpm' alone."
+                f"CHECK THE SPEED: the mesh line is {mean}at {found.speed * 30 / math.pi:.2f} rpm, {100 * off:+.2f} % "
+                f"off the {shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}, by which orders and averages are taken. "
+                f"Calibrate it{alone}."
             )
 
 
