@@ -132,6 +132,7 @@ def test_what_turns_a_point_mass_is_refused_at_its_line(given, message):
     [
         ("", False),
         ("MARKER/31, PART=3\nREQUEST/1, D, I=31, J=1\nGRAPHICS/1, ELLIPSOID, CM=31, XS=1, YS=1, ZS=1\n", False),
+        ("MARKER/31, PART=3\nGCON/1, I=20, FUNCTION=DX(20)-DX(31)\n", True),
         ("MARKER/31, PART=3\nSFORCE/2, TRANSLATIONAL, I=31, J=20, FUNCTION=1\n", True),
     ],
 )

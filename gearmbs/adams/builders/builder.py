@@ -5,6 +5,7 @@ The mechanism keeps the deck's units in its expressions (``Mechanism.units``); i
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace as replaced
@@ -272,10 +273,11 @@ class Builder:
     def _acted_on(self) -> set[tuple[str, int | None]]:
         """What the markers are on that forces, constraints, curves and solids that touch name."""
         touching = {ref for s in self.deck.of(st.Contact).values() for ref in (*s.igeom, *s.jgeom)}
-        passive = (st.Marker, st.Request, st.Part, st.Graphics)
-        acting = [s for kind, group in self.deck.items.items() if kind not in passive for s in group.values()]
+        acting = [s for kind, group in self.deck.items.items() if kind.switch == "acts" for s in group.values()]
         acting += [s for s in self.deck.of(st.Graphics).values() if s.id in touching]
         refs = {getattr(s, name, None) for s in acting for name in MARKER_FIELDS}
+        # a general constraint holds what its function names
+        refs |= {int(n) for s in self.deck.of(st.Gcon).values() for n in re.findall(r"\d{1,18}", s.function or "")}
         return {marker.owner() for marker in self.deck.of(st.Marker).values() if marker.id in refs}
 
     def add_point_mass(self, s: st.PointMass) -> None:

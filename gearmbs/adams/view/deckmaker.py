@@ -14,7 +14,7 @@ from gearmbs.adams.parse.grammar import RawStatement
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import DEGREE, JOINTS, PARTS, Item
-from gearmbs.adams.view.values import Values, is_ground
+from gearmbs.adams.view.values import ORIENTATIONS, Values, is_ground
 from gearmbs.adams.view.vocabulary import ROWS
 from gearmbs.adams.write.text import listed, number, wrapped
 from gearmbs.solids.bodies import Body
@@ -293,14 +293,28 @@ class Deckmaker:
         parts = [self.values.ref(item, f"{side}_part_name", PARTS) for side in "ij"]
         if parts[0] is None or parts[1] is None:
             raise ViewError("give i_marker_name and j_marker_name, or two parts and a location", item.line)
-        frame = item.fields.get("location")
-        a = frames.rotation(
-            [x * self.radian for x in self.values.numbers(item, "orientation", 3) or [0.0] * 3], self.db.sequence
-        )
-        r = np.array(self.values.numbers(item, "location", 3) or [0.0] * 3)
-        relative = self.values.ref(item, "relative_to") or (frame.frame if frame is not None else None)
+        placed = [item.fields[key] for key in ("location", *ORIENTATIONS) if key in item.fields]
+        relative = self.values.ref(item, "relative_to") or next((one.frame for one in placed), None)
         b, s = self.values.pose(relative)
-        found = [self.new_marker(item, part, b @ a, b @ r + s) for part in parts if part is not None]
+        r = b @ np.array(self.values.numbers(item, "location", 3, relative) or [0.0] * 3) + s
+        angles = self.values.numbers(item, "orientation", 3, relative) or [0.0] * 3
+        turned = item.fields.get("orientation")
+        # functions of orientations give 313 angles whatever the setting is
+        sequence = (
+            turned.sequence if turned is not None and not (turned.live and len(turned.values) == 1) else "body313"
+        )
+        a = b @ frames.rotation([x * self.radian for x in angles], sequence)
+        for key, count in (("along_axis_orientation", 2), ("in_plane_orientation", 3)):
+            given = self.values.numbers(item, key, frame=relative)
+            if given is None:
+                continue
+            points = [b @ np.array(given[k : k + 3]) + s for k in range(0, len(given), 3)]
+            if len(points) < count:
+                points.insert(0, r)
+            if len(points) != count or len(given) % 3:
+                raise ViewError(f"{key}: these are no points of three coordinates", item.line)
+            a = frames.directed(key, points, self.db.axis)
+        found = [self.new_marker(item, part, a, r) for part in parts if part is not None]
         return f"I = {found[0]}", f"J = {found[1]}"
 
     def run(self, makers: dict[str, Callable[[Deckmaker, Item], None]], kinds: Iterable[str]) -> None:

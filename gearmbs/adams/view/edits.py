@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,8 @@ class Editor:
             self._ground(item, fields, line)
         if item.kind in PLACED and item.kind != "model":
             self._place(item, fields)
+        else:
+            self._note_frame(item, fields)
         item.fields.update(fields)
         if item.kind == "csg":
             # what a solid is made of belongs to it from now on
@@ -245,6 +248,18 @@ class Editor:
                     a = values.pose(home)[0].T @ values.pose(frame)[0] @ a
                 fields[key] = Stored((("value", a),), stored.line)
 
+    def _note_frame(self, item: Item, fields: dict[str, Stored]) -> None:
+        """Keep with the places of what has no frame itself how they are meant: by the defaults of the moment."""
+        for key in ("location", *ORIENTATIONS):
+            if key not in fields:
+                continue
+            stored = replace(fields[key], frame=self.database.frame, sequence=self.database.sequence)
+            if key == "location" and self.database.coordinates != "car" and not stored.live:
+                given = self._triple(stored, f"the location of {item.path}")
+                point = frames.COORDINATES[self.database.coordinates](given, self.database.units.radian)
+                stored = replace(stored, values=fixed(*(float(x) for x in point)).values)
+            fields[key] = stored
+
     def _triple(self, stored: Stored, what: str) -> list[float]:
         found = self._now(stored)
         if len(found) != 3 or not all(isinstance(x, (int, float)) for x in found):
@@ -259,16 +274,12 @@ class Editor:
         if not all(isinstance(x, (int, float)) for x in found) or len(found) not in (3, 6, 9):
             raise ViewError(f"{key} of {item.path}: these are no points of three coordinates", stored.line)
         home = values.home(item)
-        points = [values.brought(np.array(found[k : k + 3], float), frame, home) for k in range(0, len(found), 3)]
+        points = [values.brought(np.array(found[k : k + 3], float), frame, None) for k in range(0, len(found), 3)]
         if len(points) < (2 if key == "along_axis_orientation" else 3):
             start = fields.get("location", item.fields.get("location"))
-            points.insert(0, np.array(self._triple(start, "location")) if start is not None else frames.ORIGIN)
-        first, plane = self.database.axis[0], self.database.axis.split("_")[-2]
-        if key == "along_axis_orientation":
-            a = frames.along(first, points[1] - points[0])
-        else:
-            second = plane.replace(first, "", 1)
-            a = frames.in_plane(first, second[:1] or "x", points[1] - points[0], points[2] - points[0])
+            at = np.array(self._triple(start, "location")) if start is not None else frames.ORIGIN
+            points.insert(0, values.brought(at, home, None))
+        a = values.pose(home)[0].T @ frames.directed(key, points, self.database.axis)
         return Stored((("value", a),), stored.line)
 
     # Variables, settings, files and macros.

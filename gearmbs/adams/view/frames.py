@@ -124,6 +124,20 @@ def in_plane(first: str, second: str, direction: np.ndarray, towards: np.ndarray
     return a
 
 
+def directed(key: str, points: list[np.ndarray], axis: str) -> np.ndarray:
+    """Return the axes that points in the global frame give: along_axis_orientation two, in_plane_orientation three.
+
+    Parameters
+    ----------
+    axis : str
+        Which axis is along the first two, and which plane the third is in, such as z_axis_xz_plane.
+    """
+    first, plane = axis[0], axis.split("_")[-2]
+    if key == "along_axis_orientation":
+        return along(first, points[1] - points[0])
+    return in_plane(first, plane.replace(first, "", 1)[:1] or "x", points[1] - points[0], points[2] - points[0])
+
+
 def _cylindrical(c: list[float], radian: float) -> np.ndarray:
     return np.array([c[0] * math.cos(c[1] * radian), c[0] * math.sin(c[1] * radian), c[2]])
 

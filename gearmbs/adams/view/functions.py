@@ -364,6 +364,21 @@ def _mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) 
     return _given(values, point - 2.0 * ((point - r) @ normal) * normal, frame)
 
 
+def _plane_normal(ev: Evaluator, value: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return a point of a plane through three points, and its normal."""
+    numbers = ev.numbers(value)
+    if len(numbers) != 9:
+        raise ev.error("a plane: give three points of three coordinates")
+    p, q, r = np.array(numbers).reshape(3, 3)
+    return p, frames.unit(np.cross(q - p, r - p), "the plane")
+
+
+def _plane_mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
+    point = _point(values, ev, args[0])
+    at, normal = _plane_normal(ev, args[1])
+    return _given(values, point - 2.0 * ((point - at) @ normal) * normal, frame)
+
+
 def _inline(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     # coordinates in one frame as the direction in another
     a, r = _pose(values, ev, args[1])
@@ -438,8 +453,19 @@ def _ori_align(values: Values, ev: Evaluator, args: list[Any], frame: Item | Non
 def _ori_mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
     a = _pose(values, ev, args[1])[0]
     normal = a[:, 3 - sum("xyz".index(c) for c in _axis(ev, args[2], "xy yx yz zy xz zx"))]
-    axes = _axis(ev, args[3], "xy yx yz zy xz zx")
-    reflected = _rotation(values, ev, args[0])
+    return _reflected(values, ev, (args[0], args[3]), normal, frame)
+
+
+def _ori_plane_mirror(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> list[float]:
+    return _reflected(values, ev, (args[0], args[2]), _plane_normal(ev, args[1])[1], frame)
+
+
+def _reflected(
+    values: Values, ev: Evaluator, given: tuple[Any, Any], normal: np.ndarray, frame: Item | None
+) -> list[float]:
+    """Return an orientation whose two axes are the mirrored ones of another; the third is as they want it."""
+    axes = _axis(ev, given[1], "xy yx yz zy xz zx")
+    reflected = _rotation(values, ev, given[0])
     reflected = reflected - 2.0 * np.outer(normal, normal @ reflected)
     i, j = ("xyz".index(c) for c in axes)
     return _turned(values, frames.in_plane(axes[0], axes[1], reflected[:, i], reflected[:, j]), frame)
@@ -533,6 +559,7 @@ FUNCTIONS |= {
     "LOC_ON_AXIS": Function(3, 3, _on_axis, placing=True),
     "LOC_MIRROR": Function(3, 3, _mirror, placing=True),
     "LOC_FRAME_MIRROR": Function(3, 3, _mirror, placing=True),
+    "LOC_PLANE_MIRROR": Function(2, 2, _plane_mirror, placing=True),
     "LOC_INLINE": Function(3, 3, _inline, placing=True),
     "LOC_CYLINDRICAL": Function(3, 3, _cylindrical),
     "LOC_SPHERICAL": Function(3, 3, _spherical),
@@ -548,5 +575,6 @@ FUNCTIONS |= {
     "ORI_ALIGN_AXIS_EUL": Function(2, 2, _ori_align, placing=True),
     "ORI_MIRROR": Function(4, 4, _ori_mirror, placing=True),
     "ORI_FRAME_MIRROR": Function(4, 4, _ori_mirror, placing=True),
+    "ORI_PLANE_MIRROR": Function(3, 3, _ori_plane_mirror, placing=True),
     "DM": Function(2, 2, _distance, placing=True),
 }

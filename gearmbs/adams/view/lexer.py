@@ -19,6 +19,7 @@ LONGEST = 2_000_000
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NAMED = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\s*=(?!=)")
 _LINES = re.compile(r"\r\n|\r|\n")
+_EXTENDED = re.compile(r"""\.\\?"([A-Za-z0-9][\w $#()+-]*)\\?"(?=[.\s,)&"'\]]|\Z)""")
 _CLOSING = {"(": ")", "{": "}", "[": "]"}
 
 
@@ -57,6 +58,11 @@ class Command:
     words: tuple[str, ...]
     arguments: tuple[tuple[str, tuple[Value, ...]], ...]
     line: int
+
+
+def plain_name(name: str) -> str:
+    """Return the name of an object with ``_`` for what stands in quotes in names: blanks and signs."""
+    return re.sub(r"[^\w.$*|]", "_", name.replace('"', "").strip())
 
 
 def split_line(line: str, depth: int, quote: str) -> tuple[str, bool, int, str]:
@@ -122,7 +128,11 @@ def logical_lines(text: str) -> Iterator[tuple[str, tuple[int, ...], tuple[int, 
 
 
 def commands(text: str) -> Iterator[Command | ViewError]:
-    """Yield the commands of a file in their order; one that has no form as an error with its line."""
+    """Yield the commands of a file in their order; one that has no form as an error with its line.
+
+    Names with parts in quotes, ``."my model"."part 1"``, are made plain ones.
+    """
+    text = _EXTENDED.sub(lambda match: f".{plain_name(match.group(1))}", text)
     for body, starts, numbers in logical_lines(text):
         try:
             yield _Reader(body, starts, numbers).command()

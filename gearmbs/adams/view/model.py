@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gearmbs.adams.parse.deck import FORCE, LENGTH, MASS, TIME
-from gearmbs.adams.view.lexer import ViewError
+from gearmbs.adams.view.lexer import ViewError, plain_name
 
 DEGREE = math.pi / 180.0
 ANGLE = {"DEGREES": DEGREE, "RADIANS": 1.0}
@@ -254,7 +254,7 @@ class Database:
         A partial name is the end of a full one; objects of the current part come first, then those of the current
         model.
         """
-        key = name.lower()
+        key = (plain_name(name) if " " in name else name).lower()
         if key.startswith("."):
             return self.items.get(key) or self._of_set(key)
         for owner in (self.part, self.model):
@@ -291,6 +291,7 @@ class Database:
         ViewError
             If nothing says to which model or part it belongs.
         """
+        name = plain_name(name) if " " in name else name
         if name.startswith("."):
             return name
         if kind == "model":

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.deckmaker import JOINTS, PART_KEYWORDS, PRIMITIVES, Deckmaker, place, translated
 from gearmbs.adams.view.lexer import ViewError
@@ -88,6 +90,8 @@ def make_marker(m: Deckmaker, item: Item) -> None:
         item.used |= {"location"}
         m.add(item, f"MARKER/{m.id(item)}", owner, node, place(m.values.orientation(item), frames.ORIGIN)[1])
         return
+    if "orientation" not in item.fields and not np.allclose(m.values.pose(part)[0], frames.IDENTITY, atol=1e-12):
+        m.remark(item, "no orientation is given: it has the axes of its part, which are turned")
     at = m.centres.get(id(item))
     where = m.values.location(item)
     m.add(item, f"MARKER/{m.id(item)}", owner, *place(m.values.orientation(item), where if at is None else at))

@@ -171,6 +171,8 @@ class Values:
             return item.name
         if item.kind in PLACED and len(word) > 2 and "location".startswith(word):
             return [float(x) for x in self.location(item)]
+        if item.kind in PLACED and word in ("loc_x", "loc_y", "loc_z"):
+            return float(self.location(item)["xyz".index(word[-1])])
         if item.kind in PLACED and len(word) > 2 and "orientation".startswith(word):
             return [x / self.db.units.radian for x in frames.angles_313(self.orientation(item))]
         if word == "adams_id" and word not in item.fields:
@@ -247,8 +249,8 @@ class Values:
         finally:
             self.busy.discard(mark)
 
-    def numbers(self, item: Item, key: str, count: int | None = None) -> list[float] | None:
-        """Return an argument as numbers, None where it was not given.
+    def numbers(self, item: Item, key: str, count: int | None = None, frame: Item | None = None) -> list[float] | None:
+        """Return an argument as numbers, places among them in a frame, None where it was not given.
 
         Raises
         ------
@@ -259,7 +261,7 @@ class Values:
             return None
         line = item.fields[key].line
         found: list[float] = []
-        for value in self.values(item, key):
+        for value in self.values(item, key, frame):
             if isinstance(value, str):
                 named = self.db.find(value)
                 if named is None or named.kind != "variable":

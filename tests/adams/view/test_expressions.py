@@ -88,6 +88,10 @@ def evaluated(values, text, frame=None):
         ("ORI_ALIGN_AXIS_EUL({8, 10, 0}, 'z-z')", [-172.0, 170.0, 90.0]),
         ("ORI_FRAME_MIRROR({6, 14, 0}, .m.ground, 'xz', 'xz')", [174.0, 14.0, 180.0]),
         ("ORI_MIRROR({{10, 8, 0}}, .m.ground, 'xy', 'xy')", [-170.0, 8.0, 180.0]),
+        ("ORI_PLANE_MIRROR({0, 0, 0}, {{18, 6, 0}, {18, 12, 0}, {21, 6, 0}}, 'xy')", [0.0, 0.0, 0.0]),
+        ("ORI_PLANE_MIRROR({0, 0, 0}, {{18, 6, 0}, {18, 12, 0}, {21, 6, 0}}, 'xz')", [0.0, 180.0, 0.0]),
+        ("LOC_PLANE_MIRROR({2, 4, 5}, {{10, 12, 1}, {14, 12, 1}, {12, 10, 1}})", [2.0, 4.0, -3.0]),
+        (".m.P.C.loc_x + 10 * .m.P.A.loc_y", -10.0),
         ("LOC_SPHERICAL(10, 8d, 90d)", [10 * np.cos(np.radians(8)), 10 * np.sin(np.radians(8)), 0.0]),
     ],
 )

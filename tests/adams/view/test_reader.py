@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, parse_view, read_deck, read_view, run_deck
+from gearmbs.adams.builders.builder import marker_orientation
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.view.interpreter import Interpreter
 
@@ -364,3 +365,76 @@ def test_scales_of_couplers():
     found, missing = coupled("first_scale_factor = 2")
     assert not found
     assert re.search(says("second_scale_factor"), missing[0].message)
+
+
+@pytest.mark.parametrize(
+    ("turned", "given", "told"),
+    [("0, 0, 30", "", True), ("0, 0, 30", "orientation = 0, 0, 0", False), ("0, 0, 0", "", False)],
+)
+def test_axes_that_are_not_given_are_told_where_they_are_turned(turned, given, told):
+    text = PENDULUM + (
+        f"part create rigid_body name_and_position part_name = .swing.B location = 1, 0, 0 orientation = {turned}\n"
+        f"marker create marker_name = .swing.B.A location = 1, 2, 3 {given}\n"
+        f"marker create marker_name = .swing.B.cm location = 1, 2, 3 orientation = 0, 0, 0\n"
+        "part create rigid_body mass_properties part_name = .swing.B mass = 1 ixx = 1 iyy = 1 izz = 1\n"
+    )
+    remarks = [d.message for d in parse_view(text).deck.diagnostics if re.search(says("B.A", "orientation"), d.message)]
+    assert len(remarks) == told
+
+
+@pytest.mark.parametrize(
+    ("before", "given", "at", "axis"),
+    [
+        ("", "location = 1, 2, 3 orientation = 0, 90, 0", (1, 2, 3), (0, -1, 0)),
+        ("", "location = 1, 2, 3 along_axis_orientation = 2, 3, 3", (1, 2, 3), (1, 1, 0)),
+        ("", "location = 1, 2, 3 along_axis_orientation = 1, 0, 0, 0, 0, 1", (1, 2, 3), (-1, 0, 1)),
+        ("", "location = 0, 0, 0 in_plane_orientation = 0, 3, 0, 1, 0, 0", (0, 0, 0), (0, 1, 0)),
+        ("", "location = 1, 0, 0 orientation = 90, 90, 0 relative_to = .swing.B", (5, 1, 0), (0, 1, 0)),
+        (
+            "defaults coordinate_system default_coordinate_system = .swing.B\n",
+            "location = 1, 0, 0",
+            (5, 1, 0),
+            (0, 0, 1),
+        ),
+        ("defaults units coordinate_system_type = cylindrical\n", "location = 2, 90, 7", (0, 2, 7), (0, 0, 1)),
+        (
+            "defaults units orientation_type = body123\n",
+            "location = 0, 0, 0 orientation = 90, 0, 0",
+            (0, 0, 0),
+            (0, -1, 0),
+        ),
+        ("", "location = (LOC_RELATIVE_TO({1, 0, 0}, .swing.B)) relative_to = .swing.B", (5, 1, 0), (0, 0, 1)),
+    ],
+)
+def test_joints_of_two_parts_are_where_their_location_is(before, given, at, axis):
+    """A place is one of the frame that is named, or of the default one when the command is given."""
+    text = PENDULUM + (
+        "part create rigid_body name_and_position part_name = .swing.B location = 5, 0, 0 orientation = 90, 0, 0\n"
+        "marker create marker_name = .swing.B.cm location = 0, 0, 0 orientation = 0, 0, 0\n"
+        "part create rigid_body mass_properties part_name = .swing.B mass = 1 ixx = 1 iyy = 1 izz = 1\n"
+        f"{before}constraint create joint translational joint_name = .swing.SLIDE i_part_name = .swing.B &\n"
+        f"   j_part_name = .swing.ground {given}\n"
+    )
+    view = parse_view(text)
+    assert not view.deck.unsupported
+    marker = view.deck.of(st.Marker)[by_name(view, st.Joint, "SLIDE").j]
+    assert np.allclose(marker.qp, at, atol=1e-12)
+    assert np.allclose(marker_orientation(marker)[:, 2], np.array(axis) / np.linalg.norm(axis), atol=1e-12)
+
+
+def test_names_with_parts_in_quotes():
+    """Of files of version 2, in which names may have blanks; texts that only look alike stay."""
+    text = PENDULUM.replace(".swing", '."my swing"').replace("model_name = swing", 'model_name = "my swing"')
+    text = text.replace(".ROD", '."ROD-1 (a)"').replace(
+        'function = "DY(."my swing"."ROD-1 (a)".cm', 'function = "DY(.my_swing.ROD_1__a_.cm'
+    )
+    text += 'variable create variable_name = ."my swing".T string_value = "swings.", "so it is."\n'
+    text += 'output_control create request request_name = ."my swing".R f2 = "DX(.\\"my swing\\".\\"ROD-1 (a)\\".cm)"\n'
+    quoted, plain = parse_view(text), parse_view(PENDULUM)
+    assert quoted.name == "my_swing"
+    assert [len(quoted.deck.of(kind)) for kind in (st.Part, st.Marker, st.Joint, st.Variable)] == [
+        len(plain.deck.of(kind)) for kind in (st.Part, st.Marker, st.Joint, st.Variable)
+    ]
+    assert by_name(quoted, st.Marker, "cm").qp == by_name(plain, st.Marker, "cm").qp
+    cm = by_name(quoted, st.Marker, "cm").id
+    assert f"DX({cm})" in [one.f2 for one in quoted.deck.of(st.Request).values()]
