@@ -288,15 +288,17 @@ def linear(session: Session, command: Linear) -> Modes | LinearPlant:
         return made, made.mechanism.compile(time)
 
     try:
-        if command.statemat:
-            return plant_of(session, command, build)
-        model = _model(session, (session.time, session.time), MODES["LINEAR"])
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
-            modes = linear_modes(model.mechanism, t=time)
+            found: Modes | LinearPlant
+            if command.statemat:
+                found = plant_of(session, command, build)
+            else:
+                model = _model(session, (session.time, session.time), MODES["LINEAR"])
+                found = linear_modes(model.mechanism, t=time)
         for warning in warned:
             remark(session, Diagnostic(WARNING, f"LINEAR: {warning.message}", command.file, command.line))
-        return modes
+        return found
     except (ModelError, ArithmeticError) as error:
         raise failed(session, command, model, error) from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -243,4 +244,7 @@ def linear_plant(
     result = run_deck(adm, script, allow_unsupported=allow_unsupported, routines=routines)
     if not result.plants:
         raise DeckError([Diagnostic(ERROR, "; ".join(result.messages) or "the script ended before", "", 0)])
+    for message in result.messages:
+        if "LINEAR: " in message:
+            warnings.warn(message, stacklevel=2)
     return result.plants[-1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -211,3 +213,29 @@ def test_the_force_between_two_markers_is_that_of_their_joint_once():
     assert plant.D[:, 0] == pytest.approx([across, across], rel=1e-8)
     result = run_deck(parse_deck(hung), parse_script("a\nb\nsimulate/dynamics, end=0.5, steps=5\n"))
     assert result.request(1)[-1, 1:3] == pytest.approx(0.5 * MASS * 9.81, rel=1e-6)
+
+
+SPINNING = """top
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+PART/2, MASS=2, CM=20, IP=1,2,3, WX=1, WY=2, WZ=3
+MARKER/20, PART=2
+VARIABLE/1, FUNCTION=0
+VARIABLE/2, FUNCTION=WX(20)
+PINPUT/1, VARIABLES=1
+POUTPUT/1, VARIABLES=2
+JOINT/1, SPHERICAL, I=20, J=1
+SFORCE/1, ROTATIONAL, ACTIONONLY, I=20, J=1, FUNCTION=VARVAL(1)
+END
+"""
+
+
+def test_plants_whose_coefficients_vary_are_told(recwarn):
+    """As a remark of the script, and as a warning of the function."""
+    script = parse_script("a\nb\nLINEAR/STATEMAT, PINPUT=1, POUTPUT=1\n")
+    result = run_deck(parse_deck(SPINNING), script)
+    assert not recwarn
+    assert any(re.search(says("LINEAR", "PART_2"), message) for message in result.messages)
+    with pytest.warns(UserWarning, match=says("LINEAR", "PART_2")):
+        linear_plant(parse_deck(SPINNING))
