@@ -19,6 +19,9 @@ from gearmbs.units import Quantity, to_si
 
 
 Path_ = str | Path
+MOVING = ("SYSTEM", "INSTANCE")
+"""Keywords of Abaqus with a line that shifts or turns the nodes of others."""
+GIVE = "give a table of number, x, y, z in the axes of the matrices"
 
 
 def read_nodes(path: Path_) -> tuple[np.ndarray, np.ndarray]:
@@ -27,11 +30,11 @@ def read_nodes(path: Path_) -> tuple[np.ndarray, np.ndarray]:
     Raises
     ------
     FlexibleError
-        For rows that are no nodes, with their line.
+        For rows that are no nodes, and nodes in coordinates of their own, with their line.
     """
     numbers: list[int] = []
     rows: list[list[float]] = []
-    inside = True
+    inside, moving, keyword = True, False, ""
     lines = text_lines(Path(path))
     last = 0
     for count, line in enumerate(lines, 1):
@@ -39,8 +42,14 @@ def read_nodes(path: Path_) -> tuple[np.ndarray, np.ndarray]:
         if not text or text.startswith(("**", "#", "$")):
             continue
         if text.startswith("*"):
-            inside = text[1:].split(",")[0].strip().upper() == "NODE"
+            keyword, *options = (part.strip().upper().replace(" ", "") for part in text[1:].split(","))
+            inside, moving = keyword == "NODE", keyword in MOVING
+            skew = next((o for o in options if inside and o in ("SYSTEM=C", "SYSTEM=S")), "")
+            if skew:
+                raise FlexibleError(f"{Path(path).name}: line {count}: {skew}: its nodes are not rectangular; {GIVE}")
             continue
+        if moving:
+            raise FlexibleError(f"{Path(path).name}: line {count}: *{keyword} moves the nodes; {GIVE}")
         if not inside:
             continue
         parts = text.replace(",", " ").split()
@@ -102,7 +111,9 @@ def read_triplets(path: Path_, size: int | None = None) -> tuple[np.ndarray | No
             raise FlexibleError(f"{file.name}: row {n} of {size}; matrix and list of degrees of freedom do not fit")
         n = size or n
     matrix = sp.csc_array((table[:, -1], (i, j)), shape=(n, n))
-    if not (np.any(i < j) and np.any(i > j)):
+    # a program's triangle is that of its own order of the nodes, so that their numbers may lie on either side
+    apart = i != j
+    if not np.intersect1d(i[apart] * n + j[apart], j[apart] * n + i[apart]).size:
         matrix = sp.csc_array(matrix + matrix.T - sp.diags_array(matrix.diagonal()))
     return dofs, matrix
 
@@ -267,7 +278,15 @@ def read_abaqus(
     return FileUnits.of(length, force, mass_unit).model(k, m, positions, dofs, ids, label)
 
 
-def read_calculix(path: Path_, nodes: Path_, *, name: str | None = None) -> FiniteElementModel:
+def read_calculix(
+    path: Path_,
+    nodes: Path_,
+    *,
+    name: str | None = None,
+    length: Quantity = 1.0,
+    force: Quantity = 1.0,
+    mass_unit: Quantity = 1.0,
+) -> FiniteElementModel:
     """Return a model from the files that CalculiX writes with ``SOLVER=MATRIXSTORAGE``.
 
     Parameters
@@ -277,6 +296,9 @@ def read_calculix(path: Path_, nodes: Path_, *, name: str | None = None) -> Fini
         and ``.dof`` (node.direction).
     nodes : str or Path
         Input file with the nodes.
+    name : str, optional
+    length, force, mass_unit : float or str
+        The file's units: SI values, or names as ``"mm"``.
 
     Raises
     ------
@@ -303,7 +325,8 @@ def read_calculix(path: Path_, nodes: Path_, *, name: str | None = None) -> Fini
     stiffness, mass = (read_triplets(file, len(rows))[1] for file in files[:2])
     check_whole(files[0], stiffness, np.array(rows), "mass and no stiffness")
     check_whole(files[1], mass, np.array(rows), "stiffness and no mass")
-    return from_matrices(stiffness, mass, positions, ids=ids, dofs=np.array(rows), name=name or base.name)
+    units = FileUnits.of(length, force, mass_unit)
+    return units.model(stiffness, mass, positions, np.array(rows), ids, name or base.name)
 
 
 class FileUnits(NamedTuple):

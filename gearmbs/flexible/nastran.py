@@ -28,6 +28,8 @@ from gearmbs.units import Quantity
 ORDERS: tuple[Literal["little", "big"], ...] = ("little", "big")
 FIRST_RECORDS = {"OP4": (24, 48), "op2": (4, 8)}
 """Sizes in bytes that the first record of a binary file may have, by words of 4 and 8 bytes."""
+ON_AXIS = 1e-6
+"""Distance from a cylinder's or sphere's axis, against that from the origin, of points on it: words of 4 bytes."""
 PRINTED = bytes(range(32, 127)) + b"\t\r\n"
 """Bytes that a text file consists of."""
 
@@ -89,12 +91,13 @@ def axes_at(rows: np.ndarray) -> np.ndarray:
     if kind == 1:
         return axes
     local = axes.T @ (rows[0] - origin)
-    around = float(np.arctan2(local[1], local[0])) if np.hypot(local[0], local[1]) > 0.0 else 0.0
+    rounded = ON_AXIS * max(np.abs(rows[0]).max(), np.abs(origin).max())
+    around = float(np.arctan2(local[1], local[0])) if np.hypot(local[0], local[1]) > rounded else 0.0
     c, s = np.cos(around), np.sin(around)
     cylinder = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     if kind == 2:
         return axes @ cylinder
-    down = float(np.arctan2(np.hypot(local[0], local[1]), local[2]))
+    down = float(np.arctan2(np.hypot(local[0], local[1]), local[2])) if np.linalg.norm(local) > rounded else 0.0
     c, s = np.cos(down), np.sin(down)
     # r, theta, phi from the cylinder's r, phi, z
     sphere = np.array([[s, c, 0.0], [0.0, 0.0, 1.0], [c, -s, 0.0]])

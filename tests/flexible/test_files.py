@@ -244,6 +244,48 @@ def test_abaqus_and_calculix_matrices(tmp_path, both, pairs):
         (tmp_path / "a.dof").write_text("".join(f"{i // 3 + 1}.{i % 3 + 1}\n" for i in range(24)))
         found = reduce_model(read_calculix(stiff, nodes), [], modes=6, method="free")
         np.testing.assert_allclose(found.frequencies, expected, rtol=1e-12)
+        write_nodes(nodes, 1e3 * corners)
+        in_mm = read_calculix(stiff, nodes, length="mm", mass_unit="t")
+        np.testing.assert_allclose(in_mm.positions, corners)
+        np.testing.assert_allclose(in_mm.mass.toarray(), 1e3 * np.asarray(m), rtol=1e-12)
+
+
+def test_one_triangle_of_nodes_in_any_order(tmp_path):
+    corners, k, m = cube()
+    numbers = np.array([3, 8, 1, 6, 2, 7, 5, 4])
+    paths = [tmp_path / name for name in ("k.mtx", "m.mtx", "n.inp")]
+    for path, matrix in zip(paths, (k, m)):
+        coo = sp.coo_array(np.tril(matrix))
+        rows = ((numbers[i // 3], i % 3 + 1, numbers[j // 3], j % 3 + 1, v) for i, j, v in zip(*coo.coords, coo.data))
+        path.write_text("".join("{},{},{},{},{!r}\n".format(*row[:4], float(row[4])) for row in rows))
+    paths[2].write_text("*NODE\n" + "".join("{}, {}, {}, {}\n".format(n, *x) for n, x in zip(numbers, corners)))
+    found = reduce_model(read_abaqus(*paths), [], modes=6, method="free").frequencies
+    expected = reduce_model(from_matrices(k, m, corners), [], modes=6, method="free").frequencies
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("head", "word"),
+    [
+        ("*NODE, SYSTEM=C\n", "SYSTEM=C"),
+        ("*SYSTEM\n1,0,0,2,0,0\n*NODE\n", "SYSTEM"),
+        ("*Instance, name=a, part=b\n1,0,0\n*NODE\n", "INSTANCE"),
+        ("*NODE, SYSTEM=R\n", None),
+        ("*Instance, name=a, part=b\n*NODE, NSET=all\n", None),
+    ],
+)
+def test_nodes_in_coordinates_of_their_own(tmp_path, head, word):
+    corners, k, m = cube()
+    paths = [tmp_path / name for name in ("k.mtx", "m.mtx", "n.inp")]
+    write_triplets(paths[0], k)
+    write_triplets(paths[1], m)
+    write_nodes(paths[2], corners)
+    paths[2].write_text(head + paths[2].read_text().split("\n", 1)[1])
+    if word is None:
+        np.testing.assert_allclose(read_abaqus(*paths).positions, corners)
+    else:
+        with pytest.raises(FlexibleError, match=says(word, "give", "line")):
+            read_abaqus(*paths)
 
 
 def millimetres(tmp_path):

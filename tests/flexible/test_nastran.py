@@ -20,7 +20,7 @@ from gearmbs.flexible import (
     read_op4,
     reduce_model,
 )
-from gearmbs.flexible.nastran import op2_tables
+from gearmbs.flexible.nastran import axes_at, op2_tables
 from tests.flexible.op2_files import Op2Writer
 from tests.generators import cases, seed
 from tests.says import says
@@ -440,3 +440,17 @@ def test_public_files():
     # of grid point 5 in mode 2, by pyNastran 1.4.1, the mean of two elements
     row = int(np.flatnonzero((stresses.positions == [1.0, 1.0, 1.0]).all(axis=1))[0])
     np.testing.assert_allclose(stresses.values[1, row], STRESS_OF_5, rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [2, 3])
+def test_points_on_the_axis_of_a_tilted_system_have_its_axes(kind):
+    c, s = np.cos(0.7), np.sin(0.7)
+    axes, origin = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]), np.array([1.1, 0.3, -0.2])
+    usual = axes if kind == 2 else axes[:, [2, 0, 1]]
+    for along in (0.1, 0.3, 0.7, 1.3):
+        # in words of 4 bytes, too, such points are beside the axis by rounding
+        for place in (origin + along * axes[:, 2], np.float32(origin + along * axes[:, 2]).astype(float)):
+            found = axes_at(np.vstack([place, [0.0, kind, 0.0], origin, axes]))
+            np.testing.assert_allclose(found, usual, atol=1e-5)
+    beside = axes_at(np.vstack([origin + axes @ [0.0, 1e-3, 0.3], [0.0, 2.0, 0.0], origin, axes]))
+    np.testing.assert_allclose(beside, axes[:, [1, 0, 2]] * [1.0, -1.0, 1.0], atol=1e-9)
