@@ -458,3 +458,74 @@ def test_what_is_set_acts_from_the_next_advance_on(lump):
     assert (sim.get("input", "u"), all_of(sim.get)) == (20.0, pytest.approx([20.0, 40.0, 60.0]))
     led, made = model().simulate(0.5, rate=2.0, inputs={"u": 10.0}), model(10.0).simulate(0.5, rate=2.0)
     np.testing.assert_allclose(over(led), over(made), atol=1e-9)
+
+
+def driven_wheels():
+    """A wheel whose speed is an input, one geared to it, and a pendulum on this one."""
+    m = gm.Mechanism("wheels")
+    one, two, third = (
+        m.body(name, mass=1.0, inertia=(k,) * 3) for name, k in (("one", 1.0), ("two", 2.0), ("arm", 3.0))
+    )
+    pin = m.revolute("pin", one, m.ground, axis=(0, 0, 1))
+    m.gear("gear", pin, m.revolute("axle", two, m.ground, axis=(0, 0, 1)), 2.0)
+    elbow = m.revolute("elbow", third, two, axis=(1, 0, 0))
+    m.rotation("turn", pin, m.input("speed", "rad/s"), level="velocity")
+    m.axis_torque("spring", elbow.i, elbow.j, "3 - 50*AZ(elbow.I, elbow.J) + push")
+    m.input("push", "N m")
+    m.algebraic_state("pushed", "10*push")
+    return m
+
+
+@pytest.mark.parametrize("start", [0.0, 0.2])
+def test_a_state_where_a_speed_jumps_is_behind_the_jump(start, tmp_path):
+    """It goes on bit for bit as without it, also from a file and with another integrator; points before it are kept."""
+    runs = []
+    for asked in (False, True):
+        sim = gm.Simulator(driven_wheels(), 1.0, tol=1e-8)
+        sim.set("speed", 3.0)
+        for t in (0.1, 0.2) if start else ():
+            sim.advance(t)
+        sim.set("speed", 1.0)
+        state = sim.state() if asked else None
+        sim.advance(0.5)
+        runs.append(sim.solution())
+    wanted, again = runs
+    sim.restore(state)
+    assert sim.get("angular_velocity", "two")[2] == pytest.approx(2.0, abs=1e-9)
+    sim.advance(0.5)
+    other = gm.Simulator(driven_wheels(), 1.0, tol=1e-8, initial=gm.State.load(state.save(tmp_path / "jump.npz")))
+    other.advance(0.5)
+    for found in (again, sim.solution()):
+        np.testing.assert_array_equal(found.t, wanted.t)
+        np.testing.assert_array_equal(found.angular_velocity("two"), wanted.angular_velocity("two"))
+    for found in (*runs, sim.solution(), other.solution()):
+        assert found.joint_angle("elbow")[-1] == wanted.joint_angle("elbow")[-1]
+    run = driven_wheels().simulate(0.5, initial=state, integrator="IDA", tol=1e-8)
+    assert run.joint_angle("elbow")[-1] == pytest.approx(wanted.joint_angle("elbow")[-1], abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["speed", "push"])
+def test_what_is_set_before_the_start_acts_from_it_on_though_a_state_is_taken_between(name):
+    sim = gm.Simulator(driven_wheels(), 1.0)
+    sim.set(name, 3.0)
+    sim.state()
+    sim.set("push", 5.0)
+    sim.advance(0.1)
+    np.testing.assert_array_equal(sim.solution().state("pushed"), [50.0, 50.0])
+    np.testing.assert_array_equal(sim.solution().input("push"), [5.0, 5.0])
+
+
+@pytest.mark.parametrize("name", ["speed", "push"])
+def test_points_before_a_state_without_history_are_kept_where_something_is_set_there(name):
+    sim = gm.Simulator(driven_wheels(), 1.0)
+    sim.set("speed", 3.0)
+    for t in (0.1, 0.2):
+        sim.advance(t)
+    sim.restore(sim.state().without_history())
+    sim.set(name, 1.0)
+    sim.advance(0.3)
+    found = sim.solution()
+    np.testing.assert_allclose(found.t, [0.0, 0.1, 0.2, 0.3])
+    speeds = [3.0, 3.0, 3.0, 1.0 if name == "speed" else 3.0]
+    np.testing.assert_allclose(found.angular_velocity("two")[:, 2], 2.0 * np.array(speeds), atol=1e-6)
+    np.testing.assert_array_equal(found.input("speed"), speeds)

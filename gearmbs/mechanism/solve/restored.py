@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.dae.equations import layout as T
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.state import State, check_state, equations_of
 from gearmbs.mechanism.solve.controllers import Control
@@ -25,6 +26,7 @@ class Restored(Told):
     _t_start: float
     _equations: str
     _integers: tuple[Any, Any]
+    _before: dict[bytes, bytes]
     _controls: list[Control]
     _unmet: list[str]
     _begin: Callable[..., None]
@@ -38,18 +40,37 @@ class Restored(Told):
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
         self.take_effect()
         point, run = self._point, self._run
+        y, yp = point.y, point.yp
+        if not (run.options.check_start or run.state.steps):
+            # behind a jump of what motions prescribe: what has been told up to it is no start of what follows
+            y, yp = self._landed()
         if not self._equations:
             self._equations = equations_of(self._base)
         history = run.history(self._equations) if run.started else None
         tables = self._own_tables(point.idata, run.state.rdata)
         # tables of integers change seldom, and are others then; to look through one takes a tenth of the rest
         known = self._integers if self._integers[0] is point.idata else None
-        state = State.of(self._base, point.t, point.y, point.yp, tables, history, integers=known and known[1])
+        state = State.of(self._base, point.t, y, yp, tables, history, integers=known and known[1])
         if known is None:
             # past the look at names that are assigned
             self.__dict__["_integers"] = point.idata, state.integers
         held = {control.name: control.memory() for control in self._controls if control.remembers}
         return replace(state, controllers=held) if held else state
+
+    def _landed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return unknowns and rates with which the run goes on where velocities have jumped."""
+        run = self._run
+        if not run.started and (failure := run.begin()) is not None:
+            self._failed = failure[1]
+            raise ModelError(failure[1])
+        idata, first = run.state.idata, run.problem
+        y = run.state.y.copy()
+        # multipliers and loads there are impulses over a vanishing step
+        for block in (slice(idata[T.H_LAMBDA], idata[T.H_Z]), slice(idata[T.H_MU], None)):
+            y[block] = first.y0[block]
+        if self._records:
+            self._before[y.tobytes()] = self._point.y.tobytes()
+        return y, first.yp0
 
     def _own_tables(self, idata: np.ndarray, rdata: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return tables without what stops have added to them."""
@@ -105,8 +126,10 @@ class Restored(Told):
     def _own_point(self, state: State) -> int | None:
         """Return which of the points a state is, or None."""
         at = bisect_left(self._points, state.t, key=itemgetter(0))
+        y = state.y.tobytes()
+        told = self._before.get(y, y)
         while at < len(self._points) and self._points[at][0] == state.t:
-            if self._points[at].y.tobytes() == state.y.tobytes():
+            if self._points[at].y.tobytes() == told:
                 return at
             at += 1
         return None

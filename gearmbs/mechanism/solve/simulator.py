@@ -185,6 +185,8 @@ class Simulator(Sampled, Restored):
         self._records = records
         self._integers: tuple[Any, Any] = None, None
         """A table of integers, and what differs in it from that of the model, of the last state."""
+        self._before: dict[bytes, bytes] = {}
+        """Unknowns before jumps of velocities, by those behind them, of which states have been made."""
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
         numbers, aliases = self._base.numbers, self._base.aliases
@@ -494,17 +496,19 @@ class Simulator(Sampled, Restored):
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""
-        point, led = self._point, self._settings.led
-        rdata = self._run.state.rdata.copy()
+        point, led, run = self._point, self._settings.led, self._run
+        rdata = run.state.rdata.copy()
         rdata[self._settings.cells] = values
-        first, points, started = (self._problem, self._origin), self._points, self._run.started
-        tables, y = self._own_tables(point.idata, rdata), point.y
-        if not started:
-            # the first point is one with what is set before the start
-            y = settle_states(self._base.residual, point.t, y, point.yp, *tables)
-        self._begin(State.of(self._base, point.t, y, point.yp, tables), repair=True)
+        first, points = (self._problem, self._origin), self._points
+        begun = self.t > self._t_start or run.state.steps > 0
+        tables, y, yp = self._own_tables(point.idata, rdata), point.y, point.yp
+        if not begun:
+            # the first point is one with what is set before the start, whatever a state has begun
+            y = settle_states(self._base.residual, point.t, run.problem.y0, run.problem.yp0, *tables)
+            yp = run.problem.yp0
+        self._begin(State.of(self._base, point.t, y, yp, tables), repair=True)
         self._settings.led = led
-        if started:
+        if begun:
             self._problem, self._origin = first
             self._points = points
             self._point = point
