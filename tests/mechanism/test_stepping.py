@@ -304,7 +304,7 @@ def test_functions_of_python_are_the_same_only_if_they_are_one(tmp_path):
 def test_the_page_on_steps_says_what_comes_out(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     page = (Path(__file__).parents[2] / "docs" / "howto" / "stepping.md").read_text()
-    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), {})
+    exec("\n".join(re.findall(r"```\{code-cell\} ipython3\n(.*?)```", page, re.DOTALL)), {})
     told = capsys.readouterr().out.splitlines()
     assert told[0].startswith("lowest at")
     assert told[1:3] == ["True", "True"]

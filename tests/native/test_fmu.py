@@ -218,6 +218,6 @@ def test_the_page_says_what_comes_out(tmp_path, monkeypatch, capsys):
     page = (Path(__file__).parents[2] / "docs" / "howto" / "native.md").read_text()
     monkeypatch.chdir(tmp_path)
     names = {}
-    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names)
+    exec("\n".join(re.findall(r"```\{code-cell\} ipython3\n(.*?)```", page, re.DOTALL)), names)
     assert capsys.readouterr().out.splitlines()[-1] == "1.0"
     assert names["result"]["speed"][-1] == pytest.approx(2.0, rel=1e-6)
