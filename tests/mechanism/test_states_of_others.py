@@ -122,3 +122,35 @@ def test_a_file_with_one_bit_turned_is_whole_or_refused(tmp_path):
         assert read.t == state.t
     assert len(told) > 40
     assert not any("\n" in text for text in told)
+
+
+def sprung_disc(stiffness, torque):
+    """A disc of 2 kg m^2 on a spring, both numbers with names."""
+    m = turning_disc(2.0)
+    pin = m.joints["pin"]
+    m.torque("load", m.bodies["disc"], m.input("load", "N m", torque))
+    m.parameter("k", "N m/rad", stiffness)
+    m.axis_torque("spring", pin.i, pin.j, "-k*AZ(pin.I, pin.J)")
+    return m
+
+
+def test_what_was_set_goes_with_a_state_though_it_is_what_the_model_had():
+    """Into one that has other numbers of its own; what was not set, or only after the state, is that one's."""
+    sim, other = gm.Simulator(sprung_disc(3.0, 4.0), 1.0), sprung_disc(9.0, 7.0)
+    unset = sim.state()
+    sim.set("load", 4.0)
+    sim.set("k", 6.0)
+    sim.advance(0.1)
+    sim.set("k", 3.0)
+    sim.advance(0.2)
+    again = gm.Simulator(sprung_disc(3.0, 4.0), 1.0, initial=sim.state())
+    again.advance(0.3)
+    ran = sprung_disc(3.0, 4.0).simulate(0.3, t_eval=[0.0, 0.3], inputs={"load": 4.0, "k": 3.0})
+    states = [sim.state(), sim.solution().state_at(0.2), again.state(), ran.state_at(0.3)]
+    sim.restore(unset)
+    for state, k, load in [(unset, 9.0, 7.0), (sim.state(), 9.0, 7.0), *((one, 3.0, 4.0) for one in states)]:
+        on = gm.Simulator(other, 1.0, initial=state)
+        assert (on.get("input", "k"), on.get("input", "load")) == (k, load)
+        plant = other.linearize(["load"], [("joint_angle", "pin")], at=state)
+        assert plant.point.inputs == [load]
+        assert plant.dc_gain == pytest.approx(1.0 / k, rel=1e-9)

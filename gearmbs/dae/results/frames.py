@@ -151,6 +151,7 @@ class Computed(Protocol):
     result: DAEResult
     members: Members | None
     initial: State | None
+    given: np.ndarray | None
 
 
 def state_at(solution: Computed, t: float) -> State:
@@ -176,7 +177,9 @@ def state_at(solution: Computed, t: float) -> State:
             f"state_at: coordinates change between the outputs at {result.t[row - 1]:.9g} and {result.t[row]:.9g} s; "
             "take one of these times"
         )
-    return State.of(problem, t, y, yp, (idata, _counted(solution, t, y, yp, row)), origin=solution.initial)
+    return State.of(
+        problem, t, y, yp, (idata, _counted(solution, t, y, yp, row)), origin=solution.initial, given=solution.given
+    )
 
 
 def _longest(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray) -> float:

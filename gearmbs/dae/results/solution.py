@@ -90,6 +90,8 @@ class Solution(Measured, Shown):
         there: accelerations, reactions and loads that jump at an end are those of the inside.
     initial : State or None
         The state that the run started in, if it was given one.
+    given : ndarray of int or None
+        Places of numbers that were set in the run, which belong to its states.
     """
 
     inside: Mapping[float, float] = MappingProxyType({})
@@ -110,6 +112,7 @@ class Solution(Measured, Shown):
         self.members = members
         self.remark = remark
         self.initial: State | None = None
+        self.given: np.ndarray | None = None
         self.t = result.t
         self._shared: tuple[Fills, outputs.Records] | None = None
         samples = np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES))

@@ -50,7 +50,8 @@ class Restored(Told):
         tables = self._own_tables(point.idata, run.state.rdata)
         # tables of integers change seldom, and are others then; to look through one takes a tenth of the rest
         known = self._integers if self._integers[0] is point.idata else None
-        state = State.of(self._base, point.t, y, yp, tables, history, integers=known and known[1])
+        given = self._places_given()
+        state = State.of(self._base, point.t, y, yp, tables, history, integers=known and known[1], given=given)
         if known is None:
             # past the look at names that are assigned
             self.__dict__["_integers"] = point.idata, state.integers
@@ -115,6 +116,7 @@ class Restored(Told):
                 # what stood there up to the state, which a jump may follow
                 self._problem, self._origin = origin
                 self._points[:] = kept
+        self._take_given(state)
         if self._controls or state.controllers:
             given = [control.name for control in self._controls]
             self._unmet = [name for name in state.controllers if name not in given]
@@ -122,6 +124,11 @@ class Restored(Told):
                 control.go_back(self.t, state.controllers.get(control.name))
         elif self._unmet:
             self._unmet = []
+
+    def _take_given(self, state: State) -> None:
+        """Let what belongs to a state be what has been set."""
+        self.__dict__["_given"] = state.reals[0]
+        self._settings.given.clear()
 
     def _own_point(self, state: State) -> int | None:
         """Return which of the points a state is, or None."""

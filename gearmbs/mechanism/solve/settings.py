@@ -47,6 +47,8 @@ class Settings:
         Inputs on a line, and when it ends.
     waiting : dict of str to (float, int)
         What has been set and has not taken effect: value and hold.
+    given : set of str
+        What has been set since it was last looked at, though to the value that it had.
     plain : dict of str to ndarray of int
         Inputs that stand nowhere as integrals, and all their places among the cells: of the time before the
         coefficients, and the number of these.
@@ -64,6 +66,7 @@ class Settings:
             if not numbers[name].prescribes and all(p.size and p.order == 0 for p in numbers[name].places)
         }
         self.waiting: dict[str, tuple[float, int]] = {}
+        self.given: set[str] = set()
         self.led: dict[str, float] = {}
         self.held = np.empty(self.cells.size)
 
@@ -114,6 +117,7 @@ class Settings:
                     "of the motion (level='velocity')"
                 )
         self.waiting[number.name] = given, int(hold)
+        self.given.add(number.name)
 
     def value(self, t: float, name: str) -> float:
         """Return the present value of an input or a parameter, the one that was set last."""

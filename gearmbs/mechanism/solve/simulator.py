@@ -194,9 +194,11 @@ class Simulator(Sampled, Restored):
         self._settings = Settings(numbers, aliases, {**mechanism.bodies, **mechanism.elements})
         self._simulated, self._took, self._since = 0.0, 0.0, 0.0
         vars(self)["t"] = 0.0
+        self._given = np.empty(0, dtype=np.int64)
         self._begin(initial)
         self._t_start = self.t
         if initial is not None:
+            self._take_given(initial)
             self._unmet = list(initial.controllers)
 
     def _begin(self, state: State | None, repair: bool = False) -> None:

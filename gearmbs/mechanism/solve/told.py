@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearmbs.dae.integrators.stepping.held_run import HeldRun, Rows
-from gearmbs.dae.problem import ModelError
+from gearmbs.dae.problem import ModelError, cells_of
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
@@ -72,6 +72,7 @@ class Told(OwnAttributes):
     _records: bool
     _failed: str | None
     _origin: State | None
+    _given: np.ndarray
 
     def get(self, what: str, *names: Any) -> Any:
         """Return a quantity at the present time.
@@ -166,6 +167,15 @@ class Told(OwnAttributes):
         self._check_records("solution")
         return self._over(first)
 
+    def _places_given(self) -> np.ndarray:
+        """Return the places of numbers that have been set, here or in the state that it goes on from."""
+        own, numbers, new = self.__dict__, self._settings.numbers, self._settings.given
+        if new:
+            places = [cells_of({name: numbers[name]}) for name in new]
+            own["_given"] = np.unique(np.concatenate([self._given, *places]))
+            new.clear()
+        return own["_given"]
+
     def _check_records(self, what: str) -> None:
         if not self._records:
             raise ModelError(f"{what}: it needs the points so far; make the simulator with records=True")
@@ -189,7 +199,7 @@ class Told(OwnAttributes):
             counted=counted,
         )  # fmt: skip
         solution = Solution(self._system, self._problem, result, self._members, self._remark)
-        solution.initial = self._origin
+        solution.initial, solution.given = self._origin, self._places_given()
         solution.inside = self._row.inside
         return solution
 
