@@ -15,13 +15,14 @@ BODY_QUANTITIES = (
     "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
     "modal_coordinates", "modal_velocities",
 )  # fmt: skip
+JOINT_QUANTITIES = ("reaction", "reaction_force", "joint_angle", "joint_displacement", "joint_rate")
 
 
 def assert_all_names_agree(m, sim, solution, row=-1):
     """Whatever a solution tells by any name at ``row`` is the same by ``get``; what it does not tell, neither."""
     markers = [marker.name for body in (*m.bodies.values(), m.ground) for marker in body.markers]
     names = {what: list(known) for known, kinds in (
-        (m.bodies, BODY_QUANTITIES), (m.joints, ("reaction", "reaction_force", "joint_angle", "joint_displacement")),
+        (m.bodies, BODY_QUANTITIES), (m.joints, JOINT_QUANTITIES),
         (m.elements, ("load", "diagnostics", "contact", "transmission_error")),
         (markers, ("marker_position", "marker_velocity", "deflection")),
         (m.state_names, ("state",)), (m.outputs, ("output",)), (sim.numbers, ("input",)),

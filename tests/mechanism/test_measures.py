@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import gearmbs as gm
 from gearmbs.mechanism import Mechanism, ModelError, harmonic
 from tests.says import says
 
@@ -32,6 +33,8 @@ def test_joint_coordinates(machine):
     np.testing.assert_allclose(solution.joint_angle("hinge"), 0.5 + 40 * t, atol=1e-9)
     np.testing.assert_allclose(solution.joint_angle(m.joints["hinge"]), solution.joint_angle("hinge"))
     np.testing.assert_allclose(solution.joint_displacement("guide"), t**2, atol=1e-9)
+    np.testing.assert_allclose(solution.joint_rate("hinge"), 40.0, atol=1e-9)
+    np.testing.assert_allclose(solution.joint_rate("guide"), 2.0 * t, atol=1e-7)
     with pytest.raises(ModelError, match=says("joint 'guide'", "angle")):
         solution.joint_angle("guide")
     with pytest.raises(KeyError, match="the joints are hinge, guide"):
@@ -105,3 +108,30 @@ def test_turns_that_outputs_cannot_tell_are_warned_of(recwarn, counted, label):
     assert not recwarn.list
     with pytest.warns(UserWarning, match=says(label, "t", "rate")):
         turned(3)
+
+
+def test_rates_of_joints_on_what_moves_are_those_of_plants():
+    """In axes of J: of a slide on an arm that turns, and of a pin on it."""
+    m = Mechanism("arm")
+    arm = m.body("arm", 1.0, (0.1, 0.1, 0.1), angular_velocity=(0, 0, 2.0))
+    slide = m.body(
+        "slide", 1.0, (0.1, 0.1, 0.1), position=(0.5, 0, 0), velocity=(0.7, 1.0, 0), angular_velocity=(0, 0, 2.0)
+    )
+    disc = m.body(
+        "disc", 1.0, (0.1, 0.1, 0.1), position=(0.5, 0, 0), velocity=(0.7, 1.0, 0), angular_velocity=(0, 0, 5.0)
+    )
+    m.revolute("hub", arm, m.ground, axis=(0, 0, 1))
+    m.translational("rail", slide, arm, at=(0.2, 0.3, 0), axis=(1, 0, 0))
+    m.revolute("pin", disc, slide, at=(0.5, 0, 0), axis=(0, 0, 1))
+    for name in ("hub", "rail", "pin"):
+        m.output(name, ("joint_rate", name))
+    start = m.simulate(0.1)
+    rates = [start.output(name)[0] for name in ("hub", "rail", "pin")]
+    np.testing.assert_allclose(rates, [2.0, 0.7, 3.0], atol=1e-9)
+    sim = gm.Simulator(m, 0.1)
+    sim.advance(0.1)
+    told = [sim.get("joint_rate", name) for name in ("hub", "rail", "pin")]
+    with pytest.warns(UserWarning, match=says("slide", "vary")):
+        plant = m.linearize([], ["hub", "rail", "pin"], at=sim.state())
+    np.testing.assert_allclose(plant.point.outputs, told, atol=1e-9)
+    assert [sim.get("output", name) for name in ("hub", "rail", "pin")] == told

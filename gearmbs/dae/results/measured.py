@@ -28,6 +28,10 @@ class Measured:
         """Return the way of a joint's I from J along z_J, shape (m,), m; by joint or name."""
         return self._measures().displacement(joint)
 
+    def joint_rate(self, joint) -> np.ndarray:
+        """Return the speed of a joint's I from J about z_J, rad/s, or along it of one that does not turn, m/s."""
+        return self._measures().rate(joint)
+
     def marker_position(self, marker) -> np.ndarray:
         """Return the origin of a marker, shape (m, 3), m, global; by marker or name, or of a body's own frame."""
         return self._measures().place(marker)

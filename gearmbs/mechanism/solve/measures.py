@@ -62,6 +62,17 @@ class Measures:
         found = self._joint(joint, kinds_with_displacement(), "displacement")
         return _dot(self.place(found.i) - self.place(found.j), self._axes(found.j)[:, :, 2])
 
+    def rate(self, joint: Joint | str) -> np.ndarray:
+        """Return how fast I turns from J about z_J, rad/s, or where it does not, moves along it, m/s, shape (m,)."""
+        turning = kinds_with_angle()
+        found = self._joint(joint, list(dict.fromkeys([*turning, *kinds_with_displacement()])), "rate")
+        i, j = found.i, found.j
+        if found.kind in turning:
+            fast = self._spin(i) - self._spin(j)
+        else:
+            fast = self.velocity(i) - self.velocity(j) - np.cross(self._spin(j), self.place(i) - self.place(j))
+        return _dot(fast, self._axes(j)[:, :, 2])
+
     def _joint(self, joint: Joint | str, kinds: list[str], what: str) -> Joint:
         name = joint.name if isinstance(joint, Joint) else joint
         found = self.mechanism.joints.get(name)

@@ -21,13 +21,13 @@ from gearmbs.wording import did_you_mean
 AT_AN_INSTANT = (
     "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
     "reaction", "reaction_force", "load", "diagnostics", "contact", "modal_coordinates", "modal_velocities",
-    "joint_displacement", "marker_position", "marker_velocity", "deflection", "state", "multipliers", "kinetic_energy",
-    "constraint_violation", "transmission_error",
+    "joint_displacement", "joint_rate", "marker_position", "marker_velocity", "deflection", "state", "multipliers",
+    "kinetic_energy", "constraint_violation", "transmission_error",
 )  # fmt: skip
 """What `Solution` tells of one instant alone."""
 COUNTED = ("joint_angle", "evaluate")
 """What it tells with full turns counted from the first point on."""
-OF_PLANTS = ("joint_rate", "marker_acceleration")
+OF_PLANTS = ("marker_acceleration",)
 """What a plant alone tells of an output."""
 COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 """AX, AY and AZ of the function language."""
