@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import tracemalloc
 import warnings
 from pathlib import Path
@@ -87,6 +88,26 @@ def test_a_short_record_is_told_from_a_weak_line():
     for speed in (None, "1500 rpm"):
         notes = analyse(make_signal(line, 12800.0), teeth=21, speed=speed).notes
         assert [note[:68] for note in notes] == ["The speed is taken as constant: a record of 10 revolutions is too sh"]
+
+
+@pytest.mark.parametrize(("told", "doubted"), [("1515 rpm", True), ("1503 rpm", False)])
+def test_a_speed_beside_the_mesh_of_a_short_record_is_told(told, doubted):
+    """25 turns are averaged at the told speed, which loses a mesh that is 1 % off."""
+    t = np.arange(12800) / RATE
+    noise = 0.1 * np.random.default_rng(1).standard_normal(t.size)
+    mesh = np.cos(2 * np.pi * 800.0 * t) + 0.5 * np.cos(2 * np.pi * 1600.0 * t) + noise
+    notes = analyse(make_signal(mesh, RATE), teeth=32, speed=told).notes
+    found = [note for note in notes if re.search(says("CHECK THE SPEED", "1500.00 rpm", "-0.99 %"), note)]
+    assert bool(found) == doubted == any("CHECK" in note for note in notes)
+
+
+def test_sidebands_of_a_planetary_set_in_a_short_record_do_not_doubt_its_speed():
+    t = np.arange(12800) / RATE
+    lines = {98: 0.3, 99: 1.0, 102: 0.8, 105: 0.3}
+    passing = sum(size * np.cos(2 * np.pi * 10.0 * order * t) for order, size in lines.items())
+    passing = passing + 0.3 * np.random.default_rng(2).standard_normal(t.size)
+    notes = analyse(make_signal(passing, RATE), teeth=100, speed="600 rpm").notes
+    assert not any("CHECK" in note for note in notes)
 
 
 @pytest.mark.slow

@@ -171,8 +171,12 @@ def test_counts_in_hdf5_are_scaled_as_netcdf_says_or_told(tmp_path):
     np.testing.assert_allclose(scaled.values[:, 0], SHAKES + 2.0, atol=5e-4)
     told = read_signal(stored(tmp_path / "b.h5", acc=(counts, {"gain": 1e-3})))
     assert any("CHECK THE SCALE" in note and "gain" in note for note in told.attrs["notes"])
-    plain = read_signal(stored(tmp_path / "c.h5", acc=(SHAKES, {"gain": 1e-3})))
-    assert "notes" not in plain.attrs
+    for gain in (1e-3, [1e-3, 2e-3]):
+        plain = read_signal(stored(tmp_path / "c.h5", acc=(SHAKES, {"gain": gain})))
+        assert "notes" not in plain.attrs
+    for wrong in ("1e-3 g", [1e-3, 2e-3]):
+        with pytest.raises(SignalFileError, match=says("scale_factor", "acc", "write one number")):
+            read_signal(stored(tmp_path / "d.h5", acc=(counts, {"scale_factor": wrong})))
 
 
 def test_columns_of_a_matrix_in_hdf5_have_the_names_and_units_that_it_lists(tmp_path):

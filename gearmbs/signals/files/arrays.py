@@ -177,6 +177,8 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
                 order[key] = int(_value(item.attrs.get("channel_index", len(order))))
 
             file.visititems(visit)
+    except SignalFileError:
+        raise
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
     if scalars.get("layout") == LAYOUT:
@@ -195,8 +197,8 @@ def _scaled(item: Any, notes: list[str]) -> np.ndarray:
         fill = attrs.get("_fillvalue")
         plain = values.astype(float)
         plain[values == fill] = np.nan
-        return plain * float(attrs.get("scale_factor", 1.0)) + float(attrs.get("add_offset", 0.0))
-    factors = sorted(name for name in attrs if name in FACTORS and attrs[name] not in (0, 1))
+        return plain * _factor(item, attrs, "scale_factor", 1.0) + _factor(item, attrs, "add_offset", 0.0)
+    factors = sorted(name for name in attrs if name in FACTORS and not np.isin(attrs[name], (0, 1)).all())
     if factors and values.dtype.kind in "iu":
         listed = ", ".join(f"{name} = {attrs[name]}" for name in factors)
         notes.append(
@@ -204,6 +206,16 @@ def _scaled(item: Any, notes: list[str]) -> np.ndarray:
             "nothing says how; write scale_factor and add_offset, as NetCDF has them, or scale the samples yourself."
         )
     return values
+
+
+def _factor(item: Any, attrs: dict[str, Any], name: str, otherwise: float) -> float:
+    """Return the number of an attribute by which a dataset is scaled."""
+    value = attrs.get(name, otherwise)
+    if isinstance(value, (int, float)):
+        return float(value)
+    raise SignalFileError(
+        Path(item.file.filename), f"{item.name} has {name} = {value!r}; write one number there, without a unit"
+    )
 
 
 def _texts(value: Any) -> list[str]:

@@ -321,15 +321,20 @@ def compare_with_mesh(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaf
     if _turns(signal, shaft.speed) >= FOLLOWED_TURNS and line_near(signal, gmf, SPEED_TOLERANCE) is None:
         notes.append(_nothing_near(counts[0], shaft.speed, False) + f" It is used as it is, {shaft.origin}.")
     elif found is not None and found.phase is not None:
-        off = found.speed / shaft.speed - 1.0
-        if abs(off) * gmf > LINES_OFF * found.resolution:
-            alone = "" if shaft.range else f", or give speed='{found.speed * 30 / math.pi:.2f} rpm' alone"
-            mean = "on average " if shaft.range else ""
-            notes.append(
-                f"CHECK THE SPEED: the mesh line is {mean}at {found.speed * 30 / math.pi:.2f} rpm, {100 * off:+.2f} % "
-                f"off the {shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}, by which orders and averages are taken. "
-                f"Calibrate it{alone}."
-            )
+        told = f"{shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}"
+        notes += _remark_off(found, shaft.speed, gmf, told, shaft.range is not None)
+
+
+def _remark_off(found: SpeedEstimate, speed: float, gmf: float, told: str, varying: bool) -> list[str]:
+    """Say so where the mesh line is off the speed (rad/s) by which angles are taken."""
+    off, rpm = found.speed / speed - 1.0, found.speed * 30 / math.pi
+    if abs(off) * gmf <= LINES_OFF * found.resolution:
+        return []
+    mean, alone = ("on average ", "") if varying else ("", f", or give speed='{rpm:.2f} rpm' alone")
+    return [
+        f"CHECK THE SPEED: the mesh line is {mean}at {rpm:.2f} rpm, {100 * off:+.2f} % off the {told}, by which orders "
+        f"and averages are taken. Calibrate it{alone}."
+    ]
 
 
 def remark_plausibility(signal: xr.DataArray, speed: float | None, estimated: bool, notes: list[str]) -> None:
@@ -371,6 +376,12 @@ def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, n
         if abs(followed / nominal - 1) < SPEED_TOLERANCE:
             return Shaft(phase, followed, "from the given speed, followed by the mesh line")
     notes.append(_why_constant(signal, nominal, "No mesh line could be followed near the given speed"))
+    if found is not None and not doubted and _turns(signal, nominal) < FOLLOWED_TURNS:
+        line, turn = line_near(signal, gmf, SPEED_TOLERANCE), nominal / math.tau
+        # whole turns from the mesh stand its sidebands, of planetary sets higher than itself
+        sideband = abs((found.gmf - gmf + 0.5 * turn) % turn - 0.5 * turn) <= found.resolution
+        if line is not None and abs(line - found.gmf) <= found.resolution and not sideband:
+            notes += _remark_off(found, nominal, gmf, f"{nominal * 30 / math.pi:.2f} rpm given", False)
     return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
 
 
