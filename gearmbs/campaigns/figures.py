@@ -75,23 +75,25 @@ def figure(
     """Draw results of a campaign over its factors; see `gearmbs.campaigns.Campaign.figure`."""
     draw = chosen(KINDS, kind, "", CampaignError, "figure")
     table = only_numbers(campaign.folder, campaign.table)
-    left = say_left_out(campaign.folder, table, "figure", stacklevel=4)
-    table = table[table["status"] == "done"]
-    known = result_names(campaign.folder, table)
+    done = table[table["status"] == "done"]
+    known = result_names(campaign.folder, done)
     wanted = texts(results, "figure: results") if results else varied_results(campaign, 3)
-    chosen_factors = texts(factors, "figure: factors") if factors else main_factors(campaign, table)
+    chosen_factors = texts(factors, "figure: factors") if factors else main_factors(campaign, done)
     for name in wanted:
         chosen(known, name, "", CampaignError, "result")
     for name in chosen_factors:
-        chosen([name for name in table.columns if name not in known], name, "", CampaignError, "factor")
+        chosen([name for name in done.columns if name not in known], name, "", CampaignError, "factor")
+    # a case is in the picture of those of the results that it has
+    unknown = int(done[list(wanted)].isna().all(axis=1).sum()) if wanted else 0
+    left = say_left_out(campaign.folder, table, "figure", unknown=unknown, stacklevel=4)
     if not wanted:
         raise CampaignError("figure: none of the results varies")
     if not chosen_factors:
-        raise CampaignError(f"figure: none of the factors varies over {len(table)} cases; name them, or run more")
+        raise CampaignError(f"figure: none of the factors varies over {len(done)} cases; name them, or run more")
     from gearmbs.view.figures.style import look
 
     with look():
-        picture = draw(table, list(wanted), list(chosen_factors), campaign.units)
+        picture = draw(done, list(wanted), list(chosen_factors), campaign.units)
         # a title of the whole is a text of the figure
         title = picture.texts[0] if picture.texts else picture.axes[0].title
         title.set_text("\n".join(filter(None, (title.get_text(), left))))
@@ -326,7 +328,8 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
 def condition_map(
     campaign: Campaign, condition: str, across: str, along: str, bins: int = 8
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return over two factors in which part of the cases a condition holds; of cases without results it is not asked.
+    """Return over two factors in which part of the cases a condition holds; of cases without results, and of results
+    that are no numbers, it is not asked.
 
     Parameters
     ----------
@@ -353,15 +356,21 @@ def _condition_map(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, str]:
     """Return the map, and in words which cases are left out of it."""
     table = campaign.table
-    left = say_left_out(campaign.folder, table, "map", stacklevel=4)
-    table = table[table["status"] == "done"]
-    columns = {str(name): table[name].to_numpy() for name in table.columns}
-    held = satisfied(condition, columns, campaign.plan.unit_of)
+    done = table[table["status"] == "done"]
+    columns = {str(name): done[name].to_numpy() for name in done.columns}
+    results = result_names(campaign.folder, done)
+    held = satisfied(condition, columns, campaign.plan.unit_of, results)
+    # of what is compared with no number neither the condition holds nor its opposite
+    known = held | satisfied(f"not ({condition})", columns, campaign.plan.unit_of, results)
+    left = say_left_out(campaign.folder, table, "map", unknown=int((~known).sum()), stacklevel=4)
+    table, held = done[known], held[known]
     bins = whole(bins, "bins", 1)
     for name in (across, along):
         if name not in table.columns or table[name].dtype.kind not in "biuf":
-            known = ", ".join(str(n) for n in factor_names(campaign.folder) if table[n].dtype.kind in "biuf")
-            raise CampaignError(f"map: {name!r} is no column of numbers; factors that are one: {known}")
+            told = ", ".join(str(n) for n in factor_names(campaign.folder) if table[n].dtype.kind in "biuf")
+            raise CampaignError(f"map: {name!r} is no column of numbers; factors that are one: {told}")
+    if table.empty:
+        raise CampaignError(f"map: {condition!r} can be asked of none of the cases; {left}")
     x, y = (table[name].to_numpy(dtype=float) for name in (across, along))
     edges_x, edges_y = (np.quantile(v, np.linspace(0.0, 1.0, bins + 1)) for v in (x, y))
     i = np.clip(np.searchsorted(edges_y, y, side="right") - 1, 0, bins - 1)

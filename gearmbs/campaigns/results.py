@@ -90,19 +90,21 @@ def read_record(folder: Folder, unit: int, index: int) -> xr.Dataset:
         return found.load()
 
 
-def left_out(folder: Folder, table: pd.DataFrame, failed: bool = True) -> str:
-    """Return in words how many cases are left out of what is made of a table: of which nothing is done yet, and those
-    that failed unless these are in it. Nothing if none is."""
+def left_out(folder: Folder, table: pd.DataFrame, failed: bool = True, unknown: int = 0) -> str:
+    """Return in words how many cases are left out of what is made of a table: of which nothing is done yet, those that
+    failed unless these are in it, and those that are done without the number that is asked for. Nothing if none is."""
     without = int((table["status"] != "done").sum()) if failed else 0
     waiting = folder.case_count - len(table)
-    counts = ((waiting, "not done yet"), (without, "failed"))
+    counts = ((waiting, "not done yet"), (without, "failed"), (unknown, "without a number"))
     told = ", ".join(f"{count} {word}" for count, word in counts if count)
-    return f"{len(table) - without} of {folder.case_count} cases; left out: {told}" if told else ""
+    return f"{len(table) - without - unknown} of {folder.case_count} cases; left out: {told}" if told else ""
 
 
-def say_left_out(folder: Folder, table: pd.DataFrame, what: str, failed: bool = True, stacklevel: int = 3) -> str:
+def say_left_out(
+    folder: Folder, table: pd.DataFrame, what: str, failed: bool = True, unknown: int = 0, stacklevel: int = 3
+) -> str:
     """Warn that something is made of a part of a campaign alone; return the words."""
-    if told := left_out(folder, table, failed):
+    if told := left_out(folder, table, failed, unknown):
         warnings.warn(f"{what} of {told}", CampaignWarning, stacklevel=stacklevel)
     return told
 

@@ -74,6 +74,11 @@ def picky(x1: float, x2: float, x3: float) -> dict:
     return ishigami(x1, x2, x3)
 
 
+def silent(x1: float, x2: float, x3: float) -> dict:
+    """Return the same for half of the values of the first, and no number for the others."""
+    return ishigami(x1, x2, x3) | ({"y": np.nan} if x1 > 0.0 else {})
+
+
 def several(x1: float, x2: float, x3: float) -> dict[str, float]:
     """Return a result, what tells the same, what tells something else, and what hardly varies."""
     y = x1 + 0.3 * x2 + 0.2 * x3

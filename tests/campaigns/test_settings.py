@@ -21,6 +21,7 @@ from gearmbs.campaigns import (
     Specimens,
     choose,
     condition_figure,
+    condition_map,
     make_plan,
 )
 from gearmbs.campaigns.datasets.splits import split_by_group
@@ -204,6 +205,36 @@ def test_what_is_made_of_a_part_says_so(tmp_path):
         campaign.export(tmp_path / "b", "hf", split_by="point", test=0.3)
         campaign.response_surface("y", 1)
         assert "left out" not in condition_figure(campaign, "y > 0", "x1", "x2", 2).axes[0].get_title()
+
+
+def test_results_that_are_no_numbers_are_left_out_of_maps_and_figures(tmp_path):
+    """Neither a condition about them holds nor its opposite; what tells of other columns has all cases."""
+    campaign = small(tmp_path / "c", "silent", keep=["numbers"], unit=64)
+    campaign.run(workers=0)
+    there = int((campaign.table["x1"] <= 0.0).sum())
+    told = f"{there} of 40 cases; left out: {40 - there} without a number"
+    maps = []
+    for condition in ("y > 0", "not y > 0"):
+        with pytest.warns(CampaignWarning, match=told):
+            share, counts, edges, _ = condition_map(campaign, condition, "x1", "x2", 2)
+        assert counts.sum() == there
+        assert edges[-1] <= 0.0
+        maps.append(share)
+    np.testing.assert_allclose(maps[0] + maps[1], 1.0)
+    with pytest.warns(CampaignWarning, match=told):
+        picture = campaign.figure("main effects", "y")
+    assert told in picture.texts[0].get_text()
+    none = make_plan(function("silent"), [Factor("x1", 1.0, 2.0), Factor("x2", 0.0, 1.0)], "grid", keep=["numbers"])
+    nothing = Campaign(tmp_path / "d", none)
+    nothing.run(workers=0)
+    with (
+        pytest.warns(CampaignWarning, match=says("4 without a number")),
+        pytest.raises(CampaignError, match=says("none of the cases")),
+    ):
+        condition_map(nothing, "y > 0", "x1", "x2")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", CampaignWarning)
+        assert condition_map(campaign, "x1 > 0 or x2 > 9", "x1", "x2", 2)[1].sum() == 40
 
 
 def test_a_report_of_a_part_says_so_once(tmp_path):
