@@ -450,6 +450,24 @@ def test_a_mesh_that_is_wrong_says_so(tmp_path, name, content, message):
         read_mesh(tmp_path / name)
 
 
+def test_meshes_of_another_unit_or_saved_twice(tmp_path):
+    vertices, triangles = Box((10.0, 20.0, 30.0)).facets()
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in triangles + 1]
+    once, twice = tmp_path / "once.obj", tmp_path / "twice.obj"
+    once.write_text("\n".join(lines) + "\n")
+    twice.write_text("\n".join([*lines, *lines[len(vertices) :]]) + "\n")
+    for unit, side in (("mm", 1e-3), ("25.4 mm", 0.0254), (0.01, 0.01)):
+        mesh = read_mesh(once, unit)
+        assert volume(mesh.vertices, mesh.triangles) == pytest.approx(6000 * side**3)
+    for wrong in (-1e-3, 0.0):
+        with pytest.raises(ModelError, match=says("scale", "unit", "mm", "length")):
+            read_mesh(once, wrong)
+    with pytest.raises(ModelError, match=says("scale", "NaN", "m")):
+        read_mesh(once, np.nan)
+    with pytest.raises(ModelError, match=says("12", "twice")):
+        read_mesh(twice)
+
+
 def test_mistakes_are_named():
     m = Mechanism("m")
     body = m.body("b", 1.0, (1, 1, 1))

@@ -281,21 +281,25 @@ STL_FACET = 50
 """Bytes of a binary STL before the facets and of each."""
 
 
-def read_mesh(path: str | Path, scale: float = 1.0) -> Mesh:
+def read_mesh(path: str | Path, scale: Any = 1.0) -> Mesh:
     """Read a closed surface.
 
     Parameters
     ----------
     path : path
         A .stl, .obj, .shl or .slp file.
-    scale : float
-        SI value of the file's unit of length, m.
+    scale : float or str
+        The file's unit of length: its SI value, m, or a text as ``"mm"``.
 
     Raises
     ------
     ModelError
         If the file cannot be read, holds no triangles, or its surface is not closed.
     """
+    bare = isinstance(scale, str) and scale.strip()[:1].isalpha()
+    scale = quantity(f"1 {scale.strip()}" if bare else scale, "length", "scale")
+    if not scale > 0.0:
+        raise ModelError(f"scale = {scale}; give the file's unit of length, above zero: 1e-3, or 'mm'")
     vertices, triangles = read_triangles(path)
     try:
         return Mesh(scale * vertices, triangles)

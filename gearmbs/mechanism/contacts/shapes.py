@@ -205,6 +205,9 @@ class Mesh(Shape):
         _, uses = np.unique(edges, axis=0, return_counts=True)
         if np.any(uses % 2):
             raise ModelError(f"mesh: {np.sum(uses % 2)} edges belong to one triangle only; a solid's surface is closed")
+        there = len(np.unique(np.sort(triangles, axis=1), axis=0))
+        if there < len(triangles):
+            raise ModelError(f"mesh: {len(triangles) - there} triangles are there twice; save the solid once")
         triangles = turned_alike(triangles)
         inside = volume(vertices, triangles)
         if abs(inside) <= NOTHING * float(np.ptp(vertices, axis=0).max()) ** 3:
