@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gearmbs.identify.fit import SIMULATION_STEP, central, fit, noise_of_columns, steps
+from gearmbs.identify.fit import SIMULATION_STEP, central, fit, noise_of_columns
 from gearmbs.identify.identifiability import LIMIT, Identifiability
 from gearmbs.identify.parameters import Fit, Free, IdentifyError, Scale
 from gearmbs.progress import staged
@@ -240,7 +240,11 @@ class CaseProblem:
         return self.table["sigma"].to_numpy()
 
     def derivatives(self, p: Sequence[float] | None = None) -> np.ndarray:
-        """Return the derivatives of the predictions in z over their standard deviations, shape (m, n)."""
+        """Return the derivatives of the predictions over their standard deviations, shape (m, n).
+
+        They are those by the logarithm of each parameter; of one fitted as it is, times its magnitude, which is the
+        same, or where that is zero half the distance of its bounds, if it has any.
+        """
         return self._derivatives(p)[0]
 
     def _derivatives(self, p: Sequence[float] | None) -> tuple[np.ndarray, np.ndarray, Any]:
@@ -250,11 +254,17 @@ class CaseProblem:
         def many(points: Sequence[np.ndarray]) -> list[np.ndarray]:
             return [f / self.sigma for f in self.predictions([scale.p(q) for q in points])]
 
-        h = steps(z, scale.logs, SIMULATION_STEP)
+        h = SIMULATION_STEP * self._magnitudes(z)
         matrix = central(many, z, h)
         if not np.isfinite(matrix).all():
             raise IdentifyError("the simulations fail about the start; give another one")
-        return matrix, h, many
+        return matrix * self._magnitudes(z), h, many
+
+    def _magnitudes(self, z: np.ndarray) -> np.ndarray:
+        """Return by what derivatives in z become those by logarithms."""
+        low, high = Scale(tuple(self.free)).bounds()
+        reach = np.where(np.isfinite(high - low), 0.5 * (high - low), 1.0)
+        return np.where([f.log for f in self.free], 1.0, np.where(z == 0.0, reach, np.abs(z)))
 
     def identifiability(
         self, p: Sequence[float] | None = None, *, noise: bool = True, limit: float = LIMIT
@@ -269,7 +279,8 @@ class CaseProblem:
         matrix, h, many = self._derivatives(p)
         scale = Scale(tuple(self.free))
         z = scale.z([f.start for f in self.free] if p is None else p)
-        floor = noise_of_columns(many, z, h, matrix) if noise else np.zeros(len(self.free))
+        size = self._magnitudes(z)
+        floor = size * noise_of_columns(many, z, h, matrix / size) if noise else np.zeros(len(self.free))
         return Identifiability(scale.names, matrix, floor, limit)
 
     def fit(self, **settings: Any) -> Fit:
@@ -454,8 +465,9 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
             raise IdentifyError(f"measured: column {name}: {error}") from None
     if not ((table["harmonic"] >= 1) & (table["harmonic"] % 1 == 0)).all():
         raise IdentifyError("measured: harmonic must be a whole number, 1 or more, in every row")
-    if not ((table["value"] > 0.0) & (table["sigma"] > 0.0)).all():
-        raise IdentifyError("measured: value and sigma must be positive in every row")
+    finite = np.isfinite(table[["value", "sigma"]].to_numpy(dtype=float)).all()
+    if not (finite and ((table["value"] > 0.0) & (table["sigma"] > 0.0)).all()):
+        raise IdentifyError("measured: value and sigma must be positive and finite in every row; leave out the others")
     return table.reset_index(drop=True)
 
 

@@ -8,6 +8,7 @@ Regression, Wiley, 1989, chapters 2 and 5).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -177,7 +178,8 @@ def fit(
     z = attempts[0][0]
     if loss == "linear":
         z = _polished(problem, z, low, high, tolerance)
-    return problem.result(z, waterfall=[cost for _, cost in attempts], runs=problem.total)
+    best = problem.result(z, waterfall=[cost for _, cost in attempts], runs=problem.total)
+    return replace(best, loss=loss)
 
 
 def progress_of_runs(progress: Progress, usual: int) -> Callable[[int], None]:
@@ -185,12 +187,30 @@ def progress_of_runs(progress: Progress, usual: int) -> Callable[[int], None]:
     return lambda done: progress(min(done / usual, 0.99), f"{done} evaluations")
 
 
+def _real(values: ArrayLike) -> np.ndarray:
+    """Return what a model gave as real numbers."""
+    if np.iscomplexobj(values):
+        raise IdentifyError("fit: the model returned complex values; return real and imaginary parts side by side")
+    return np.asarray(values, dtype=float)
+
+
 class _Problem:
     """Weighted residuals of a model over z."""
 
     def __init__(self, model, measured, free, sigma, many, step, lost, absolute_sigma) -> None:
         self.scale = Scale(tuple(free))
+        names = self.scale.names
+        if len(set(names)) < len(names):
+            raise IdentifyError(f"fit: free has a name twice: {', '.join(names)}; give each its own")
+        if np.iscomplexobj(measured):
+            raise IdentifyError(
+                "fit: measured is complex; give real and imaginary parts side by side, as the model does"
+            )
         self.measured = np.asarray(measured, dtype=float)
+        if self.measured.ndim != 1:
+            raise IdentifyError(
+                f"fit: measured has shape {self.measured.shape}; give it and the model flat, by ravel()"
+            )
         size, count = self.measured.size, len(self.scale.free)
         if not np.isfinite(self.measured).all():
             raise IdentifyError("fit: every measured value must be finite")
@@ -201,10 +221,13 @@ class _Problem:
                 f"fit: {size - lost} independent values for {count} parameters; measure more or free fewer"
             )
         self.known = sigma is not None and absolute_sigma
-        self.sigma = np.broadcast_to(np.asarray(1.0 if sigma is None else sigma, dtype=float), (size,))
-        if not (self.sigma > 0.0).all():
-            raise IdentifyError("fit: every sigma must be positive")
-        self._many = many or (lambda points: [np.asarray(model(p), dtype=float) for p in points])
+        given = np.asarray(1.0 if sigma is None else sigma, dtype=float)
+        if given.shape not in ((), (1,), (size,)):
+            raise IdentifyError(f"fit: sigma has shape {given.shape} for {size} measured values; give one, or one each")
+        self.sigma = np.broadcast_to(given, (size,))
+        if not ((self.sigma > 0.0) & (self.sigma < np.inf)).all():
+            raise IdentifyError("fit: every sigma must be positive and finite; leave out values that say nothing")
+        self._many = many or (lambda points: [_real(model(p)) for p in points])
         self.step, self.lost = step, lost
         self.runs = self.total = self.without = 0
         self.tell: Callable[[int], None] = lambda done: None

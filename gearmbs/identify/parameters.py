@@ -155,6 +155,7 @@ class Fit:
     z_errors: np.ndarray
     singular_values: np.ndarray
     problem: Any = field(repr=False, default=None)
+    loss: str = "linear"
 
     @classmethod
     def of(cls, problem: Any, z: np.ndarray, r: np.ndarray, matrix: np.ndarray, *, waterfall: list, runs: int) -> Fit:
@@ -266,6 +267,14 @@ class Fit:
         import pandas as pd
 
         k = self._place(name)
+        if self.loss != "linear":
+            raise IdentifyError(
+                f"{name}: a profile is one of least squares, the fit's loss is {self.loss!r}; fit without"
+            )
+        if not np.isfinite(self.z_errors[k]):
+            raise IdentifyError(
+                f"{name}: its standard error is {self.z_errors[k]}, so that it has no profile; hold others"
+            )
         low, high = self.scale.bounds()
         at = np.linspace(-reach, reach, points) * self.z_errors[k] + self.z[k]
         unit = 1.0 if self.known_noise else self.cost / max(1, self.freedom)

@@ -50,6 +50,60 @@ def test_bad_problems(settings, words):
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize("column", ["value", "sigma"])
+def test_rows_that_weigh_nothing_are_left_out_not_given(column):
+    with pytest.raises(IdentifyError, match=says("finite", "sigma")):
+        CaseProblem(TABLE.assign(**{column: [1.0] * 5 + [np.inf]}), Case(), DEPTH)
+
+
+X = np.linspace(0.0, 1.0, 12)
+LINE = [Free("a", 1.0), Free("b", 1.0)]
+
+
+def line(p):
+    return p[0] + p[1] * X
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"sigma": [0.1] * 11 + [np.inf]}, ("sigma", "finite")),
+        ({"sigma": [0.1] * 3}, ("sigma", "shape")),
+        ({"measured": 1j * X}, ("complex",)),
+        ({"model": lambda p: line(p) + 0j}, ("complex",)),
+        ({"measured": X.reshape(3, 4)}, ("shape", "ravel")),
+        ({"free": [LINE[0], LINE[0]]}, ("a", "twice")),
+    ],
+)
+def test_what_least_squares_cannot_weigh(settings, words):
+    given = {"model": line, "measured": 2.0 + 3.0 * X, "free": LINE, **settings}
+    with pytest.raises(IdentifyError, match=says(*words)):
+        fit(**given)
+    np.testing.assert_allclose(fit(line, 2.0 + 3.0 * X, LINE, sigma=[0.1] * 12).values, [2.0, 3.0])
+
+
+def test_profiles_there_are_none_of():
+    noisy = 2.0 + 3.0 * X + 0.01 * np.cos(37.0 * X)
+    with pytest.raises(IdentifyError, match=says("loss", "huber")):
+        fit(line, noisy, LINE, sigma=0.01, loss="huber").profile_interval("a")
+    with pytest.raises(IdentifyError, match=says("a", "profile", "inf")):
+        fit(lambda p: p[0] * p[1] * X, 3.0 * X, LINE, sigma=0.01).profile("a")
+    low, high = fit(line, noisy, LINE, sigma=0.01).profile_interval("a")
+    assert low < 2.0 < high
+
+
+def test_amounts_are_told_by_their_share_as_logarithms_are(monkeypatch):
+    def predictions(self, points):
+        return [np.log(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])) * (p[0] / 1e-4) for p in points]
+
+    monkeypatch.setattr(CaseProblem, "predictions", predictions)
+    tables = [
+        CaseProblem(TABLE, Case(), [Free("contact.depth", 1e-4, log=log)]).identifiability().table()
+        for log in (True, False)
+    ]
+    np.testing.assert_allclose(tables[0]["together"], tables[1]["together"], rtol=1e-3)
+
+
 def test_one_case_and_one_parameter_will_do():
     problem = CaseProblem(TABLE, Case(), "contact.depth")
     assert list(problem.cases) == ["a"]
