@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.material import FlexibleError
+from gearmbs.units import Quantity, to_si
 
 # The surface of a body that deforms: what is drawn of it, and how each of its points moves by the modes.
 
@@ -164,6 +165,8 @@ def hull_surface(positions: np.ndarray, moved: np.ndarray) -> BodySurface | None
 
 
 KINDS = ("rigid", "average")
+FAR = 10.0
+"""Distance of a reference point from its nodes, in diagonals of the body, above which it is given in another unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,15 +183,15 @@ class Interface:
         ``"average"`` (RBE3): the reference point follows the nodes by weighted least squares, which adds no stiffness;
         a load at it is shared by the nodes.
     at : array_like of 3 floats, optional
-        Reference point, m; default: the mean of the nodes.
+        Reference point, m, or texts with units; default: the mean of the nodes.
     weights : sequence of float, optional
-        Of the nodes of an average; default: equal.
+        Of the nodes of an average, none negative; default: equal.
     """
 
     name: str
     nodes: Sequence[int]
     kind: str = "rigid"
-    at: Sequence[float] | None = None
+    at: Sequence[Quantity] | None = None
     weights: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
@@ -196,8 +199,19 @@ class Interface:
             raise FlexibleError(f"interface '{self.name}': kind {self.kind!r}; choose one of {', '.join(KINDS)}")
         if len(self.nodes) == 0:
             raise FlexibleError(f"interface '{self.name}': it has no nodes")
+        if len(set(self.nodes)) < len(self.nodes):
+            raise FlexibleError(f"interface '{self.name}': it has nodes twice; give each once (numpy.unique)")
         if self.weights is not None and len(self.weights) != len(self.nodes):
             raise FlexibleError(f"interface '{self.name}': {len(self.weights)} weights for {len(self.nodes)} nodes")
+        if self.weights is not None and not all(0.0 <= w < np.inf for w in self.weights):
+            raise FlexibleError(f"interface '{self.name}': weights must be 0 or more, and finite; give others")
+        if self.at is not None:
+            try:
+                object.__setattr__(self, "at", [float(to_si(x, "length", "at")) for x in self.at])
+            except (TypeError, ValueError) as error:
+                raise FlexibleError(f"interface '{self.name}': {error}") from None
+            if len(self.at) != 3 or not np.all(np.isfinite(self.at)):
+                raise FlexibleError(f"interface '{self.name}': at = {self.at}; give three finite lengths, m")
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,9 +297,16 @@ def resolve(model: FiniteElementModel, interfaces: Iterable[str | Interface]) ->
 
 def reference(model: FiniteElementModel, face: Interface) -> np.ndarray:
     """Return the reference point of an interface."""
-    if face.at is not None:
-        return np.asarray(face.at, dtype=float)
-    return model.positions[[model.row_of(k) for k in face.nodes]].mean(axis=0)
+    mean = model.positions[[model.row_of(k) for k in face.nodes]].mean(axis=0)
+    if face.at is None:
+        return mean
+    size = float(np.linalg.norm(np.ptp(model.positions, axis=0)))
+    if np.linalg.norm(face.at - mean) > FAR * size:
+        raise FlexibleError(
+            f"interface '{face.name}': at = {list(face.at)} m is more than {FAR:g} the body's {size:.4g} m from its "
+            "nodes; give metres, or texts as '300 mm'"
+        )
+    return np.asarray(face.at, dtype=float)
 
 
 def _node_rows(model, name, column, width, dependent):
@@ -318,8 +339,8 @@ def _rigid_rows(model: FiniteElementModel, face: Interface) -> tuple[np.ndarray,
 def _average_rows(model: FiniteElementModel, face: Interface) -> sp.csr_array:
     """Return the rows that give the reference point's motion: weighted least squares over the displacements."""
     nodes = [model.row_of(k) for k in face.nodes]
-    _check_spread(model, face, nodes)
     weights = np.ones(len(nodes)) if face.weights is None else np.asarray(face.weights, dtype=float)
+    _check_spread(model, face, [k for k, w in zip(nodes, weights) if w > 0.0])
     motion = model.rigid_motion(reference(model, face))
     rows = np.flatnonzero(np.isin(model.dofs[:, 0], nodes) & (model.dofs[:, 1] < 3))
     weight = np.array([weights[nodes.index(n)] for n in model.dofs[rows, 0]])
@@ -338,7 +359,7 @@ def _check_spread(model: FiniteElementModel, face: Interface, nodes: list[int]) 
             raise FlexibleError(f"interface '{face.name}': node {model.ids[k]} has no degrees of freedom")
     if model.has_rotations and face.kind == "rigid":
         return
-    arm = model.positions[nodes] - model.positions[nodes].mean(axis=0)
+    arm = model.positions[nodes] - model.positions[nodes].sum(axis=0) / max(1, len(nodes))
     sizes = np.linalg.svd(arm, compute_uv=False)
     if len(nodes) < 3 or sizes[1] < 1e-6 * max(sizes[0], 1e-300):
         raise FlexibleError(

@@ -266,8 +266,19 @@ class ModalModel:
         return section_motion(self, at)
 
     def selected(self, chosen: npt.ArrayLike) -> ModalModel:
-        """Return the body with some of its modes, counted from 0."""
-        k = np.asarray(chosen, dtype=int)
+        """Return the body with some of its modes, counted from 0, or those of a mask.
+
+        Raises
+        ------
+        FlexibleError
+            If one is not there, or there twice.
+        """
+        given = np.asarray(chosen)
+        masked = given.dtype == bool and given.shape == (self.modes,)
+        k = np.flatnonzero(given) if masked else given.astype(int)
+        there = np.all((k >= -self.modes) & (k < self.modes))
+        if (given.dtype == bool and not masked) or not there or np.unique(k % self.modes).size < k.size:
+            raise FlexibleError(f"{self.name}: modes {given.tolist()!r:.60} of {self.modes}; give each once, from 0 on")
         i = self.integrals
         integrals = ShapeIntegrals(
             i.mass[np.ix_(k, k)], i.momentum[k], i.angular_momentum[k], i.cross[np.ix_(k, k)], i.first[k],

@@ -537,7 +537,10 @@ def _model_of(table: GridTable, matrices: list[Any], name: str, file: Path, unit
                 f"have {len(table.dofs)} degrees of freedom; name the matrices of all of them, or give dofs"
             )
     k, m = (table.in_basic(matrix) for matrix in matrices)
-    return units.model(k, m, table.positions, table.dofs, table.ids, name)
+    # the g-set has six degrees of freedom a point; solid elements leave those of rotation empty
+    there = (abs(k).sum(axis=0) + abs(m).sum(axis=0) > 0.0) | (table.dofs[:, 1] <= 3)
+    k, m = (matrix[there][:, there] for matrix in (k, m))
+    return units.model(k, m, table.positions, table.dofs[there], table.ids, name)
 
 
 def _named(found: dict[str, Any], wanted: str, file: Path) -> Any:

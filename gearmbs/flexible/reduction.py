@@ -19,9 +19,10 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
+from scipy.sparse.csgraph import connected_components
 
 from gearmbs.flexible.beam import Slices
-from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
+from gearmbs.flexible.fe_model import SYMMETRIC, FiniteElementModel, MassProperties
 from gearmbs.flexible.interfaces import Interface, Resolved, resolve
 from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.modal_model import PAIR, ModalModel, Seat
@@ -229,9 +230,15 @@ def reduce_model(
     if modes is not None and not (whole and modes >= 1):
         raise FlexibleError(f"modes = {modes!r}; a modal body needs one at least, and a whole number")
     limit = None if max_frequency is None else quantity(max_frequency, "frequency", "max_frequency")
-    parts = resolve(model, list(model.seats) if interfaces is None else interfaces)
+    preload, spin_stiffness = (
+        None if given is None else _geometric(model, given, label)
+        for given, label in ((preload, "preload"), (spin_stiffness, "spin_stiffness"))
+    )
+    chosen = list(model.seats if interfaces is None else interfaces)
+    parts = resolve(model, chosen)
     properties = model.mass_properties()
     _check_free(model)
+    _check_whole(model, [i for i in chosen if isinstance(i, Interface) and i.kind == "rigid"])
     doubts = model.unit_doubts(properties)
     if doubts:
         warnings.warn(f"{model.name}: {'; '.join(doubts)}", stacklevel=3)
@@ -384,6 +391,40 @@ def _check_free(model: FiniteElementModel) -> None:
         raise FlexibleError(
             f"{model.name}: rigid motion in {motion} meets stiffness ({energy[worst]:.3g} of {scale[worst]:.3g}); a "
             "body in a floating frame must be free: export the matrices without supports, or check node table and units"
+        )
+
+
+def _geometric(model: FiniteElementModel, given: Any, label: str) -> sp.csc_array:
+    """Return a geometric stiffness, refused if it is not finite, symmetric and of the model's degrees of freedom."""
+    matrix = sp.csc_array(given)
+    if matrix.shape != model.stiffness.shape or not np.all(np.isfinite(matrix.data)):
+        raise FlexibleError(
+            f"{model.name}: {label} has shape {matrix.shape}, or is not finite; give that of the "
+            f"{len(model.dofs)} degrees of freedom"
+        )
+    if abs(matrix - matrix.T).max() > SYMMETRIC * abs(matrix).max():
+        raise FlexibleError(f"{model.name}: {label} is not symmetric; give both triangles of the matrix")
+    return matrix
+
+
+def _check_whole(model: FiniteElementModel, faces: list[Interface]) -> None:
+    """Refuse a body of several parts that neither elements nor rigid faces join: it has more than six rigid motions."""
+    count = len(model.ids)
+    node = np.where(model.dofs[:, 0] >= 0, model.dofs[:, 0], count + np.arange(len(model.dofs)))
+    rows = [[model.row_of(k) for k in face.nodes] for face in faces]
+    tied = [(face[0], k) for face in rows for k in face]
+    links = [abs(matrix).tocoo() for matrix in (model.stiffness, model.mass)]
+    one = np.concatenate([*(node[c.row] for c in links), [a for a, _ in tied]]).astype(int)
+    two = np.concatenate([*(node[c.col] for c in links), [b for _, b in tied]]).astype(int)
+    graph = sp.coo_array((np.ones(one.size), (one, two)), shape=(count + len(node),) * 2)
+    part = connected_components(graph, directed=False)[1]
+    stiff = model.stiffness.diagonal() > 0.0
+    parts = np.unique(part[node[stiff & (model.dofs[:, 0] >= 0)]])
+    if parts.size > 1:
+        first, other = (model.ids[np.flatnonzero(part[:count] == k)[0]] for k in parts[:2])
+        raise FlexibleError(
+            f"{model.name}: it is in {parts.size} parts, as those of nodes {first} and {other}, which nothing joins; "
+            "merge their nodes, join them by one rigid interface, or reduce each by itself"
         )
 
 

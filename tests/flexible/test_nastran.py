@@ -13,6 +13,7 @@ from gearmbs.flexible import (
     Shaft,
     ShaftSection,
     check_model,
+    from_matrices,
     mnf_of,
     read_op2,
     read_op2_modes,
@@ -22,6 +23,7 @@ from gearmbs.flexible import (
 )
 from gearmbs.flexible.nastran import axes_at, op2_tables
 from tests.flexible.op2_files import Op2Writer
+from tests.flexible.test_files import cube
 from tests.generators import cases, seed
 from tests.says import says
 
@@ -454,3 +456,18 @@ def test_points_on_the_axis_of_a_tilted_system_have_its_axes(kind):
             np.testing.assert_allclose(found, usual, atol=1e-5)
     beside = axes_at(np.vstack([origin + axes @ [0.0, 1e-3, 0.3], [0.0, 2.0, 0.0], origin, axes]))
     np.testing.assert_allclose(beside, axes[:, [1, 0, 2]] * [1.0, -1.0, 1.0], atol=1e-9)
+
+
+def test_empty_rotations_of_solid_elements_are_none(tmp_path):
+    corners, k, m = cube()
+    rows = np.flatnonzero(np.arange(48) % 6 < 3)
+    writer = Op2Writer()
+    writer.grids(np.arange(1, 9), corners)
+    for name, matrix in (("KGG", k), ("MGG", m)):
+        whole = np.zeros((48, 48))
+        whole[np.ix_(rows, rows)] = matrix
+        writer.matrix(name, whole)
+    found = read_op2(writer.write(tmp_path / "cube.op2"))
+    assert not found.has_rotations
+    expected = reduce_model(from_matrices(k, m, corners), [], modes=4, method="free").frequencies
+    np.testing.assert_allclose(reduce_model(found, [], modes=4, method="free").frequencies, expected, rtol=1e-6)
