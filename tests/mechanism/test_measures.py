@@ -135,3 +135,14 @@ def test_rates_of_joints_on_what_moves_are_those_of_plants():
         plant = m.linearize([], ["hub", "rail", "pin"], at=sim.state())
     np.testing.assert_allclose(plant.point.outputs, told, atol=1e-9)
     assert [sim.get("output", name) for name in ("hub", "rail", "pin")] == told
+
+
+def test_plants_between_outputs_have_the_turns_of_their_time():
+    """10 rad/s, 4 rad from one output to the next."""
+    m = Mechanism("disc")
+    disc = m.body("disc", 1.0, (2.0, 2.0, 2.0), angular_velocity=(0, 0, 10.0))
+    m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    solution = m.simulate(2.0, rate=2.5, dense_output=True)
+    for t in (0.4, 0.41, 0.79, 2.0):
+        plant = m.linearize([], [("joint_angle", "pin")], at=solution, t=t)
+        np.testing.assert_allclose(plant.point.outputs, [10.0 * t], rtol=1e-9)

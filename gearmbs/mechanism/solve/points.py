@@ -172,12 +172,13 @@ def _turns(counted: Counted | None, rdata: np.ndarray, t: float) -> dict[tuple[s
 
 def turns_of(solution: Solution, point: Point, instant: Instant) -> dict[tuple[str, str, str], float]:
     """Return angles that an instant counts and its point does not know, as a solution counts them from its start on."""
-    counted, row, found = instant.problem.counted, int(np.searchsorted(solution.t, point.t)), {}
-    for function, i, j in counted.angles if counted is not None and row < solution.t.size else ():
+    counted, t, found = instant.problem.counted, solution.t, {}
+    for function, i, j in counted.angles if counted is not None and point.t <= t[-1] else ():
         if (function, i, j) not in point.turns:
             # not markers made for the outputs of the plant
             with suppress(ModelError):
-                found[function, i, j] = float(solution.evaluate(f'{function}("{i}", "{j}")')[row])
+                # between outputs a line tells full turns: the next one may be more than half a turn ahead
+                found[function, i, j] = float(np.interp(point.t, t, solution.evaluate(f'{function}("{i}", "{j}")')))
     return found
 
 
