@@ -13,6 +13,7 @@ from gearmbs.files import write_whole
 from gearmbs.studies.run.code import Code
 
 FIRST = "first"
+FILES = "files"
 
 
 class OtherCode(CampaignError):
@@ -90,6 +91,39 @@ def admit(folder: Folder, code: Code, *, mix: bool = False, again: bool = False)
             f"{folder.path}: what is done comes from another code than this one: {code.differences(theirs)}. Take that "
             "code; or do its units again (--other-code again); or go on all the same (--other-code mix), which status "
             "and reports then say"
+        )
+
+
+def admit_files(folder: Folder, *, mix: bool = False, again: bool = False) -> None:
+    """Let the files that a subject's cases read be what they are: note them, or refuse if they were others.
+
+    Parameters
+    ----------
+    mix : bool
+        Let others be read, too.
+    again : bool
+        Note those of today: nothing that is done comes from others.
+
+    Raises
+    ------
+    OtherCode
+        Naming the files.
+    """
+    files = folder.plan.subject.files()
+    place = _file(folder, FILES)
+    try:
+        noted = unsealed(place)["files"]
+    except (OSError, ValueError, KeyError):
+        # folders of before have no note
+        noted = None
+    if noted is None or again:
+        if files or noted:
+            write_whole(place, sealed({"files": files}), durable=folder.path)
+    elif noted != files and not mix:
+        changed = sorted(name for name in {*noted, *files} if noted.get(name) != files.get(name))
+        raise OtherCode(
+            f"{folder.path}: what is done read other files than those that are there: {', '.join(changed)} changed. "
+            "Put them back; or do all units again (--other-code again); or go on all the same (--other-code mix)"
         )
 
 

@@ -171,7 +171,7 @@ def test_an_uncertain_bearing_asks():
         ({"kind": "angular contact"}, says("'25 deg'")),
         ({"kind": "tapered roller"}, "effective length"),
         ({"inner_curvature": 0.4}, says("Bearing.inner_curvature", "wider", "ball")),
-        ({"clearance": "9 mm"}, "give it in"),
+        ({"clearance": "9 mm"}, says("Bearing.clearance", "um")),
         ({"bore": 25}, says("Bearing.bore", "25 m", "plain")),
         ({"bore": "35 mm"}, says("Bearing.bore", "35 mm", "31.1 mm", "smaller")),
         ({"outside_diameter": "42 mm"}, says("Bearing.outside_diameter", "42 mm", "46.98 mm", "larger")),

@@ -178,6 +178,30 @@ def test_files_that_a_deck_names_count(tmp_path):
     assert key() == first
 
 
+def test_files_that_changed_after_cases_were_done_are_refused(tmp_path):
+    """Cases before and behind an edit of what a script reads are of two models; put back, or done again, they run."""
+    commands = tmp_path / "more.acf"
+    short, long = (f"a\nsimulate/dynamics, end={end}, steps=10\n" for end in ("0.1", "0.2"))
+    commands.write_text(short)
+    subject = DeckSubject(
+        DECK, {"mass": 1.0}, script="a\nb\nFILE/COMMAND=more\n", name=str(tmp_path / "m.adm"), skip_unsupported=True
+    )
+    campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("mass", 1.0, 2.0)], "sobol", n=2, unit=1))
+    campaign.run(workers=0)
+    commands.write_text(long)
+    campaign.extend(4)
+    with pytest.raises(CampaignError, match=says("FILE/COMMAND", "--other-code", "again")):
+        campaign.run(workers=0)
+    assert len(campaign.folder.done()) == 2
+    commands.write_text(short)
+    campaign.run(workers=0)
+    assert len(campaign.folder.done()) == 4
+    commands.write_text(long)
+    campaign.run(workers=0, other_code="again")
+    assert campaign.status().done == 4
+    campaign.run(workers=0)
+
+
 @pytest.mark.slow
 def test_variables_of_a_deck_as_factors(tmp_path):
     """A constant VARIABLE, by its id and by its name, and a place in the script."""

@@ -215,13 +215,13 @@ def test_results_that_are_no_numbers_are_left_out_of_maps_and_figures(tmp_path):
     told = f"{there} of 40 cases; left out: {40 - there} without a number"
     maps = []
     for condition in ("y > 0", "not y > 0"):
-        with pytest.warns(CampaignWarning, match=told):
+        with pytest.warns(CampaignWarning, match=says(f"{there} of 40 cases", f"{40 - there} without a number")):
             share, counts, edges, _ = condition_map(campaign, condition, "x1", "x2", 2)
         assert counts.sum() == there
         assert edges[-1] <= 0.0
         maps.append(share)
     np.testing.assert_allclose(maps[0] + maps[1], 1.0)
-    with pytest.warns(CampaignWarning, match=told):
+    with pytest.warns(CampaignWarning, match=says(f"{there} of 40 cases", f"{40 - there} without a number")):
         picture = campaign.figure("main effects", "y")
     assert told in picture.texts[0].get_text()
     none = make_plan(function("silent"), [Factor("x1", 1.0, 2.0), Factor("x2", 0.0, 1.0)], "grid", keep=["numbers"])

@@ -250,7 +250,7 @@ def test_channels_of_tdms_begin_together(tmp_path, late):
 
 
 def test_a_spectrum_in_tdms_is_no_record(tmp_path):
-    with pytest.raises(SignalFileError, match=says("no samples")):
+    with pytest.raises(SignalFileError, match=says("samples over time")):
         read_signal(waveforms(tmp_path / "a.tdms", a={"wf_xunit_string": "Hz"}))
 
 

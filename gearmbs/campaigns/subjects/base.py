@@ -182,6 +182,10 @@ class Subject(ABC):
         """Return the names of the modules that simulate; with what they import they are part of a result's identity."""
         return [type(self).__module__]
 
+    def files(self) -> dict[str, str]:
+        """Return digests of the files that cases read beside the plan, by name: results come from them, too."""
+        return {}
+
     def explain(self, error: Exception) -> Outcome:
         """Return how a case that raised has ended."""
         status = IMPOSSIBLE if isinstance(error, ValueError) else FAILED

@@ -160,9 +160,19 @@ class DeckSubject(Subject):
         if self.skip_unsupported:
             found["skip_unsupported"] = True
         if files := _named_files(thing["deck"]):
-            found["files"] = files
+            found["files"] = [digest for _, digest in files]
         if thing["script"] is not None and (commands := _included(thing["script"], self.name)):
             found["commands"] = commands
+        return found
+
+    def files(self) -> dict[str, str]:
+        """Return digests of the files that the deck names, of the commands that its script takes, of routines."""
+        thing = self.check(self.base(), "deck")
+        found = dict(_named_files(thing["deck"]))
+        if thing["script"] is not None and (commands := _included(thing["script"], self.name)):
+            found["the commands of FILE/COMMAND"] = commands
+        if self.routines is not None:
+            found[str(self.routines)] = _digest(self.routines)
         return found
 
     def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
@@ -210,8 +220,8 @@ def _digest_as_written(path: Path, _written: tuple[int, int, int]) -> str:
     return _digest(path)
 
 
-def _named_files(deck: Any) -> list[str]:
-    """Return digests of the files that a deck reads, as modal neutral files and meshes, in the order of the deck."""
+def _named_files(deck: Any) -> list[tuple[str, str]]:
+    """Return names and digests of the files that a deck reads, as modal neutral files and meshes, in its order."""
     from gearmbs.adams.parse.files import named_file
 
     found = []
@@ -222,7 +232,8 @@ def _named_files(deck: Any) -> list[str]:
             if name:
                 path = named_file("FILE", name, deck.file)
                 about = path.stat()
-                found.append(_digest_as_written(path, (about.st_mtime_ns, about.st_size, about.st_ino)))
+                digest = _digest_as_written(path, (about.st_mtime_ns, about.st_size, about.st_ino))
+                found.append((str(path), digest))
     return found
 
 

@@ -213,7 +213,9 @@ def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list
     ]
     if not kept:
         listed = f"; it holds {', '.join(names) or 'none'}"
-        raise SignalFileError(path, f"holds no samples{'' if channels is None else f' in {list(channels)}'}{listed}")
+        raise SignalFileError(
+            path, f"holds no samples over time{'' if channels is None else f' in {list(channels)}'}{listed}"
+        )
     longest = max(len(c) for _, c in kept)
     if any(len(c) < longest and not _is_slow(c) for _, c in kept):
         listed = ", ".join(f"{name} ({len(c)})" for name, c in kept)
