@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.plans.designs import SEQUENCES
+from gearmbs.campaigns.plans.designs import SEQUENCES, TWO_LEVELS
 from gearmbs.campaigns.plans.factors import Choice
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning
 from gearmbs.campaigns.sobol_bounds import in_scale, out_of_scale
@@ -427,7 +427,7 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
         return sobol_indices(values, names, points=points, levels=_levels(plan))
     if plan.design == "morris":
         return morris_effects(values, points, names, places=plan.places(points))
-    if plan.design in ("factorial", "plackett burman"):
+    if plan.design in TWO_LEVELS:
         return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
     if plan.design == "grid":
         # crossed choices, which take no coordinate, were refused above

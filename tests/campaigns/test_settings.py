@@ -57,6 +57,16 @@ def test_options_that_mean_something(design, options, cases):
     assert make_plan(function(), ranges(), design, options=options).size == cases
 
 
+@pytest.mark.parametrize("design", ["factorial", "plackett burman"])
+def test_designs_of_two_levels_take_no_names_without_order(design):
+    def plan(*values):
+        return make_plan(function(), [*ranges()[:2], Factor(ranges()[2].path, values=values)], design)
+
+    with pytest.raises(CampaignError, match=says(design, "3 values", "grid")):
+        plan("a", "b", "c")
+    assert plan(0.0, 1.0).size == plan(0.0, 0.5, 1.0).size
+
+
 def test_what_is_of_ranges_stands_beside_no_values():
     for settings in ({"levels": 3}, {"scale": "log"}):
         with pytest.raises(CampaignError, match=says("levels", "scale", "values")):

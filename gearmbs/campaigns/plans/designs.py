@@ -21,14 +21,16 @@ SEQUENCES = ("sobol", "halton", "random")
 ANALYSES = ("saltelli", "morris")
 """Designs made for an analysis, which go on as well."""
 
+TWO_LEVELS = ("factorial", "plackett burman")
+"""Designs that take the ends of what a factor has."""
+
 DESIGNS = (
     "grid",
     "list",
     "latin hypercube",
     *SEQUENCES,
     *ANALYSES,
-    "factorial",
-    "plackett burman",
+    *TWO_LEVELS,
     "central composite",
     "box behnken",
     "one at a time",

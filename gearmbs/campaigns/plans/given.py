@@ -164,6 +164,13 @@ def _consistent(plan: Plan) -> None:
                     f"factor {f.path!r}: its {len(found)} values are {', '.join(map(str, found))}, some of them twice; "
                     "give it fewer levels, or values that are different"
                 )
+    for f in plan.factors if plan.design in designs.TWO_LEVELS else ():
+        # of numbers the ends are meant; of names nothing tells which two
+        if isinstance(f, Factor) and len(f.values) > 2 and not all(isinstance(v, int | float) for v in f.values):
+            raise CampaignError(
+                f"factor {f.path!r}: a {plan.design} design takes two of its {len(f.values)} values, which have no "
+                "order; give it two, or take a grid"
+            )
     drawn = [f for f in plan.factors if isinstance(f, Specimens)]
     if alike := [f.name for f in drawn if [other.seed for other in drawn].count(f.seed) > 1]:
         raise CampaignError(
