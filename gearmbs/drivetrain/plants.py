@@ -18,7 +18,7 @@ from gearmbs.gears.mesh import FlankFriction
 from gearmbs.mechanism.parts.functions import constant
 from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.solve.analyses import static_equilibrium
-from gearmbs.mechanism.solve.plant_names import Given, Told, own_marker
+from gearmbs.mechanism.solve.plant_names import Given, Told, count_from_here, own_marker
 from gearmbs.mechanism.solve.plants import linearize as linear_plant
 from gearmbs.mechanism.solve.points import point_of
 from gearmbs.wording import did_you_mean
@@ -69,6 +69,7 @@ def loaded(train: Drivetrain) -> tuple[Mechanism, float]:
     """
     still = resting(train)
     m = still.build()
+    count_from_here(m)
     after = 2.0 * still.run_up
     rest = static_equilibrium(m, t=after, move=True)
     for drive in train.drives:

@@ -23,7 +23,7 @@ from gearmbs.drivetrain import (
     Wheel,
 )
 from gearmbs.drivetrain.drives import Drive
-from gearmbs.gears import GearSpec, IdealMesh
+from gearmbs.gears import GearSpec, IdealMesh, loaded_transmission_error
 from gearmbs.mechanism import ModelError, make_input
 from gearmbs.studies import train_modes
 from tests.says import says
@@ -199,3 +199,11 @@ def test_states_of_its_simulators():
     m.bodies["in"].marker(name="later")
     with pytest.raises(ModelError, match=says("state", "markers", "take")):
         m.linearize(*asked, at=state)
+
+
+def test_transmission_error_under_load_counts_from_before_it():
+    """What a plant tells at rest under load is how far the teeth have given way, as in the static curve."""
+    train = stage("speed")
+    plant = train.linearize([("torque", "out")], [("transmission_error", "stage")])
+    curve = loaded_transmission_error(train.pairs["stage"], torque=300.0, points=40).error
+    assert curve.min() * (1.0 - 1e-3) < plant.point.outputs[0] < curve.max() * (1.0 + 1e-3)

@@ -413,9 +413,7 @@ class PlantNames:
         element = self._mesh(mesh)
         parts = []
         for marker, lever in zip((element.i, element.j), levers(element)[:2], strict=True):
-            ground = self.mechanism.ground
-            where = marker.global_position(), marker.global_orientation()
-            at = own_marker(ground, f"{marker.name} plant ground", ground.marker_at, *where)
+            at = unturned(self.mechanism, marker)
             parts.append(f'{lever!r}*AZ("{marker.name}", "{at.name}")')
         return [Told(f"transmission_error {element.name}", "m", " + ".join(parts))]
 
@@ -486,6 +484,20 @@ class PlantNames:
 def own_marker(body: Body, name: str, make: Callable[..., Marker], *where: Any) -> Marker:
     """Return the marker of a body that has a name, made by a method of the body if it is not there yet."""
     return next((one for one in body.markers if one.name == name), None) or make(*where, name=name)
+
+
+def unturned(mechanism: Mechanism, marker: Marker) -> Marker:
+    """Return the marker of the ground from which a wheel's turn counts, made where it is if it is not there yet."""
+    ground, where = mechanism.ground, (marker.global_position(), marker.global_orientation())
+    return own_marker(ground, f"{marker.name} plant ground", ground.marker_at, *where)
+
+
+def count_from_here(mechanism: Mechanism) -> None:
+    """Let transmission errors count from where the wheels are now, wherever bodies are moved afterwards."""
+    for element in mechanism.elements.values():
+        if pair_of(element) is not None:
+            for marker in (element.i, element.j):
+                unturned(mechanism, marker)
 
 
 def _at_level(given: Given) -> Given:
