@@ -23,9 +23,10 @@ def drawn_first(app, _, docnames: list[str]) -> None:
     """Let pages with figures be read before those with cards, which are read again if a card's page is."""
     fronts = [name for name in docnames if name in FRONTS]
     others = [name for name in docnames if name not in FRONTS]
-    shown = {card for front in FRONTS for card in _cards(Path(app.srcdir, f"{front}.md"))}
+    there = [name for name in FRONTS if Path(app.srcdir, f"{name}.md").is_file()]
+    shown = {card for front in there for card in _cards(Path(app.srcdir, f"{front}.md"))}
     if any(name.rpartition("/")[2] in shown for name in others):
-        fronts = list(FRONTS)
+        fronts = there
     docnames[:] = [*others, *fronts]
 
 

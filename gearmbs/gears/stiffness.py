@@ -27,7 +27,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh, require_points
@@ -532,7 +531,8 @@ def mesh_stiffness(
     }  # fmt: skip
     # the mean over the face, of what the sections that are on the path have there
     fine = np.linspace(0.0, path, FACE_POINTS)
-    sums = cumulative_trapezoid(pair_stiffness(geometry, begin + fine * pitch, **bodies), fine, initial=0.0)
+    along = pair_stiffness(geometry, begin + fine * pitch, **bodies)
+    sums = np.concatenate(([0.0], np.cumsum(0.5 * (along[1:] + along[:-1]) * np.diff(fine))))
 
     def pair_alone(travel: np.ndarray) -> np.ndarray:
         if overlap == 0.0:

@@ -136,7 +136,7 @@ def states(path, **options) -> Campaign:
 
 def having(state) -> dict[str, float]:
     """Return the size of a state."""
-    return {"y": 0.0 if state == "sound" else float(state[0]["size"])}
+    return {"y": 0.0 if state == "sound" else float(state["size"])}
 
 
 def test_a_state_without_size_is_not_held_out(tmp_path):

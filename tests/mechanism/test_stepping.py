@@ -26,6 +26,7 @@ from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.parts import functions
 from gearmbs.studies import flexible_rig
 from gearmbs.studies.run.simulation import case_mechanism
+from tests.docs.support import blocks
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_kinds_of_wheels import QUIET
 from tests.mechanism.agreement import assert_all_names_agree
@@ -510,8 +511,8 @@ def test_planetary_set():
 @pytest.mark.slow
 def test_the_environment_balances_its_pole(capsys):
     """The page's policy, made of the linear plant, keeps the pole up for whole episodes; without it the pole falls."""
-    page = (Path(__file__).parents[2] / "docs" / "notebooks" / "environment.md").read_text()
-    exec("\n".join(re.findall(r"```\{code-cell\} ipython3\n(.*?)```", page, re.DOTALL)), {})
+    page = Path(__file__).parents[2] / "docs" / "notebooks" / "environment.md"
+    exec("\n".join(block.code for block in blocks(page) if block.language == "code-cell"), {})
     told = capsys.readouterr().out.splitlines()
     assert [line.split()[-1] for line in told[:3]] == ["balanced"] * 3
     assert told[4].startswith("fallen")
