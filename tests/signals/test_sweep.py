@@ -47,6 +47,17 @@ def test_a_run_up_with_one_speed_is_told(teeth):
     assert not any("move" in note for note in (*steady, *followed))
 
 
+@pytest.mark.parametrize(("wobble", "rate"), [(0.01, 1), (0.01, 2), (0.02, 1), (0.004, 1), (0.0, 1)])
+def test_a_speed_that_wobbles_by_more_than_is_followed_is_told(wobble, rate):
+    """A wobble of 0.15 / 29 is followed; one that is not takes a part of the mesh out of the average."""
+    seen = record(1500 * (1 + wobble * np.sin(2 * np.pi * rate * SECONDS * PART)))
+    report = analyse(seen, 29, speed="1500 rpm")
+    told = any("wobbles" in note for note in report.notes)
+    assert told == (wobble > 0.15 / 29)
+    # the mesh with its sideband and second harmonic, and the orders: 0.86
+    assert (float(report.average.std()) > 0.8) != told
+
+
 @pytest.mark.parametrize("share", [1.0, 1.02, 0.9, 2.0])
 def test_a_run_up_whose_mesh_is_elsewhere_is_told(share):
     curve = [(0.0, f"{900 * share} rpm"), (SECONDS, f"{2400 * share} rpm")]

@@ -26,7 +26,7 @@ from gearmbs.signals.rotation.speed import (
     own_lines_missing,
     prominence,
 )
-from gearmbs.signals.rotation.sweep import remark_sweep
+from gearmbs.signals.rotation.sweep import remark_sweep, remark_wander
 from gearmbs.signals.signal.given import is_curve, speed_curve, unit_factor
 from gearmbs.signals.signal.signal import rate_of
 from gearmbs.signals.spectra import periodograms
@@ -305,6 +305,8 @@ def mesh_shaft(
     remark_plausibility(signal, shaft.speed, found is None, notes)
     if (found is None or isinstance(found, float)) and (shaft.estimate is None or shaft.estimate.phase is None):
         notes += remark_sweep(signal, shaft.speed)
+    if shaft.phase.attrs.get("origin") == "line":
+        notes += remark_wander(signal, shaft.speed, teeth[0])
     return shaft, signal
 
 
