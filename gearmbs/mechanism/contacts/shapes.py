@@ -206,7 +206,9 @@ class Mesh(Shape):
         if np.any(uses % 2):
             raise ModelError(f"mesh: {np.sum(uses % 2)} edges belong to one triangle only; a solid's surface is closed")
         there = len(np.unique(np.sort(triangles, axis=1), axis=0))
-        if there < len(triangles):
+        # of what is flat both sides coincide
+        flat = np.linalg.matrix_rank(vertices - vertices.mean(axis=0)) < 3
+        if there < len(triangles) and not flat:
             raise ModelError(f"mesh: {len(triangles) - there} triangles are there twice; save the solid once")
         triangles = turned_alike(triangles)
         inside = volume(vertices, triangles)
