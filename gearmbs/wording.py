@@ -18,7 +18,7 @@ OF_ADAMS = {
 }
 """What files of ADAMS are, by their endings."""
 
-BETWEEN = ("gearmbs", "contextlib", "functools")
+BETWEEN = ("gearmbs", "contextlib", "dataclasses", "functools")
 """Modules whose lines no warning is about: the package, and what stands between two of its functions."""
 
 

@@ -23,7 +23,6 @@ References
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from numbers import Real
@@ -45,6 +44,7 @@ from gearmbs.bearings.laws_kernel import (
 from gearmbs.schema.described import Described, check_keys
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_material, to_si
+from gearmbs.wording import warn
 
 Length = Annotated[Quantity, Measure("length", above=0)]
 Boundary = Annotated[Quantity, Measure("length", above=0, below=10)]
@@ -122,7 +122,7 @@ class Bearing(Described):
         self._check()
         doubt = doubt_of_material(self.youngs_modulus, self.density)
         if doubt:
-            warnings.warn(f"Bearing: {doubt}", stacklevel=3)
+            warn(f"Bearing: {doubt}")
 
     def _check(self) -> None:
         z, d, pitch = self.elements, self.element_diameter, self.pitch_diameter

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from typing import Any
 
 from gearmbs.bearings.boundary import RATINGS, boundary
 from gearmbs.bearings.estimate import TAPERED_ANGLES, Rating, estimated
 from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of
+from gearmbs.wording import warn
 
 
 def dimension_series(designation: str) -> tuple[str, str, str] | None:
@@ -209,10 +209,9 @@ def _named_class(designation: str, suffixes: str, changes: dict[str, Any]) -> st
         For a class that is not tabulated, and for two, unless the clearance is given.
     """
     if HYBRID.search(suffixes) and not {"youngs_modulus", "density"} <= changes.keys():
-        warnings.warn(
+        warn(
             f"designation {designation!r}: its elements are ceramic by HC, and are taken as steel; give density= (3200 "
             "kg/m^3) and a youngs_modulus= for elements and rings (of silicon nitride on steel 2.46e11 Pa)",
-            stacklevel=4,
         )
     bare = HYBRID.sub("", suffixes)
     found = {f"C{one['name'] or one['short']}{one['half'] or ''}" for one in CLASSES.finditer(bare)}
@@ -222,10 +221,9 @@ def _named_class(designation: str, suffixes: str, changes: dict[str, Any]) -> st
         raise BearingError(f"designation {designation!r} names {' and '.join(sorted(found))}; give one class")
     (named,) = found
     if named == "CM":
-        warnings.warn(
+        warn(
             f"designation {designation!r}: CM is a maker's own class for electric motors, which is not "
             "tabulated here; give clearance= (diametral), it is taken as not given",
-            stacklevel=4,
         )
         return None
     if named.rstrip("HL") not in TABULATED:
@@ -254,10 +252,9 @@ def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> N
     words = [CLASSES.sub("", word) for word in apart]
     unknown = [word for word in words if word and SUFFIX.fullmatch(word) is None and APART.fullmatch(word) is None]
     if unknown and "clearance" not in changes:
-        warnings.warn(
+        warn(
             f"designation {designation!r}: what {', '.join(unknown)} means is not known, and is taken to say nothing "
             "of the clearance; give clearance= (diametral) if it does",
-            stacklevel=4,
         )
 
 
@@ -347,11 +344,10 @@ def _estimated(
     if "element_diameter" in found:
         told += f" of {1e3 * found['element_diameter']:.4g} mm"
     rated = "its C is that of a maker's catalogue" if "dynamic_rating" in own else "its C is estimated from them, too"
-    warnings.warn(
+    warn(
         f"designation {designation!r}: {told} are estimated, for makers do not publish them: one element more or less "
         f"moves the lines of its races by {100.0 / count:.2g} %, and its radial "
         f"stiffness is known to some 10 %; {rated}. Count the elements and give elements= and element_diameter= where "
         "that matters",
-        stacklevel=6,
     )
     return {**own, **{key: value for key, value in found.items() if own.get(key) is None}, "estimated": tuple(missing)}

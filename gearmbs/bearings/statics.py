@@ -6,7 +6,6 @@ of the outer ring; loads are those that act on the inner ring from outside, with
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +19,7 @@ from gearmbs.bearings.bearing import Bearing
 from gearmbs.bearings.kinds import KINDS, BearingError, require
 from gearmbs.bearings.settings import BearingTables, bearing_settings, pack
 from gearmbs.units import Quantity, to_si
+from gearmbs.wording import warn
 
 # Where a load puts the inner ring: the minimum of a convex potential, and which loads have none.
 #
@@ -412,11 +412,10 @@ class BearingStatics:
         against = -self.settings.sense * float(found[2])
         if KINDS[self.bearing.kind].one_shoulder and against > AGAINST * float(state.element_loads.sum()):
             name = f" {self.bearing.designation}" if self.bearing.designation else ""
-            warnings.warn(
+            warn(
                 f"{self.bearing.kind} bearing{name}: {against:.4g} N along the axis press against its sense "
                 f"({self.settings.sense:+d}) and are carried across the groove, on a shoulder that most such bearings "
                 "do not have; turn the load or the sense, or add a second bearing",
-                stacklevel=2,
             )
         return state
 

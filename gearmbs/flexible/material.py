@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -13,6 +12,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.schema.described import Described
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_material
+from gearmbs.wording import warn
 
 # The error of everything that describes, reads or reduces a body that deforms.
 
@@ -63,14 +63,13 @@ class ElasticMaterial(Described):
         e = self.youngs_modulus
         doubt = doubt_of_material(e, self.density)
         if doubt:
-            warnings.warn(f"ElasticMaterial '{self.name}': {doubt}", stacklevel=3)
+            warn(f"ElasticMaterial '{self.name}': {doubt}")
         if self.shear_modulus is None:
             object.__setattr__(self, "shear_modulus", e / (2.0 * (1.0 + self.poisson_ratio)))
         if self.shear_modulus > MOST_SHEAR * e:
-            warnings.warn(
+            warn(
                 f"ElasticMaterial '{self.name}': shear_modulus is {self.shear_modulus:.4g} Pa beside E = {e:.4g} Pa; "
                 "of an isotropic material it is at most E / 2",
-                stacklevel=3,
             )
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import hashlib
 import struct
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -24,7 +23,7 @@ from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile, check_numbers
 from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.progress import waiting
-from gearmbs.wording import of_adams
+from gearmbs.wording import of_adams, warn
 
 SAME = 1e-12
 """Largest difference of two places that move alike, in m and in what a unit of a mode moves and turns them."""
@@ -320,10 +319,9 @@ def _follow_to_end(r: Reader, flags: tuple[int, ...], ids: np.ndarray, n: int) -
     if others:
         if r.at == len(r.data):
             r.wrong(f"number {others[0]}", "the file ends here, and its summary names this block; it is cut off")
-        warnings.warn(
+        warn(
             f"{r.label}: of its blocks {', '.join(others)} the length is not known: whether the file is whole after "
             f"byte {r.at} cannot be told. What is read stands before it",
-            stacklevel=5,
         )
         return None
     statistics = None
@@ -333,10 +331,9 @@ def _follow_to_end(r: Reader, flags: tuple[int, ...], ids: np.ndarray, n: int) -
             r.wrong("modal statistics", f"they are of {found} modes, the file has {n}", 4)
         statistics = r.records([("k", ">i4", (13,)), ("v", ">f8", (13,))], n, "modal statistics")["v"].astype(float)
     if r.at != len(r.data):
-        warnings.warn(
+        warn(
             f"{r.label}: {len(r.data) - r.at} bytes from byte {r.at} on are of no block that its summary names; they "
             "are not looked at",
-            stacklevel=5,
         )
     return statistics
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,6 +12,7 @@ from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.flexible.stress import KnownStresses, StressModes
 from gearmbs.mechanism import ShapeIntegrals
 from gearmbs.units import to_si
+from gearmbs.wording import warn
 
 UNITS = {
     "KILOGRAM": "kg", "KG": "kg", "GRAM": "g", "MEGAGRAM": "1000 kg", "TONNE": "1000 kg",
@@ -281,7 +281,7 @@ def check_numbers(found: ModalNeutralFile, label: str) -> None:
     diagonal = float(np.linalg.norm(np.ptp(found.positions, axis=0))) * unit["length"]
     scaled = MassProperties(found.mass * unit["mass"], found.centre * unit["length"], found.inertia)
     for doubt in scaled.doubts(diagonal):
-        warnings.warn(f"{label}: {doubt}; the file names {', '.join(found.units)}", stacklevel=4)
+        warn(f"{label}: {doubt}; the file names {', '.join(found.units)}")
 
 
 def _check_eigenvalues(found: ModalNeutralFile, label: str) -> None:

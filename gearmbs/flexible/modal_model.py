@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from gearmbs.flexible.material import Damping, FlexibleError, damping_ratios
 from gearmbs.flexible.stress import KnownStresses, StressModes, StressRecovery
 from gearmbs.mechanism import Mechanism, ModalBody, Mode, ShapeIntegrals
 from gearmbs.mechanism.parts.modal import COUPLING, ShapedMarker
+from gearmbs.wording import warn
 
 # Named places of a modal body.
 
@@ -313,9 +313,8 @@ class ModalModel:
             kept -= 1
         kept = kept or count
         if kept < count:
-            warnings.warn(
+            warn(
                 f"{self.name}: {kept} modes are kept instead of {count}, whose last is one half of a bending pair",
-                stacklevel=2,
             )
         return self.selected(np.arange(kept))
 

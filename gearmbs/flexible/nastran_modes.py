@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from gearmbs.flexible.nastran import GridTable, block_records, op2_tables, pyyet
 from gearmbs.flexible.reduction import nodal_lumps
 from gearmbs.flexible.stress import COMPONENTS, StressModes
 from gearmbs.units import Quantity
+from gearmbs.wording import warn
 
 # Stresses of the modes of Nastran's op2 files, at the grid points of solid elements.
 
@@ -85,9 +85,8 @@ def grid_stresses(file: Path, table: GridTable, length: float, force: float) -> 
             raise FlexibleError(f"{file.name}: mode {mode} has stresses of elements of type {kind} and none of solids")
     if others:
         kinds = ", ".join(str(kind) for kind in sorted(others))
-        warnings.warn(
+        warn(
             f"{file.name}: stresses of elements that are no solids (types {kinds} of Nastran) are left out",
-            stacklevel=3,
         )
     grids = [np.concatenate([g for g, _ in parts]) for parts in modes.values()]
     for mode, own in zip(modes, grids):

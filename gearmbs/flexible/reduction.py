@@ -9,7 +9,6 @@ relief. In both cases rigid motions are taken out, since the frame carries them,
 from __future__ import annotations
 
 import contextlib
-import warnings
 from collections.abc import Iterable
 from dataclasses import replace
 from numbers import Integral
@@ -30,6 +29,7 @@ from gearmbs.mechanism.parts.modal import ShapeIntegrals
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity
+from gearmbs.wording import warn
 
 # Integrals of shapes over a finite-element body, as the floating frame needs them.
 #
@@ -241,7 +241,7 @@ def reduce_model(
     _check_whole(model, [i for i in chosen if isinstance(i, Interface) and i.kind == "rigid"])
     doubts = model.unit_doubts(properties)
     if doubts:
-        warnings.warn(f"{model.name}: {'; '.join(doubts)}", stacklevel=3)
+        warn(f"{model.name}: {'; '.join(doubts)}")
     k = sp.csc_array(parts.expand.T @ model.stiffness @ parts.expand)
     m = sp.csc_array(parts.expand.T @ model.mass @ parts.expand)
     rigid = _rigid_of(model, parts)

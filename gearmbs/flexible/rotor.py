@@ -9,7 +9,6 @@ the modal body of the same shaft, which turns with its frame and needs no G.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Number
@@ -24,6 +23,7 @@ from gearmbs.flexible.shaft import Shaft
 from gearmbs.mechanism.parts.quantities import quantities, quantity
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity
+from gearmbs.wording import warn
 
 DIRECTIONS = {"lateral": (0, 1, 3, 4), "torsional": (5,), "axial": (2,), "all": (0, 1, 2, 3, 4, 5)}
 """Degrees of freedom of each kind of vibration; those of round shafts do not know each other."""
@@ -255,10 +255,9 @@ class Rotor:
         floor = AT_REST * np.sqrt(self._local)
         growing = values.real[(np.abs(values.imag) <= floor) & (values.real > floor)]
         if growing.size:
-            warnings.warn(
+            warn(
                 f"the rotor is unstable: {growing.size} motion(s) without a frequency, which are no modes, grow by up "
                 f"to exp({growing.max():.4g} t); give its supports a stiffness and damping that are not negative",
-                stacklevel=2,
             )
         chosen = np.flatnonzero(values.imag > floor)
         chosen = chosen[np.argsort(values[chosen].imag)][:count]

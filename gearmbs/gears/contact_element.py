@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -18,6 +17,7 @@ from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import law_factors, pack
 from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, ForceElement, Setting, StartOverlap
 from gearmbs.units import shown
+from gearmbs.wording import warn
 
 DEEP = 0.02
 """Depth of teeth in each other, in modules, up to which no load is asked for: 0.06 mm at 3 mm, twice and a half what
@@ -109,13 +109,9 @@ class GearContact(ForceElement):
                 "placement() says"
             )
         if geometry.sign > 0 and distance > most:
-            warnings.warn(
-                f"{label}, more than the tip radii together, {1e3 * most:.4g} mm: the teeth cannot touch", stacklevel=4
-            )
+            warn(f"{label}, more than the tip radii together, {1e3 * most:.4g} mm: the teeth cannot touch")
         if geometry.sign < 0 and distance < most:
-            warnings.warn(
-                f"{label}, less than the tip radii differ, {1e3 * most:.4g} mm: the teeth cannot touch", stacklevel=4
-            )
+            warn(f"{label}, less than the tip radii differ, {1e3 * most:.4g} mm: the teeth cannot touch")
 
     def start_overlap(self) -> StartOverlap | None:
         """Return how teeth stand in each other at the start: deeper than a fiftieth of the module, jams apart.

@@ -7,16 +7,16 @@ one negative, and with them centre distance and line of action of the pair. One 
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Literal, overload
+from typing import Literal, overload
 
 import numpy as np
 
 from gearmbs._display import Written
 from gearmbs.gears.spec import GearSpec, convert_fields, involute
 from gearmbs.units import Quantity
+from gearmbs.wording import warn
 
 JAM_ROUNDING = 1e-12
 """Overlap of parallel wheels, m, that is taken for rounding: standard teeth at their nominal distance have none."""
@@ -101,9 +101,6 @@ class PairGeometry(Written):
     pivot: Quantity = 0.0
     axial_shift: Quantity = 0.0
     backlash: Quantity = 0.0
-
-    _calls: ClassVar[int] = 4
-    """Calls from `_remark` up to the line that makes the pair."""
 
     def __post_init__(self) -> None:
         lengths = ("centre_distance_error", "pivot", "axial_shift", "backlash")
@@ -237,12 +234,11 @@ class PairGeometry(Written):
         overlap = -self.normal_backlash
         if overlap > JAM_ROUNDING:
             farther = overlap / (2 * math.sin(self.working_pressure_angle))
-            warnings.warn(
+            warn(
                 f"{self._name}: negative backlash: at the centre distance {self.centre_distance * MM:.4f} mm the "
                 f"normal backlash is {-overlap * MM:.4g} mm, so that the teeth press on both flanks without load; give "
                 f"backlash {(self.backlash + overlap) * MM:.4g} mm or more, or "
                 f"{'increase' if self.sign > 0 else 'reduce'} centre_distance_error by {farther * MM:.4g} mm",
-                stacklevel=self._calls,
             )
 
     # --- signed sums --------------------------------------------------------------------------------

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import math
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import InitVar, dataclass, field
 from functools import partial
@@ -17,7 +16,7 @@ from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.modifications import STEPS_A_DETAIL, Fault
 from gearmbs.gears.spec import WIDEST_FACE, Material
 from gearmbs.units import Given, Quantity, shown, to_si, truth
-from gearmbs.wording import any_of
+from gearmbs.wording import any_of, warn
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -217,10 +216,9 @@ class FlankFriction(Written):
         if self.kind not in ("adams", "smooth", "none"):
             raise ValueError(f"FlankFriction.kind is {self.kind!r}; choose 'adams', 'smooth' or 'none'")
         if self.kind == "adams" and self.static < self.dynamic:
-            warnings.warn(
+            warn(
                 f"FlankFriction.static is {self.static:g}, below dynamic {self.dynamic:g}: friction would grow where "
                 "flanks slide faster; are they exchanged? Give static as much as dynamic, or more",
-                stacklevel=3,
             )
 
     @classmethod

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -29,6 +28,7 @@ from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 from gearmbs.gears.tables import fillet_clearance, pack
 from gearmbs.units import Quantity, shown, to_si
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.gears.contact_element import GearContact
@@ -111,7 +111,6 @@ class GearPair(PairGeometry, Shown):
     faults: tuple[Fault, ...] = ()
     input_torque: InitVar[Quantity] = None
 
-    _calls: ClassVar[int] = 5
     _input_torque: ClassVar[Quantity] = None  # of an instance, where it was given
 
     # mypy may lose InitVar among modules that import each other for types
@@ -154,10 +153,9 @@ class GearPair(PairGeometry, Shown):
             return
         varying = varying_along_face(self, self.faults)
         if varying:
-            warnings.warn(
+            warn(
                 f"GearPair.slices is 1: the flanks are looked at in the middle of the face only, and how they vary "
                 f"along it is not seen ({', '.join(varying)}); leave slices out for as many as that needs",
-                stacklevel=self._calls - 1,
             )
 
     def _remark_on_tips(self) -> None:
@@ -177,21 +175,19 @@ class GearPair(PairGeometry, Shown):
             ]
             if fouls:
                 counted = "" if self.driver.helix_angle else ", or give root_contact=True, which counts the force there"
-                warnings.warn(
+                warn(
                     f"GearPair: under {shown(self.torque, 'N*m', '.4g')} the flanks yield {yielding * 1e3:.3g} mm, and "
                     f"{', '.join(fouls)}, unseen; reduce fillet_radius there or the addendum{counted}",
-                    stacklevel=self._calls - 1,
                 )
         if self.sign < 0:
             needed, free = self.fouling_angles
             passing = (free - needed) * self.driven.base_radius
             yielding = self.penetration(pairs=max(whole, 1))
             if passing < yielding:
-                warnings.warn(
+                warn(
                     f"GearPair: the tips of {names[0]} and {names[1]} pass each other {passing * 1e3:.3g} mm apart, "
                     f"and under {shown(self.torque, 'N*m', '.4g')} the flanks yield {yielding * 1e3:.3g} mm: they "
                     "touch there; use lower addenda or a greater difference of teeth",
-                    stacklevel=self._calls - 1,
                 )
 
     @cached_property

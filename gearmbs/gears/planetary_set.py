@@ -24,7 +24,7 @@ from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.units import Quantity, to_si
-from gearmbs.wording import did_you_mean
+from gearmbs.wording import did_you_mean, warn
 
 MEMBERS = ("sun", "carrier", "ring")
 FITTING = 1e-6
@@ -294,11 +294,10 @@ class PlanetarySet(Written):
         error = self.carrier_radius - plain.nominal_centre_distance
         own = plain.normal_backlash_of(self.carrier_radius)
         if own > backlash * (1.0 + UNASKED) > 0.0:
-            warnings.warn(
+            warn(
                 f"PlanetarySet.backlash_{mesh} is {backlash * 1e3:.4g} mm, but at the carrier_radius of "
                 f"{self.carrier_radius * 1e3:.4f} mm {one.name} and {two.name} have {own * 1e3:.4g} mm, which thinner "
                 "teeth do not lessen; change the carrier_radius or the profile shifts",
-                stacklevel=2,
             )
         cut = max(0.0, backlash - own) / math.cos(one.transverse_pressure_angle)
         if cut > 0 and thin == "one":
@@ -310,19 +309,21 @@ class PlanetarySet(Written):
         for k in range(self.planets):
             faults = self._faults_of(k, mesh)
             if faults not in made:
-                pair = GearPair(
-                    one,
-                    two,
-                    centre_distance_error=error,
-                    friction=self.friction,
-                    slices=self.slices,
-                    rotation=self.rotation if mesh == "sun" else -self.rotation,  # type: ignore[arg-type]
-                    faults=faults,
-                )
+                given: dict[str, Any] = {
+                    "centre_distance_error": error,
+                    "friction": self.friction,
+                    "slices": self.slices,
+                    "rotation": self.rotation if mesh == "sun" else -self.rotation,
+                    "faults": faults,
+                }
                 if self.contact is None:
+                    with warnings.catch_warnings():
+                        # how far flanks yield is told of the law that they get
+                        warnings.filterwarnings("ignore", message=".*the flanks yield")
+                        pair = GearPair(one, two, **given)
                     made[faults] = pair.with_own_stiffness(self.stiffness or "iso", self.damping_ratio)
                 else:
-                    made[faults] = pair.with_changes(contact=self.contact)
+                    made[faults] = GearPair(one, two, contact=self.contact, **given)
             pairs.append(made[faults])
         return tuple(pairs)
 

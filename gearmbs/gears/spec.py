@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from numbers import Integral, Real
@@ -11,6 +10,7 @@ from typing import Any, Literal
 
 from gearmbs._display import Shown, Written
 from gearmbs.units import Given, Quantity, doubt_of_material, shown, to_si, truth
+from gearmbs.wording import warn
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
 
@@ -77,7 +77,7 @@ class Material(Written):
             raise ValueError(f"Material.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
         doubt = doubt_of_material(self.youngs_modulus, self.density)
         if doubt:
-            warnings.warn(f"Material '{self.name}': {doubt}", stacklevel=3)
+            warn(f"Material '{self.name}': {doubt}")
 
 
 @dataclass(frozen=True)
@@ -214,10 +214,9 @@ class GearSpec(Shown, Written):
                     f"'{value:g} mm'"
                 )
             if value > MOST_MODULES * self.module:
-                warnings.warn(
+                warn(
                     f"{self.name}.{name} is {shown(value, 'mm')}, {value / self.module:.4g} times the module of "
                     f"{shown(self.module, 'mm')}; is another unit meant?",
-                    stacklevel=4,
                 )
 
     def _fit_root(self) -> None:

@@ -22,7 +22,6 @@ References
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +32,7 @@ from gearmbs.gears.mesh import Mesh, require_points
 from gearmbs.gears.modifications import COMPLIANCE_POINTS
 from gearmbs.gears.spec import GearSpec
 from gearmbs.units import Quantity, to_si
+from gearmbs.wording import warn
 
 POINTS = 200  # stations of the beam from root to tip
 FACE_POINTS = 2001
@@ -516,10 +516,9 @@ def mesh_stiffness(
         ``loaded_transmission_error(...).stiffness`` knows all faults.
     """
     if any(fault.label == "root crack" for fault in pair.faults):
-        warnings.warn(
+        warn(
             "mesh_stiffness is that of perfect wheels and leaves the pair's root cracks out; use pair_stiffness with a "
             "Crack, or loaded_transmission_error(pair, cycles=...).stiffness",
-            stacklevel=2,
         )
     require_points(points)
     geometry = pair.geometry

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Integral
@@ -16,6 +15,7 @@ from gearmbs.gears.modifications import face_sections
 from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity, to_si
+from gearmbs.wording import warn
 
 SIDE, TOOTH_1, TOOTH_2, GAP = (GAP_COLUMNS.index(name) for name in ("side", "tooth_1", "tooth_2", "gap"))
 NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.place(layout.TOTALS, "pairs_drive")
@@ -423,10 +423,9 @@ def _check_slices(pair: Mesh, slices: int | None, level: int) -> None:
         raise ValueError(f"slices is {slices!r}; give an integer of 1 or more, or leave it out for the pair's own")
     varying = varying_along_face(pair.geometry, pair.faults)
     if slices == 1 and varying and pair.contact_model.slices != 1:
-        warnings.warn(
+        warn(
             f"slices is 1: the flanks are looked at in the middle of the face only, and how they vary along it is not "
             f"seen ({', '.join(varying)}); leave slices out for as many as that needs",
-            stacklevel=level,
         )
 
 
@@ -458,11 +457,10 @@ def warn_of_jam(pair: Mesh, level: int = 3) -> None:
     """
     geometry = pair.geometry
     if geometry.misalignment and geometry.jams:
-        warnings.warn(
+        warn(
             f"the teeth jam: under the misalignment of {math.degrees(geometry.misalignment):.4g} deg they need a "
             f"normal backlash of {geometry.jam_backlash * 1e3:.4g} mm and have {geometry.normal_backlash * 1e3:.4g} "
             "mm, so that the coast flanks are in each other where the drive flanks touch; give more backlash",
-            stacklevel=level,
         )
 
 
@@ -483,10 +481,9 @@ def warn_of_unseen(pair: Mesh, begin: float, end: float, remedy: str, level: int
         unseen = sorted(numbers - passing[wheel])
         if unseen:
             names = ", ".join(map(str, unseen))
-            warnings.warn(
+            warn(
                 f"{fault.label} on tooth {names} of the {fault.wheel} wheel does not pass the mesh in the range looked "
                 f"at; {remedy.format(turn=z)}",
-                stacklevel=level,
             )
 
 

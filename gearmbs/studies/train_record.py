@@ -8,7 +8,6 @@ angle of the driver; where it changes more there are none.
 from __future__ import annotations
 
 import math
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from gearmbs.drivetrain.kinematics import RPM, KinematicTable, table_at
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, differentials
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals.files.simulated import held_speed
+from gearmbs.wording import warn
 
 CONTACT = {
     "normal_force": "N", "penetration_drive": "m", "penetration_back": "m", "pairs_drive": "1", "pairs_back": "1",
@@ -455,8 +455,7 @@ def warn_of_speeds(train: Drivetrain, held: dict[str, HeldSpeed]) -> None:
     """
     doubtful = {mesh: one for mesh, one in held.items() if not one.is_steady or abs(one.stray) > FAR}
     for remark in remarks(doubtful):
-        warnings.warn(
+        warn(
             f"drivetrain '{train.name}': {remark}; give a drive that carries the load at its speed, longer "
             "run.settling, or a SpeedDrive with curve for a run-up",
-            stacklevel=4,
         )

@@ -1,5 +1,8 @@
 """The industrial gearbox: kinematics, forces in closed form, modes, Campbell diagram, run-up, command line."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -34,6 +37,20 @@ def test_kinematics():
 
 def test_the_file_is_the_gearbox():
     agrees_with_its_file("gearbox", industrial_gearbox())
+
+
+def test_nothing_is_counted_twice():
+    """The moving mass of a shaft with its wheels: the shaft, and of each wheel what is outside of its bore."""
+    train = industrial_gearbox()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        train.build()
+    for wheel in train.wheels:
+        ((_, radius),) = next(shaft.cylinders for shaft in train.shafts if shaft.name == wheel.shaft)
+        assert wheel.gear.bore_radius == pytest.approx(radius)
+        solid = replace(wheel.gear, bore_radius=0.0)
+        share = (radius / wheel.gear.pitch_radius) ** 2
+        assert wheel.gear.mass == pytest.approx((1.0 - share) * solid.mass, rel=1e-9)
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,6 +13,7 @@ import xarray as xr
 from gearmbs.progress import waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.units import to_si
+from gearmbs.wording import warn
 
 TURN = 2.0 * math.pi
 LOWEST = 1e-3
@@ -198,11 +198,10 @@ def _warn_of_whirl(mechanism: Any) -> None:
     ]  # fmt: skip
     if found:
         more = f" and {len(found) - 1} more" if len(found) > 1 else ""
-        warnings.warn(
+        warn(
             "modes: those of the mechanism at its initial speeds are taken at all speeds, though body "
             f"'{found[0]}'{more} deforms or spins; for whirl give a function of the speed that builds the mechanism, "
             "campbell(lambda speed: build(speed), speeds)",
-            stacklevel=4,
         )
 
 

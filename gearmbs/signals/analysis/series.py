@@ -7,7 +7,6 @@ import json
 import math
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -25,6 +24,7 @@ from gearmbs.signals.analysis.sections import sections
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.files.table import known_endings
+from gearmbs.wording import warn
 
 Progress = Callable[[str, float], None]
 Files = str | Path | Iterable[str | Path] | Mapping[Any, str | Path]
@@ -186,11 +186,10 @@ class Journal:
         except OSError as error:
             # the work goes on; what is half written of the line is left out by the next call
             self.broken = True
-            warnings.warn(
+            warn(
                 f"store: {self.path} cannot be written ({error.strerror or error}); files after {path.name} would have "
                 "to be analysed again if this is interrupted",
                 StoreWarning,
-                stacklevel=3,
             )
 
 

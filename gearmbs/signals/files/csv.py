@@ -11,7 +11,6 @@ import gzip
 import io
 import json
 import re
-import warnings
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -54,6 +53,7 @@ from gearmbs.signals.signal.record import (
     speed_of,
 )
 from gearmbs.signals.signal.signal import check_teeth
+from gearmbs.wording import warn
 
 CHUNK_ROWS = 1 << 17
 # Times are written with few digits; beyond this many samples a gap is a gap.
@@ -217,7 +217,7 @@ def csv_pieces(
                 record = replace(record, values=_filled(record.values))
             yield record, fraction
         for words in _end_checked(path, packed, layout, count):
-            warnings.warn(words, UserWarning, stacklevel=2)
+            warn(words, UserWarning)
 
 
 def _bridged(path: Path, values: np.ndarray, layout: CsvLayout, gaps: str | None) -> list[str]:

@@ -19,6 +19,7 @@ from gearmbs.signals.files.table import TABLE, Asked, Content, format_of, known_
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.record import Progress, Record, checked_gaps, columns_asked, record_of, signal_from
 from gearmbs.signals.signal.signal import as_signal, check_units
+from gearmbs.wording import warn
 
 FORMATS = tuple(TABLE)
 """Names of the formats that are read; most are written, too (`gearmbs.signals.files.table`)."""
@@ -85,7 +86,7 @@ def read_signal(
         )
     for words in record.notes:
         if words.startswith(CUT):
-            warnings.warn(words, UserWarning, stacklevel=3)
+            warn(words, UserWarning)
     for words in contradictions(record.teeth, record.speed, teeth, constant, path.name):
         record.notes = [*record.notes, words]
     with damage_named(path, format):

@@ -6,7 +6,6 @@ Pulses that are missing or too many are told from the intervals beside them.
 from __future__ import annotations
 
 import math
-import warnings
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kai
 from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.given import speed_curve
 from gearmbs.signals.signal.signal import rate_of
+from gearmbs.wording import warn
 
 LINE_ATTENUATION_DB = 60.0
 """Attenuation of all beside the line that is followed: a thousandth of a neighbour as large moves its phase by a
@@ -150,7 +150,7 @@ def phase_from_tacho(
     if notes and faults == "refuse":
         raise SignalError(f"faults: {' '.join(notes)} Mend them with faults='mend', or take them with faults='keep'")
     for note in notes:
-        warnings.warn(note, UserWarning, stacklevel=3)
+        warn(note, UserWarning)
     kept_edges, numbers = mended_count(edges.size, places)
     edges, angles = edges[kept_edges], 2.0 * np.pi / pulses_per_rev * numbers
     inside = (times >= edges[0]) & (times <= edges[-1])

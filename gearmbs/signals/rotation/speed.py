@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,6 +16,7 @@ from gearmbs.signals.rotation.phase import phase_from_line
 from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import rate_of, require
 from gearmbs.signals.spectra import periodograms
+from gearmbs.wording import warn
 
 LOCAL_BINS = 256
 """Width of the blocks over which it is found what height chance gives."""
@@ -321,7 +321,7 @@ def estimate_speed(
     """
     found = followed_comb(signal, teeth, speed_range)
     if found.doubt:
-        warnings.warn(found.doubt, UserWarning, stacklevel=3)
+        warn(found.doubt, UserWarning)
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -17,6 +16,7 @@ from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.labels import HERTZ, RPM_UNITS, THOUSANDS
 from gearmbs.signals.signal.signal import SHAFT, STEADY, check_teeth, with_metadata
 from gearmbs.units import to_si
+from gearmbs.wording import warn
 
 # A known speed in any shape: number, text, points, curve, function; and its values over a record.
 
@@ -237,7 +237,7 @@ def contradictions(
             "one is used."
         )
     for words in said:
-        warnings.warn(words, UserWarning, stacklevel=4)
+        warn(words, UserWarning)
     return said
 
 

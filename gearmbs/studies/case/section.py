@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -17,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, mo
 from gearmbs.schema.described import OWN, faults, path_of, remedy
 from gearmbs.schema.quantities import Measure, counts, no_truth
 from gearmbs.units import NUMBER
-from gearmbs.wording import did_you_mean
+from gearmbs.wording import did_you_mean, warn
 
 # Quantities of a case: texts with units or plain numbers in SI, within a range that gears can have.
 #
@@ -212,11 +211,10 @@ def _remark(field: str, value: Any, measure: Measure) -> None:
     """Warn of a plain number in SI, or a speed in Hz, that looks as if it were meant in the unit people use."""
     in_hertz = isinstance(value, str) and measure.dimension == "angular speed" and re.fullmatch(HERTZ, value.strip())
     if in_hertz and float(in_hertz[1]) >= TURNS:
-        warnings.warn(
+        warn(
             f"{field} = {value!r} is {60.0 * float(in_hertz[1]):.6g} rpm; write '{in_hertz[1]} rpm' if that is meant, "
             f"'{60.0 * float(in_hertz[1]):.6g} rpm' if not",
             CaseWarning,
-            stacklevel=6,
         )
     if isinstance(value, bool) or not isinstance(value, Real):
         return
@@ -226,11 +224,10 @@ def _remark(field: str, value: Any, measure: Measure) -> None:
     elif measure.dimension == "length" and abs(number) >= HALF_METRE:
         meant, is_now = "mm", f"m, which is {number * 1e3:.6g} mm"
     if meant:
-        warnings.warn(
+        warn(
             f"{field} = {value!r} is a plain number and so in {is_now}; write '{value} {meant}' if that is meant, "
             f"'{value} {measure.unit}' if not",
             CaseWarning,
-            stacklevel=6,
         )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -15,6 +14,7 @@ from gearmbs.schema.quantities import flag, two
 from gearmbs.studies.case import section as q
 from gearmbs.studies.case.section import CaseWarning, Section, measures_of
 from gearmbs.units import to_si
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.gears import ContactLaw, FlankFriction, GearSpec
@@ -205,11 +205,10 @@ class Operation(Section):
         if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
             if self.duration != AUTO and "duration" in data and "duration" not in changes:
                 asked = data.pop("duration")
-                warnings.warn(
+                warn(
                     f"operation.duration = {asked!r}, given before, goes: the record lasts as long as the new curve; "
                     f"give 'duration': {asked!r} beside the curve to keep it",
                     CaseWarning,
-                    stacklevel=3,
                 )
         return data
 

@@ -132,9 +132,13 @@ def industrial_gearbox(settings: GearboxSettings | None = None) -> Drivetrain:
 
 
 def _mesh(mesh: GearMesh, driver: GearSpec, driven: GearSpec, s: GearboxSettings) -> dict[str, Any]:
-    """Return the settings of a mesh: the stiffness of ISO 6336-1, damped as its two wheels on it, and its faults."""
+    """Return the settings of a mesh: the stiffness of ISO 6336-1, damped as its two wheels on it, and its faults.
+
+    The shaft in a wheel's bore moves with it: its inertia is that of the solid wheel.
+    """
     k = GearPair(driver, driven).with_iso_stiffness().contact.stiffness
-    mass = 1.0 / sum(wheel.base_radius**2 / wheel.inertia[2] for wheel in (driver, driven))
+    solid = [replace(wheel, bore_radius=0.0) for wheel in (driver, driven)]
+    mass = 1.0 / sum(wheel.base_radius**2 / wheel.inertia[2] for wheel in solid)
     contact = ContactLaw.linear(k, damping=2.0 * s.damping_ratio * math.sqrt(k * mass), depth="2 um")
     faults = {"faults": tuple(s.faults[mesh.name])} if s.faults and mesh.name in s.faults else {}
     return {**mesh.settings, "contact": contact, **faults}

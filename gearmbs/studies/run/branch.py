@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +19,7 @@ from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.orbits import TIGHTER, Posed, SteadyMotion, check_along
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.run.steady import posed_case
+from gearmbs.wording import warn
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,10 +149,9 @@ def steady_branch(
     used = made(first)[2] if tol is None else tol
     branch = follow_branch(lambda value: made(value)[1], first, last, tol=used, step=step, largest=largest, most=most)
     if branch.why != "left the span":
-        warnings.warn(
+        warn(
             f"steady_branch: the curve ends at {branch.values[-1]:.6g}, not beyond {first:g} or {last:g}: "
             + (f"{branch.why}; raise most" if branch.why != "lost" else "no step along it was short enough"),
-            stacklevel=2,
         )
     motions = []
     for value, orbit in zip(branch.values, branch.orbits, strict=True):

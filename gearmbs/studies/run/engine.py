@@ -25,7 +25,6 @@ import signal
 import sys
 import threading
 import time
-import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -35,6 +34,7 @@ from types import ModuleType
 from typing import Any
 
 from gearmbs.studies.run.claims import STOPPED, Claimed, Ledger, owner, process_of, spent, vacant
+from gearmbs.wording import warn
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 GRACE = 5.0
@@ -202,7 +202,7 @@ def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool =
             stuck = watch.stuck({c: started[c].pid for c in at_work}, finished)
             for connection in stuck:
                 sent = f"worker process {started[connection].pid} stood still, it is ended and its job done by another"
-                warnings.warn(sent, WorkerReplaced, stacklevel=2)
+                warn(sent, WorkerReplaced)
                 started[connection].kill()
             for ready in [connection for connection in at_work if connection in {*finished, *stuck}]:
                 try:

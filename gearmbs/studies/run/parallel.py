@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,6 +19,7 @@ from gearmbs.studies.run.claims import Claim, claimed
 from gearmbs.studies.run.engine import processes, run_jobs, threads
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
 from gearmbs.studies.run.store import RecordFolder, file_stem, record_size
+from gearmbs.wording import warn
 
 
 class StorageWarning(UserWarning):
@@ -128,7 +128,7 @@ def run_cases(
             move(case.name, 1.0)
             if trouble:
                 # the record is in memory all the same, and other cases are not to blame
-                warnings.warn(trouble, StorageWarning, stacklevel=5)
+                warn(trouble, StorageWarning)
             if done is not None and not isinstance(result, SimulationFailed):
                 done(case, result)
 

@@ -7,7 +7,6 @@ near an orbit; see `gearmbs.dae.orbits` and docs/theory/orbits.md.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -29,7 +28,7 @@ from gearmbs.studies.case.limits import check_record, geometric_period
 from gearmbs.studies.run.periodic import Found, PeriodicRecorder
 from gearmbs.studies.run.record import check_variables
 from gearmbs.studies.run.simulation import case_mechanism, evaluated_period, load_kernels
-from gearmbs.wording import any_of
+from gearmbs.wording import any_of, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -199,11 +198,10 @@ def _warn_of_length(train: Drivetrain, period: float) -> None:
     """Warn of a period in which planets come back after very many meshes, before it is integrated."""
     cycles = period * max(abs(train.kinematics.mesh_frequency(mesh.name)) for mesh in train.meshings)
     if train.planetary_stages and cycles > LONG:
-        warnings.warn(
+        warn(
             f"steady: all teeth of drivetrain '{train.name}' stand as before after {cycles:.0f} mesh cycles, "
             f"{period:.4g} s, and the search takes several such periods; run_train records some turns of the carrier "
             "in less, or give the period after which your planets come back",
-            stacklevel=4,
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
@@ -29,6 +28,7 @@ from gearmbs.view.figures.style import (
     scaling_name,
     state_colour,
 )
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.signals.encoders.result import MeasuredTransmissionError
@@ -397,7 +397,7 @@ def average_plot(
             raise ValueError(f"teeth: must be a whole number of teeth, got {teeth!r}")
         for name, average in named.items():
             if doubt := _doubt(average, curves[str(name)][:2], teeth):
-                warnings.warn(f"teeth={teeth}: {doubt}{f' ({name})' if name else ''}", UserWarning, stacklevel=2)
+                warn(f"teeth={teeth}: {doubt}{f' ({name})' if name else ''}", UserWarning)
     if ax is not None and len(curves) > 1:
         raise ValueError(f"ax: one panel for {len(curves)} averages; give one or leave ax away")
     with look():
