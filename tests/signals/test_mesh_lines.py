@@ -127,3 +127,26 @@ def test_hum_is_doubted_as_a_mesh_line():
     # a mesh at 450 Hz alone is none
     mesh = sum(np.cos(2 * np.pi * 450.0 * k * t) / k for k in range(1, 4))
     assert not any("mains" in note for note in analyse(mesh + noise, 29, rate=12800).notes)
+
+
+OF_A_RING = {83: 0.5, 84: 0.1, 85: 1.0, 86: 0.3, 168: 0.4, 170: 0.5}
+OF_A_PAIR = {82: 0.1, 83: 0.3, 84: 1.0, 85: 0.4, 86: 0.2, 168: 0.5}
+
+
+@pytest.mark.parametrize(("orders", "off", "right", "words"), [
+    (OF_A_RING, 0.0, True, says("1 turns", "sideband", "kept")),
+    (OF_A_RING, 0.003, False, says("turns", "If it", "planetary=")),
+    (OF_A_PAIR, 0.0, True, None),
+    (OF_A_PAIR, 0.003, True, None),
+    (OF_A_PAIR, 0.009, True, says("turns", "If it", "planetary=")),
+])  # fmt: skip
+def test_a_sideband_higher_than_the_mesh_line_moves_no_right_speed(orders, off, right, words):
+    """Sidebands stand whole turns beside the mesh frequency, nearer than 2 % where there are more than 50 teeth."""
+    rate, turn = 2000.0, 2.0
+    t = np.arange(round(20.0 * rate)) / rate
+    x = sum(a * np.sin(math.tau * turn * k * t + k) for k, a in orders.items())
+    x = x + 0.3 * np.random.default_rng(1).standard_normal(t.size)
+    found = analyse(make_signal(x, rate), teeth=84, speed=math.tau * turn * (1.0 + off))
+    notes = " ".join(found.notes)
+    assert (abs(found.speed / (math.tau * turn) - 1.0) < 2e-4) == right
+    assert "turns of the shaft" not in notes if words is None else re.search(words, notes)

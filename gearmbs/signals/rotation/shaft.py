@@ -178,6 +178,8 @@ OTHER_COMB = 0.03
 given one is looked for."""
 LINES_OFF = 2.0
 """Lines of the whole record's spectrum by which a mesh line may be off: there a Hann window leaves nothing of it."""
+SIDEBAND_TURNS = 0.5
+"""Turns of the shaft beside the expected mesh frequency from which a line is nearer to one of its sidebands."""
 STRONGER_DB = 3.0
 """By which another comb must be higher to count as stronger: scores of one record scatter by less."""
 SHARED_HARMONIC = 2
@@ -359,6 +361,8 @@ def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, n
     """Return the angle by the mesh line near a given speed, or at that speed where none stands out, which is told."""
     around = (nominal * (1.0 - SPEED_TOLERANCE), nominal * (1.0 + SPEED_TOLERANCE))
     found = _estimate(signal, counts, around)
+    if found is not None and (beside := _turns_beside(found, counts[0], nominal)):
+        found = _not_a_sideband(signal, counts, nominal, found, beside, notes)
     doubted = _remark_other(signal, counts, nominal, found, notes)
     sure = found is not None and not doubted
     gmf = nominal * counts[0] / math.tau
@@ -385,6 +389,43 @@ def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, n
         if line is not None and abs(line - found.gmf) <= found.resolution and not sideband:
             notes += _remark_off(found, nominal, gmf, f"{nominal * 30 / math.pi:.2f} rpm given", False)
     return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
+
+
+def _turns_beside(found: SpeedEstimate, count: int, nominal: float) -> float:
+    """Return by how many turns of the shaft a line is beside the mesh frequency of the given speed; 0 below a half."""
+    turns = (found.gmf - nominal * count / math.tau) / (nominal / math.tau)
+    return turns if abs(turns) > SIDEBAND_TURNS else 0.0
+
+
+def _not_a_sideband(
+    signal: xr.DataArray,
+    counts: tuple[int, ...],
+    nominal: float,
+    found: SpeedEstimate,
+    beside: float,
+    notes: list[str],
+) -> SpeedEstimate | None:
+    """Return the line by which the speed is taken, where the highest stands turns of the shaft beside the expected one.
+
+    Whole turns beside the mesh frequency stand its sidebands, of planetary sets higher than itself, if it is there at
+    all: a line exactly there confirms the given speed more than it speaks against it. Elsewhere it may be either.
+    """
+    whole = round(beside)
+    told = f"{nominal * 30 / math.pi:.2f} rpm"
+    exact = abs(beside - whole) * nominal / math.tau <= LINES_OFF * found.resolution
+    kind = f"{abs(beside):.3g} turns of the shaft {'above' if beside > 0 else 'below'} that of the given {told}"
+    if not exact:
+        notes.append(
+            f"The highest line near the mesh frequency is {kind}, and the speed is taken by it. If it "
+            "is a sideband, as planetary sets have, pass planetary= or a tacho."
+        )
+        return found
+    notes.append(
+        f"The highest line near the mesh frequency is {kind}: a sideband, as planetary sets have (planetary=). The "
+        f"given speed is kept; if {found.speed * 30 / math.pi:.2f} rpm is right, give that."
+    )
+    half = SIDEBAND_TURNS / counts[0]
+    return _estimate(signal, counts, (nominal * (1.0 - half), nominal * (1.0 + half)))
 
 
 def _nothing_near(count: int, nominal: float, doubted: bool) -> str:
