@@ -173,13 +173,13 @@ def million(folder: Path, n: int = 1_000_000) -> None:
 
 def stubs(path: str, n: int) -> None:
     """Make a campaign of n cases and store results that were not simulated."""
-    from gearmbs.campaigns.codes import admit, plan_modules
+    from gearmbs.campaigns.codes import admit, folder_code
     from gearmbs.campaigns.subjects.base import FAILED, Kept, Outcome
     from gearmbs.campaigns.work import CaseResult, enter, store
     from gearmbs.studies.run.code import code_of
 
     folder = cheap(Path(path), "plain", n, unit=None, keep=["numbers"]).folder
-    admit(folder, code := code_of(plan_modules(folder)))
+    admit(folder, code := folder_code(folder, code_of))
     for unit in range(folder.unit_count):
         rows = folder.cases(unit)
         numbers = [{name: row["a"] + k for k, name in enumerate("yzuvw")} for row in rows]

@@ -218,11 +218,11 @@ class Campaign:
 
     def _compare(self, other_code: str) -> None:
         """Compare this process's code with that of the results so far, before anything is worked on."""
-        from gearmbs.campaigns.codes import OtherCode, admit, admit_files, plan_modules
+        from gearmbs.campaigns.codes import admit, folder_code
         from gearmbs.studies.run.code import CodeChanged, code_of
 
         try:
-            code = code_of(plan_modules(self.folder))
+            code = folder_code(self.folder, code_of)
         except CodeChanged as error:
             raise CampaignError(f"{self.path}: {error}; start the program again") from error
         except ImportError as error:
@@ -230,21 +230,12 @@ class Campaign:
                 f"{self.path}: {error}; what the plan names has to be there, installed or on the PYTHONPATH"
             ) from error
         if other_code == "again":
-            try:
-                admit_files(self.folder)
-            except OtherCode:
-                # no ledger says which files its unit has read
-                other_files = True
-            else:
-                other_files = False
             for unit in self.folder.done():
-                if other_files or self.folder.entry(unit)["code"] != code.digest:
+                if self.folder.entry(unit)["code"] != code.digest:
                     self.folder.ledger(unit).unlink(missing_ok=True)
         # what nobody has come to an end with decides nothing
         fresh = not self.folder.done() and not _driven(self.folder, [0])
-        mix, again = other_code == "mix", fresh or other_code == "again"
-        admit_files(self.folder, mix=mix, again=again)
-        admit(self.folder, code, mix=mix, again=again)
+        admit(self.folder, code, mix=other_code == "mix", again=fresh or other_code == "again")
 
     def status(self) -> CampaignStatus:
         """Return how far it is; from anywhere, at any time."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from gearmbs.campaigns.folder import Folder, sealed, unsealed
@@ -13,7 +14,6 @@ from gearmbs.files import write_whole
 from gearmbs.studies.run.code import Code
 
 FIRST = "first"
-FILES = "files"
 
 
 class OtherCode(CampaignError):
@@ -24,6 +24,18 @@ def plan_modules(folder: Folder) -> list[str]:
     """Return the modules that a plan names: those of what it simulates and of what it keeps."""
     kept = [item.partition(":")[0] for item in folder.plan.keep if ":" in item and not item.startswith("signal:")]
     return [*folder.plan.subject.modules(), *kept]
+
+
+def folder_code(folder: Folder, look: Callable[[list[str]], Code]) -> Code:
+    """Return the code by which this process would work on a campaign, with the files that its cases read.
+
+    Parameters
+    ----------
+    look : callable
+        `code_of` or `running_code`.
+    """
+    code, files = look(plan_modules(folder)), folder.plan.subject.files()
+    return replace(code, files=files) if files else code
 
 
 def _file(folder: Folder, name: str) -> Path:
@@ -91,39 +103,6 @@ def admit(folder: Folder, code: Code, *, mix: bool = False, again: bool = False)
             f"{folder.path}: what is done comes from another code than this one: {code.differences(theirs)}. Take that "
             "code; or do its units again (--other-code again); or go on all the same (--other-code mix), which status "
             "and reports then say"
-        )
-
-
-def admit_files(folder: Folder, *, mix: bool = False, again: bool = False) -> None:
-    """Let the files that a subject's cases read be what they are: note them, or refuse if they were others.
-
-    Parameters
-    ----------
-    mix : bool
-        Let others be read, too.
-    again : bool
-        Note those of today: nothing that is done comes from others.
-
-    Raises
-    ------
-    OtherCode
-        Naming the files.
-    """
-    files = folder.plan.subject.files()
-    place = _file(folder, FILES)
-    try:
-        noted = unsealed(place)["files"]
-    except (OSError, ValueError, KeyError):
-        # folders of before have no note
-        noted = None
-    if noted is None or again:
-        if files or noted:
-            write_whole(place, sealed({"files": files}), durable=folder.path)
-    elif noted != files and not mix:
-        changed = sorted(name for name in {*noted, *files} if noted.get(name) != files.get(name))
-        raise OtherCode(
-            f"{folder.path}: what is done read other files than those that are there: {', '.join(changed)} changed. "
-            "Put them back; or do all units again (--other-code again); or go on all the same (--other-code mix)"
         )
 
 

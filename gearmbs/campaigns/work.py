@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import gearmbs
-from gearmbs.campaigns.codes import admit, plan_modules
+from gearmbs.campaigns.codes import admit, folder_code
 from gearmbs.campaigns.folder import Folder, sealed
 from gearmbs.campaigns.limits import TimeLimitReached, last, limited
 from gearmbs.campaigns.reuse import Reuse
@@ -343,7 +343,7 @@ _admitted: set[tuple[str, str, bool, int]] = set()
 
 def _code(folder: Folder, mix: bool) -> str:
     """Return the digest of the code that this process runs, if it may work on the campaign."""
-    digest = (code := running_code(plan_modules(folder))).digest
+    digest = (code := folder_code(folder, running_code)).digest
     first = folder.path / "codes" / "first.json"
     key = str(folder.path), digest, mix, first.stat().st_mtime_ns if first.exists() else 0
     if key not in _admitted:
@@ -388,7 +388,7 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
             runner.close()
     digests = store(folder, unit, rows, results)
     if _code(folder, mix) != code:
-        raise CodeChanged("the code was edited while the unit was done")
+        raise CodeChanged("the code, or a file that cases read, was edited while the unit was done")
     about = {
         "processor_seconds": round(time.process_time() - cpu + runner.elsewhere - before, 4),
         "wall_seconds": round(time.monotonic() - clock, 4),

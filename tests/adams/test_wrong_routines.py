@@ -249,3 +249,18 @@ def test_a_routine_that_fails_in_rehearsal_says_so():
     line, told = message("SFORCE/1, TRANSLATIONAL, I=20, J=1, ACTIONONLY, FUNCTION=USER(1)", {"sfosub": sfosub})
     assert line == 8
     assert "in a rehearsal, where numbers have no meaning: see call.rehearsal" in told
+
+
+def test_modules_beside_routines_are_those_of_their_folder_and_of_today(tmp_path):
+    """Two folders have modules of one name; one is edited."""
+
+    def loaded(name):
+        return load_routines(tmp_path / name / "own.py")["sfosub"](None)
+
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "own.py").write_text("from sizes import SIZE\n\n\ndef sfosub(call):\n    return SIZE\n")
+        (tmp_path / name / "sizes.py").write_text(f"SIZE = {name!r}\n")
+    assert [loaded(name) for name in ("one", "other", "one")] == ["one", "other", "one"]
+    (tmp_path / "one" / "sizes.py").write_text("SIZE = 'larger'\n")
+    assert [loaded(name) for name in ("one", "other")] == ["larger", "other"]

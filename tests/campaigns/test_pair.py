@@ -144,9 +144,11 @@ def test_a_deck_in_a_plans_file(tmp_path):
     subject = plan.subject
     again = DeckSubject.from_settings(subject.settings())
     thing = subject.check({"mass": 2.0}, "c")
-    assert again.canonical(thing) == subject.canonical(thing)
+    before = subject.canonical(thing)
+    assert again.canonical(thing) == before
     (tmp_path / "own.py").write_text("def sfosub(call):\n    return 0.0\n")
-    assert DeckSubject.from_settings(subject.settings()).canonical(thing) != subject.canonical(thing)
+    assert DeckSubject.from_settings(subject.settings()).canonical(thing) != before
+    assert subject.canonical(thing) != before
     (tmp_path / "p.toml").write_text(text.replace("[[factor]]", "[[factors]]"))
     with pytest.raises(CampaignError, match=r"write \[\[factor\]\] above each"):
         load_plan(tmp_path / "p.toml")
@@ -188,6 +190,7 @@ def test_files_that_changed_after_cases_were_done_are_refused(tmp_path):
     )
     campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("mass", 1.0, 2.0)], "sobol", n=2, unit=1))
     campaign.run(workers=0)
+    first = campaign.folder.ledger(0).stat().st_mtime_ns
     commands.write_text(long)
     campaign.extend(4)
     with pytest.raises(CampaignError, match=says("FILE/COMMAND", "--other-code", "again")):
@@ -197,9 +200,52 @@ def test_files_that_changed_after_cases_were_done_are_refused(tmp_path):
     campaign.run(workers=0)
     assert len(campaign.folder.done()) == 4
     commands.write_text(long)
+    campaign.extend(6)
+    assert campaign.run(workers=0, other_code="mix").codes == 2
+    assert [line for line in campaign.check() if "2 of 6 units" in line and "FILE/COMMAND" in line]
+    commands.write_text(short)
     campaign.run(workers=0, other_code="again")
-    assert campaign.status().done == 4
-    campaign.run(workers=0)
+    status = campaign.status()
+    assert (status.done, status.codes) == (6, 1)
+    assert campaign.folder.ledger(0).stat().st_mtime_ns == first
+
+
+OWN = "from stiffness import K\n\n\ndef sfosub(call):\n    return -K * (call.sysfnc('DM', 2, 1) - 0.5)\n"
+
+
+def test_routines_that_are_edited_under_a_run_are_refused(tmp_path, monkeypatch):
+    """What they import counts as they do: a unit during which it was edited is none, one before and one after are."""
+    (tmp_path / "own.py").write_text(OWN)
+    beside = tmp_path / "stiffness.py"
+    beside.write_text("K = 100.0\n")
+    deck = DECK.replace("I=2, J=4", "I=5, J=4").replace(
+        "SPRINGDAMPER/1, TRANSLATIONAL, I=2, J=1, K=100, LENGTH=0.5",
+        "SFORCE/1, TRANSLATIONAL, I=2, J=1, FUNCTION=USER(1)",
+    )
+    subject = DeckSubject(deck, {"mass": 1.0}, end=0.5, steps=5, routines=tmp_path / "own.py")
+    plan = make_plan(subject, [Factor("mass", 1.0, 4.0)], "grid", options={"levels": 6}, unit=2)
+    campaign = Campaign(tmp_path / "c", plan)
+    run, count = DeckSubject.run, iter(range(100))
+
+    def edited(self, *given):
+        found = run(self, *given)
+        if next(count) == 2:
+            beside.write_text("K = 250.5\n")
+        return found
+
+    with monkeypatch.context() as patched:
+        patched.setattr(DeckSubject, "run", edited)
+        with pytest.raises(CampaignError, match=says("stiffness.py", "another content", "--other-code")):
+            campaign.run(workers=0)
+    assert len(campaign.folder.done()) == 1
+    beside.write_text("K = 100.0\n")
+    assert campaign.run(workers=0).codes == 1
+    last = 0.5 + 0.5 * np.cos(np.sqrt(100.0 / campaign.table["mass"]) * 0.5)
+    np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=1e-5)
+    beside.write_text("K = 250.5\n")
+    assert campaign.run(workers=0, other_code="again").codes == 1
+    last = 0.5 + 0.5 * np.cos(np.sqrt(250.5 / campaign.table["mass"]) * 0.5)
+    np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=1e-5)
 
 
 @pytest.mark.slow

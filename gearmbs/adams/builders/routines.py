@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import inspect
 import runpy
 import sys
@@ -245,7 +247,8 @@ def _wrong(deck: Deck, statement: st.Statement, error: ValueError) -> Diagnostic
 def load_routines(path: str | Path) -> dict[str, Any]:
     """Return what a Python file defines for USER(...), by name: functions, and pairs for gear forces.
 
-    It may import what stands beside it.
+    It may import what stands beside it, which is read anew where it was written since, or where routines of another
+    folder have loaded modules of the same names.
 
     Raises
     ------
@@ -253,17 +256,85 @@ def load_routines(path: str | Path) -> dict[str, Any]:
         If it cannot be read or run, or defines none.
     """
     path = Path(path)
-    sys.path.insert(0, str(path.resolve().parent))
+    beside = str(path.resolve().parent)
+    _forget_outdated(beside)
+    before = set(sys.modules)
+    sys.path.insert(0, beside)
     try:
         space = runpy.run_path(str(path))
     except Exception as error:
         raise ValueError(f"{path}: {type(error).__name__}: {error}") from error
     finally:
-        sys.path.remove(str(path.resolve().parent))
+        sys.path.remove(beside)
+        _note_beside(beside, set(sys.modules) - before)
     found = {k: v for k, v in space.items() if k[0] != "_" and (_defined_here(v) or is_pair(v))}
     if not found:
         raise ValueError(f"{path}: it defines no functions; write for example def sfosub(call): ...")
     return found
+
+
+_beside: dict[str, tuple[str, Path, tuple[int, int]]] = {}
+"""Modules that routines have loaded from beside them, by name: the folder, the file, and how that looked."""
+
+
+def _looks(path: Path) -> tuple[int, int]:
+    try:
+        about = path.stat()
+    except OSError:
+        return 0, -1
+    return about.st_mtime_ns, about.st_size
+
+
+def _note_beside(folder: str, names: Iterable[str]) -> None:
+    """Note which of the modules that were loaded stand in a folder."""
+    for name in names:
+        file = getattr(sys.modules[name], "__file__", None)
+        if file and Path(folder) in Path(file).resolve().parents:
+            _beside[name] = folder, Path(file), _looks(Path(file))
+
+
+def _forget_outdated(folder: str) -> None:
+    """Forget modules of other folders; and all of this one if one was written since, for they use each other."""
+    mine = [name for name, (home, _, _) in _beside.items() if home == folder]
+    written = any(_looks(_beside[name][1]) != _beside[name][2] for name in mine)
+    for name in list(_beside):
+        if written or name not in mine:
+            del _beside[name]
+            sys.modules.pop(name, None)
+    importlib.invalidate_caches()
+
+
+def files_of_routines(path: str | Path) -> list[Path]:
+    """Return a file of routines and those beside it whose modules it imports, of packages all files.
+
+    Raises
+    ------
+    OSError
+        If one cannot be read.
+    """
+    path = Path(path).resolve()
+    found, waiting = list[Path](), [path]
+    while waiting:
+        file = waiting.pop()
+        if file in found:
+            continue
+        found.append(file)
+        for name in _imported_names(file):
+            module, package = path.parent / f"{name}.py", path.parent / name
+            waiting += sorted(package.rglob("*.py")) if package.is_dir() else [module] if module.is_file() else []
+    return found
+
+
+def _imported_names(file: Path) -> set[str]:
+    """Return the first parts of the names of the modules that a file imports, anywhere in it."""
+    try:
+        tree = list(ast.walk(ast.parse(file.read_bytes())))
+    except SyntaxError:
+        # refused where it is run
+        return set()
+    names = [alias.name for node in tree if isinstance(node, ast.Import) for alias in node.names]
+    names += [node.module for node in tree if isinstance(node, ast.ImportFrom) and node.module and not node.level]
+    return {name.partition(".")[0] for name in names}
 
 
 def _defined_here(value: Any) -> bool:

@@ -40,7 +40,8 @@ class DeckSubject(Subject):
     script : str, optional
         Text of a command script (.acf) to carry out instead, which may have places, too.
     routines : path, optional
-        Python file with the routines that the deck's USER(...) call; what it holds is part of a case's key.
+        Python file with the routines that the deck's USER(...) call; what it holds is part of a case's key, with the
+        modules beside it that it imports.
     skip_unsupported : bool
         Leave out what is not supported instead of refusing the deck.
     name : str
@@ -86,7 +87,8 @@ class DeckSubject(Subject):
         self.end, self.steps, self.script = None if end is None else float(end), int(steps), script
         self.name, self.skip_unsupported = str(name), bool(skip_unsupported)
         self.routines = None if routines is None else Path(routines).resolve()
-        self.routines_digest = None if self.routines is None else _digest(self.routines)
+        if self.routines is not None:
+            _routine_files(self.routines)
 
     @classmethod
     def from_file(
@@ -155,8 +157,8 @@ class DeckSubject(Subject):
         found = {"deck": digest, "values": thing["values"], "end": self.end, "steps": self.steps}
         if self.script is not None:
             found["script"] = hashlib.sha256(self.script.encode()).hexdigest()
-        if self.routines_digest is not None:
-            found["routines"] = self.routines_digest
+        if self.routines is not None:
+            found["routines"] = _routine_files(self.routines)
         if self.skip_unsupported:
             found["skip_unsupported"] = True
         if files := _named_files(thing["deck"]):
@@ -172,7 +174,7 @@ class DeckSubject(Subject):
         if thing["script"] is not None and (commands := _included(thing["script"], self.name)):
             found["the commands of FILE/COMMAND"] = commands
         if self.routines is not None:
-            found[str(self.routines)] = _digest(self.routines)
+            found |= _routine_files(self.routines)
         return found
 
     def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
@@ -208,16 +210,15 @@ def _text_of(path: Path) -> str:
         raise CampaignError(f"deck: {path}: cannot be read ({error.strerror or error})") from error
 
 
-def _digest(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise CampaignError(f"deck: routines {path}: cannot be read ({error.strerror or error})") from error
-
-
 @lru_cache(maxsize=256)
-def _digest_as_written(path: Path, _written: tuple[int, int, int]) -> str:
-    return _digest(path)
+def _digest_as_written(path: Path, _written: tuple[int, int, int, int]) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _digest_now(path: Path) -> str:
+    """Return the digest of a file, which is read again only if it was written since."""
+    about = path.stat()
+    return _digest_as_written(path, (about.st_mtime_ns, about.st_ctime_ns, about.st_size, about.st_ino))
 
 
 def _named_files(deck: Any) -> list[tuple[str, str]]:
@@ -230,11 +231,18 @@ def _named_files(deck: Any) -> list[tuple[str, str]]:
         # what may not be read, or is not there, is refused where it is needed
         with suppress(ValueError, OSError):
             if name:
-                path = named_file("FILE", name, deck.file)
-                about = path.stat()
-                digest = _digest_as_written(path, (about.st_mtime_ns, about.st_size, about.st_ino))
-                found.append((str(path), digest))
+                found.append((name, _digest_now(named_file("FILE", name, deck.file))))
     return found
+
+
+def _routine_files(path: Path) -> dict[str, str]:
+    """Return names and digests of a file of routines and of the modules beside it that it imports."""
+    from gearmbs.adams.builders.routines import files_of_routines
+
+    try:
+        return {file.relative_to(path.parent).as_posix(): _digest_now(file) for file in files_of_routines(path)}
+    except OSError as error:
+        raise CampaignError(f"deck: routines {path}: cannot be read ({error.strerror or error})") from error
 
 
 def _included(script: str, name: str) -> str:

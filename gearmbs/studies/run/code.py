@@ -12,7 +12,8 @@ those. Beyond it count the modules that a plan names, with all they import that 
 that is written; of other packages their version and the digests that their installer noted. Kernels are made
 of these sources by numba and LLVM for a target processor: their versions, options and the processor count, too.
 
-What a module reads while it runs, such as a table beside it, is not known here.
+What a module reads while it runs, such as a table beside it, is not known here; who knows of files puts them into
+`Code.files`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ import sysconfig
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
@@ -75,15 +76,19 @@ class Code:
         Of each module and table its digest, without what cannot change a number.
     setting : dict of str
         Versions of Python and libraries, the processor that kernels are made for, options.
+    files : dict of str
+        Of each file that is read besides its digest, by the name under which it is read.
     """
 
     sources: dict[str, str]
     setting: dict[str, str]
+    files: dict[str, str] = field(default_factory=dict)
 
     @functools.cached_property
     def digest(self) -> str:
         """The fingerprint."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:32]
+        what = {name: value for name, value in asdict(self).items() if value or name != "files"}
+        return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:32]
 
     def differences(self, other: Code | None) -> str:
         """Return in words in what another code differs from this one."""
@@ -93,10 +98,10 @@ class Code:
             f"{name} {theirs or 'missing'} instead of {mine or 'missing'}"
             for name, mine, theirs in _unequal(self.setting, other.setting)
         ]
-        modules = [name for name, _, _ in _unequal(self.sources, other.sources)]
-        if modules:
-            more = f" and {len(modules) - 3} more" if len(modules) > 3 else ""
-            differing.append(f"another source of {', '.join(modules[:3])}{more}")
+        for what, here, there in (("source", self.sources, other.sources), ("content", self.files, other.files)):
+            if names := [name for name, _, _ in _unequal(here, there)]:
+                more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+                differing.append(f"another {what} of {', '.join(names[:3])}{more}")
         return "; ".join(differing) or "nothing"
 
 
