@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import float64, int64, void
+from numba import float64, int16, int64, void
 
 from gearmbs.kernels.jit import njit
 from gearmbs.signals.errors import SignalError
@@ -28,7 +28,7 @@ BLOCK = 4096
 KNOWN = 4
 """Values at an end of those known so far that have no slope yet of the cubic through all, and one more."""
 
-_VEC, _MAT = float64[::1], float64[:, ::1]
+_VEC, _ROWS = float64[::1], float64[:, ::1]
 
 
 def even_signal(
@@ -127,20 +127,21 @@ class EvenSamples:
         self._sharp = np.cumsum([held, linear, smooth])[::-1]
         self._low: int | None = None
         self._next = 0
+        # each column on end, as the kernels take it
         self._t, self._columns = np.empty(0), np.empty((0, 0))
-        self._even, self._held = np.empty((0, 0)), np.empty((0, held), np.int16)
+        self._even, self._held = np.empty((0, 0)), np.empty((held, 0), np.int16)
 
     def take(self, t: np.ndarray, columns: np.ndarray) -> None:
         """Take values, (m, columns), at increasing times behind those taken before; make what they decide."""
         if self._low is None:
             self._low = self._next = max(self._first - MARGIN, int(np.ceil(t[0] * self.rate - 1e-6)))
-            # each column on end, as the kernel takes it
-            held = self._held.shape[1]
-            self._even = np.empty((columns.shape[1] - held, self.t.size)).T
-            self._held = np.empty((held, self.t.size), np.int16).T
-            self._t, self._columns = t, columns
+            held = len(self._held)
+            self._even = np.empty((columns.shape[1] - held, self.t.size))
+            self._held = np.empty((held, self.t.size), np.int16)
+            self._t, self._columns = t, np.ascontiguousarray(columns.T)
         else:
-            self._t, self._columns = np.concatenate([self._t, t]), np.concatenate([self._columns, columns])
+            self._t = np.concatenate([self._t, t])
+            self._columns = np.concatenate([self._columns, columns.T], axis=1)
         self._go_on(self._last + MARGIN, is_last=False)
 
     def finish(self) -> tuple[np.ndarray, np.ndarray]:
@@ -161,14 +162,14 @@ class EvenSamples:
                 f"start, stop: {start:g} to {stop:g} s is not within the times {self._low / self.rate:g} to {t[-1]:g} s"
             )
         self._go_on(high, is_last=True)
-        return self._even, self._held
+        return self._even.T, self._held.T
 
     def known(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return times and columns of the samples made so far, and of the values behind them."""
         made = min(max(self._next - self._first, 0), self.t.size)
         behind = int(np.searchsorted(self._t, self.t[made - 1], side="right")) if made else 0
-        samples = np.column_stack([self._even[:made], self._held[:made]])
-        return [(self.t[:made], samples), (self._t[behind:], self._columns[behind:])]
+        samples = np.concatenate([self._even[:, :made], self._held[:, :made]]).T
+        return [(self.t[:made], samples), (self._t[behind:], self._columns[:, behind:].T)]
 
     def _go_on(self, high: int, *, is_last: bool) -> None:
         """Make samples in blocks up to number ``high``, or as far as the slopes of the cubic are known."""
@@ -184,7 +185,7 @@ class EvenSamples:
         if not is_last:
             spent = int(np.searchsorted(self._t, (self._next - half / self._factor - 1.0) / self.rate)) - KNOWN
             if spent > 0:
-                self._t, self._columns = self._t[spent:].copy(), self._columns[spent:].copy()
+                self._t, self._columns = self._t[spent:].copy(), self._columns[:, spent:].copy()
 
     def _block(self, last: int, high: int, half: int) -> None:
         """Make the samples from the next one to number ``last``."""
@@ -196,25 +197,23 @@ class EvenSamples:
             # all of it lies in the margin behind the span
             return
         n = last - self._next + 1
-        smooth, linear, held = (columns.shape[1] - int(k) for k in self._sharp)
+        smooth, linear = (len(columns) - int(k) for k in self._sharp[:2])
         # the filter has a gain of one: what does not change, as forces along spur wheels' shafts, comes out as it is
-        changing = [c for c in range(smooth) if columns[0, c] != columns[-1, c] or np.ptp(columns[:, c]) != 0.0]
+        changing = [c for c in range(smooth) if columns[c, 0] != columns[c, -1] or np.ptp(columns[c]) != 0.0]
         constant = [c for c in range(smooth) if c not in changing]
-        even[rows, constant] = columns[0, constant]
+        even[constant, rows] = columns[constant, :1]
         if changing:
-            values = columns if len(changing) == columns.shape[1] else np.ascontiguousarray(columns[:, changing])
+            values = columns[changing]
             fine = _fine(t, values, self.rate, self._factor, (self._low, high), (self._next, last), half)
             room = np.empty(n)
-            for channel, source in zip(changing, fine.T, strict=True):
-                products(np.ascontiguousarray(source), self._weights, self._factor, room)
-                even[rows, channel] = room[begin : begin + rows.stop - rows.start]
+            for channel, source in zip(changing, fine, strict=True):
+                products(source, self._weights, self._factor, room)
+                even[channel, rows] = room[begin : begin + rows.stop - rows.start]
         at = self.t[rows]
         if linear > smooth:
-            even[rows, smooth:linear] = monotone_cubic(t, columns[:, smooth:linear], np.clip(at, t[0], t[-1]))
-        for c in range(linear, held):
-            even[rows, c] = np.interp(at, t, columns[:, c])
-        if held < columns.shape[1]:
-            self._held[rows] = columns[np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 1), held:]
+            even[smooth:linear, rows] = monotone_cubic(t, columns[smooth:linear].T, np.clip(at, t[0], t[-1])).T
+        if linear < len(columns):
+            between(t, columns[linear:], at, even[linear:, rows], self._held[:, rows])
 
 
 def _fine_factor(rate: float, fine_rate: float) -> int:
@@ -231,7 +230,7 @@ def _fine(
     wanted: tuple[int, int],
     half: int,
 ) -> np.ndarray:
-    """Return the samples at ``factor`` times the rate that a filter of half length ``half`` spans.
+    """Return the samples at ``factor`` times the rate that a filter of half length ``half`` spans, a row a column.
 
     ``span`` and ``wanted`` are the first and last sample, at the rate itself, of what is known and of what is to come
     out of the filter. Beyond the span the values are continued by point reflection in its end samples.
@@ -239,17 +238,17 @@ def _fine(
     first, last = wanted[0] * factor - half, wanted[1] * factor + half
     low, high = span[0] * factor, span[1] * factor
     grid = np.arange(max(first, low), min(last, high) + 1) / (factor * rate)
-    known = monotone_cubic(t, columns, np.clip(grid, t[0], t[-1]))
     before, after = max(low - first, 0), max(last - high, 0)
-    parts = [known]
-    if before:
-        parts.insert(0, 2.0 * known[0] - known[before:0:-1])
-    if after:
-        parts.append(2.0 * known[-1] - known[-2 : -after - 2 : -1])
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    known = np.empty((len(columns), grid.size))
+    interpolate(t, columns, np.clip(grid, t[0], t[-1]), known)
+    if not before and not after:
+        return known
+    ahead = 2.0 * known[:, :1] - known[:, before:0:-1]
+    return np.concatenate([ahead, known, 2.0 * known[:, -1:] - known[:, -2 : -after - 2 : -1]], axis=1)
 
 
-# The kernel of filters that lower the rate: only the samples that are kept are computed.
+# The kernel of filters that lower the rate: only the samples that are kept are computed, four of them at a time, so
+# that a weight is read once for all of them.
 
 
 @njit(
@@ -261,11 +260,22 @@ def _fine(
 )
 def products(values, weights, every, out):
     """Write the products of ``weights`` with the values from each ``every``-th one on."""
-    for k in range(out.size):
+    fours = out.size - out.size % 4
+    for k in range(0, fours, 4):
         first = every * k
+        second, third, fourth = first + every, first + 2 * every, first + 3 * every
+        one, two, three, four = 0.0, 0.0, 0.0, 0.0
+        for i in range(weights.size):
+            weight = weights[i]
+            one += weight * values[first + i]
+            two += weight * values[second + i]
+            three += weight * values[third + i]
+            four += weight * values[fourth + i]
+        out[k], out[k + 1], out[k + 2], out[k + 3] = one, two, three, four
+    for k in range(fours, out.size):
         total = 0.0
         for i in range(weights.size):
-            total += weights[i] * values[first + i]
+            total += weights[i] * values[every * k + i]
         out[k] = total
 
 
@@ -300,8 +310,8 @@ def monotone_cubic(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
        Sci. Stat. Comput. 5, 1984.
     """
     x, at = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(at, dtype=float)
-    columns = np.ascontiguousarray(y, dtype=float).reshape(x.size, -1)
-    out = np.empty((columns.shape[1], at.size))
+    columns = np.ascontiguousarray(np.asarray(y, dtype=float).reshape(x.size, -1).T)
+    out = np.empty((len(columns), at.size))
     interpolate(x, columns, at, out)
     return out.T.reshape(at.shape + y.shape[1:])
 
@@ -331,10 +341,10 @@ def _derivative(x, y, k, c):
     """Return the derivative at point k of column c."""
     n = x.size
     if n == 2:
-        return (y[1, c] - y[0, c]) / (x[1] - x[0])
+        return (y[c, 1] - y[c, 0]) / (x[1] - x[0])
     first = min(max(k - 1, 0), n - 3)
     h0, h1 = x[first + 1] - x[first], x[first + 2] - x[first + 1]
-    left, right = (y[first + 1, c] - y[first, c]) / h0, (y[first + 2, c] - y[first + 1, c]) / h1
+    left, right = (y[c, first + 1] - y[c, first]) / h0, (y[c, first + 2] - y[c, first + 1]) / h1
     if k == 0:
         return _end(h0, h1, left, right)
     if k == n - 1:
@@ -342,10 +352,10 @@ def _derivative(x, y, k, c):
     return _inner(h0, h1, left, right)
 
 
-@njit(void(_VEC, _MAT, _VEC, _MAT), cache=True, error_model="numpy", nogil=True)
+@njit(void(_VEC, _ROWS, _VEC, _ROWS), cache=True, error_model="numpy", nogil=True)
 def interpolate(x, y, at, out):
-    """Write the interpolant of each column of y at the points ``at`` to a row of ``out``."""
-    n, m = y.shape
+    """Write the interpolant of each row of y at the points ``at`` to a row of ``out``."""
+    m, n = y.shape
     # derivative at the end of the interval, difference over the next one
     end, ahead = np.zeros(m), np.zeros(m)
     p, k, known = 0, 0, -2
@@ -364,10 +374,10 @@ def interpolate(x, y, at, out):
         h_next = x[k + 2] - x[k + 1] if is_inner else h
         per_h, per_next = 1.0 / h, 1.0 / h_next
         for c in range(m):
-            slope = ahead[c] if follows else (y[k + 1, c] - y[k, c]) * per_h
+            slope = ahead[c] if follows else (y[c, k + 1] - y[c, k]) * per_h
             near = end[c] if follows else _derivative(x, y, k, c)
             if is_inner:
-                ahead[c] = (y[k + 2, c] - y[k + 1, c]) * per_next
+                ahead[c] = (y[c, k + 2] - y[c, k + 1]) * per_next
                 end[c] = _inner(h, h_next, slope, ahead[c])
             else:
                 end[c] = _derivative(x, y, k + 1, c)
@@ -375,5 +385,26 @@ def interpolate(x, y, at, out):
             second, third = (slope - near) * per_h - cubic, cubic * per_h
             for q in range(p, stop):
                 s = at[q] - x[k]
-                out[c, q] = ((third * s + second) * s + near) * s + y[k, c]
+                out[c, q] = ((third * s + second) * s + near) * s + y[c, k]
         p, known = stop, k
+
+
+@njit(void(_VEC, _ROWS, _VEC, float64[:, :], int16[:, :]), cache=True, error_model="numpy", nogil=True)
+def between(x, y, at, linear, held):
+    """Write straight lines through the first rows of y at the points ``at``, and the last values before of the others.
+
+    Points increase; before the first value and behind the last one these go on.
+    """
+    lines, n, k = linear.shape[0], x.size, 0
+    for p in range(at.size):
+        while k + 2 < n and x[k + 1] <= at[p]:
+            k += 1
+        inside = x[0] <= at[p] < x[n - 1]
+        end = 0 if at[p] < x[0] else n - 1
+        for c in range(lines):
+            if inside:
+                linear[c, p] = (y[c, k + 1] - y[c, k]) / (x[k + 1] - x[k]) * (at[p] - x[k]) + y[c, k]
+            else:
+                linear[c, p] = y[c, end]
+        for c in range(held.shape[0]):
+            held[c, p] = np.int16(y[lines + c, k if inside else end])

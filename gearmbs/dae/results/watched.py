@@ -22,12 +22,14 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads.forces import DIAGNOSTICS
-from gearmbs.dae.equations.rotation import POSE_A, POSE_R, matrix_of
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R
 from gearmbs.dae.equations.unknowns import SI2
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, Status
+from gearmbs.dae.results import readers
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, PART_SIZE, Solution
+from gearmbs.kernels.pointers import direct
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.members import Members
@@ -53,6 +55,13 @@ class Steps:
 
 
 Reader = Callable[[Steps], Any]
+
+
+def _read(kind: int, steps: Steps, places: np.ndarray, numbers: np.ndarray, components: int) -> np.ndarray:
+    """Return what a compiled reader reads, (m, components), each component on end in memory."""
+    out = np.empty((components, len(steps.y)))
+    direct(readers.read)(kind, steps.y, steps.left, places, numbers, out)
+    return out.T
 
 
 class Watch:
@@ -159,11 +168,8 @@ class Watch:
         first, place = int(row[T.AT_THETA]), int(self.idata[T.H_I_CODE]) + number + 1
 
         def reader(steps: Steps) -> np.ndarray:
-            angles = steps.y[:, first : first + 3].T
-            found = np.empty((9, len(steps.y)))
-            turns = zip(np.cos(angles), np.sin(angles), strict=True)
-            matrix_of.py_func(*turns, steps.idata[place], found, 0)
-            return found.T.reshape(-1, 3, 3)
+            places = np.array([first, steps.idata[place]], dtype=np.int64)
+            return _read(readers.EULER, steps, places, np.empty(0), 9).reshape(-1, 3, 3)
 
         return reader
 
@@ -188,13 +194,9 @@ class Watch:
             column = self.n + self._columns([value]).start
             shift, sense = float(turn[fx.TURN_START]), float(turn[fx.TURN_SENSE])
 
-        def reader(steps: Steps) -> np.ndarray:
-            phi = steps.y[:, column] if column < self.n else steps.left[:, column - self.n]
-            phi = sense * (phi - shift)
-            cosine, sine = np.cos(phi)[:, None], np.sin(phi)[:, None]
-            return (a.ravel() + b.ravel() * cosine + c.ravel() * sine).reshape(-1, 3, 3)
-
-        return reader
+        places = np.array([column], dtype=np.int64)
+        numbers = np.concatenate([[sense, shift], a.ravel(), b.ravel(), c.ravel()])
+        return lambda steps: _read(readers.ABOUT_AXIS, steps, places, numbers, 9).reshape(-1, 3, 3)
 
     # --- forces of joints -----------------------------------------------------------------------------
 
@@ -220,13 +222,9 @@ class Watch:
             if table[r, T.ROW_TAPE] >= 0:
                 return None
 
-        def reader(steps: Steps) -> np.ndarray:
-            force = np.zeros((len(steps.y), 3))
-            for axis, column, factor in parts:
-                force[:, axis] += factor * steps.y[:, column]
-            return force
-
-        return reader
+        places = np.array([part[:2] for part in parts], dtype=np.int64).ravel()
+        numbers = np.array([factor for _, _, factor in parts])
+        return lambda steps: _read(readers.SUM, steps, places, numbers, 3)
 
     def _force_inside(self, rows: list[int]) -> Reader | None:
         """Return the same for a fixed joint inside a group that turns about a fixed axis."""
@@ -251,16 +249,9 @@ class Watch:
             return None
         weight = -sum(members.place[m, mb.PLACE_MASS] for m in beyond) * self.system.model.gravity
 
-        def reader(steps: Steps) -> np.ndarray:
-            force = np.tile(weight, (len(steps.y), 1))
-            for sign, wrench, slopes, seen in loads:
-                moved, by_unknown = steps.y - steps.left[:, seen], steps.left[:, slopes]
-                force -= sign * steps.left[:, wrench]
-                for i in range(self.n):
-                    force -= sign * by_unknown[:, i :: self.n] * moved[:, i : i + 1]
-            return side * force
-
-        return reader
+        places = np.array([columns for _, *columns in loads], dtype=np.int64).ravel()
+        numbers = np.array([side, *weight, *(sign for sign, *_ in loads)])
+        return lambda steps: _read(readers.INSIDE, steps, places, numbers, 3)
 
     def _are_balanced(self, beyond: set[int]) -> bool:
         """Whether the centre of mass of some members is on their axis, so that no turn moves it."""
@@ -280,8 +271,8 @@ class Watch:
         off = np.linalg.norm(np.cross(turn[fx.TURN_AXIS : fx.TURN_AXIS + 3], arm))
         return bool(off <= BALANCED * masses.sum())
 
-    def _loads_on(self, beyond: set[int]) -> list[tuple[float, slice, slice, slice]] | None:
-        """Return the elements whose forces act on some members: sign; columns of force, slopes and unknowns at y_m."""
+    def _loads_on(self, beyond: set[int]) -> list[tuple[float, int, int, int]] | None:
+        """Return the loads on some members: sign; the first columns of force, slopes and unknowns at y_m."""
         members, kept, n = self.members, int(self.idata[-1]), self.n
         assert members is not None
         found = []
@@ -296,12 +287,24 @@ class Watch:
             found.append(
                 (
                     sign,
-                    self._columns(range(wrench, wrench + 3)),
-                    self._columns(range(slopes, slopes + 3 * n)),
-                    self._columns(range(kept, kept + n)),
+                    self._columns(range(wrench, wrench + 3)).start,
+                    self._columns(range(slopes, slopes + 3 * n)).start,
+                    self._columns(range(kept, kept + n)).start,
                 )
             )
         return found
+
+
+def some_of(part: Solution, rows: np.ndarray) -> Solution:
+    """Return some steps of a part that was read, by their numbers; what was read of the others is left out."""
+    out = part.over(part.t[rows], part.result.y[rows], part.result.epochs)
+    out.at_steps = {key: _rows_of(value, rows) for key, value in part.at_steps.items()}
+    return out
+
+
+def _rows_of(told: Any, rows: np.ndarray) -> Any:
+    """Return what a reader has told, an array or arrays by name, of some steps."""
+    return {name: values[rows] for name, values in told.items()} if isinstance(told, dict) else told[rows]
 
 
 WATCHED_PART_SIZE = 8192

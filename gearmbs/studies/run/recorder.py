@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import float64, void
 
 from gearmbs.dae.results.solution import Solution
+from gearmbs.dae.results.watched import some_of
+from gearmbs.kernels.jit import njit
 from gearmbs.signals.resampling import MARGIN, EvenSamples
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.case.limits import edge, slip
@@ -69,35 +72,67 @@ class _Turned:
     def __init__(self, case: Case) -> None:
         pair = case.pair()
         place = pair.placement(0.0)
-        self._axes = (place.axes_1, place.axes_2)
+        self._axes = np.array([place.axes_1, place.axes_2])
         self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
         self._lag = pair.rotation * pair.wheels[1].base_radius
-        self._last: list[np.ndarray] = [np.empty(0), np.empty(0)]
+        self._last = np.full(2, np.nan)
         self._pitch = pair.driver.base_pitch
         self._whole: float | None = None
 
     def error(self, part: Solution) -> np.ndarray:
         """Return the transmission error of the next part of a solution, m."""
-        turned, wheels = [], [*map(part.orientation, rig.GEARS)]
-        for wheel, (matrices, axes) in enumerate(zip(wheels, self._axes, strict=True)):
-            along, across = (matrices[..., 0] @ axes[:, k] for k in range(2))
-            before = self._last[wheel]
-            angles = np.unwrap(np.concatenate([before, np.arctan2(across, along)]))[before.size :]
-            self._last[wheel] = angles[-1:]
-            turned.append(angles)
-        error = self._lag * (turned[0] * self._ratio + turned[1])
+        first, second = map(part.orientation, rig.GEARS)
+        error = np.empty(part.t.size)
+        _lags(first, second, self._axes, self._last, self._ratio, self._lag, error)
         if self._whole is None:
             # what starts with the wheels turned is counted from the nearest tooth
             self._whole = self._pitch * float(np.round(error[0] / self._pitch))
-        return error - self._whole
+        error -= self._whole
+        return error
+
+
+@njit(
+    void(float64[:, :, :], float64[:, :, :], float64[:, :, :], float64[::1], float64, float64, float64[::1]),
+    cache=True,
+    error_model="numpy",
+    nogil=True,
+)
+def _lags(first, second, axes, last, ratio, lag, out):
+    """Write ``lag (ratio angle_1 + angle_2)`` at each of some steps, and to ``last`` the angles at the last of them.
+
+    Angles are those of the x-axes of two wheels, from matrices of rotation, (m, 3, 3), about the axes that they have at
+    rest; they go on from ``last``, if that is a number, and from step to step by less than half a turn.
+    """
+    turn = 2.0 * np.pi
+    for k in range(out.size):
+        for wheel in range(2):
+            along, across = 0.0, 0.0
+            for c in range(3):
+                x = first[k, c, 0] if wheel == 0 else second[k, c, 0]
+                along += x * axes[wheel, c, 0]
+                across += x * axes[wheel, c, 1]
+            angle = np.arctan2(across, along)
+            if last[wheel] == last[wheel]:
+                angle += turn * np.floor((last[wheel] - angle) / turn + 0.5)
+            last[wheel] = angle
+        out[k] = lag * (ratio * last[0] + last[1])
 
 
 def _taken(part: Solution, turned: _Turned) -> np.ndarray:
-    """Return what is recorded of a part of a solution, shape (m, 13): forces, transmission error, contact."""
-    forces = [*map(part.reaction_force, rig.SEATS)]
+    """Return what is recorded of a part of a solution, shape (m, 13): forces, transmission error, contact.
+
+    Each column is on end in memory, as filters take it.
+    """
+    columns = np.empty((FORCES + 1 + len(CONTACT), part.t.size)).T
+    for k, seat in enumerate(rig.SEATS):
+        columns[:, 3 * k : 3 * k + 3] = part.reaction_force(seat)
+    x, y, z = columns[:, 3 : FORCES - 1].T
+    columns[:, FORCES - 1] = np.sqrt(x * x + y * y + z * z)
+    columns[:, FORCES] = turned.error(part)
     told = part.contact(rig.MESH)
-    size = np.linalg.norm(forces[1], axis=1)
-    return np.column_stack([*forces, size, turned.error(part), *(told[name] for name in CONTACT)])
+    for k, name in enumerate(CONTACT, FORCES + 1):
+        columns[:, k] = told[name]
+    return columns
 
 
 def _joined(parts: Sequence[Taken]) -> Measured:
@@ -194,13 +229,18 @@ class Recorder:
             return
         if self._model is None:
             self._model = part.over(np.empty(0), part.result.y[:0], part.result.epochs)
+        before = sum(t.size for t, _, _ in self._early)
         self._early.append((part.t.copy(), part.result.y.copy(), part.result.epochs[0][1]))
         if part.t[-1] < self._begin:
             return
         self._turned = _Turned(self.case)
         wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]), self._begin)
-        for piece in self._solution_over(wanted).parts():
+        # what this part has been read already is not evaluated
+        anew = wanted[wanted < before] if {*WATCHED} <= part.at_steps.keys() else wanted
+        for piece in self._solution_over(anew).parts() if anew.size else ():
             self._add(piece, self._turned)
+        if anew.size < wanted.size:
+            self._add(some_of(part, wanted[anew.size :] - before), self._turned)
 
     def _add(self, part: Solution, turned: _Turned) -> None:
         """Keep what is recorded of a part of a solution."""
