@@ -7,9 +7,9 @@ are negative.
 
 from __future__ import annotations
 
+import functools
 import math
 import operator
-from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from gearmbs.contact import layout as L
 from gearmbs.contact.law_kinds import LAW_KINDS
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import ContactModel, Mesh
-from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, Fault, ToothDeviations, face_sections
+from gearmbs.gears.modifications import COMPLIANCE_POINTS, PROFILE_POINTS, ToothDeviations, face_sections
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 
@@ -58,29 +58,38 @@ def _pack_wheel(gear: GearSpec, table: np.void) -> None:
     table["twist"] = -sign * gear.twist_tangent
 
 
-class _Latest:
-    """The tables packed last: setting a simulation up asks for them several times, a series changes the load alone."""
+class _Asked:
+    """A mesh whose tables are asked for: equal to those of the same key and these very faults.
 
-    def __init__(self) -> None:
-        self._cache: deque[tuple[tuple, tuple[Fault, ...], tuple[np.ndarray, np.ndarray, int]]] = deque(maxlen=MESHES)
+    What cannot be hashed is compared with all that are kept.
+    """
 
-    def find(self, key: tuple, faults: tuple[Fault, ...]) -> tuple[np.ndarray, np.ndarray, int] | None:
-        """Return copies of the tables of what the key holds and of these very faults, or None."""
-        for known, known_faults, (gi, gr, size) in self._cache:
-            same_faults = len(faults) == len(known_faults) and all(map(operator.is_, faults, known_faults))
-            if same_faults and known == key:
-                return gi.copy(), gr.copy(), size
-        return None
+    def __init__(self, pair: Mesh, slices: int | None) -> None:
+        self.pair, self.slices = pair, slices
+        self._key = (pair.geometry, pair.contact_model, pair.operating_point.rotation, slices)
+        try:
+            self._hash = hash(self._key)
+        except TypeError:
+            self._hash = 0
 
-    def keep(self, key: tuple, faults: tuple[Fault, ...], tables: tuple[np.ndarray, np.ndarray, int]) -> None:
-        """Keep copies of tables."""
-        gi, gr, size = tables
-        self._cache.appendleft((key, faults, (gi.copy(), gr.copy(), size)))
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, _Asked):
+            return NotImplemented
+        one, two = self.pair.faults, other.pair.faults
+        return len(one) == len(two) and all(map(operator.is_, one, two)) and self._key == other._key
 
 
-MESHES = 12
-"""Meshes whose tables are kept, some 10 kB each: those of a planetary set with six planets."""
-_latest = _Latest()
+MESHES = 64
+"""Meshes whose tables are kept, some 10 kB each: all of a train of thirty stages, twice."""
+
+
+@functools.lru_cache(maxsize=MESHES)
+def _kept(asked: _Asked) -> tuple[np.ndarray, np.ndarray, int]:
+    """Return tables, not to be written to: setting a simulation up asks for them several times, a series for many."""
+    return _pack(asked.pair, asked.slices)
 
 
 def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:
@@ -96,12 +105,8 @@ def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray,
     if parameters is None or not parameters.frozen:
         # it may change
         return _pack(pair, slices)
-    key, faults = (pair.geometry, pair.contact_model, pair.operating_point.rotation, slices), pair.faults
-    tables = _latest.find(key, faults)
-    if tables is None:
-        tables = _pack(pair, slices)
-        _latest.keep(key, faults, tables)
-    return tables
+    integers, reals, size = _kept(_Asked(pair, slices))
+    return integers.copy(), reals.copy(), size
 
 
 def _pack(pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int]:
