@@ -86,7 +86,8 @@ def shapes_at(model: ModalModel, point: np.ndarray) -> tuple[np.ndarray, np.ndar
             f"{model.ids[k]}, is {distance[k]:.4g} m away. Put the marker on a node, place(number), or "
             f"reduce with an interface there"
         )
-    if model.turned is not None:
+    # nodes of solids among those of shells and beams have no rotation of their own: files hold zeros there
+    if model.turned is not None and (model.turned[:, k].any() or not model.moved[:, k].any()):
         return model.moved[:, k], model.turned[:, k]
     return model.moved[:, k], _fitted(model, k)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,10 +20,13 @@ from gearmbs.gears.spec import convert_fields
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, ForceElement, Setting
 from gearmbs.units import Quantity, shown, to_si
+from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.parts.bodies import Marker
 
+SOFTEST = 0.1
+"""Deflection under the pair's torque, by the module, that no teeth have: steel yields at some thousandths of it."""
 POINTS = 64
 """Least number of points of the tables over a mesh cycle."""
 
@@ -72,9 +76,17 @@ class IdealMesh(Written):
     error: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
+        given = self.stiffness
         convert_fields(self, {"stiffness": "N/m", "damping": "N*s/m", "depth": "length"}, "IdealMesh")
         if not self.stiffness > 0:
             raise ValueError(f"IdealMesh.stiffness is {self.stiffness} N/m; it must be positive")
+        deflection = abs(self.pair._force(None)) / self.stiffness
+        if isinstance(given, Real) and deflection > SOFTEST * self.pair.driver.module:
+            warn(
+                f"IdealMesh.stiffness is {given:g}, and so in N/m: {shown(self.pair.torque, 'N*m', '.4g')} deflect it "
+                f"by {shown(deflection, 'mm', '.4g')}, as no teeth do; write '{given:g} N/mm' or '{given:g} N/um' if "
+                f"that is meant, '{given:g} N/m' if not"
+            )
         if not self.damping >= 0:
             raise ValueError(f"IdealMesh.damping is {self.damping} N s/m; it must not be negative")
         if not self.depth > 0:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.identify.parameters import errors_of
+from gearmbs.identify.parameters import IdentifyError, errors_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 LIMIT = 0.3
 """Standard deviation of a combination of logarithms from which it counts as undetermined: a third of the value."""
+
+NOT_AT_ALL = 1e6
+"""Standard deviation of a combination of logarithms that is rounding: columns alike but for differences by 1e-6."""
 
 SHARE = 0.25
 """Smallest part of a direction that is named."""
@@ -101,7 +104,7 @@ class Identifiability:
         lines = []
         for deviation, parts in self.undetermined():
             names = sorted(parts, key=lambda n: -abs(parts[n]))
-            size = "not at all" if deviation > 1e6 else f"to {100 * deviation:.0f} % only"
+            size = "not at all" if deviation > NOT_AT_ALL else f"to {100 * deviation:.0f} % only"
             if len(names) == 1:
                 lines.append(f"{names[0]} has hardly any influence on what was measured: it is known {size}")
             else:
@@ -216,11 +219,22 @@ def posterior(fit: Fit, *, draws: int = 4000, reach: float = 3.0, seed: int = 0)
     DataFrame
         A draw a row, in the parameters; ``attrs`` holds the surrogate's error in standard deviations of the noise
         (``surrogate_error``: trust the draws if it is well below 1) and the share of accepted moves.
+
+    Raises
+    ------
+    IdentifyError
+        If the data do not determine a parameter: about it there is no posterior but its bounds.
     """
     import pandas as pd
 
-    surrogate = make_surrogate(fit, reach=reach, seed=seed)
     low, high = fit.problem.scale.bounds()
+    lost = [name for name, error, wide in zip(fit.names, fit.z_errors, high - low) if not error < min(wide, NOT_AT_ALL)]
+    if lost:
+        raise IdentifyError(
+            f"posterior: {', '.join(lost)}: not determined by the data, a standard error is wider than the bounds; "
+            "hold all but one of those that act alike, or measure where they act differently"
+        )
+    surrogate = make_surrogate(fit, reach=reach, seed=seed)
     unit = 1.0 if fit.known_noise else fit.cost / max(1, fit.freedom)
 
     def log_density(z: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Interfaces and reductions of finite elements: rigid and averaging faces, convergence, integrals without slices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -247,3 +249,18 @@ def test_what_modes_counts():
         reduce_model(model, seats, modes=4).slowest(1 + static)
     with pytest.raises(FlexibleError, match="give 1 to 17"):
         reduce_model(model, seats, modes=4).slowest(18)
+
+
+def test_nodes_of_solids_among_shells_turn_with_their_neighbours():
+    """A file with both holds zeros as rotations of nodes of solids: a marker there turns as the body around it."""
+    solid = reduce_model(tower(), ends("rigid"), modes=4)
+    # in no interface, whose own motion comes first
+    node, other = (k for k, number in enumerate(solid.ids) if number in (9, 14))
+    own = np.zeros_like(solid.moved)
+    own[:, node] = 0.1
+    mixed = replace(solid, turned=own)
+    assert np.array_equal(mixed.shapes(mixed.positions[node])[1], own[:, node])
+    moved, turned = mixed.shapes(mixed.positions[other])
+    assert np.array_equal(moved, solid.moved[:, other])
+    assert np.array_equal(turned, solid.shapes(solid.positions[other])[1])
+    assert np.abs(turned).max() > 0.0

@@ -1,6 +1,7 @@
 """The ideal mesh made from a pair's tooth contact carries its load with its stiffness, for every kind of wheels."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from gearmbs.gears.ideal_mesh import IdealMeshForce
 from gearmbs.gears.transmission import StaticMesh
 from gearmbs.mechanism.forces.functions import vary
 from tests.drivetrain.support import differences, evaluate, rotation
+from tests.says import says
 
 LOAD = 200.0
 
@@ -117,3 +119,14 @@ def test_the_force_of_tilted_helical_springs_is_that_of_their_energy():
             energies.append(evaluate(element, moved)[3][0])
         found[column] = -(energies[0] - energies[1]) / (2.0 * step)
     np.testing.assert_allclose(wrench, found, atol=1e-6 * np.abs(wrench).max())
+
+
+@pytest.mark.parametrize("stiffness", [400.0, 400e3])
+def test_a_stiffness_that_is_meant_in_other_units_is_told(stiffness):
+    pair = GearPair.paper()
+    with pytest.warns(UserWarning, match=says("IdealMesh.stiffness", "N/m", "write")):
+        IdealMesh(pair, stiffness)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert IdealMesh(pair, f"{stiffness} N/m").stiffness == stiffness
+        IdealMesh(pair, 4e8)

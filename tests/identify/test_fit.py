@@ -86,6 +86,17 @@ def test_posterior_agrees_with_the_normal_approximation():
     assert draws.attrs["surrogate_error"] < 0.2
 
 
+def test_there_is_no_posterior_of_what_data_do_not_determine():
+    """Only the product of two amplitudes acts; with one held there is one."""
+    free = [Free("a", 1.0, 0.1, 10.0), Free("b", 1.0, 0.1, 10.0)]
+    y = 2.0 * np.exp(-T) + 0.02 * np.random.default_rng(0).standard_normal(T.size)
+    both = fit(lambda p: p[0] * p[1] * np.exp(-T), y, free, sigma=0.02)
+    with pytest.raises(IdentifyError, match=says("a, b", "not determined", "hold")):
+        posterior(both)
+    one = fit(lambda p: p[0] * np.exp(-T), y, free[:1], sigma=0.02)
+    assert posterior(one, draws=500)["a"].std() == pytest.approx(one.errors[0], rel=0.3)
+
+
 def test_reports_and_errors():
     found = fit(decay, noisy(1), FREE)
     assert "standard error" in found.report()
