@@ -7,6 +7,8 @@ from .mesh import ContactLaw as ContactLaw
 from .mesh import ContactModel as ContactModel
 from .mesh import FlankFriction as FlankFriction
 from .mesh import OperatingPoint as OperatingPoint
+from .mesh_tables import MeshTables as MeshTables
+from .mesh_tables import mesh_tables as mesh_tables
 from .pair import GearPair as GearPair
 from .planetary_mechanism import ElasticRim as ElasticRim
 from .planetary_mechanism import RimModes as RimModes
