@@ -2,17 +2,18 @@
 
 Ball bearings, with g = d cos(a)/D, lengths in mm and f the groove radii by the ball diameter,
 
-    C = 1.3 f_c cos(a)^0.7 Z^(2/3) d^1.8        (d^1.4 3.647 above 25.4 mm),
+    C = 1.3 f_c (i cos(a))^0.7 Z^(2/3) d^1.8    (d^1.4 3.647 above 25.4 mm),
     f_c = 39.9 lambda g^0.3 (1 - g)^1.39/(1 + g)^(1/3) (2 f_i/(2 f_i - 1))^0.41 (1 + u^(10/3))^(-3/10),
     u = 1.04 ((1 - g)/(1 + g))^1.72 (f_i (2 f_o - 1)/(f_o (2 f_i - 1)))^0.41;
 
-roller bearings C = 1.1 f_c (L cos(a))^(7/9) Z^(3/4) d^(29/27) with
+roller bearings C = 1.1 f_c (i L cos(a))^(7/9) Z^(3/4) d^(29/27) with
 
     f_c = 207.9 lambda g^(2/9) (1 - g)^(29/27)/(1 + g)^(1/4) (1 + u^(9/2))^(-2/9),
     u = 1.04 ((1 - g)/(1 + g))^(143/108).
 
 The standard fixes f_i = f_o = 0.52 and the reduction factors lambda, whatever the grooves are. Static: of balls the
-load at which the most loaded one, 5 F/(Z cos a), presses its groove with 4200 MPa; of rollers 44 (1 - g) Z L d cos(a).
+load at which the most loaded one, 5 F/(i Z cos a), presses its groove with 4200 MPa; of rollers
+44 (1 - g) i Z L d cos(a). i counts rows; makers count the two paths of four-point bearings as two.
 
 References
 ----------
@@ -51,6 +52,8 @@ Boundary = Annotated[Quantity, Measure("length", above=0, below=10)]
 Force = Annotated[Quantity, Measure("force", above=0)]
 GROOVE = Measure(above=0.5, below=1, remedy="a groove is wider than its ball: give 0.505 to 0.6")
 ELEMENT_SIZE = Measure("length", above=0, below=1)
+TOUCHING = 1e-9
+"""Rounding of the diameters of bearings without a ring, whose needles run on the shaft or in the housing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +83,8 @@ class Bearing(Described):
     youngs_modulus, poisson_ratio, density
         Of elements and rings, Pa and kg/m^3.
     designation : str
+    rating_source : str
+        Maker whose catalogue the ratings are of, where they follow from the designation; others differ.
     estimated : tuple of str
         Names of the fields that are what is usual, and not this bearing's own; see `gearmbs.bearings.estimate`.
 
@@ -115,6 +120,7 @@ class Bearing(Described):
     poisson_ratio: Annotated[Quantity, Measure(low=0, below=0.5)] = STEEL[1]
     density: Annotated[Quantity, Measure("density", above=0)] = 7800.0
     designation: str = ""
+    rating_source: str = ""
     estimated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -140,12 +146,12 @@ class Bearing(Described):
         angle = self.contact_angle
         within, beyond = (pitch + side * d * math.cos(angle) for side in (-1.0, 1.0))
         require(
-            self.bore is None or self.bore < within,
+            self.bore is None or self.bore <= within * (1.0 + TOUCHING),
             f"Bearing.bore is {1e3 * (self.bore or 0.0):.4g} mm, and the elements run on {1e3 * within:.4g} mm; a bore "
             "is smaller than its inner race",
         )
         require(
-            self.outside_diameter is None or self.outside_diameter > beyond,
+            self.outside_diameter is None or self.outside_diameter >= beyond * (1.0 - TOUCHING),
             f"Bearing.outside_diameter is {1e3 * (self.outside_diameter or 0.0):.4g} mm, and the elements run in "
             f"{1e3 * beyond:.4g} mm; an outer ring is larger than its race",
         )
@@ -321,6 +327,7 @@ class Bearing(Described):
             **({"estimated": ", ".join(self.estimated)} if self.estimated else {}),
             **{name: f"{value:.4f}" for name, value in self.multiples.items()},
             "C": f"{1e-3 * self.rating:.3g} kN", "C0": f"{1e-3 * self.rating_at_rest:.3g} kN",
+            **({"C and C0 of": self.rating_source} if self.rating_source else {}),
         }  # fmt: skip
         cells = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in rows.items())
         return f"<table><caption>{self.designation or 'bearing'}</caption>{cells}</table>"
@@ -337,17 +344,17 @@ PRESSURE = 4.2e9
 def dynamic_rating(bearing: Bearing) -> float:
     """Return the basic dynamic radial load rating C by ISO 281, N."""
     g, z, cosine = bearing.ratio, bearing.elements, math.cos(bearing.contact_angle)
-    d, factor = 1e3 * bearing.element_diameter, KINDS[bearing.kind].reduction
+    d, factor, i = 1e3 * bearing.element_diameter, KINDS[bearing.kind].reduction, KINDS[bearing.kind].rated_rows
     if bearing.rollers:
         u = 1.04 * ((1 - g) / (1 + g)) ** (143 / 108)
         f_c = 207.9 * factor * g ** (2 / 9) * (1 - g) ** (29 / 27) / (1 + g) ** 0.25 * (1 + u**4.5) ** (-2 / 9)
-        return 1.1 * f_c * (1e3 * bearing.roller_length * cosine) ** (7 / 9) * z**0.75 * d ** (29 / 27)
+        return 1.1 * f_c * (i * 1e3 * bearing.roller_length * cosine) ** (7 / 9) * z**0.75 * d ** (29 / 27)
     f = STANDARD_GROOVE
     u = 1.04 * ((1 - g) / (1 + g)) ** 1.72
     f_c = 39.9 * factor * g**0.3 * (1 - g) ** 1.39 / (1 + g) ** (1 / 3) * (2 * f / (2 * f - 1)) ** 0.41
     f_c *= (1 + u ** (10 / 3)) ** -0.3
     size = d**1.8 if d <= 25.4 else 3.647 * d**1.4
-    return 1.3 * f_c * cosine**0.7 * z ** (2 / 3) * size
+    return 1.3 * f_c * (i * cosine) ** 0.7 * z ** (2 / 3) * size
 
 
 def roller_length_for(bearing: Bearing) -> Bearing:
@@ -363,7 +370,7 @@ def roller_length_for(bearing: Bearing) -> Bearing:
 
 def static_rating(bearing: Bearing) -> float:
     """Return the basic static radial load rating C_0 by ISO 76, N."""
-    g, z, cosine = bearing.ratio, bearing.elements, math.cos(bearing.contact_angle)
+    g, z, cosine = bearing.ratio, KINDS[bearing.kind].rated_rows * bearing.elements, math.cos(bearing.contact_angle)
     if bearing.rollers:
         return 44.0 * (1 - g) * z * 1e6 * bearing.roller_length * bearing.element_diameter * cosine
     contact = groove_contact(bearing.element_diameter, STANDARD_GROOVE, g / (1 - g))

@@ -1,123 +1,125 @@
-"""Boundary dimensions of rolling bearings by dimension series, and ratings that a maker prints.
+"""Boundary dimensions of rolling bearings by series and code of the bore, and ratings that makers print.
 
-Bore, outside diameter and width are those of ISO 15 (radial bearings) and ISO 355 (tapered roller bearings: width T and
-contact angle), which all makers keep. Ratings are those of one maker's public catalogue (URB, 2017): others differ by
-their steel and by the number of elements, some per cent for the same design. In mm and kN, by bore.
+They stand in ``designations.csv``, one row for a size of a series: bore d, outside diameter D and width B (of tapered
+roller bearings T, of thrust bearings H), mm; C and C_0, kN, and the limit e = 1.5 tan(a) of the load factors where a
+maker prints them, and whose they are; of needle roller bearings the raceway F on the inner ring. Dimensions are those
+of ISO 15, ISO 355 and ISO 104, which all makers keep: each row is in two catalogues.
+
+Ratings are those of one maker's public catalogue (URB, 2017); of four-point, double row angular contact, full
+complement and needle roller bearings, which that has not, of DAS Lager, NKE and FBJ. Others differ by their steel and
+by the number of elements, some 5 to 15 % for the same design.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 
-SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
-"""Bores by their codes below 04, mm; from there on a code is a fifth of the bore."""
-
-OUTSIDE = {
-    "0": {8: 22, 9: 24, 10: 26, 12: 28, 15: 32, 17: 35, 20: 42, 25: 47, 30: 55, 35: 62, 40: 68, 45: 75, 50: 80, 55: 90,
-          60: 95, 65: 100, 70: 110, 75: 115, 80: 125, 85: 130, 90: 140, 95: 145, 100: 150, 105: 160, 110: 170, 120: 180,
-          130: 200, 140: 210, 150: 225, 160: 240, 170: 260, 180: 280, 190: 290, 200: 310},
-    "2": {8: 24, 9: 26, 10: 30, 12: 32, 15: 35, 17: 40, 20: 47, 25: 52, 30: 62, 35: 72, 40: 80, 45: 85, 50: 90, 55: 100,
-          60: 110, 65: 120, 70: 125, 75: 130, 80: 140, 85: 150, 90: 160, 95: 170, 100: 180, 105: 190, 110: 200,
-          120: 215, 130: 230, 140: 250, 150: 270, 160: 290, 170: 310, 180: 320, 190: 340, 200: 360},
-    "3": {10: 35, 12: 37, 15: 42, 17: 47, 20: 52, 25: 62, 30: 72, 35: 80, 40: 90, 45: 100, 50: 110, 55: 120, 60: 130,
-          65: 140, 70: 150, 75: 160, 80: 170, 85: 180, 90: 190, 95: 200, 100: 215, 105: 225, 110: 240, 120: 260,
-          130: 280, 140: 300, 150: 320, 160: 340, 170: 360, 180: 380, 190: 400, 200: 420},
-    "4": {17: 62, 20: 72, 25: 80, 30: 90, 35: 100, 40: 110, 45: 120, 50: 130, 55: 140, 60: 150, 65: 160, 70: 180,
-          75: 190, 80: 200, 85: 210, 90: 225},
+SAME = {
+    "70": "60", "72": "62", "73": "63", "QJ2": "62", "QJ3": "63", "NU10": "60", "NU2": "62", "NU3": "63", "NU4": "64",
+    "NU22": "22", "NU23": "23", "12": "62", "13": "63", "213": "63", "222": "22", "223": "23", "622": "22", "623": "23",
+    "42": "22", "43": "23",
 }  # fmt: skip
-"""Outside diameters of the diameter series 0, 2, 3 and 4."""
+"""Series with the boundary dimensions of another one, that stand in for a size they have no row of."""
 
-WIDTH: dict[str, dict[int, float]] = {
-    "10": {8: 7, 9: 7, 10: 8, 12: 8, 15: 9, 17: 10, 20: 12, 25: 12, 30: 13, 35: 14, 40: 15, 45: 16, 50: 16, 55: 18,
-           60: 18, 65: 18, 70: 20, 75: 20, 80: 22, 85: 22, 90: 24, 95: 24, 100: 24, 105: 26, 110: 28, 120: 28, 130: 33,
-           140: 33, 150: 35, 160: 38, 170: 42, 180: 46, 190: 46, 200: 51},
-    "02": {8: 8, 9: 8, 10: 9, 12: 10, 15: 11, 17: 12, 20: 14, 25: 15, 30: 16, 35: 17, 40: 18, 45: 19, 50: 20, 55: 21,
-           60: 22, 65: 23, 70: 24, 75: 25, 80: 26, 85: 28, 90: 30, 95: 32, 100: 34, 105: 36, 110: 38, 120: 40, 130: 40,
-           140: 42, 150: 45, 160: 48, 170: 52, 180: 52, 190: 55, 200: 58},
-    "03": {10: 11, 12: 12, 15: 13, 17: 14, 20: 15, 25: 17, 30: 19, 35: 21, 40: 23, 45: 25, 50: 27, 55: 29, 60: 31,
-           65: 33, 70: 35, 75: 37, 80: 39, 85: 41, 90: 43, 95: 45, 100: 47, 105: 49, 110: 50, 120: 55, 130: 58, 140: 62,
-           150: 65, 160: 68, 170: 72, 180: 75, 190: 78, 200: 80},
-    "04": {17: 17, 20: 19, 25: 21, 30: 23, 35: 25, 40: 27, 45: 29, 50: 31, 55: 33, 60: 35, 65: 37, 70: 42, 75: 45,
-           80: 48, 85: 52, 90: 54},
-    "22": {20: 18, 25: 18, 30: 20, 35: 23, 40: 23, 45: 23, 50: 23, 55: 25, 60: 28, 65: 31, 70: 31, 75: 31, 80: 33,
-           85: 36, 90: 40, 95: 43, 100: 46, 110: 53, 120: 58, 130: 64, 140: 68, 150: 73, 160: 80, 170: 86, 180: 86,
-           190: 92, 200: 98},
-    "23": {20: 21, 25: 24, 30: 27, 35: 31, 40: 33, 45: 36, 50: 40, 55: 43, 60: 46, 65: 48, 70: 51, 75: 55, 80: 58,
-           85: 60, 90: 64, 95: 67, 100: 73, 110: 80, 120: 86, 130: 93, 140: 102, 150: 108, 160: 114, 170: 120, 180: 126,
-           190: 132, 200: 138},
-}  # fmt: skip
-"""Widths of the dimension series: the series of the width, then that of the diameter."""
+LETTERS = {"72": "B", "73": "B"}
+"""Series whose rows have a letter for the contact angle; the boundary dimensions are those of all letters."""
 
-TAPERED: dict[str, dict[int, float]] = {
-    "320": {20: 15, 25: 15, 30: 17, 35: 18, 40: 19, 45: 20, 50: 20, 55: 23, 60: 23, 65: 23, 70: 25, 75: 25, 80: 29,
-            85: 29, 90: 32, 95: 32, 100: 32},
-    "302": {20: 15.25, 25: 16.25, 30: 17.25, 35: 18.25, 40: 19.75, 45: 20.75, 50: 21.75, 55: 22.75, 60: 23.75,
-            65: 24.75, 70: 26.25, 75: 27.25, 80: 28.25, 85: 30.5, 90: 32.5, 95: 34.5, 100: 37},
-    "303": {20: 16.25, 25: 18.25, 30: 20.75, 35: 22.75, 40: 25.25, 45: 27.25, 50: 29.25, 55: 31.5, 60: 33.5, 65: 36,
-            70: 38, 75: 40, 80: 42.5, 85: 44.5, 90: 46.5, 95: 49.5, 100: 51.5},
-    "322": {30: 21.25, 35: 24.25, 40: 24.75, 45: 24.75, 50: 24.75, 55: 26.75, 60: 29.75, 65: 32.75, 70: 33.25,
-            75: 33.25, 80: 35.25, 85: 38.5, 90: 42.5, 95: 45.5, 100: 49},
-    "323": {20: 22.25, 25: 25.25, 30: 28.75, 35: 32.75, 40: 35.25, 45: 38.25, 50: 42.25, 55: 45.5, 60: 48.5, 65: 51,
-            70: 54, 75: 58, 80: 61.5, 85: 63.5, 90: 67.5, 95: 71.5, 100: 77.5},
-}  # fmt: skip
-"""Widths T of tapered roller bearings by the beginning of their designations."""
-
-RATINGS: dict[str, dict[int, tuple[float, float]]] = {
-    "60": {12: (5.1, 2.4), 15: (5.6, 2.9), 17: (6, 3.3), 20: (9.4, 5.1), 35: (15.9, 10.3), 40: (16.8, 11.6),
-           45: (21, 15), 60: (29.4, 23.3), 70: (38.1, 30.9), 85: (49.5, 43.1), 95: (60.5, 53.6), 110: (82, 73),
-           130: (106, 101), 180: (186, 194)},
-    "62": {12: (6.9, 3.1), 15: (7.8, 3.8), 17: (9.6, 4.8), 20: (12.8, 6.7), 25: (14, 7.9), 30: (19.5, 11.3),
-           40: (32.6, 20), 45: (32.7, 20.6), 50: (35.1, 23.2), 55: (43.4, 29.4), 60: (52.4, 36.3), 65: (57.2, 40),
-           70: (62.2, 44.1), 75: (67.4, 49.3), 80: (72.7, 53), 85: (84, 61.9), 90: (96, 71.5), 100: (124, 93),
-           105: (133, 104), 110: (143, 118), 120: (155, 131), 130: (167, 146), 140: (176, 164), 180: (227, 242)},
-    "63": {10: (8.1, 3.45), 12: (9.8, 4.2), 15: (11.5, 5.5), 17: (13.7, 6.7), 20: (15.9, 7.9), 25: (20.6, 11.3),
-           30: (29.5, 15.8), 35: (33.5, 19.2), 40: (40.8, 24), 45: (52.8, 31.7), 50: (61.8, 37.9), 55: (71.7, 45),
-           60: (81.9, 52.2), 65: (92.7, 59.7), 70: (104, 68.1), 75: (113, 77), 85: (133, 96.9), 90: (143, 107),
-           95: (153, 118), 110: (203, 178)},
-    "64": {17: (22.7, 11), 20: (31, 15.2), 25: (37.6, 19), 30: (47.3, 24.5), 35: (55.5, 29.4), 40: (64, 35),
-           45: (76.8, 44.9), 50: (87.1, 52), 55: (100, 62), 60: (110, 70.8), 65: (118, 79), 70: (144, 104),
-           75: (154, 115), 80: (164, 125), 85: (173, 136), 90: (190, 160)},
-    "NU2": {20: (27.5, 24.5), 25: (29, 27.5), 30: (39.7, 37.9), 35: (50, 50), 40: (53.9, 53), 45: (61, 63),
-            50: (64.4, 68), 55: (83, 95), 60: (95, 104), 65: (108, 120), 70: (120, 137), 75: (132, 156),
-            80: (140, 170), 85: (165, 194), 90: (183, 216), 95: (210, 249), 100: (251, 305), 105: (260, 320),
-            110: (292, 365), 120: (335, 415), 130: (360, 450), 140: (390, 510), 150: (440, 585), 160: (500, 670),
-            180: (610, 830), 190: (680, 930), 200: (750, 1040)},
-    "NU3": {20: (31.5, 27), 25: (41.5, 37.5), 30: (51.2, 48), 35: (66.7, 65.4), 40: (81.5, 78), 45: (98, 100),
-            50: (110, 114), 55: (134, 140), 60: (150, 156), 65: (180, 190), 70: (205, 222), 75: (240, 265),
-            80: (255, 275), 85: (288, 325), 90: (315, 345), 95: (311, 351), 100: (380, 425), 105: (335, 380),
-            110: (443, 513), 120: (520, 600), 130: (570, 670), 140: (670, 800), 150: (800, 1000), 160: (865, 1060),
-            170: (928, 1150), 190: (1236, 1635), 200: (1300, 1695)},
-    "NU22": {20: (32.5, 31), 25: (34.5, 35), 30: (49, 50), 40: (71, 75), 45: (76, 81.6), 50: (78, 88), 55: (98, 118),
-             60: (129, 153), 65: (147, 178), 70: (156, 196), 75: (151, 190), 80: (186, 245), 85: (216, 275),
-             90: (240, 315), 95: (273, 349), 100: (335, 440), 110: (380, 520), 120: (450, 610), 130: (530, 735),
-             140: (570, 830), 150: (655, 980), 160: (800, 1180), 170: (950, 1400), 180: (1000, 1500),
-             190: (854, 1338), 200: (1220, 1860)},
-    "NU23": {20: (41.5, 39), 25: (57, 56), 35: (91.5, 98), 40: (112, 120), 45: (137, 153), 50: (163, 186),
-             55: (187.3, 212), 60: (224, 260), 65: (245, 285), 70: (275, 325), 75: (329, 395), 80: (352, 424),
-             85: (367, 444), 90: (430, 530), 100: (570, 720), 110: (630, 800), 120: (780, 1020), 130: (915, 1220),
-             140: (1130, 1589), 150: (1160, 1600), 160: (1320, 1830)},
-}  # fmt: skip
-"""Basic load ratings C and C_0, kN, of deep groove and of cylindrical roller bearings (reinforced design, E)."""
+CAGE = re.compile(r"(\d+)X(\d+)X(\d+)$")
+"""Code of a needle roller and cage assembly K: the raceways F and E and the width, mm."""
 
 
-def bore_of(code: int) -> int:
-    """Return the bore that a code of two digits stands for, mm."""
-    return SMALL_BORES.get(code, 5 * code)
+@dataclass(frozen=True)
+class Size:
+    """A size of a series, m and N; None where no maker prints it.
+
+    Attributes
+    ----------
+    bore, outside_diameter, width : float
+    dynamic_rating, static_rating : float or None
+    limit : float or None
+        e.
+    raceway : float or None
+        F.
+    maker : str
+        Whose the ratings are.
+    """
+
+    bore: float
+    outside_diameter: float
+    width: float
+    dynamic_rating: float | None = None
+    static_rating: float | None = None
+    limit: float | None = None
+    raceway: float | None = None
+    maker: str = ""
+
+    @property
+    def boundary(self) -> dict[str, float]:
+        """Bore, outside diameter and width."""
+        return {"bore": self.bore, "outside_diameter": self.outside_diameter, "width": self.width}
+
+    @property
+    def ratings(self) -> dict[str, float | str]:
+        """C and C_0 as fields of a bearing, and whose they are; empty if they are not tabulated."""
+        if self.dynamic_rating is None or self.static_rating is None:
+            return {}
+        return {
+            "dynamic_rating": self.dynamic_rating, "static_rating": self.static_rating, "rating_source": self.maker,
+        }  # fmt: skip
 
 
-def boundary(dimension_series: str, code: int) -> dict[str, float]:
-    """Return bore, outside diameter and width of a dimension series and a code of the bore, m; empty if not tabulated.
+@cache
+def sizes() -> dict[tuple[str, str], Size]:
+    """Return all sizes by series and code of the bore."""
+
+    def number(text: str, power: int) -> float | None:
+        return float(f"{text}e{power}") if text else None
+
+    found = {}
+    text = files("gearmbs.bearings").joinpath("designations.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        found[row["series"], row["code"]] = Size(
+            float(f"{row['d']}e-3"), float(f"{row['D']}e-3"), float(f"{row['B']}e-3"), number(row["C"], 3),
+            number(row["C0"], 3), number(row["e"], 0), number(row["F"], -3), row["maker"],
+        )  # fmt: skip
+    return found
+
+
+def size_of(series: str, code: str) -> Size | None:
+    """Return a size of a series, of its own row or only with the dimensions of another series that has them.
 
     Parameters
     ----------
-    dimension_series : str
-        One of `WIDTH`, or of `TAPERED`.
-    code : int
-        Two digits.
+    series : str
+        One of the table, such as "62", "NU2", "303"; RNA for NA without its inner ring, K for cages by their code.
+    code : str
+        Of the bore, as it stands in a designation: "05" for 25 mm, "/22" for 22 mm, "8" below 10 mm.
     """
-    bore = bore_of(code)
-    widths: Mapping[int, float] = WIDTH.get(dimension_series) or TAPERED.get(dimension_series, {})
-    outside = OUTSIDE[dimension_series[-1]]
-    if bore not in widths or bore not in outside:
-        return {}
-    return {"bore": 1e-3 * bore, "outside_diameter": 1e-3 * outside[bore], "width": 1e-3 * widths[bore]}
+    if series == "K":
+        cage = CAGE.match(code)
+        inner, outer, width = (0.0, 0.0, 0.0) if cage is None else (1e-3 * float(part) for part in cage.groups())
+        return Size(inner, outer, width, raceway=inner) if inner < outer else None
+    table = sizes()
+    if series.startswith("RNA"):
+        whole = table.get((series[1:], code))
+        if whole is None or whole.raceway is None:
+            return None
+        return Size(
+            whole.raceway, whole.outside_diameter, whole.width, whole.dynamic_rating, whole.static_rating, None,
+            whole.raceway, whole.maker,
+        )  # fmt: skip
+    own = table.get((series, code)) or table.get((series + LETTERS.get(series, ""), code))
+    if own is not None and (series, code) in table:
+        return own
+    other = own or table.get((SAME.get(series, ""), code))
+    return None if other is None else Size(other.bore, other.outside_diameter, other.width)
+
+
+def boundary(series: str, code: str) -> dict[str, float]:
+    """Return bore, outside diameter and width of a size of a series, m; empty if it is not tabulated."""
+    size = size_of(series, code)
+    return {} if size is None else size.boundary

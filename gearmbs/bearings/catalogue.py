@@ -11,14 +11,15 @@ import math
 import re
 from typing import Any
 
-from gearmbs.bearings.boundary import RATINGS, boundary
-from gearmbs.bearings.estimate import TAPERED_ANGLES, Rating, estimated
+from gearmbs.bearings.boundary import Size, size_of
+from gearmbs.bearings.classes import CLASSES, HYBRID, mean_clearance, named_class
+from gearmbs.bearings.estimate import Rating, estimated, usual_angle
 from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of
 from gearmbs.wording import warn
 
 
-def dimension_series(designation: str) -> tuple[str, str, str] | None:
-    """Return dimension series, bore code and suffixes of a designation; None if it has no series of a kind."""
+def series_of(designation: str) -> tuple[str, str, str] | None:
+    """Return series, bore code and suffixes of a designation; None if it has no series of a kind."""
     for kind in KINDS.values():
         if kind.designation is not None and (found := kind.designation.match(designation)):
             return kind.series[found[1]], found[2], designation[found.end() :]
@@ -28,8 +29,8 @@ def dimension_series(designation: str) -> tuple[str, str, str] | None:
 INCH = 25.4e-3
 """Metres."""
 
-DEEP_GROOVE = {"60": "10", "62": "02", "63": "03", "64": "04"}
-"""Dimension series of deep groove bearings by the first two digits of their designations."""
+DEEP_GROOVE = re.compile(r"^(618|619|160|161|622|623|60|62|63|64)(\d\d(?!\d)|/\d\d)|^(6[0-3])(\d)(?!\d)")
+"""Designations of deep groove bearings: series, and code of the bore; below 10 mm the bore itself."""
 
 ELEMENTS = {
     "6203": (8, 6.746, 28.5),
@@ -66,36 +67,6 @@ ALIASES = {
     "LDKUER204": "XJTU", "CWRUDRIVEEND": "CWRU drive end", "CWRUFANEND": "CWRU fan end", "MFPT": "MFPT",
     "PHM09": "PHM09", "IMS": "IMS", "XJTU": "XJTU", "SPECTRAQUEST": "SpectraQuest", "REXNORDZA2115": "IMS",
 }  # fmt: skip
-CLASSES = re.compile(r"C(?P<name>N|M|\d+)(?:(?P<half>[HL])(?![A-Z0-9]))?|P[456](?P<short>[0-9])(?![0-9])")
-"""Class of radial clearance among the suffixes: written apart or onto others, "/C3", "ZZC3", with its upper or lower
-half, "C3H", or in short with the class of precision, "P63" for P6 and C3."""
-TABULATED = ("C2", "CN", "C3", "C4", "C5")
-CLEARANCES = (
-    (10, (0, 7), (2, 13), (8, 23), (14, 29), (20, 37)), (18, (0, 9), (3, 18), (11, 25), (18, 33), (25, 45)),
-    (24, (0, 10), (5, 20), (13, 28), (20, 36), (28, 48)), (30, (1, 11), (5, 20), (13, 28), (23, 41), (30, 53)),
-    (40, (1, 11), (6, 20), (15, 33), (28, 46), (40, 64)), (50, (1, 11), (6, 23), (18, 36), (30, 51), (45, 73)),
-    (65, (1, 15), (8, 28), (23, 43), (38, 61), (55, 90)), (80, (1, 15), (10, 30), (25, 51), (46, 71), (65, 105)),
-    (100, (1, 18), (12, 36), (30, 58), (53, 84), (75, 120)), (120, (2, 20), (15, 41), (36, 66), (61, 97), (90, 140)),
-    (140, (2, 23), (18, 48), (41, 81), (71, 114), (105, 160)),
-    (160, (2, 23), (18, 53), (46, 91), (81, 130), (120, 180)),
-    (180, (2, 25), (20, 61), (53, 102), (91, 147), (135, 200)),
-    (200, (2, 30), (25, 71), (63, 117), (107, 163), (150, 230)),
-)  # fmt: skip
-"""Clearances of deep groove bearings up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3,
-C4, C5 by ISO 5753-1, um."""
-ROLLER_CLEARANCES = (
-    (24, (0, 25), (20, 45), (35, 60), (50, 75), (65, 90)), (30, (0, 25), (20, 45), (35, 60), (50, 75), (70, 95)),
-    (40, (5, 30), (25, 50), (45, 70), (60, 85), (80, 105)), (50, (5, 35), (30, 60), (50, 80), (70, 100), (95, 125)),
-    (65, (10, 40), (40, 70), (60, 90), (80, 110), (110, 140)),
-    (80, (10, 45), (40, 75), (65, 100), (90, 125), (130, 165)),
-    (100, (15, 50), (50, 85), (75, 110), (105, 140), (155, 190)),
-    (120, (15, 55), (50, 90), (85, 125), (125, 165), (180, 220)),
-    (140, (15, 60), (60, 105), (100, 145), (145, 190), (200, 245)),
-    (160, (20, 70), (70, 120), (115, 165), (165, 215), (225, 275)),
-    (180, (25, 75), (75, 125), (120, 170), (170, 220), (250, 300)),
-    (200, (35, 90), (90, 145), (140, 195), (195, 250), (275, 330)),
-)  # fmt: skip
-"""The same of cylindrical roller bearings with a cylindrical bore."""
 SUFFIX = re.compile(
     r"(?:N|E|ET|A|B|K|M|MA|J|T|TN9|ETN9|TVH|TVP2?|2?Z|ZZ|2?RS[1HLR]?|2?RSR|2?RZ|LL[BUH]|L[BUH]|DDU?|DU|VV|EE|NR|ZNR|2?ZNR"
     r"|P[456])+"
@@ -104,9 +75,7 @@ SUFFIX = re.compile(
 precision."""
 APART = re.compile(r"[CE]|2?HRS|MT\d+|GJN|WT|LHT\d+|V[LAT]\d+|TN|S[0-4]|X?\dK|[25]K|2AS|NS7S?|Q\d+|L\d+|P[456]|")
 """The same of those written apart only: design, grease, heat treatment, quality."""
-HYBRID = re.compile(r"(?<![A-Z0-9])HC(?=\d|P|[^A-Z0-9]|$)\d?")
-"""Elements of ceramics, with a number for which, that is no class of clearance: "/HC5", "/HC5C3"."""
-MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO)\s*")
+MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO|TIMKEN|NACHI|NKE|ZVL|ZKL|KINEX|SNR|URB|RHP)\s*")
 
 
 def known() -> list[str]:
@@ -135,32 +104,38 @@ def look_up(
     if bare in ALIASES:
         return {**RECORDINGS[ALIASES[bare]], **changes}
     bare = MAKERS.sub("", designation.upper().strip())
-    group = dimension_series(bare)
+    bare = re.sub(r"^([A-Z]+(?:18(?=\s+\d))?)\s+(?=\d)", r"\1", re.sub(r"^SL\s+18", "SL18", bare))
+    group = series_of(bare)
     if group is not None:
-        fixed = known_of(bare, boundary(group[0], int(group[1])))
+        size = size_of(*group[:2])
+        fixed = known_of(bare, {} if size is None else size.boundary)
         if fixed is not None:
-            return _asked(designation, fixed, changes, _named_class(designation, group[2], changes), rating)
-    digits = re.match(r"^(\d{4,5})", bare)
-    series = digits[1] if digits else ""
+            rated = size_of(fixed.rated, group[1]) if fixed.rated else size
+            named = named_class(designation, group[2], changes)
+            return _asked(designation, fixed, changes, named, rating, rated)
+    digits = DEEP_GROOVE.match(bare) or re.match(r"^(\d{4,5})", bare)
+    series = digits[0] if digits else ""
+    size = size_of(*(part for part in digits.groups() if part)) if digits and digits.re is DEEP_GROOVE else None
     named = None
     if digits:
         suffixes = bare[digits.end() :]
-        named = _named_class(designation, suffixes, changes)
+        named = named_class(designation, suffixes, changes)
         _check_suffix(designation, suffixes, changes)
     if series in ELEMENTS:
         z, d, pitch = ELEMENTS[series]
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
-        found |= _clearance(named, _boundary(series))
-        return {**found, **_boundary(series), "designation": designation.strip(), **changes}
-    sizes_of = _boundary(series)
-    if sizes_of:
-        own = {**sizes_of, "designation": designation.strip(), **_clearance(named, sizes_of), **changes}
+        known_size = size if size is not None else size_of(series[:2], series[2:])
+        assert known_size is not None
+        own = {**known_size.boundary, **_clearance(named, known_size), "designation": designation.strip()}
+        return {**found, **own, **(known_size.ratings if rating is not None else {}), **changes}
+    if size is not None:
+        sizes_of = size.boundary
+        own = {**sizes_of, "designation": designation.strip(), **_clearance(named, size), **changes}
         open_ones = [name for name in ("elements", "element_diameter") if own.get(name) is None]
         if not open_ones:
             return {"pitch_diameter": 0.5 * (sizes_of["bore"] + sizes_of["outside_diameter"]), **own}
         if rating is not None:
-            own = {**_ratings(series[:2], sizes_of["bore"]), **own}
-            return _estimated(designation, series, own, open_ones, rating)
+            return _estimated(designation, {**_ratings(size, own), **own}, open_ones, rating)
         sizes = ", ".join(f"{key.replace('_', ' ')} {1e3 * value:g} mm" for key, value in sizes_of.items())
         raise BearingError(
             f"designation {designation!r}: {sizes}, but how many balls it has, and of which diameter, differs between "
@@ -200,40 +175,6 @@ def _with_fields(text: str, names: list[str]) -> tuple[str, dict[str, Any]]:
     return head, found
 
 
-def _named_class(designation: str, suffixes: str, changes: dict[str, Any]) -> str | None:
-    """Return the class of clearance among the suffixes, "C3" or its half "C3H", None without one.
-
-    Raises
-    ------
-    BearingError
-        For a class that is not tabulated, and for two, unless the clearance is given.
-    """
-    if HYBRID.search(suffixes) and not {"youngs_modulus", "density"} <= changes.keys():
-        warn(
-            f"designation {designation!r}: its elements are ceramic by HC, and are taken as steel; give density= (3200 "
-            "kg/m^3) and a youngs_modulus= for elements and rings (of silicon nitride on steel 2.46e11 Pa)",
-        )
-    bare = HYBRID.sub("", suffixes)
-    found = {f"C{one['name'] or one['short']}{one['half'] or ''}" for one in CLASSES.finditer(bare)}
-    if "clearance" in changes or not found:
-        return None
-    if len(found) > 1:
-        raise BearingError(f"designation {designation!r} names {' and '.join(sorted(found))}; give one class")
-    (named,) = found
-    if named == "CM":
-        warn(
-            f"designation {designation!r}: CM is a maker's own class for electric motors, which is not "
-            "tabulated here; give clearance= (diametral), it is taken as not given",
-        )
-        return None
-    if named.rstrip("HL") not in TABULATED:
-        raise BearingError(
-            f"designation {designation!r}: {named} is no class of clearance of the standard; choose "
-            f"{', '.join(TABULATED)}, or give clearance= (diametral)"
-        )
-    return named
-
-
 def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> None:
     """Refuse letters written onto the digits that no maker uses: they are a slip, or mean another bearing.
 
@@ -259,7 +200,12 @@ def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> N
 
 
 def _asked(
-    designation: str, fixed: Known, changes: dict[str, Any], named: str | None, rating: Rating | None
+    designation: str,
+    fixed: Known,
+    changes: dict[str, Any],
+    named: str | None,
+    rating: Rating | None,
+    size: Size | None,
 ) -> dict[str, Any]:
     """Return the fields of a bearing whose designation fixes some; rollers may be without a length if rated."""
     own = {**fixed.fields, **_class_of(designation, fixed, named), "designation": designation.strip(), **changes}
@@ -267,8 +213,7 @@ def _asked(
     if not missing or (missing == ["roller_length"] and own.get("dynamic_rating") is not None):
         return own
     if rating is not None:
-        own = {**_ratings(fixed.rated, own["bore"]), **own}
-        return _estimated(designation, fixed.rated, own, missing, rating)
+        return _estimated(designation, {**_ratings(size, own), **own}, missing, rating, fixed, size)
     sizes = ", ".join(
         f"{key.replace('_', ' ')} {1e3 * value:.4g} mm"
         if key != "contact_angle"
@@ -289,7 +234,7 @@ def _class_of(designation: str, fixed: Known, named: str | None) -> dict[str, fl
     """Return the mean clearance of a class that is named; refuse it of bearings that have no radial classes."""
     kind = fixed.fields["kind"]
     if not KINDS[kind].unclassed:
-        return _clearance(named, fixed.fields, ROLLER_CLEARANCES if KINDS[kind].rollers else CLEARANCES)
+        return mean_clearance(named, fixed.fields.get("bore"), KINDS[kind].classes)
     if named is not None:
         raise BearingError(
             f"designation {designation!r}: {named} says nothing of the radial clearance of {kind} bearings, "
@@ -299,34 +244,23 @@ def _class_of(designation: str, fixed: Known, named: str | None) -> dict[str, fl
     return {}
 
 
-def _clearance(named: str | None, boundary: dict[str, Any], classes: tuple = CLEARANCES) -> dict[str, float]:
-    """Return the mean clearance of a class, or of its upper or lower half; empty without one."""
-    if named is None or not boundary:
-        return {}
-    bore = 1e3 * boundary["bore"]
-    share = {"H": 0.75, "L": 0.25}.get(named[-1], 0.5)
-    for top, *limits in classes:
-        if bore <= top + 1e-6:
-            low, high = limits[TABULATED.index(named.rstrip("HL"))]
-            return {"clearance": 1e-6 * (low + share * (high - low))}
-    return {}
+def _clearance(named: str | None, size: Size) -> dict[str, float]:
+    """Return the mean clearance of a class of a deep groove bearing; empty without one."""
+    return mean_clearance(named, size.bore, "balls")
 
 
-def _boundary(series: str) -> dict[str, float]:
-    """Return bore, outside diameter and width of a deep groove bearing by its digits, empty if unknown."""
-    if len(series) != 4 or series[:2] not in DEEP_GROOVE:
-        return {}
-    return boundary(DEEP_GROOVE[series[:2]], int(series[2:]))
-
-
-def _ratings(series: str, bore: float) -> dict[str, float]:
-    """Return C and C_0 of a series of `RATINGS` and a bore, N; empty if they are not tabulated."""
-    found = RATINGS.get(series, {}).get(round(1e3 * bore))
-    return {} if found is None else {"dynamic_rating": 1e3 * found[0], "static_rating": 1e3 * found[1]}
+def _ratings(size: Size | None, own: dict[str, Any]) -> dict[str, float | str]:
+    """Return C and C_0 of a size, unless one of them is given; empty if they are not tabulated."""
+    return {} if size is None or "dynamic_rating" in own or "static_rating" in own else size.ratings
 
 
 def _estimated(
-    designation: str, series: str, own: dict[str, Any], missing: list[str], rating: Rating
+    designation: str,
+    own: dict[str, Any],
+    missing: list[str],
+    rating: Rating,
+    fixed: Known | None = None,
+    size: Size | None = None,
 ) -> dict[str, Any]:
     """Return the fields of a bearing with those that its designation leaves open as they usually are.
 
@@ -336,14 +270,18 @@ def _estimated(
         With what was taken, and how far it may be from the bearing at hand.
     """
     kind = own.get("kind", next(iter(KINDS)))
-    found = estimated(kind, own, [name for name in missing if name != "contact_angle"], rating)
     if "contact_angle" in missing:
-        found["contact_angle"] = TAPERED_ANGLES[series[-1]]
+        own = {**own, "contact_angle": usual_angle(kind, size)}
+    asked = [name for name in missing if name != "contact_angle"]
+    found = estimated(kind, own, asked, rating, fixed.usual if fixed else None, fixed.raceway if fixed else None)
     count = int(found.get("elements") or own["elements"])
     told = f"{count} elements"
     if "element_diameter" in found:
         told += f" of {1e3 * found['element_diameter']:.4g} mm"
-    rated = "its C is that of a maker's catalogue" if "dynamic_rating" in own else "its C is estimated from them, too"
+    rated = "its C is estimated from them, too"
+    if "dynamic_rating" in own:
+        maker = own.get("rating_source")
+        rated = f"its C is that of a maker's catalogue ({maker})" if maker else "its C is the one given"
     warn(
         f"designation {designation!r}: {told} are estimated, for makers do not publish them: one element more or less "
         f"moves the lines of its races by {100.0 / count:.2g} %, and its radial "

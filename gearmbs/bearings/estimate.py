@@ -16,22 +16,44 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from gearmbs.bearings.kinds import KINDS
+from gearmbs.bearings.boundary import Size
+from gearmbs.bearings.kinds import KINDS, Usual
+from gearmbs.units import to_si
 
 Rating = Callable[[dict[str, Any]], float]
 """From fields of a bearing to its rating C by ISO 281, N."""
 
-TAPERED_ANGLES = {"0": math.radians(15.5), "2": math.radians(15.5), "3": math.radians(12.95)}
-"""Contact angle that ISO 355 gives most sizes of tapered roller bearings, by their diameter series."""
+LIMIT_BY_TANGENT = 1.5
+"""e by tan(a) in ISO 281 of bearings with a contact angle of rollers, and of self-aligning ball bearings."""
 
 ROOM = 0.12
 """Share by which a diameter may be moved from the usual one for the sake of a rating: known bearings differ by 7 %."""
+
+MEASURED = {
+    "bore": "length", "outside_diameter": "length", "width": "length", "pitch_diameter": "length",
+    "element_diameter": "length", "roller_length": "length", "dynamic_rating": "force",
+}  # fmt: skip
+"""Fields that elements follow from, and their dimensions: they may be given as texts."""
 
 FEWEST = 7
 """Least number of elements: with fewer the rings would be carried by two of them."""
 
 
-def estimated(kind: str, found: dict[str, Any], missing: list[str], rating: Rating) -> dict[str, Any]:
+def usual_angle(kind: str, size: Size | None) -> float:
+    """Return the contact angle by the limit e = 1.5 tan(a) that a maker prints for a size, or that of the kind, rad."""
+    if size is None or size.limit is None:
+        return KINDS[kind].usual.angle
+    return math.atan(size.limit / LIMIT_BY_TANGENT)
+
+
+def estimated(
+    kind: str,
+    found: dict[str, Any],
+    missing: list[str],
+    rating: Rating,
+    usual: Usual | None = None,
+    raceway: float | None = None,
+) -> dict[str, Any]:
     """Return what is missing of the elements of a bearing.
 
     Parameters
@@ -42,12 +64,20 @@ def estimated(kind: str, found: dict[str, Any], missing: list[str], rating: Rati
     missing : list of str
         Among ``elements``, ``element_diameter`` and ``roller_length``.
     rating : callable
+    usual : Usual, optional
+        What is usual of the series, if not what is of the kind.
+    raceway : float, optional
+        Diameter of the inner raceway, m: elements roll on it, and their size is a share of what is outside of it.
     """
-    usual = KINDS[kind].usual
-    bore, outside = found["bore"], found["outside_diameter"]
-    pitch = found.get("pitch_diameter") or 0.5 * (bore + outside)
-    out = {"pitch_diameter": pitch}
+    found = {
+        name: to_si(value, MEASURED[name], name) if isinstance(value, str) and name in MEASURED else value
+        for name, value in found.items()
+    }
+    usual = KINDS[kind].usual if usual is None else usual
+    bore, outside = found["bore"] if raceway is None else raceway, found["outside_diameter"]
     size = found.get("element_diameter") or usual.size * (outside - bore)
+    pitch = found.get("pitch_diameter") or (0.5 * (bore + outside) if raceway is None else raceway + size)
+    out = {"pitch_diameter": pitch}
     out["element_diameter"] = size
     # the number that fits beside each other is never exceeded
     most = math.floor(math.pi / math.asin(size / pitch))

@@ -13,6 +13,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gearmbs.bearings.boundary import size_of
+
 
 class BearingError(ValueError):
     """A bearing cannot be what is meant: a field, a name or a value is wrong; the message says what would do."""
@@ -32,15 +34,6 @@ Bearing = Any
 
 
 @dataclass(frozen=True)
-class Known:
-    """Fields that a designation fixes, the names of those to be counted or measured, and the series of the ratings."""
-
-    fields: dict[str, Any]
-    asked: tuple[str, ...]
-    rated: str = ""
-
-
-@dataclass(frozen=True)
 class Usual:
     """What elements usually are in bearings of a kind; see `gearmbs.bearings.estimate`.
 
@@ -52,11 +45,39 @@ class Usual:
         Share of the circle of the centres that the elements take.
     length : float
         Effective length of rollers over the width; zero of balls.
+    angle : float
+        Contact angle where the designation tells none and no maker prints its e, rad.
     """
 
     size: float
     fill: float
     length: float = 0.0
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class Known:
+    """What a designation fixes.
+
+    Attributes
+    ----------
+    fields : dict
+        Fields of the bearing.
+    asked : tuple of str
+        Those to be counted or measured.
+    rated : str
+        Series of the ratings in `gearmbs.bearings.boundary`, if it is another one than that of the dimensions.
+    usual : Usual, optional
+        Elements as they usually are, if others than those of the kind.
+    raceway : float, optional
+        Diameter of the inner raceway, m, from which size and place of the elements then follow.
+    """
+
+    fields: dict[str, Any]
+    asked: tuple[str, ...]
+    rated: str = ""
+    usual: Usual | None = None
+    raceway: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,12 +98,14 @@ class Kind:
         Whether a preload is set by moving a ring along the axis; else by a negative clearance.
     reduction : float
         Factor of the dynamic rating by ISO 281.
+    rated_rows : int
+        Rows i that ratings count: makers count the two paths of a four-point bearing so.
     load_factors : callable
         ``load_factors(bearing, radial, axial)`` returns e, X and Y of ISO 281.
     designation : re.Pattern, optional
-        Beginning of designations: its digits of the series, code of the bore.
+        Beginning of designations: its letters and digits of the series, code of the bore.
     series : dict
-        Dimension series by these digits, as of `gearmbs.bearings.boundary`.
+        Series by these, as of `gearmbs.bearings.boundary`.
     known : callable, optional
         ``known(found, boundary)`` returns what such a designation fixes.
     usual : Usual
@@ -90,6 +113,8 @@ class Kind:
         standardised raceways; cages of the other kinds leave as much room as these shares say.
     unclassed : str
         Why a class of radial clearance says nothing of such bearings; empty if it does.
+    classes : str
+        Table of the classes of radial clearance, see `gearmbs.bearings.classes`.
     """
 
     rollers: bool = False
@@ -98,11 +123,13 @@ class Kind:
     one_shoulder: bool = False
     preloaded: bool = False
     reduction: float
+    rated_rows: int = 1
     load_factors: Callable[[Bearing, float, float], tuple[float, float, float]]
     designation: re.Pattern[str] | None = None
     series: dict[str, str] = field(default_factory=dict)
     known: Callable[[re.Match[str], dict[str, Any]], Known] | None = None
     unclassed: str = ""
+    classes: str = "balls"
     usual: Usual
 
 
@@ -187,13 +214,26 @@ def _middle(boundary: dict[str, Any]) -> float:
 def _cylindrical(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     # the wider series have the rings of the narrower ones
     raceways = RACEWAYS.get(found[1][-1], {}).get(round(1e3 * boundary["bore"]))
-    rated = f"NU{found[1]}"
-    if raceways is None:
+    full = None if found[1].startswith("N") and not found[1].startswith("NCF") else FULL
+    if raceways is None or full:
         fields = {**boundary, "pitch_diameter": _middle(boundary)}
-        return Known(fields, ("elements", "element_diameter", "roller_length"), rated)
+        return Known(fields, ("elements", "element_diameter", "roller_length"), usual=full)
     inner, outer = (1e-3 * value for value in raceways)
     own = {"element_diameter": 0.5 * (outer - inner), "pitch_diameter": 0.5 * (outer + inner)}
-    return Known({**boundary, **own}, ("elements", "roller_length"), rated)
+    return Known({**boundary, **own}, ("elements", "roller_length"))
+
+
+def _needle(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    letters = found[1].rstrip("0123456789")
+    asked = ("elements", "element_diameter", "roller_length")
+    if letters == "K":
+        # cages are named by both raceways
+        inner, outer = boundary["bore"], boundary["outside_diameter"]
+        own = {"element_diameter": 0.5 * (outer - inner), "pitch_diameter": 0.5 * (outer + inner)}
+        return Known({**boundary, **own}, ("elements", "roller_length"))
+    size = size_of(found[1], found[2])
+    raceway = boundary["bore"] if size is None else size.raceway
+    return Known(dict(boundary), (*asked, "pitch_diameter"), usual=DRAWN if letters == "HK" else None, raceway=raceway)
 
 
 def _tapered(found: re.Match[str], boundary: dict[str, Any]) -> Known:
@@ -202,20 +242,26 @@ def _tapered(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     narrow = found[1][0] == "0"
     taper = TAPERS.get(found[1][1], {}).get(round(1e3 * boundary["bore"])) if narrow else None
     if taper is None:
-        return Known(fields, (*asked, "contact_angle"), found[1])
+        return Known(fields, (*asked, "contact_angle"))
     width, degrees, minutes, seconds = taper
     angle = math.radians(degrees + minutes / 60.0 + seconds / 3600.0)
-    return Known({**fields, "width": 1e-3 * width, "contact_angle": angle}, asked, found[1])
+    return Known({**fields, "width": 1e-3 * width, "contact_angle": angle}, asked)
 
 
 def _angular(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     fields = {**boundary, "pitch_diameter": _middle(boundary), "contact_angle": math.radians(ANGLES[found[3]])}
-    return Known(fields, ("elements", "element_diameter"))
+    return Known(fields, ("elements", "element_diameter"), f"7{found[1]}{found[3]}")
 
 
 def _four_point(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     fields = {**boundary, "pitch_diameter": _middle(boundary), "contact_angle": math.radians(FOUR_POINTS)}
     return Known(fields, ("elements", "element_diameter"))
+
+
+FULL = Usual(size=0.270, fill=0.97, length=0.60)
+"""Cylindrical rollers without a cage, NCF and SL18."""
+DRAWN = Usual(size=0.355, fill=0.75, length=0.75)
+"""Needle rollers in a drawn cup, HK: its wall is some 1 mm, and the rest of (D - F)/2 the roller's."""
 
 
 SET_WHEN_MOUNTED = "their clearance is set when they are mounted"
@@ -232,7 +278,7 @@ KINDS: dict[str, Kind] = {
         load_factors=_angular_factors,
         usual=Usual(size=0.300, fill=0.82),
         designation=re.compile(r"^7([023])(\d\d)\s*-?\s*(AC|[ABC])(?:EC?[ABC]?)?(?:G[ABC]?)?(?:JP|[DFJMPY])?(?![A-Z])"),
-        series={"0": "10", "2": "02", "3": "03"},
+        series={"0": "70", "2": "72", "3": "73"},
         known=_angular,
         unclassed=SET_WHEN_MOUNTED,
     ),
@@ -240,10 +286,11 @@ KINDS: dict[str, Kind] = {
         angle="needed",
         both_ways=True,
         reduction=0.95,
+        rated_rows=2,
         load_factors=_angular_factors,
         usual=Usual(size=0.300, fill=0.80),
         designation=re.compile(r"^QJ\s*([23])(\d\d)(?!\d)"),
-        series={"2": "02", "3": "03"},
+        series={"2": "QJ2", "3": "QJ3"},
         known=_four_point,
         unclassed="it is one of axial clearance",
     ),
@@ -253,9 +300,32 @@ KINDS: dict[str, Kind] = {
         reduction=0.83,
         load_factors=_cylindrical_factors,
         usual=Usual(size=0.270, fill=0.80, length=0.60),
-        designation=re.compile(r"^(?:NU|NJ|NUP|N)\s*(10|22|23|[234])(\d\d)(?!\d)"),
-        series={"10": "10", "2": "02", "3": "03", "4": "04", "22": "22", "23": "23"},
+        designation=re.compile(r"^((?:NU|NJ|NUP|N)(?:10|22|23|[234])|(?:NCF|SL18)(?:22|29|30))(\d\d)(?!\d)"),
+        series={
+            f"{letters}{digits}": f"{table}{digits}"
+            for letters, table in (
+                ("NU", "NU"),
+                ("NJ", "NU"),
+                ("NUP", "NU"),
+                ("N", "NU"),
+                ("NCF", "NCF"),
+                ("SL18", "NCF"),
+            )
+            for digits in ("10", "2", "3", "4", "22", "23", "29", "30")
+        },
         known=_cylindrical,
+        classes="rollers",
+    ),
+    "needle roller": Kind(
+        rollers=True,
+        angle="none",
+        reduction=0.83,
+        load_factors=_cylindrical_factors,
+        usual=Usual(size=0.220, fill=0.75, length=0.70),
+        designation=re.compile(r"^(R?NA(?:49|69)|NKI|HK|K)(\d+(?:/\d+|X\d+X\d+)?)"),
+        series={letters: letters for letters in ("NA49", "NA69", "RNA49", "RNA69", "NKI", "HK", "K")},
+        known=_needle,
+        classes="rollers",
     ),
     "tapered roller": Kind(
         rollers=True,
@@ -263,9 +333,9 @@ KINDS: dict[str, Kind] = {
         preloaded=True,
         reduction=0.83,
         load_factors=_tapered_factors,
-        usual=Usual(size=0.235, fill=0.90, length=0.62),
-        designation=re.compile(r"^3(20|02|03|22|23)(\d\d)(?!\d)"),
-        series={digits: f"3{digits}" for digits in ("20", "02", "03", "22", "23")},
+        usual=Usual(size=0.235, fill=0.90, length=0.62, angle=math.radians(15.5)),
+        designation=re.compile(r"^3(20|02|03|13|22|23|29|30|31|32)(\d\d)(?!\d)"),
+        series={digits: f"3{digits}" for digits in ("20", "02", "03", "13", "22", "23", "29", "30", "31", "32")},
         known=_tapered,
         unclassed=SET_WHEN_MOUNTED,
     ),
