@@ -17,8 +17,8 @@ PLATFORMS = {"2.0": "linux64", "3.0": "x86_64-linux"}
 BASE = ("m", "kg", "s", "rad")
 """Base units as FMI names them, in the order of `gearmbs.units.powers_of`."""
 ABILITIES = {
-    "2.0": {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"},
-    "3.0": {"canGetAndSetFMUState": "true", "canSerializeFMUState": "true"},
+    "2.0": dict.fromkeys(("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"), "true"),
+    "3.0": dict.fromkeys(("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"), "true"),
 }
 STEPS = 500
 """Communication points of the default experiment."""

@@ -77,6 +77,21 @@ class Driven:
         self.fmu.doStep(currentCommunicationPoint=self.t, communicationStepSize=size)
         self.t += size
 
+    def derivative(self, unknowns, known, along):
+        """Derivatives of outputs along a direction of numbers."""
+        from ctypes import c_double, c_uint32
+
+        sizes = [len(unknowns), len(known)]
+        rows, columns = ((c_uint32 * len(names))(*(self.references[n] for n in names)) for names in (unknowns, known))
+        seed, values = (c_double * sizes[1])(*along), (c_double * sizes[0])()
+        if self.second:
+            self.fmu.fmi2GetDirectionalDerivative(self.fmu.component, rows, sizes[0], columns, sizes[1], seed, values)
+        else:
+            self.fmu.fmi3GetDirectionalDerivative(
+                self.fmu.component, rows, sizes[0], columns, sizes[1], seed, sizes[1], values, sizes[0]
+            )
+        return np.array(values)
+
     def save(self):
         state = self.fmu.getFMUstate() if self.second else self.fmu.getFMUState()
         return state, self.t
@@ -158,6 +173,93 @@ def test_outputs_follow_what_is_set(made, tmp_path):
     before = driven.get(name)[0]
     driven.set(load__torque=2.0 * driven.get("load.torque")[0])
     assert driven.get(name)[0] == pytest.approx(2.0 * before)
+    driven.end()
+
+
+def two_links():
+    """Two links under gravity, each driven from the ground, one by a torque that is a curve of its input."""
+    m = gm.Mechanism("arm", gravity=(0.0, -9.81, 0.0))
+    first = m.body("first", mass=2.0, inertia=(0.1, 0.1, 0.2), position=(0.5, 0.0, 0.0))
+    second = m.body("second", mass=1.0, inertia=(0.05, 0.05, 0.1), position=(1.4, 0.3, 0.0))
+    shoulder = m.revolute("shoulder", first, m.ground, at=(0.0, 0.0, 0.0), axis=(0, 0, 1))
+    elbow = m.revolute("elbow", second, first, at=(1.0, 0.0, 0.0), axis=(0, 0, 1))
+    m.torque("drive", shoulder.i, m.input("load", "N m", 4.0))
+    m.input("lean", "rad", 0.3)
+    m.torque("curved", elbow.i, "7*SIN(lean)")
+    m.output("first", ("com_acceleration", "first", "y"))
+    m.output("second", ("com_acceleration", "second", "x"))
+    m.output("reaction", ("reaction", "shoulder", "fx"))
+    for name, body, axis in (
+        ("place", "second", "x"),
+        ("y2", "second", "y"),
+        ("x1", "first", "x"),
+        ("y1", "first", "y"),
+    ):
+        m.output(name, ("com_position", body, axis))
+    return m
+
+
+def rates_of_two_links(place_1, place_2):
+    """Derivatives of the accelerations and of the reaction by the torque on each link: J M^-1 in closed form."""
+    turned = np.arctan2(place_1[1], place_1[0])
+    elbow = np.array([np.cos(turned), np.sin(turned)])
+
+    def across(arm):
+        return np.array([-arm[1], arm[0]])
+
+    none = np.zeros(2)
+    jacobians = [np.stack([across(0.5 * elbow), none], axis=1),
+                 np.stack([across(elbow), across(place_2[:2] - elbow)], axis=1)]  # fmt: skip
+    mass = sum(m * j.T @ j for m, j in zip((2.0, 1.0), jacobians, strict=True)) + np.diag([0.2, 0.1])
+    # each torque acts on its link from the ground
+    rates = np.linalg.inv(mass)
+    one, two = (j @ rates for j in jacobians)
+    return np.stack([one[1], two[0], 2.0 * one[0] + 1.0 * two[0], np.zeros(2)])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_derivatives_of_outputs_by_inputs(version, tmp_path):
+    """Against the equations of motion of two links, and along a direction the sum."""
+    m = two_links()
+    made = export(m, tmp_path / "arm", t_end=1.0, target=version)
+    driven, other = (Driven(str(made.library), tmp_path / name).begin() for name in "ab")
+    for _ in range(7):
+        driven.step(0.05)
+        other.step(0.05)
+    names = ["first", "second", "reaction", "place"]
+    before = driven.get(*names)
+    places = driven.get("x1", "y1", "place", "y2").reshape(2, 2)
+    exact = rates_of_two_links(*places)
+    # the reaction on the first link, whichever way it is counted
+    exact[2] *= np.sign(exact[2, 0] * driven.derivative(names, ["load"], [1.0])[2])
+    by_load, by_lean = exact[:, 0], 7.0 * np.cos(0.3) * exact[:, 1]
+    for known, along, wanted in (
+        (["load"], [1.0], by_load),
+        (["lean"], [1.0], by_lean),
+        (["load", "lean"], [2.0, -3.0], 2.0 * by_load - 3.0 * by_lean),
+    ):
+        np.testing.assert_allclose(driven.derivative(names, known, along), wanted, rtol=1e-6, atol=1e-7)
+    # the instance is as it was, and goes on as one that was not asked
+    np.testing.assert_array_equal(driven.get(*names), before)
+    other.get(*names)
+    for one in (driven, other):
+        one.step(0.05)
+    np.testing.assert_array_equal(driven.get(*names), other.get(*names))
+    for one in (driven, other):
+        one.end()
+
+
+def test_derivatives_are_those_of_outputs(made, tmp_path):
+    from fmpy.fmi1 import FMICallException
+
+    driven = Driven(str(made.library), tmp_path).begin()
+    driven.step(0.25 * END)
+    assert np.isfinite(driven.derivative(["mesh.load.ty"], ["load.torque"], [1.0]))
+    with pytest.raises(FMICallException):
+        driven.derivative(["load.torque"], ["load.torque"], [1.0])
+    with pytest.raises(FMICallException):
+        driven.derivative(["mesh.load.ty"], ["mesh.load.fx"], [1.0])
+    assert np.isfinite(driven.get(*NAMES)).all()
     driven.end()
 
 

@@ -118,8 +118,7 @@ GEARMBS_API fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const char bytes
 GEARMBS_API fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t rows,
                                                     const fmi2ValueReference known[], size_t columns,
                                                     const fmi2Real along[], fmi2Real values[]) {
-    (void)unknowns, (void)rows, (void)known, (void)columns, (void)along, (void)values;
-    return fmu_refuse(c, "Directional derivatives are not provided.");
+    return fmu_derivative(c, unknowns, rows, known, columns, along, values);
 }
 
 GEARMBS_API fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference r[], size_t n,

@@ -156,7 +156,14 @@ GEARMBS_API fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool
     return status;
 }
 
-/* What this model has none of: arrays that change, clocks, events, derivatives. */
+GEARMBS_API fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t rows,
+                                                    const fmi3ValueReference known[], size_t columns,
+                                                    const double along[], size_t size, double values[], size_t count) {
+    if (size != columns || count != rows) return fmu_refuse(c, "All variables are scalars.");
+    return fmu_derivative(c, unknowns, rows, known, columns, along, values);
+}
+
+/* What this model has none of: arrays that change, clocks, events, derivatives by time and backwards. */
 #define NONE(name, ...)                                                                                                \
     GEARMBS_API fmi3Status fmi3##name(fmi3Instance c, __VA_ARGS__) { return fmu_refuse(c, #name " is not provided."); }
 #define NONE_OF_INSTANCE(name)                                                                                         \
@@ -172,8 +179,6 @@ NONE_OF_INSTANCE(EvaluateDiscreteStates)
 NONE(GetNumberOfVariableDependencies, fmi3ValueReference r, size_t *count)
 NONE(GetVariableDependencies, fmi3ValueReference r, size_t places[], references others, size_t other_places[],
      int kinds[], size_t count)
-NONE(GetDirectionalDerivative, references unknowns, size_t rows, references known, size_t columns, const double along[],
-     size_t size, double values[], size_t count)
 NONE(GetAdjointDerivative, references unknowns, size_t rows, references known, size_t columns, const double along[],
      size_t size, double values[], size_t count)
 NONE(GetOutputDerivatives, references r, size_t n, const int32_t orders[], double values[], size_t count)

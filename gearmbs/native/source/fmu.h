@@ -23,6 +23,8 @@ fmu *fmu_new(const char *name, const char *token, void *environment, void *logge
 void fmu_free(fmu *self);
 int fmu_get(fmu *self, const unsigned *references, size_t count, double *values);
 int fmu_set(fmu *self, const unsigned *references, size_t count, const double *values);
+int fmu_derivative(fmu *self, const unsigned *unknowns, size_t rows, const unsigned *known, size_t columns,
+                   const double *along, double *values);
 int fmu_span(const fmu *self, double start, int has_stop, double stop);
 int fmu_step(fmu *self, double time, double size);
 int fmu_reset(fmu *self);
