@@ -257,13 +257,25 @@ def truth(value: Any, field: str = "value") -> bool:
     return bool(value)
 
 
+NAMED = {
+    (1.0, 1.0, -2.0): "N",
+    (2.0, 1.0, -2.0): "N m",
+    (0.0, 1.0, -2.0): "N/m",
+    (0.0, 1.0, -1.0): "N s/m",
+    (2.0, 1.0, -1.0): "N m s",
+    (-1.0, 1.0, -2.0): "Pa",
+    (2.0, 1.0, -3.0): "W",
+}
+"""Usual names of products of powers of m, kg and s. Of torque and energy, which have the same, torque is meant here."""
+
+
 def si_unit(text: Any) -> str | None:
     """Return the SI unit of a text that is a number with a unit, for `to_si`; None for anything else.
 
     Examples
     --------
     >>> si_unit("0.1 mm"), si_unit("1500 rpm"), si_unit("20 N m"), si_unit("pump"), si_unit(3.0)
-    ('m', 'rad/s', 'm^2*kg/s^2', None, None)
+    ('m', 'rad/s', 'N m', None, None)
     """
     if not isinstance(text, str):
         return None
@@ -283,6 +295,9 @@ def si_unit(text: Any) -> str | None:
     powers = dict(zip(("m", "kg", "s", "rad"), known[1]))
     if powers == {"m": 0.0, "kg": 0.0, "s": -1.0, "rad": 0.0}:
         return "Hz"
+    named = NAMED.get((powers["m"], powers["kg"], powers["s"]))
+    if named is not None and powers["rad"] in (0.0, -1.0):
+        return named + ("/rad" if powers["rad"] else "")
     above = "*".join(_power(base, p) for base, p in powers.items() if p > 0.0)
     below = "".join(f"/{_power(base, -p)}" for base, p in powers.items() if p < 0.0)
     return (above or "1") + below

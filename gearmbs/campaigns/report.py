@@ -211,10 +211,14 @@ def _table(table: pd.DataFrame) -> str:
     index = ", ".join(str(name) for name in table.index.names)
     heads = "".join(f"<th>{html.escape(str(c))}</th>" for c in (index, *table.columns))
     rows = "".join(
-        f"<tr><td>{html.escape(_label(name))}</td>" + "".join(f"<td>{v:.4g}</td>" for v in row) + "</tr>"
-        for name, row in zip(table.index, np.asarray(table, dtype=float))
+        f"<tr><td>{html.escape(_label(name))}</td>" + "".join(f"<td>{_cell(v)}</td>" for v in row) + "</tr>"
+        for name, row in zip(table.index, table.to_numpy(dtype=object))
     )
     return f"<table><tr>{heads}</tr>{rows}</table>"
+
+
+def _cell(value: Any) -> str:
+    return html.escape(value) if isinstance(value, str) else f"{float(value):.4g}"
 
 
 def _label(name: Any) -> str:

@@ -35,6 +35,9 @@ RESAMPLES = 200
 CONFIDENCE = 0.95
 """Probability of the intervals of indices, the customary one."""
 
+LEAST_HELD, MOST_HELD = 1e-9, 20
+"""Share of a term that an effect of a fraction holds, below which it is rounding; and terms that are named."""
+
 
 @dataclass(frozen=True)
 class SobolIndices:
@@ -115,7 +118,15 @@ def sobol_indices(
     SobolIndices
     """
     d = len(names)
-    blocks = np.asarray(values, dtype=float).reshape(-1, d + 2)
+    y = np.asarray(values, dtype=float)
+    if not d or y.size % (d + 2):
+        raise CampaignError(f"sobol: {y.size} values for {d} names; give n ({d} + 2), in the order of the design")
+    blocks = y.reshape(-1, d + 2)
+    if points is not None and not _is_saltelli(np.reshape(points, (-1, d + 2, d))):
+        raise CampaignError(
+            "sobol: the points are no Saltelli design, of each base point A, A with one coordinate of B each, B; take "
+            "fit_chaos for others"
+        )
     good = np.isfinite(blocks).all(axis=1)
     left_out = int((~good).sum())
     blocks = blocks[good]
@@ -136,10 +147,9 @@ def sobol_indices(
     first, total = estimate(np.arange(len(blocks)))
     generator = np.random.default_rng(seed)
     drawn = [estimate(generator.integers(len(blocks), size=len(blocks))) for _ in range(resamples)]
-    spread = np.std(np.array(drawn), axis=0, ddof=1)
-    from scipy.stats import norm
-
-    q = norm.ppf(0.5 + 0.5 * CONFIDENCE)
+    # a resample of n is as if drawn from what is spread by (n - 1) / n of the variance
+    spread = np.std(np.array(drawn), axis=0, ddof=1) * np.sqrt(len(blocks) / (len(blocks) - 1.0))
+    q = _student(len(blocks))
     return SobolIndices(
         names,
         first,
@@ -154,6 +164,20 @@ def sobol_indices(
     )
 
 
+def _is_saltelli(points: np.ndarray) -> bool:
+    """Whether points of shape (n, d + 2, d) are A, A with one coordinate of B each, B."""
+    own = np.eye(points.shape[2], dtype=bool)
+    wanted = np.where(own, points[:, -1:], points[:, :1])
+    return bool(np.array_equal(points[:, 1:-1], wanted))
+
+
+def _student(count: int) -> float:
+    """Return half the width of the interval of a mean of so many values over its standard error."""
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1))
+
+
 def _indices(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     a, b, mixed = blocks[:, :1], blocks[:, -1:], blocks[:, 1:-1]
     variance = np.var(np.r_[a, b])
@@ -161,7 +185,7 @@ def _indices(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def morris_effects(
-    values: np.ndarray, points: np.ndarray, names: list[str], *, places: np.ndarray | None = None, seed: int = 0
+    values: np.ndarray, points: np.ndarray, names: list[str], *, places: np.ndarray | None = None
 ) -> pd.DataFrame:
     """Return the elementary effects on a Morris design: mean, mean of the absolute value, spread, and its confidence.
 
@@ -178,14 +202,17 @@ def morris_effects(
     Returns
     -------
     DataFrame
-        ``mu``, ``mu_star`` (Campolongo 2007), ``sigma`` and ``confidence`` (half width of the 95 % interval of mu_star)
-        by factor. An effect is the change of the result over the whole range of the factor; from one alternative to
-        another of what has no order.
+        ``mu``, ``mu_star`` (Campolongo 2007), ``sigma`` and ``confidence`` (half width of the 95 % interval of mu_star,
+        by Student's t) by factor. An effect is the change of the result over the whole range of the factor; from one
+        alternative to another of what has no order. Of one trajectory neither sigma nor confidence is known. Of a few
+        the interval is that of the effects they have met: where these are equal, by chance or since the result is
+        linear, it is zero.
     """
     import pandas as pd
-    from scipy.stats import norm
 
     d = len(names)
+    if np.shape(points) != (np.size(values), d) or np.size(values) % (d + 1):
+        raise CampaignError(f"morris: {np.size(values)} values and points of shape {np.shape(points)} for {d} names")
     y, x = np.asarray(values, dtype=float).reshape(-1, d + 1), np.asarray(points).reshape(-1, d + 1, d)
     good = np.isfinite(y).all(axis=1)
     at = x if places is None else np.asarray(places).reshape(x.shape)
@@ -194,6 +221,8 @@ def morris_effects(
         raise CampaignError("morris: no trajectory has all its results")
     moves = np.diff(x, axis=1)
     axis = np.abs(moves).argmax(axis=2)
+    if (np.count_nonzero(moves, axis=2) != 1).any() or (np.sort(axis, axis=1) != np.arange(d)).any():
+        raise CampaignError("morris: the points are no Morris design, whose trajectories change each coordinate once")
     effect = np.empty((len(y), d))
     rows = np.arange(len(y))[:, None]
     move, step = (np.take_along_axis(m, axis[..., None], axis=2)[..., 0] for m in (moves, np.diff(at, axis=1)))
@@ -201,13 +230,12 @@ def morris_effects(
     # a value that did not move, as one of a range of one whole number, has no effect
     effect[rows, axis] = np.divide(np.diff(y, axis=1), step, out=np.zeros_like(step), where=step != 0.0)
     size = np.abs(effect)
-    drawn = np.random.default_rng(seed).integers(len(y), size=(RESAMPLES, len(y)))
-    spread = size[drawn].mean(axis=1).std(axis=0, ddof=1)
+    several = len(y) > 1
     found = {
         "mu": effect.mean(axis=0),
         "mu_star": size.mean(axis=0),
-        "sigma": effect.std(axis=0, ddof=1) if len(y) > 1 else np.full(d, np.nan),
-        "confidence": norm.ppf(0.5 + 0.5 * CONFIDENCE) * spread,
+        "sigma": effect.std(axis=0, ddof=1) if several else np.full(d, np.nan),
+        "confidence": _student(len(y)) * size.std(axis=0, ddof=1) / len(y) ** 0.5 if several else np.full(d, np.nan),
     }
     columns = {name: out_of_scale(values, power, name) for name, values in found.items()}
     table = pd.DataFrame(columns, index=pd.Index(names, name="factor"))
@@ -217,7 +245,8 @@ def morris_effects(
 def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, interactions: bool = True) -> pd.DataFrame:
     """Return main effects and two-factor interactions of a two-level design: mean at high less mean at low.
 
-    Of a fraction ``aliases`` names those of them that an effect cannot be told from, it being the sum of all.
+    Of a fraction ``aliases`` names the terms that an effect holds besides, with the part of each that is not the whole:
+    it is the sum of all. Where they are many, the largest are named.
 
     Parameters
     ----------
@@ -233,27 +262,41 @@ def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, int
     import pandas as pd
 
     values = np.asarray(values, dtype=float)
+    if np.shape(coded) != (values.size, len(names)) or not np.isin(coded, (-1.0, 1.0)).all():
+        raise CampaignError(
+            f"effects: coded has the shape {np.shape(coded)} for {values.size} values of {len(names)} names, or other "
+            "numbers than -1 and 1; give these, the low and the high end"
+        )
     missing = int((~np.isfinite(values)).sum())
     if missing:
         raise CampaignError(f"effects: {missing} of {values.size} cases have no result; a factorial needs them all")
     values, power = in_scale(values)
     terms = {name: coded[:, k] for k, name in enumerate(names)}
-    if interactions:
-        for i, j in itertools.combinations(range(len(names)), 2):
-            terms[f"{names[i]} x {names[j]}"] = coded[:, i] * coded[:, j]
+    for i, j in itertools.combinations(range(len(names)), 2):
+        terms[f"{names[i]} x {names[j]}"] = coded[:, i] * coded[:, j]
     rows, aliases = {}, {}
-    for name, column in terms.items():
+    for name in terms if interactions else names:
+        column = terms[name]
         up, down = column > 0, column < 0
         if up.any() and down.any():
             effect = values[up].mean() - values[down].mean()
             rows[name] = float(out_of_scale(effect, power, f"effect of {name}"))
-            # in a fraction the columns of some terms are equal but for the sign, and so are their effects
             both = {other: float(column @ terms[other]) / len(column) for other in terms if other != name}
-            same = [other if share > 0 else f"-{other}" for other, share in both.items() if abs(share) > 1.0 - 1e-9]
-            aliases[name] = ", ".join(same)
+            aliases[name] = _held(both)
     table = pd.DataFrame({"effect": rows} | ({"aliases": aliases} if any(aliases.values()) else {}))
     table.index.name = "term"
     return table.reindex(table.effect.abs().sort_values(ascending=False).index)
+
+
+def _held(shares: dict[str, float]) -> str:
+    """Return in words which terms an effect holds, of which it has these shares."""
+    held = sorted((item for item in shares.items() if abs(item[1]) > LEAST_HELD), key=lambda item: -abs(item[1]))
+    told = []
+    for name, share in held[:MOST_HELD]:
+        size = "" if abs(share) > 1.0 - LEAST_HELD else f"{abs(share):.2g} "
+        told.append(f"{'-' if share < 0 else ''}{size}{name}")
+    more = [f"and {len(held) - MOST_HELD} more"] if len(held) > MOST_HELD else []
+    return ", ".join([*told, *more])
 
 
 def one_factor_studies(campaign: Campaign, result: str) -> pd.DataFrame:
@@ -369,7 +412,7 @@ def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -
     plan = campaign.plan
     if plan.variants > 1 or plan.constraints:
         raise CampaignError(
-            "polynomial chaos: not of crossed choices or constraints; fit the table's columns by fit_chaos"
+            "polynomial chaos: not of crossed choices or constraints; fit plan.points()[table['point']] by fit_chaos"
         )
     names, points = coordinates(campaign)
     return fit_chaos(points, results_in_order(campaign, result), names, levels=_levels(plan), degree=degree)
@@ -412,8 +455,8 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
         )
     if plan.constraints:
         raise CampaignError(
-            f"sensitivity: constraints have left points of the {plan.design} design out; fit the table's columns by "
-            "fit_surface or fit_chaos"
+            f"sensitivity: constraints have left points of the {plan.design} design out; fit "
+            "plan.points()[table['point']] by fit_surface or fit_chaos"
         )
     missing = int((~np.isfinite(values)).sum())
     if missing:

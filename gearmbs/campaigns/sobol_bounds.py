@@ -118,7 +118,7 @@ def total_bounds(
     """
     y = np.asarray(values, dtype=float)
     good = np.isfinite(y)
-    x, y = _places(np.asarray(u, dtype=float)[good], levels or [0] * len(names)), y[good]
+    x, y = _places(in_unit_cube(u, names, "bounds")[good], levels or [0] * len(names)), y[good]
     if y.size < FEWEST or np.ptp(y) == 0.0:
         raise CampaignError(f"bounds: {y.size} points, or a result that is the same everywhere; draw more points")
     y, _ = in_scale(y)
@@ -249,7 +249,11 @@ def first_indices(
 ) -> pd.DataFrame:
     """Return first Sobol' indices estimated from the points at hand, against those of shuffled results.
 
-    The index of a column is the variance of the result's means over bins of equal numbers of points, over its variance.
+    The index of a column is the variance of the result's means over bins, over its variance, less the part that chance
+    gives (Kelley's epsilon squared, Proc. Natl. Acad. Sci. 21 (1935) 554: unbiased but for a ratio of means, of
+    independent points). Bins hold equal numbers of points; of a column with no more values than bins each value is one,
+    else equal values are in one bin, so that nothing hangs on the order of the points. Values that are no numbers are
+    a bin.
 
     Parameters
     ----------
@@ -263,9 +267,10 @@ def first_indices(
     Returns
     -------
     DataFrame
-        ``index``, less what chance gives, and ``chance``, the 95 % point of the index of shuffled results: below it a
-        factor cannot be told from one without influence. Best first. Of points that are spread more evenly than
-        independent ones chance gives less, and the index comes out too small by up to ``bins`` over their number.
+        ``index`` and ``chance``, the 95 % point of the index of shuffled results: below it a factor cannot be told from
+        one without influence. Best first; NaN where no value is there twice. Of points that are spread more evenly than
+        independent ones chance gives less, and an index S comes out too small by up to (1 - S) ``bins`` over their
+        number.
     """
     import pandas as pd
 
@@ -276,24 +281,34 @@ def first_indices(
     generator = np.random.default_rng(seed)
     rows = {}
     for name, column in columns.items():
-        x = np.asarray(column)[good]
-        if x.dtype.kind in "fiu":
-            place = np.argsort(np.argsort(x, kind="stable")) * count // x.size
-        else:
-            place = np.unique(x.astype(str), return_inverse=True)[1]
-        real = _index(place, y)
-        shuffled = np.array([_index(place, generator.permutation(y)) for _ in range(SHUFFLES)])
-        rows[name] = {"index": real - shuffled.mean(), "chance": np.quantile(shuffled, 0.95) - shuffled.mean()}
+        place = _bins(np.asarray(column)[good], count)
+        shuffled = [_index(place, generator.permutation(y)) for _ in range(SHUFFLES)]
+        rows[name] = {"index": _index(place, y), "chance": np.quantile(shuffled, 0.95)}
     table = pd.DataFrame.from_dict(rows, orient="index").sort_values("index", ascending=False)
     table.index.name = "factor"
     return table
 
 
+def _bins(x: np.ndarray, count: int) -> np.ndarray:
+    """Return the bin of each value of a column, 0 to the number of bins less one."""
+    numbers = x.dtype.kind in "fiu"
+    _, inverse, sizes = np.unique(x if numbers else x.astype(str), return_inverse=True, return_counts=True)
+    if not numbers or sizes.size <= count:
+        return inverse
+    middle = np.cumsum(sizes) - 0.5 * (sizes + 1)
+    return np.unique((middle * count // x.size)[inverse], return_inverse=True)[1]
+
+
 def _index(place: np.ndarray, y: np.ndarray) -> float:
+    """Return the part of the variance that means over bins explain, less that of chance, (bins - 1) / (points - 1)."""
     counts = np.bincount(place)
-    means = np.bincount(place, y) / np.maximum(counts, 1)
+    means = np.bincount(place, y) / counts
     spread = float(np.var(y))
-    return float(np.sum(counts * (means - y.mean()) ** 2) / y.size / spread) if spread > 0.0 else 0.0
+    if counts.size == y.size:
+        return np.nan
+    share = float(np.sum(counts * (means - y.mean()) ** 2) / y.size / spread) if spread > 0.0 else 0.0
+    chance = (counts.size - 1) / (y.size - 1)
+    return (share - chance) / (1.0 - chance) if spread > 0.0 else 0.0
 
 
 def probability(held: np.ndarray, level: float = 0.95) -> tuple[float, float, float]:
@@ -303,15 +318,50 @@ def probability(held: np.ndarray, level: float = 0.95) -> tuple[float, float, fl
     ----------
     held : ndarray of 1 and 0, shape (n,)
         NaN are left out.
+
+    Raises
+    ------
+    CampaignError
+        If none is left, or one is another number.
     """
     from scipy.stats import norm
 
     y = np.asarray(held, dtype=float)
     y = y[np.isfinite(y)]
+    if not y.size or not np.isin(y, (0.0, 1.0)).all():
+        raise CampaignError(f"probability: {y.size} values, which are not all 1 or 0; give whether a condition holds")
     n, p, q = y.size, float(y.mean()), float(norm.ppf(0.5 + 0.5 * level))
     middle = (p + q * q / (2 * n)) / (1 + q * q / n)
     half = q / (1 + q * q / n) * float(np.sqrt(p * (1 - p) / n + q * q / (4 * n * n)))
     return p, max(0.0, middle - half), min(1.0, middle + half)
+
+
+# Points that are asked for.
+
+
+OUTSIDE = 1e-9
+"""Of the unit cube, what rounding may have put there."""
+
+
+def in_unit_cube(u: np.ndarray, names: Sequence[str], what: str) -> np.ndarray:
+    """Return points if they are of the unit cube, with a coordinate a name.
+
+    Raises
+    ------
+    CampaignError
+        Naming the coordinate that has other values, as the columns of a table in SI have.
+    """
+    points = np.asarray(u, dtype=float)
+    if points.ndim != 2 or points.shape[1] != len(names):
+        raise CampaignError(f"{what}: points of shape {points.shape} for {len(names)} names; give a column a name")
+    inside = ((points >= -OUTSIDE) & (points <= 1.0 + OUTSIDE)).all(axis=0)
+    for k in np.flatnonzero(~inside)[:1]:
+        low, high = points[:, k].min(), points[:, k].max()
+        raise CampaignError(
+            f"{what}: {names[k]} goes from {low:.4g} to {high:.4g}, and points of the unit cube are asked for; give "
+            "(x - low) / (high - low) with the ends of its range, or plan.points()[table['point']]"
+        )
+    return points
 
 
 # Results of any size.

@@ -14,14 +14,14 @@ import itertools
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.campaigns.plans.factors import Factor
+from gearmbs.campaigns.plans.factors import AnyFactor, Choice, Factor
 from gearmbs.campaigns.sensitivity import coordinates, results_in_order
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning
-from gearmbs.campaigns.sobol_bounds import in_scale, out_of_scale
+from gearmbs.campaigns.sobol_bounds import in_scale, in_unit_cube, out_of_scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,6 +35,9 @@ is then as large as the intervals of a hundred points."""
 
 POINTS_A_TERM = 2.0
 """Points for each coefficient at least: with fewer the errors at points left out say little."""
+
+DETERMINED = 1e-10
+"""Of the largest of the diagonal of a triangular factor, below which columns are those of others but for rounding."""
 
 RESAMPLES = 100
 
@@ -128,7 +131,7 @@ def fit_chaos(
     Raises
     ------
     CampaignError
-        If there are too few points, or the result is the same everywhere.
+        If points are not of the unit cube or determine no sum, or the result is the same everywhere.
 
     Warns
     -----
@@ -144,7 +147,7 @@ def fit_chaos(
     """
     y = np.asarray(values, dtype=float)
     good = np.isfinite(y)
-    u, y = np.asarray(u, dtype=float)[good], y[good]
+    u, y = in_unit_cube(u, names, "polynomial chaos")[good], y[good]
     few = tuple(levels or [0] * len(names))
     if y.size < 2 or np.ptp(y) == 0.0:
         raise CampaignError("polynomial chaos: the result is the same everywhere; it depends on none of the factors")
@@ -198,20 +201,27 @@ def best_chaos(
         degrees = _terms(levels, highest, together)
         if best is not None and (POINTS_A_TERM * len(degrees) > y.size or len(degrees) > most):
             break
-        if len(degrees) >= y.size:
-            raise CampaignError(f"polynomial chaos: {y.size} points for {len(degrees)} coefficients; draw more points")
-        found = Fitted(degrees, *_least_squares(chaos_columns(u, degrees, levels), y))
+        q, r = np.linalg.qr(chaos_columns(u, degrees, levels))
+        sizes = np.abs(np.diag(r))
+        if len(degrees) >= y.size or sizes.min() < DETERMINED * sizes.max():
+            if best is not None:
+                break
+            raise CampaignError(
+                f"polynomial chaos: {y.size} points do not determine {len(degrees)} coefficients; draw more points, or "
+                "leave out what does not vary"
+            )
+        found = Fitted(degrees, *_least_squares(q, r, y))
         if best is None or found.q_squared > best.q_squared:
             best = found
     assert best is not None
     return best
 
 
-def _least_squares(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Return coefficients, R^2 and the same of points left out."""
-    q, r = np.linalg.qr(x)
-    coefficients = np.linalg.solve(r, q.T @ y)
-    rest = y - x @ coefficients
+def _least_squares(q: np.ndarray, r: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Return coefficients, R^2 and the same of points left out, for columns that are q r."""
+    part = q.T @ y
+    coefficients = np.linalg.solve(r, part)
+    rest = y - q @ part
     leverage = np.minimum((q**2).sum(axis=1), 1.0 - 1e-12)
     spread = float(((y - y.mean()) ** 2).sum())
     out = rest / (1.0 - leverage)
@@ -443,8 +453,9 @@ def fit_surface(
     Raises
     ------
     CampaignError
-        If the points do not determine the coefficients.
+        If points are not of the unit cube, or do not determine the coefficients.
     """
+    u = in_unit_cube(u, names, "response surface")
     if degree not in (1, 2):
         raise CampaignError(f"response surface: degree = {degree!r}; give 1 or 2, or fit_chaos for more")
     y = np.asarray(values, dtype=float)
@@ -478,10 +489,23 @@ def fit_surface(
     )
 
 
+def _alternatives(factor: AnyFactor) -> Sequence[Any]:
+    """Return what a factor is one of."""
+    if isinstance(factor, Factor):
+        return factor.values
+    return list(factor.options) if isinstance(factor, Choice) else range(factor.draws)
+
+
 def response_surface(campaign: Campaign, result: str, degree: int = 2) -> ResponseSurface:
     """Return the response surface of a campaign's result over the coordinates of its plan.
 
-    Whole numbers have the place of their value in the range, and not that of the coordinate that chose them.
+    Numbers have the place of their value in the range, and not that of the coordinate that chose them, where they are
+    whole or a few; of two alternatives the first is 0 and the other 1.
+
+    Raises
+    ------
+    CampaignError
+        If a factor has more than two alternatives without order.
 
     Warns
     -----
@@ -494,7 +518,7 @@ def response_surface(campaign: Campaign, result: str, degree: int = 2) -> Respon
     values = results_in_order(campaign, result)
     if len(values) != len(points):
         raise CampaignError(
-            "response surface: constraints have left points out; fit the table's columns by fit_surface"
+            "response surface: constraints have left points out; fit plan.points()[table['point']] by fit_surface"
         )
     if missing := int((~np.isfinite(values)).sum()):
         warnings.warn(
@@ -502,9 +526,16 @@ def response_surface(campaign: Campaign, result: str, degree: int = 2) -> Respon
             CampaignWarning,
             stacklevel=3,
         )
-    at, points = 0, points.copy()
+    at, found = 0, campaign.plan.places(points)
     for factor in campaign.plan.factors:
-        if isinstance(factor, Factor) and factor.whole and not factor.values:
-            points[:, at : at + 1] = factor.places(points[:, at : at + 1])
+        mine = points[:, at : at + factor.width]
+        if factor.width and np.isnan(found[:, at]).any():
+            alternatives = _alternatives(factor)
+            if len(alternatives) > 2:
+                raise CampaignError(
+                    f"response surface: {factor.name} has {len(alternatives)} alternatives, which have no order; ask "
+                    "sensitivity, or fit the cases of each by fit_surface"
+                )
+            found[:, at] = [value == alternatives[-1] for value in factor.columns(mine)[factor.name]]
         at += factor.width
-    return fit_surface(points, values, names, degree)
+    return fit_surface(found, values, names, degree)

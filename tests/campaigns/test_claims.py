@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearmbs.campaigns import Campaign, load_plan, make_plan
+from gearmbs.campaigns import Campaign, CampaignError, load_plan, make_plan
 from gearmbs.campaigns.sobol_bounds import first_indices, probability
 from gearmbs.campaigns.subjects.pair import ClaimsSubject, ratios
 from tests.docs.support import DOCS
+from tests.says import says
 
 
 def levels(tilted, apart, high):
@@ -60,10 +61,44 @@ def test_given_data_find_what_acts():
     assert (table["index"][["c", "text"]] < table["chance"][["c", "text"]]).all()
 
 
+def test_given_data_of_a_few_values_do_not_hang_on_their_order():
+    """On a grid, whose rows go by its factors, a factor without influence has none, and the only one has all."""
+    slow, fast = (axis.ravel() for axis in np.meshgrid([0.0, 1.0], np.arange(100) // 10, indexing="ij"))
+    columns = {
+        "slow": slow,
+        "fast": fast,
+        "none": np.where(slow > 0.5, np.nan, 1.0),
+        "each": np.arange(200).astype(str),
+    }
+    table = first_indices(columns, fast**2)
+    assert table["index"]["fast"] == pytest.approx(1.0)
+    assert (table["index"][["slow", "none"]] < table["chance"][["slow", "none"]]).all()
+    assert np.isnan(table["index"]["each"])
+    table = first_indices(columns, slow)
+    np.testing.assert_allclose(table["index"][["slow", "none"]], 1.0)
+    assert table["index"]["fast"] < table["chance"]["fast"]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.9])
+def test_given_data_are_right_on_average(share):
+    """Of independent results over as many values as bins, five of each."""
+    generator = np.random.default_rng(1)
+    found = []
+    for _ in range(300):
+        x = generator.permutation(np.arange(100) // 5)
+        y = np.sqrt(share) * (2.0 * (x % 2) - 1.0) + np.sqrt(1.0 - share) * generator.standard_normal(100)
+        found.append(first_indices({"x": x}, y, bins=20)["index"]["x"])
+    error = np.std(found) / np.sqrt(len(found))
+    assert abs(np.mean(found) - share) < 4.0 * error + 0.005
+
+
 def test_probability_has_its_interval():
     p, low, high = probability(np.array([1.0] * 30 + [0.0] * 70 + [np.nan]))
     assert p == 0.3
     np.testing.assert_allclose([low, high], [0.2189, 0.3958], atol=1e-4)
+    for values in ([], [np.nan], [0.0, 3.0]):
+        with pytest.raises(CampaignError, match=says("probability", "condition")):
+            probability(values)
 
 
 @pytest.mark.slow

@@ -491,6 +491,8 @@ def test_from_plan_to_files(tmp_path):
         assert np.isfinite(np.stack(rows[name])).all()
         assert len(rows[name].iloc[0]) == 1280
     assert (rows.filter(like="clipped.") == 0).all(axis=None)
+    # batches of tensors are made of columns of one length
+    assert all(rows[name].map(np.size).nunique() == 1 for name in rows.columns.drop("tacho"))
     # pulses are as far apart as the speed says
     for row in rows.itertuples():
         turns = 0.5 / np.pi * np.interp(row.tacho, np.arange(1280) / RATE, np.cumsum(row.speed) / RATE)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from scipy import stats
 from scipy.io import loadmat
 from scipy.stats import qmc
 from typer.testing import CliRunner
@@ -28,7 +29,7 @@ from gearmbs.campaigns import (
     sobol_indices,
     total_bounds,
 )
-from gearmbs.campaigns.plans.designs import factorial, morris, saltelli, sequence
+from gearmbs.campaigns.plans.designs import factorial, morris, plackett_burman, saltelli, sequence
 from gearmbs.cli import app
 from tests.campaigns.models import PI, PLACES, adding
 from tests.campaigns.support import function, ranges, small
@@ -129,6 +130,20 @@ def test_morris_of_a_linear_function_is_exact():
     assert list(table.index) == ["x2", "x1", "x3"]
     np.testing.assert_allclose(table.mu, [-3.0, 1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(table.sigma, 0.0, atol=1e-12)
+
+
+def test_the_confidence_of_elementary_effects_is_that_of_their_mean():
+    """Student's interval of the absolute values; of one trajectory there is none, of a linear function it is zero."""
+    points = morris(5, 3, 0)
+    y = points[:, 0] ** 2 + points[:, 1]
+    size = [abs(np.diff(y[4 * k : 4 * k + 4])) for k in range(5)]
+    moved = [np.abs(np.diff(points[4 * k : 4 * k + 4], axis=0)).argmax(axis=1) for k in range(5)]
+    effects = np.array([(s * 1.5)[list(m).index(0)] for s, m in zip(size, moved)])
+    half = stats.t.ppf(0.975, 4) * stats.sem(effects)
+    table = morris_effects(y, points, NAMES)
+    np.testing.assert_allclose(table.loc["x1", ["mu_star", "confidence"]], [effects.mean(), half], rtol=1e-12)
+    np.testing.assert_allclose(table.confidence["x2"], 0.0, atol=1e-12)
+    assert morris_effects(y[:4], points[:4], NAMES)[["sigma", "confidence"]].isna().all(axis=None)
 
 
 @pytest.mark.parametrize(
@@ -457,6 +472,52 @@ def test_a_fraction_names_what_it_cannot_tell(tmp_path):
             assert table.effect["x3"] == table.effect["x1 x x2"]
 
 
+@pytest.mark.parametrize("count", [3, 5])
+def test_screening_designs_name_what_their_effects_hold(count):
+    """Of four runs whole interactions, of eight whole ones or none, of twelve thirds: each as it is found."""
+    coded = plackett_burman(count) if count == 3 else plackett_burman(11)[:, :count]
+    names = list("abcde")[:count]
+    held = main_effects(coded, coded[:, 0] * coded[:, 1], names, interactions=False)
+    effect = held.effect / 2.0  # that of the interaction itself, from -1 to 1, is 2
+    assert set(effect.abs().round(12)) - {0.0} == ({1.0} if count == 3 else {round(1 / 3, 12)})
+    for name in names:
+        size = "" if count == 3 else f"{abs(effect[name]):.2g} "
+        sign = "-" if effect[name] < 0 else ""
+        assert (f"{sign}{size}a x b" in held.aliases[name].split(", ")) == (abs(effect[name]) > 1e-9)
+    plain = main_effects(factorial(3), factorial(3)[:, 0], NAMES)
+    assert "aliases" not in plain
+
+
+def test_a_fraction_has_a_report(tmp_path):
+    factors = [Factor(name, -1.0, 1.0) for name in PLACES]
+    campaign = Campaign(tmp_path / "c", make_plan(function(), factors, "factorial", options={"generators": ["C=AB"]}))
+    campaign.run(workers=0)
+    assert "<td>x1 x x2</td>" in campaign.report(tmp_path / "r.html", "y").read_text()
+
+
+@pytest.mark.parametrize("design", ["sobol", "grid"])
+def test_a_surface_of_a_few_values_goes_by_them(tmp_path, design):
+    """Of two alternatives the second is 1; three have no order, and are refused."""
+    subject = FunctionSubject(adding, {"a": 1.0, "b": 2.0})
+    n = {"n": 32} if design == "sobol" else {}
+    factors = [Factor("a", values=(1.0, 2.0, 10.0)), Factor("b", 1.0, 3.0)]
+    campaign = Campaign(tmp_path / "c", make_plan(subject, factors, design, **n))
+    campaign.run(workers=0)
+    surface = campaign.response_surface("s", 1)
+    assert surface.q_squared == pytest.approx(1.0)
+    np.testing.assert_allclose(surface.coefficients, [5.5 + 3.0 + 2.0, 4.5, 1.0])
+    for options in ({"none": 4.0, "one": 9.0}, {"none": 4.0, "one": 9.0, "two": 7.0}):
+        campaign = Campaign(
+            tmp_path / f"{len(options)}", make_plan(subject, [Choice("a", options), factors[1]], design, **n)
+        )
+        campaign.run(workers=0)
+        if len(options) == 2:
+            np.testing.assert_allclose(campaign.response_surface("s", 1).coefficients, [6.5 + 3.0 + 2.0, 2.5, 1.0])
+        else:
+            with pytest.raises(CampaignError, match=says("a", "3", "order", "sensitivity")):
+                campaign.response_surface("s", 1)
+
+
 def test_a_surface_of_whole_numbers_goes_by_their_values(tmp_path):
     factors = [Factor("a", 1, 6, whole=True), Factor("b", 1.0, 3.0)]
     plan = make_plan(FunctionSubject(adding, {"a": 1.0, "b": 2.0}), factors, n=32)
@@ -465,3 +526,49 @@ def test_a_surface_of_whole_numbers_goes_by_their_values(tmp_path):
     surface = campaign.response_surface("s", 1)
     assert surface.r_squared == pytest.approx(1.0)
     np.testing.assert_allclose(surface.coefficients, [3.0 + 3.5 + 2.0, 2.5, 1.0])
+
+
+def test_points_that_constraints_leave_are_fitted_in_the_unit_cube(tmp_path):
+    """As the messages say; columns in SI, of which the indices would be of other ranges, are refused."""
+    factors = [Factor("a", 1.0, 5.0), Factor("b", 100.0, 300.0)]
+    subject = FunctionSubject(adding, {"a": 1.0, "b": 2.0})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, factors, n=64, constraints=["a * b < 1200"]))
+    campaign.run(workers=0)
+    table = campaign.table
+    assert 32 < len(table) < 64
+    for ask in (lambda: campaign.sensitivity("s"), lambda: campaign.response_surface("s")):
+        with pytest.raises(CampaignError, match=says("constraints", "plan.points()[table['point']]")):
+            ask()
+    u = campaign.plan.points()[table["point"]]
+    np.testing.assert_allclose(fit_surface(u, table["s"], ["a", "b"], 1).coefficients, [203.0 + 3.0, 2.0, 100.0])
+    variances = np.array([4.0, 200.0]) ** 2 / 12.0
+    found = fit_chaos(u, table["s"], ["a", "b"], degree=1)
+    np.testing.assert_allclose(found.indices, [variances / variances.sum()] * 2, rtol=1e-9)
+    columns = table[["a", "b"]].to_numpy()
+    for ask in (fit_surface, fit_chaos, total_bounds):
+        with pytest.raises(CampaignError, match=says("a", "unit cube", "low")):
+            ask(columns, table["s"], ["a", "b"])
+        with pytest.raises(CampaignError, match=says("3 names", "2")):
+            ask(u, table["s"], NAMES)
+
+
+def test_points_of_another_design_are_refused():
+    """In another order, of another code, or of values that are not asked for."""
+    points = saltelli(16, 3, 0)
+    moved = points.reshape(16, 5, 3).transpose(1, 0, 2).reshape(-1, 3)
+    sobol_indices(_values(points), NAMES, points=points)
+    with pytest.raises(CampaignError, match=says("Saltelli", "fit_chaos")):
+        sobol_indices(_values(moved), NAMES, points=moved)
+    with pytest.raises(CampaignError, match=says("79", "3 names")):
+        sobol_indices(_values(points)[1:], NAMES)
+    points = morris(4, 3, 0)
+    for wrong in (points[::-1].reshape(4, 4, 3)[:, [0, 2, 1, 3]].reshape(-1, 3), saltelli(4, 3, 0)[:16]):
+        with pytest.raises(CampaignError, match=says("Morris", "once")):
+            morris_effects(_values(wrong), wrong, NAMES)
+    assert len(morris_effects(_values(points[::-1]), points[::-1], NAMES)) == 3
+    coded = factorial(3)
+    for wrong in (0.5 * (coded + 1.0), coded[:, :2]):
+        with pytest.raises(CampaignError, match=says("effects", "-1")):
+            main_effects(wrong, coded[:, 0], NAMES)
+    with pytest.raises(CampaignError, match=says("50", "determine", "leave out")):
+        fit_chaos(np.full((50, 2), 0.3), np.arange(50.0), NAMES[:2])

@@ -239,8 +239,9 @@ def data_set_plan(
     points = -(-signals // each)
     if points < specimens:
         raise CampaignError(
-            f"data set: {signals} signals are {points} points of {len(states)} states and {len(box.accelerometers)} "
-            f"sensors, too few for {specimens} specimens; ask for {each * specimens} signals or fewer specimens"
+            f"data set: {signals} signals of {box.name} are {points} points of {len(states)} states and "
+            f"{len(box.accelerometers)} sensors, too few for {specimens} specimens; ask for {each * specimens} signals "
+            "of each gearbox or fewer specimens"
         )
     tables = {**box.tables, "run": dict(box.tables.get("run", {}))}
     rate = box.rate
