@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.parse import statements as st
@@ -189,3 +190,61 @@ def test_curves_of_points():
     ):
         with pytest.raises(ModelError, match=message):
             Curve(points)
+
+
+@pytest.mark.slow
+def test_a_bead_on_a_parabola():
+    """An open curve that stands: against x'' (1 + f'^2) = -f' (g + f'' x'^2)."""
+    x, bend = np.linspace(-300.0, 300.0, 121), 2.0 / 200.0
+    points = np.column_stack([x, bend / 2.0 * x**2, 0.0 * x])
+    text = BEAD.format(
+        markers="PART/2, MASS=1, CM=20, IP=1000,1000,1000, QG=150,112.5,0\nMARKER/12, PART=1, FLOATING",
+        matrix=matrix(1, points), guide=10, more=f"ACCGRAV/JGRAV=-{G}\nREQUEST/1, F2=DX(20)\\F3=DY(20)",
+    )  # fmt: skip
+    result = run_deck(parse_deck(text), end=1.0, steps=100)
+
+    def rates(_, s):
+        slope = bend * s[0]
+        return [s[1], -slope * (G + bend * s[1] ** 2) / (1.0 + slope**2)]
+
+    exact = solve_ivp(rates, (0.0, 1.0), [150.0, 0.0], t_eval=result.t, rtol=1e-11, atol=1e-9).y
+    np.testing.assert_allclose(result.request(1)[:, 1], exact[0], atol=5e-4)
+    np.testing.assert_allclose(result.request(1)[:, 2], bend / 2.0 * exact[0] ** 2, atol=5e-4)
+    speeding = np.array([rates(0.0, s)[1] for s in exact.T])
+    normal = 1e-3 * (G + bend * exact[0] * speeding + bend * exact[1] ** 2)
+    assert np.abs(result.force("ptcv", 1)[:, 1] - normal).max() < 1e-3 * normal.max()
+
+
+@pytest.mark.slow
+def test_a_bead_on_a_turning_arm():
+    """A straight curve on a part that turns by a motion: r = r0 cosh(w t), and the torque 2 m w r r' of the drive."""
+    points = np.column_stack([np.linspace(0.0, 2000.0, 11), np.zeros(11), np.zeros(11)])
+    text = BEAD.format(
+        markers="PART/2, MASS=1, CM=20, IP=1000,1000,1000, QG=100,0,0, VY=500\nMARKER/12, PART=3, FLOATING",
+        matrix=matrix(1, points), guide=30, more="REQUEST/1, F2=DM(20,10)\\F3=MOTION(1,0,8,0)",
+    )  # fmt: skip
+    result = run_deck(parse_deck(text), end=0.5, steps=50)
+    far = 100.0 * np.cosh(5.0 * result.t)
+    np.testing.assert_allclose(result.request(1)[:, 1], far, rtol=1e-6)
+    torque = 1e-3 * 2.0 * 5.0 * far * 500.0 * np.sinh(5.0 * result.t)
+    np.testing.assert_allclose(np.abs(result.request(1)[:, 2]), torque, atol=1e-5 * torque.max())
+
+
+BEAD = """bead
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
+PART/1, GROUND
+MARKER/10, PART=1
+MARKER/11, PART=1
+PART/3, MASS=1, CM=30, IP=1000,1000,1000
+MARKER/30, PART=3
+JOINT/1, REVOLUTE, I=30, J=10
+MOTION/1, JOINT=1, ROTATION, FUNCTION=5*TIME
+{markers}
+MARKER/20, PART=2
+JPRIM/1, ORIENTATION, I=20, J=11
+{matrix}
+CURVE/1, OPEN, CURVE_POINTS, MATRIX=1
+PTCV/1, I=20, CURVE=1, RM={guide}, JFLOAT=12
+{more}
+END
+"""

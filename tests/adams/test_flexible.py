@@ -213,3 +213,44 @@ def test_the_way_that_the_refusal_of_matrices_names_leads_to_a_body(tmp_path):
     (body,) = read_deck(deck).to_mechanism().bodies.values()
     np.testing.assert_allclose(body.origin.model.frequencies, model.frequencies, rtol=1e-9)
     np.testing.assert_allclose(body.mass, model.properties.mass, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("loaded", "force", "torque"), [(101, 0.1, 0.0), (103, 0.1, 0.0), (102, 0.0, 10.0), (103, 0.0, 10.0)]
+)
+def test_markers_on_a_bent_cantilever(tmp_path, loaded, force, torque):
+    """Tip deflection and slope of a clamped beam, and the moment at the clamp, by a load at either of two places."""
+    bar = Shaft([ShaftSection(0.4, 0.004)], seats={"A": 0.0, "M": 0.2, "B": 0.4}, elements=16, name="bar").model()
+    write_mnf(tmp_path / "bar.mnf", mnf_of(reduce_model(bar, modes=8)))
+    (tmp_path / "bar.adm").write_text(CANTILEVER.format(loaded=loaded, force=force, torque=torque))
+    result = run_deck(read_deck(tmp_path / "bar.adm"), parse_script("a\nb\nSIMULATE/STATICS\n"))
+    rigidity = 2.1e11 * np.pi * 0.004**4 / 64.0
+    at, bent = (0.2 if loaded == 103 else 0.4), 1e-3 * torque
+    tip = force * at**2 / 6.0 * (1.2 - at) + bent * at * (0.4 - at / 2.0)
+    slope = force * at**2 / 2.0 + bent * at
+    found = result.request(1)[-1]
+    # shear adds 5e-5 of the deflection
+    assert found[1] == pytest.approx(1e3 * tip / rigidity, rel=2e-4)
+    assert found[2] == pytest.approx(slope / rigidity, rel=1e-5)
+    assert found[3] == pytest.approx(-(1e3 * force * at + torque), rel=1e-5)
+
+
+CANTILEVER = """bar
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
+PART/1,GROUND
+MARKER/10,PART=1
+MARKER/11,PART=1
+MARKER/12,PART=1,FLOATING
+FLEX_BODY/1,MATRICES=1,2,MNF_FILE=bar.mnf,CRATIO=0.5
+MATRIX/1,FILE=bar.mtx,NAME=GENSTIFF
+MATRIX/2,FILE=bar.mtx,NAME=INVAR1
+MARKER/100,FLEX_BODY=1,NODE_ID=1
+MARKER/101,FLEX_BODY=1,QP=0,0,400
+MARKER/102,FLEX_BODY=1,QP=0,0,400,REULER=0,30D,0
+MARKER/103,FLEX_BODY=1,QP=0,0,200
+JOINT/1,FIXED,I=100,J=11
+VFORCE/1,I={loaded},JFLOAT=12,RM=10,FX={force}\\FY=0\\FZ=0
+VTORQUE/2,I={loaded},JFLOAT=12,RM=10,TX=0\\TY={torque}\\TZ=0
+REQUEST/1,F2=DX(101,10)\\F3=AY(101,10)\\F4=JOINT(1,0,7,10)
+END
+"""

@@ -1,4 +1,4 @@
-"""Moments of solids that are put together from blocks and prisms, and of edges that are taken off blocks."""
+"""Moments of solids that are put together from blocks, prisms and cylinders, and of edges that are taken off blocks."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from gearmbs.adams.view.solids import (
     Moments,
     block_corner,
     block_outline,
+    cylinder_outline,
     extrusion_outline,
     link_outline,
     plate_outline,
@@ -22,6 +23,7 @@ from gearmbs.adams.view.solids import (
 
 PRISMS = {
     "block": block_outline, "link": link_outline, "plate": plate_outline, "extrusion": extrusion_outline,
+    "cylinder": cylinder_outline,
 }  # fmt: skip
 POINTS = 20
 """Of Gauss, to which moments of an arc are exact to rounding."""

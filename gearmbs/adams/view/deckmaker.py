@@ -32,12 +32,14 @@ KEYWORDS = {
     "diff": "DIFF", "lse": "LSE", "tfsiso": "TFSISO", "gse": "GSE", "array": "ARRAY", "ic_array": "ARRAY",
     "u_array": "ARRAY", "x_array": "ARRAY", "y_array": "ARRAY", "curve": "CURVE", "matrix": "MATRIX",
     "sparse_matrix": "MATRIX", "plant_input": "PINPUT", "plant_output": "POUTPUT", "spline": "SPLINE",
-    "string": "STRING", "sensor": "SENSOR", "request": "REQUEST", "modal_force": "MFORCE",
+    "string": "STRING", "motion_of_instance": "MOTION", "sensor": "SENSOR",
+    "request": "REQUEST", "modal_force": "MFORCE",
 }  # fmt: skip
 """Statements by kinds of objects; graphics have ids of their own when contacts name them."""
 SPACES = {"POINT_MASS": "PART", "FLEX_BODY": "PART"}
 """Statements whose ids are those of others, too."""
 IDLE = {row.kind: {name for name, acts in row.arguments.items() if not acts} for row in ROWS}
+IDLE["ude"] |= {"location", "orientation", "relative_to"}
 NAMING = {row.naming for row in ROWS} | {"adams_id"}
 
 

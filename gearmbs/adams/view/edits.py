@@ -9,14 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.adams.view import frames, machinery
+from gearmbs.adams.view import frames, machinery, tires
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.lexer import Command, ViewError
-from gearmbs.adams.view.model import BLOCKS, JOINTS, PARTS, PLACED, Database, Item
+from gearmbs.adams.view.model import (
+    BLOCKS,
+    DIRECTIONS,
+    GENERAL_MOTION,
+    JOINTS,
+    PARTS,
+    PLACED,
+    Database,
+    Item,
+)
 from gearmbs.adams.view.renaming import rename
 from gearmbs.adams.view.values import ORIENTATIONS, Stored, Values, fixed, is_ground
 from gearmbs.adams.view.vocabulary import Row, argument_of
 
+REFERRING = ("marker", "marker_name", "part_name")
+"""Endings of arguments that name markers and parts."""
 VALUES = ("real_value", "integer_value", "string_value", "object_value")
 
 
@@ -100,12 +111,13 @@ class Editor:
         """Make or change an object."""
         name = self._name(row, given, line)
         item = self._of_name(row, name, line)
-        fields = {key: value for key, value in given.items() if key != row.naming}
+        fields = {key: self._meant_now(key, value) for key, value in given.items() if key != row.naming}
         new = fields.pop(f"new_{row.naming}", None)
         if new is not None:
             rename(self.database, item, text_of((self._now(new) or [""])[0]), line)
         if "ground_part" in fields:
             self._ground(item, fields, line)
+        placed = {key: one for key, one in fields.items() if key in ("location", "orientation", "relative_to")}
         if item.kind in PLACED and item.kind != "model":
             self._place(item, fields)
         else:
@@ -119,15 +131,32 @@ class Editor:
             self.database.part = item
         if item.kind == "ude" and row.verb == "create":
             self._parts_of_instance(item, line)
+        if item.kind == "ude" and (wheel := self.database.items.get(f"{item.path}.wheel_part".lower())) is not None:
+            self._place(wheel, placed)
+            wheel.fields.update(placed)
         if row.kind == "model":
             self._new_model(item, line)
         self.database.version += 1
 
+    def _meant_now(self, key: str, stored: Stored) -> Stored:
+        """Return what names markers or parts with their full names: short ones mean those of the current part."""
+        if not key.endswith(REFERRING) or all(kind != "word" for kind, _ in stored.values):
+            return stored
+        found = []
+        for kind, value in stored.values:
+            one = self.database.find(value, PLACED) if kind == "word" and not value.startswith(".") else None
+            found.append((kind, value if one is None else one.path))
+        return replace(stored, values=tuple(found))
+
     def _parts_of_instance(self, item: Item, line: int) -> None:
-        """Make what commands may go on to name: state variables and state of a block of Controls, part of a wheel."""
+        """Make what commands may go on to name: states of a block of Controls, part of a wheel, motions."""
         kind = self.values.definition(item)
         if kind == machinery.ELEMENT:
             machinery.add_wheel(self.database, item, line)
+        if kind == tires.TIRE:
+            tires.add_wheel(self.database, item, line)
+        for direction in DIRECTIONS if kind == GENERAL_MOTION else ():
+            self.database.add("motion_of_instance", f"{item.path}.motion_{direction}", line)
         for ending in BLOCKS.get(kind, ()):
             self.database.add("state_variable", f"{item.path}.{item.name}{ending}", line)
         if kind.endswith("pid"):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from gearmbs.adams.view import machinery
+from gearmbs.adams.view import machinery, tires
 from gearmbs.adams.view.deckmaker import Deckmaker, translated
 from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.model import BLOCKS, Item
+from gearmbs.adams.view.model import BLOCKS, DIRECTIONS, GENERAL_MOTION, Item
 from gearmbs.adams.view.values import fixed
 from gearmbs.adams.write.text import number
 
@@ -67,7 +67,6 @@ def _spring(turning: bool) -> Callable[[Deckmaker, Item], None]:
 
 
 LEVELS = {1: "DISPLACEMENT", 2: "VELOCITY", 3: "ACCELERATION"}
-DIRECTIONS = {"t1": "X", "t2": "Y", "t3": "Z", "r1": "B1", "r2": "B2", "r3": "B3"}
 
 
 def _general_motion(m: Deckmaker, item: Item) -> None:
@@ -86,9 +85,10 @@ def _general_motion(m: Deckmaker, item: Item) -> None:
             for least, key, keyword in ((2, "ic_disp", "ICDISP"), (3, "ic_velo", "ICVEL"))
             if kind >= least
         ]
+        own = m.db.items.get(f"{item.path}.motion_{name}".lower())
         m.add(
             item,
-            f"MOTION/{m.fresh('MOTION')}",
+            f"MOTION/{m.fresh('MOTION') if own is None else m.id(own)}",
             f"I = {m.id(i)}",
             f"J = {m.id(j)}",
             direction,
@@ -142,17 +142,19 @@ def _block(m: Deckmaker, item: Item) -> None:
 
 
 def _nothing(m: Deckmaker, item: Item) -> None:
-    """Lists: of inputs and outputs, which the deck has as PINPUT and POUTPUT; of what a set of gears consists of."""
+    """Lists: inputs and outputs, which are PINPUT and POUTPUT, the gears of a set; a road, which its tires read."""
 
 
 DEFINITIONS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "forces.spring": _spring(turning=False),
     "forces.torsion_spring": _spring(turning=True),
-    "constraints.general_motion": _general_motion,
+    GENERAL_MOTION: _general_motion,
     "controls.controls_plant": _nothing,
     machinery.SET: _nothing,
     machinery.ELEMENT: machinery.make_wheel,
     machinery.FORCE: machinery.make_force,
+    tires.ROAD: _nothing,
+    tires.TIRE: tires.make_tire,
     **dict.fromkeys(BLOCKS, _block),
 }
 """By the last two parts of a definition's name."""

@@ -119,6 +119,9 @@ BLOCKS = {
     "acontrols.controls_gain": ("_input", ""), "acontrols.controls_pid": ("_input", "_input_d", ""),
 }  # fmt: skip
 """State variables that blocks of Controls have, by the last two parts of their definition's name: endings of names."""
+GENERAL_MOTION = "constraints.general_motion"
+DIRECTIONS = {"t1": "X", "t2": "Y", "t3": "Z", "r1": "B1", "r2": "B2", "r3": "B3"}
+"""Components of a general motion by the endings of their names."""
 PLACED = (*PARTS, "marker", "floating_marker", "point", "model")
 """Kinds that have a place, and may be what others are placed relative to."""
 

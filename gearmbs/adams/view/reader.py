@@ -12,7 +12,7 @@ from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError
 from gearmbs.adams.parse.commands import Script, parse_script
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import COMMANDS_OF_VIEW, deck_of, is_deck, is_script, read_file
-from gearmbs.adams.view import data, forces, instances, machinery, measures, statements
+from gearmbs.adams.view import data, forces, instances, machinery, measures, statements, tires
 from gearmbs.adams.view.deckmaker import PART_KEYWORDS, Deckmaker, Made
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.interpreter import Interpreter
@@ -161,6 +161,7 @@ def _chosen(run: Interpreter, name: str | None) -> Item | None:
 def _made(run: Interpreter, model: Item, file: str) -> Deckmaker:
     """Return a model's statements, and what is left out with all that needs it."""
     machinery.weigh(run.database, run.values)
+    tires.weigh(run.database, run.values)
     maker = Deckmaker(run.values, model, file, measures.variable_of, run.parasolids, run.folder)
     before = -1
     while len(maker.failed) > before:

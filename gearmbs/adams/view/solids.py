@@ -372,6 +372,27 @@ def block_outline(m: Deckmaker, item: Item) -> Outline:
     return marker, np.array([[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]]), min(z, 0.0), max(z, 0.0)
 
 
+CHORDS = 512
+"""Sides of the polygon, of the circle's area, that a cylinder cut by planes is taken for: 2e-5 radii off the circle."""
+
+
+def cylinder_outline(m: Deckmaker, item: Item) -> Outline:
+    """Return the outline of a whole cylinder.
+
+    Raises
+    ------
+    ViewError
+        If it is a sector, or has sides.
+    """
+    if abs(abs(_angle(m, item)) - 2.0 * math.pi) > 1e-9 or _sides(m, item):
+        raise ViewError(f"{item.path} is part of a cylinder in a csg, whose mass is not computed; {REMEDY}", item.line)
+    at = 2.0 * math.pi / CHORDS * np.arange(CHORDS)
+    radius = _radius(m, item) * math.sqrt(at[1] / math.sin(at[1]))
+    points = radius * np.column_stack([np.cos(at), np.sin(at)])
+    length = need(m, item, "length")
+    return _marker(m, item, "center_marker"), points, min(length, 0.0), max(length, 0.0)
+
+
 def link_outline(m: Deckmaker, item: Item) -> Outline:
     """Return the outline of a link."""
     (marker, points, low, high), radius = _spine(m, item)

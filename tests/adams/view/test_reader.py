@@ -149,7 +149,8 @@ def test_errors_have_a_line_and_a_reason(line):
 
 LEFT_OUT = {
     "force create direct multi_point_force multi_point_force_name = .swing.N i_marker_name = .swing.ROD.TOP": "beams",
-    "ude create instance instance_name = .swing.T definition_name = .MDI.Forces.vpg_tire": "vpg_tire",
+    "ude create instance instance_name = .swing.T definition_name = .MDI.Forces.vpg_belt": "vpg_belt",
+    "ude create instance instance_name = .swing.T definition_name = .MDI.Forces.vpg_tire": "wheel_tire_mass",
     "contact create contact_name = .swing.C i_geometry_name = .swing.ROD.BOB j_geometry_name = .swing.ground.NONE  &\n"
     " stiffness = 1 damping = 1 exponent = 1 dmax = 1": "NONE",
     "constraint create primitive_joint point_point jprim_name = .swing.P i_marker_name = .swing.ROD.TOP  &\n"
@@ -438,3 +439,22 @@ def test_names_with_parts_in_quotes():
     assert by_name(quoted, st.Marker, "cm").qp == by_name(plain, st.Marker, "cm").qp
     cm = by_name(quoted, st.Marker, "cm").id
     assert f"DX({cm})" in [one.f2 for one in quoted.deck.of(st.Request).values()]
+
+
+def test_short_names_mean_what_they_meant_when_they_were_written():
+    """Each part's own cm, though all have one."""
+    text = (
+        PENDULUM
+        + """\
+part create rigid_body name_and_position part_name = .swing.A location = 1, 0, 0
+marker create marker_name = .swing.A.cm location = 1, 0, 0 orientation = 0d, 0d, 0d
+part create rigid_body mass_properties part_name = .swing.A mass = 1 center_of_mass_marker = cm ixx = 1 iyy = 1 izz = 1
+part create rigid_body name_and_position part_name = .swing.B location = 2, 0, 0
+marker create marker_name = .swing.B.cm location = 2, 0, 0 orientation = 0d, 0d, 0d
+part create rigid_body mass_properties part_name = .swing.B mass = 1 center_of_mass_marker = cm ixx = 1 iyy = 1 izz = 1
+"""
+    )
+    deck = parse_view(text).deck
+    owners = {one.id: one.part for one in deck.of(st.Marker).values()}
+    parts = [one for one in deck.of(st.Part).values() if one.name in ("A", "B")]
+    assert [owners[one.cm] for one in parts] == [one.id for one in parts]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -169,6 +170,32 @@ def test_blocks_put_together(kind, volume, centre):
     part = deck.of(st.Part)[2]
     assert part.mass == pytest.approx(volume)
     assert deck.of(st.Marker)[part.cm].qp[0] == pytest.approx(centre)
+
+
+AXLE = math.pi * 0.3**2
+HALF = AXLE * (3.0 - 4.0 * 0.3 / (3.0 * math.pi)) / 2.0
+"""First moment of the half of it that is within the block."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "volume", "moment"),
+    [
+        ("union", 2.0 + 2.5 * AXLE, 4.0 + 9.0 * AXLE - HALF),
+        ("difference", 2.0 - AXLE / 2.0, 4.0 - HALF),
+        ("intersection", AXLE / 2.0, HALF),
+    ],
+)
+def test_a_block_and_an_axle(kind, volume, moment):
+    """A block from x = 1 to 3 of section 1, and a cylinder of radius 0.3 across its end face, longer than it."""
+    csg = (
+        "marker create marker_name = .m.P.B location = 3, 0.5, -1 orientation = 0, 0, 0\n"
+        "geometry create shape cylinder cylinder_name = .m.P.IN center_marker = .m.P.B length = 3 radius = 0.3\n"
+        f"geometry create shape csg csg_name = .m.P.C base_object = .m.P.BOX object = .m.P.IN type = {kind}"
+    )
+    deck = parse_view(PART + MASSES % ("density = 1", csg)).deck
+    part = deck.of(st.Part)[2]
+    assert part.mass == pytest.approx(volume, rel=2e-5)
+    assert deck.of(st.Marker)[part.cm].qp[0] == pytest.approx(moment / volume, rel=2e-5)
 
 
 BLEND = (

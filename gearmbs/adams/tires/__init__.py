@@ -1,0 +1,1 @@
+"""Tires of ADAMS/Tire: property files, and the Magic Formula as function expressions of a deck."""
