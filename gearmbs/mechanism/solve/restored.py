@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.problem import DAEProblem, ModelError
-from gearmbs.dae.state import State, check_state, equations_of
+from gearmbs.dae.state import State, changed_places, check_state, equations_of
 from gearmbs.mechanism.solve.controllers import Control
 from gearmbs.mechanism.solve.told import Point, Told
 
@@ -25,6 +26,7 @@ class Restored(Told):
     _base: DAEProblem
     _t_start: float
     _equations: str
+    _names: tuple[str, ...]
     _integers: tuple[Any, Any]
     _before: dict[bytes, bytes]
     _controls: list[Control]
@@ -33,30 +35,55 @@ class Restored(Told):
     _stand_at: Callable[[Point, bool], None]
     _tell_clock: Callable[[], None]
     _check_outside: Callable[[str], None]
+    _is_plain: Callable[[], bool]
 
     def state(self) -> State:
         """Return the present state with the integrator's history: what follows from it is the same, bit for bit."""
-        if self._failed is not None:
+        own = self.__dict__
+        if own["_failed"] is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
-        self.take_effect()
-        point, run = self._point, self._run
+        settings, point, run = own["_settings"], own["_point"], own["_run"]
+        if settings.waiting or settings.led:
+            self.take_effect()
+            point, run = own["_point"], own["_run"]
+        if not own["_equations"]:
+            own["_equations"] = equations_of(self._base)
+        if run.started and run.state.steps:
+            state = self._with_history(run, point)
+        else:
+            state = self._at_start(run, point)
+        if own["_controls"]:
+            held = {control.name: control.memory() for control in self._controls if control.remembers}
+            return replace(state, controllers=held) if held else state
+        return state
+
+    def _with_history(self, run: HeldRun, point: Point) -> State:
+        """Return the state at a point of a run that is under way."""
+        own, history = self.__dict__, run.history(self._equations, point)
+        held: Any = history.numbers
+        held.mark = len(own["_points"]), point
+        given = self._places_given() if own["_settings"].cells.size else None
+        return State.held(own["_base"], own["_names"], point[0], held, history, self._changed_integers(point[3]), given)
+
+    def _at_start(self, run: HeldRun, point: Point) -> State:
+        """Return the state where no step has been taken."""
         y, yp = point.y, point.yp
-        if not (run.options.check_start or run.state.steps):
+        if not run.options.check_start:
             # behind a jump of what motions prescribe: what has been told up to it is no start of what follows
             y, yp = self._landed()
-        if not self._equations:
-            self._equations = equations_of(self._base)
-        history = run.history(self._equations) if run.started else None
+        history = run.history(self._equations, point) if run.started else None
         tables = self._own_tables(point.idata, run.state.rdata)
-        # tables of integers change seldom, and are others then; to look through one takes a tenth of the rest
-        known = self._integers if self._integers[0] is point.idata else None
-        given = self._places_given()
-        state = State.of(self._base, point.t, y, yp, tables, history, integers=known and known[1], given=given)
-        if known is None:
+        known, given = self._changed_integers(point.idata), self._places_given()
+        return State.of(self._base, point.t, y, yp, tables, history, integers=known, given=given)
+
+    def _changed_integers(self, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return places and values of what differs from the model's integers; they change seldom, in another table."""
+        known = self.__dict__["_integers"]
+        if known[0] is not table:
             # past the look at names that are assigned
-            self.__dict__["_integers"] = point.idata, state.integers
-        held = {control.name: control.memory() for control in self._controls if control.remembers}
-        return replace(state, controllers=held) if held else state
+            known = table, changed_places(table[: len(self._base.idata)], self._base.idata)
+            self.__dict__["_integers"] = known
+        return known[1]
 
     def _landed(self) -> tuple[np.ndarray, np.ndarray]:
         """Return unknowns and rates with which the run goes on where velocities have jumped."""
@@ -105,11 +132,8 @@ class Restored(Told):
                 f"state: its model was assembled for t = {state.t_model:g} s, this one for {self._base.t0:g} s; "
                 "start both simulators at the same time"
             )
-        first, origin = self._own_point(state), (self._problem, self._origin)
-        if (first is not None or not self._records) and self._go_back(state):
-            if first is not None:
-                del self._points[first + 1 :]
-        else:
+        if not self._goes_back(state):
+            first, origin = self._own_point(state), (self._problem, self._origin)
             kept = self._points[: first + 1] if first is not None else []
             self._begin(state)
             if kept:
@@ -124,11 +148,14 @@ class Restored(Told):
                 control.go_back(self.t, state.controllers.get(control.name))
         elif self._unmet:
             self._unmet = []
+        self.__dict__["_plain"] = self._is_plain()
 
     def _take_given(self, state: State) -> None:
         """Let what belongs to a state be what has been set."""
-        self.__dict__["_given"] = state.reals[0]
-        self._settings.given.clear()
+        settings = self._settings
+        if settings.cells.size:
+            self.__dict__["_given"] = state.reals[0]
+            settings.given.clear()
 
     def _own_point(self, state: State) -> int | None:
         """Return which of the points a state is, or None."""
@@ -141,21 +168,33 @@ class Restored(Told):
             at += 1
         return None
 
-    def _go_back(self, state: State) -> bool:
-        """Go to a state of the present run in place, as a new run from it would; return whether it is one of it."""
-        history = state.history
-        if history is None or not state.is_own or history.equations != self._equations:
+    def _goes_back(self, state: State) -> bool:
+        """Go to a state of the present run in place, as a new run from it would, if it is one; return that."""
+        history, own = state.history, self.__dict__
+        if history is None or not state.is_own or history.equations != own["_equations"]:
             return False
-        if not self._run.go_back(history):
+        points, run, held = own["_points"], own["_run"], history.numbers
+        first = None
+        if own["_records"]:
+            count, point = getattr(held, "mark", (0, None))
+            # the very point, which is among the last ones mostly
+            first = count - 1 if 0 < count <= len(points) and points[count - 1] is point else self._own_point(state)
+            if first is None:
+                return False
+        place = run.go_back(history)
+        if place is None:
             return False
+        if first is not None:
+            del points[first + 1 :]
         self._tell_clock()
-        look = state.t if self._system.has_dropped_rows else np.inf
-        # past the look at names, as in `_stand_at`
-        self.__dict__.update(_failed=None, _passed=None, _counted={}, _since=state.t, _next_look=look)
-        self._settings.begin(self._run.state.rdata, state.t)
-        table = self._run.table
-        place = self._run.place(state.y, state.yp, keep=False)
-        self._stand_at(Point(state.t, *place, table, self._settings.held), False)
+        settings, t = own["_settings"], state.t
+        settings.begin(run.state.rdata, t)
+        own["_failed"] = own["_passed"] = own["_present"] = None
+        if own["_counted"]:
+            own["_counted"] = {}
+        own["_next_look"] = t if own["_system"].has_dropped_rows else np.inf
+        own["_since"] = own["t"] = t
+        own["_point"] = Point(t, place[0], place[1], run.table, settings.held)
         return True
 
     def __copy__(self) -> Any:

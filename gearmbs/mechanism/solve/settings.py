@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED, ON_LINE
+from gearmbs.dae.integrators.stepping.jumps import ON_LINE
 from gearmbs.dae.problem import INPUT, ModelError, Number, cells_of
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.wording import did_you_mean
@@ -49,9 +49,11 @@ class Settings:
         What has been set and has not taken effect: value and hold.
     given : set of str
         What has been set since it was last looked at, though to the value that it had.
-    plain : dict of str to ndarray of int
+    places : dict of str to ndarray of int
         Inputs that stand nowhere as integrals, and all their places among the cells: of the time before the
         coefficients, and the number of these.
+    plain : dict of str to (int, int)
+        The first of their places among all of ``places``, and how many there are.
     """
 
     def __init__(self, numbers: Mapping[str, Number], aliases: Mapping[str, str], parts: Mapping[str, Any]) -> None:
@@ -60,10 +62,15 @@ class Settings:
         # the same numbers where these cells alone are a table
         self._own = {name: number.moved_to(self.cells) for name, number in numbers.items()}
         self._inputs = [name for name, number in numbers.items() if number.kind == INPUT]
-        self.plain = {
+        self.places = {
             name: np.array([(place.at, place.size) for place in self._own[name].places])
             for name in self._inputs
             if not numbers[name].prescribes and all(p.size and p.order == 0 for p in numbers[name].places)
+        }
+        ends = np.cumsum([len(places) for places in self.places.values()]).tolist()
+        self.plain = {
+            name: (end - len(places), len(places))
+            for (name, places), end in zip(self.places.items(), ends, strict=True)
         }
         self.waiting: dict[str, tuple[float, int]] = {}
         self.given: set[str] = set()
@@ -72,8 +79,10 @@ class Settings:
 
     def begin(self, rdata: np.ndarray, t: float) -> None:
         """Take what stands in a table; lines end at its time, ``t``."""
-        self.held = rdata[self.cells]
         self.waiting.clear()
+        if not self.cells.size:
+            return
+        self.held = rdata[self.cells]
         self.led = {name: t for name in self._inputs if self._own[name].line(self.held, t)[1] != 0.0}
 
     def number(self, name: str) -> Number:
@@ -130,26 +139,6 @@ class Settings:
         led = [name for name, (_, hold) in self.waiting.items() if hold]
         led += [name for name, end in self.led.items() if end > t and name not in self.waiting]
         return led[0] if led else None
-
-    def plainly_set(self) -> tuple[str, np.ndarray, float, int] | None:
-        """Return name, places, value and hold if one of ``plain`` alone is waiting and no line of another may end."""
-        if len(self.waiting) != 1:
-            return None
-        name, (value, hold) = next(iter(self.waiting.items()))
-        places = self.plain.get(name)
-        if places is None or (self.led and (len(self.led) > 1 or name not in self.led)):
-            return None
-        return name, places, value, hold
-
-    def has_taken(self, name: str, end: float, code: int, held: np.ndarray) -> None:
-        """Note that it has taken effect, see `gearmbs.dae.integrators.stepping.jumps.steer`."""
-        self.waiting.clear()
-        if code & CHANGED:
-            self.held = held
-        if code & LED:
-            self.led[name] = end
-        elif self.led:
-            self.led.clear()
 
     def take(self, t: float, end: float) -> Change | None:
         """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""

@@ -16,6 +16,7 @@ from gearmbs._lazy import uncollected
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
+from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.model.system import settle_states
 from gearmbs.dae.problem import DAEProblem, ModelError, Number
@@ -172,6 +173,8 @@ class Simulator(Sampled, Restored):
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []
+        self._plain = False
+        """Whether nothing of Python has to be asked on the way."""
         self._inside = ""
         """Whose controller has been called and has not returned, or that a function in the equations has."""
         self._unmet: list[str] = []
@@ -189,6 +192,7 @@ class Simulator(Sampled, Restored):
         """Unknowns before jumps of velocities, by those behind them, of which states have been made."""
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
+        self._names = tuple(self._base.names)
         numbers, aliases = self._base.numbers, self._base.aliases
         self.numbers = MappingProxyType({**numbers} | {alias: numbers[name] for alias, name in aliases.items()})
         self._settings = Settings(numbers, aliases, {**mechanism.bodies, **mechanism.elements})
@@ -220,6 +224,7 @@ class Simulator(Sampled, Restored):
             self._run = HeldRun(problem, self.t_end, replace(options, check_start=options.check_start and not repair))
         nothing = np.empty((0, problem.n))
         cells = self._settings.cells
+        self._run.take_inputs(cells, list(self._settings.places.values()))
         held = (cells, np.empty((0, cells.size)))
         empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "", held=held)
         # lines end where a state is
@@ -260,6 +265,31 @@ class Simulator(Sampled, Restored):
             For a time that is no number, that lies behind or after the end, and where the integration fails: the
             simulator then stands where it stood, and can only be restored to an earlier state.
         """
+        own = self.__dict__
+        if own["_plain"] and type(t) is float and own["t"] < t <= own["t_end"] and own["_failed"] is None:
+            # as below, by one call of compiled code
+            settings = own["_settings"]
+            if settings.waiting or settings.led:
+                if t - own["t"] < RESOLVED * own["t_end"] or not self._steer(t):
+                    return self._advance(t, record)
+            run, keep = own["_run"], record and own["_records"]
+            rows, row, began = run.rows, run.row, perf_counter()
+            failure = run.go_to(t, keep)
+            own["_took"] += perf_counter() - began
+            if failure is not None:
+                self._fail(failure)
+            own["t"], own["_present"] = t, None
+            own["_point"] = point = new_point(Point, (t, rows, row, run.table, settings.held))
+            if keep:
+                own["_points"].append(point)
+            if t >= own["_next_look"]:
+                self._look(t)
+            return None
+        return self._advance(t, record)
+
+    def _advance(self, t: Any, record: bool) -> StopAt | None:
+        """Go on to a time with all that may stand in the way."""
+        own = self.__dict__
         if not (type(t) is float and self.t <= t <= self.t_end and self._failed is None and not self._inside):
             t = float(self._time(t))
         if self._unmet:
@@ -283,7 +313,11 @@ class Simulator(Sampled, Restored):
                 self._go_to(hit[0], record)
                 return self._stops[hit[1]]
             self._go_to(end, record and end == t)
+        own["_plain"] = self._is_plain()
         return None
+
+    def _is_plain(self) -> bool:
+        return not (self._controls or self._stops or self._functions or self._unmet)
 
     def _stay(self, record: bool) -> None:
         """Let the present time be a point of the solution if it is to be one and is none."""
@@ -327,11 +361,15 @@ class Simulator(Sampled, Restored):
         if keep:
             own["_points"].append(point)
         if t >= self._next_look:
-            self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
-            found = self._now().find_conflict(np.array([0]))
-            if found is not None:
-                self._failed = found
-                raise ModelError(found)
+            self._look(t)
+
+    def _look(self, t: float) -> None:
+        """Look whether rows that have been left out contradict the others."""
+        self._next_look = t + (self.t_end - self._problem.t0) / CONFLICT_SAMPLES
+        found = self._now().find_conflict(np.array([0]))
+        if found is not None:
+            self._failed = found
+            raise ModelError(found)
 
     def _run_to(self, t: float, keep: bool) -> None:
         """Take steps; the simulator itself stays where it stands."""
@@ -348,10 +386,13 @@ class Simulator(Sampled, Restored):
             failure = run.go_to(t, keep)
         own["_took"] += perf_counter() - began
         if failure is not None:
-            if failure[0] is Status.INTERRUPTED:
-                raise KeyboardInterrupt
-            self._failed = failure[1]
-            raise ModelError(failure[1])
+            self._fail(failure)
+
+    def _fail(self, failure: tuple[Status, str]) -> None:
+        if failure[0] is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        self._failed = failure[1]
+        raise ModelError(failure[1])
 
     def _check_outside(self, what: str) -> None:
         if self._inside:
@@ -427,7 +468,14 @@ class Simulator(Sampled, Restored):
             For a name that is not there, a value that is no number in its unit, and an input that would let a body
             jump: the position of a motion with ``hold=0``.
         """
-        self._settings.set(name, value, hold)
+        settings = self.__dict__["_settings"]
+        if type(name) is str and name in settings.plain and type(value) is float and value - value == 0.0:
+            if type(hold) is int and -1 < hold < 2:
+                # an input that only loads depend on takes any number
+                settings.waiting[name] = value, hold
+                settings.given.add(name)
+                return
+        settings.set(name, value, hold)
 
     def take_effect(self) -> None:
         """Let values that have been set take effect now, and not with the next :meth:`advance`.
@@ -484,15 +532,26 @@ class Simulator(Sampled, Restored):
     def _steer(self, end: float) -> bool:
         """Let what has been set take effect in one compiled call, where it is one input of loads; return that."""
         own = self.__dict__
-        settings, point, began = own["_settings"], own["_point"], perf_counter()
-        plain = settings.plainly_set()
-        if plain is None:
+        settings, waiting, led = own["_settings"], own["_settings"].waiting, own["_settings"].led
+        if len(waiting) != 1:
             return False
-        name, places, value, hold = plain
-        done = own["_run"].steer(point, places, value, end if hold else point[0], settings.cells)
+        ((name, (value, hold)),) = waiting.items()
+        places = settings.plain.get(name)
+        # and no line of another one may end
+        if places is None or (led and (len(led) > 1 or name not in led)):
+            return False
+        point, began = own["_point"], perf_counter()
+        done = own["_run"].steer(point, *places, value, end if hold else point[0], settings.held.size)
         if done is None:
             return False
-        settings.has_taken(name, end, *done)
+        waiting.clear()
+        code, held = done
+        if code & CHANGED:
+            settings.held = held
+        if code & LED:
+            led[name] = end
+        elif led:
+            led.clear()
         own["_took"] += perf_counter() - began
         return True
 

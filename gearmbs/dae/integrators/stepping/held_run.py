@@ -6,9 +6,12 @@ that was told all times ahead: what is asked does not change the steps.
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
+from weakref import ref
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,9 +21,18 @@ from gearmbs.dae.integrators.driver import FIRST_CHUNK, InterruptFlag, Run, Stal
 from gearmbs.dae.integrators.events import SAMPLES
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
-from gearmbs.dae.integrators.stepping.jumps import CHANGED, TERMS, pass_jump, steer
-from gearmbs.dae.integrators.stepping.memory import Held, LastStep, Layout, put_memory, value_in
-from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, reach, stand_behind
+from gearmbs.dae.integrators.stepping.jumps import CHANGED, TERMS, pass_jump
+from gearmbs.dae.integrators.stepping.memory import (
+    Held,
+    LastStep,
+    factor_words,
+    laid_out,
+    put_memory,
+    value_in,
+    words_of,
+)
+from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, stand_behind
+from gearmbs.dae.integrators.stepping.standing import Standing, go_on, pack, steer_on, unpack
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
@@ -122,15 +134,41 @@ class HeldRun(Run):
         self._jumped: tuple[int, float, Rows, int] | None = None
         """Steps, time and point behind which numbers of the equations have changed."""
         self._scratch = np.empty((TERMS + 3, problem.n))
-        self._pass_jump, self._steer = direct(pass_jump), direct(steer)
-        self.layout: Layout | None = None
+        self._pass_jump, self._go_on, self._steer_on = direct(pass_jump), direct(go_on), direct(steer_on)
+        self._pack, self._unpack = direct(pack), direct(unpack)
+        self.itself = ref(self)
         self.crossings: list[tuple[float, int]] = []
         """Times and events in the last step."""
-        self._advance, self._reach, self._part = address_of_advance(), direct(reach), self.algebraic.part
         self._errors = options.errors
+        self._watched = False
+        """Whether ``stall`` may have noted something."""
         self._make_rows()
+        self.layout, numbers = laid_out(self)
+        nothing = np.zeros(0, dtype=np.int64)
+        st, part = self.state, self.algebraic.part
+        self._standing = Standing(
+            state=ctypes.addressof(st), part=ctypes.addressof(part), advance=address_of_advance(), scalars=words_of(st),
+            part_scalars=words_of(part), numbers=numbers, factor_numbers=np.zeros(0), cells=nothing, places=nothing,
+            scratch=self._scratch,
+        )  # fmt: skip
+        self._at = ctypes.addressof(self._standing)
+        self._placed: Any = None
+        """The factors whose place is known."""
         if options.history is not None:
             self.put_back(options.history)
+
+    def take_inputs(self, cells: np.ndarray, places: Sequence[np.ndarray]) -> None:
+        """Take the cells of named numbers, and of each input that can be steered its places among them."""
+        self._standing.cells = cells
+        self._standing.places = np.concatenate([np.ravel(own) for own in places]) if places else cells[:0]
+
+    def _find_factors(self) -> None:
+        """Find the place of the factors, which pivots that are chosen anew change."""
+        plan, factors = self.plan, self.factors
+        if factors is not self._placed and factors is not None and plan is not None:
+            standing, self._placed = self._standing, factors
+            standing.plan, standing.factors = ctypes.addressof(plan), ctypes.addressof(factors)
+            standing.factor_numbers = factor_words(factors)
 
     # --- points -------------------------------------------------------------------------------------
 
@@ -168,6 +206,7 @@ class HeldRun(Run):
     def begin(self) -> tuple[Status, str] | None:
         """Begin as any run; from where velocities jump to what motions prescribe, events are behind that."""
         failure = super().begin()
+        self._find_factors()
         if failure is None and self.state.n_events and not self.options.check_start:
             self.state.g_old[:] = self.event_values()
         return failure
@@ -185,9 +224,7 @@ class HeldRun(Run):
         if self.started:
             if self.crossings and t > st.t:
                 self.crossings.clear()
-            code = self._reach(
-                self.functions, st, self._part, self.plan, self.factors, self._advance, t, row, self._look_at
-            )
+            code = self._go_on(self.functions, self._at, t, row, self._look_at)
         if code == REACHED and not self._errors:
             self.table = self.last_records.table
             if keep and row + 2 < self._count:
@@ -210,6 +247,8 @@ class HeldRun(Run):
             st.t_pause = np.nextafter(st.t, np.inf)
         with InterruptFlag() as interrupt:
             told = self._loop(interrupt)
+        self._find_factors()
+        self._watched = True
         # before the first step there are no factors
         self._look_at = 0 if self.stall.looking else st.steps + LOOK
         if told[0] < 0:
@@ -349,9 +388,9 @@ class HeldRun(Run):
             st.g_old[fired] = 0.0
 
     def steer(
-        self, point: tuple, places: np.ndarray, value: float, end: float, cells: np.ndarray
+        self, point: tuple, first: int, count: int, value: float, end: float, cells: int
     ) -> tuple[int, np.ndarray] | None:
-        """Do the same for an input that only loads depend on, see `jumps.steer`.
+        """Do the same for an input that only loads depend on, by its places, see `jumps.steer`.
 
         Returns
         -------
@@ -366,50 +405,78 @@ class HeldRun(Run):
         if told and not np.array_equal(self.last_step().idata, st.idata):
             return None
         t, rows, row = point[0], point[1], point[2]
-        values = np.empty(len(cells))
-        code = self._steer(
-            self.functions, st, self.plan, self.factors, t, rows.y[row], rows.yp[row], places, value, end, cells,
-            values, self._scratch,
-        )  # fmt: skip
+        values, at = np.empty(cells), row
+        if rows is not self.rows:
+            at = self._copied(rows, row)
+        code = self._steer_on(self.functions, self._at, t, at, first, count, value, end, values)
         if code & CHANGED:
             self._given, self._jumped = None, (steps, t, rows, row)
         return code, values
 
-    def history(self, equations: str) -> History:
-        """Return what the next steps of these equations depend on; a run that has not been started has nothing yet."""
-        st = self.state
-        given, jumped = self._given, self._jumped
-        told = self.last_records.changed_at == st.steps or (given and given[0] == st.steps)
-        told = told or (jumped and jumped[0] == st.steps)
-        held = Held(self, self.last_step() if told else None)
-        return History(self.options.method, held, self.plan, equations, self.options.tol)
+    def _copied(self, rows: Rows, row: int) -> int:
+        """Copy a point of earlier rows to where the next one is going to be written; return that row."""
+        at = self.row
+        self.rows.y[at], self.rows.yp[at] = rows.y[row], rows.yp[row]
+        return at
+
+    def history(self, equations: str, point: tuple) -> History:
+        """Return what the next steps of these equations depend on, at a point of the last step."""
+        steps, given, jumped = self.state.steps, self._given, self._jumped
+        told = self.last_records.changed_at == steps or (given and given[0] == steps)
+        told = told or (jumped and jumped[0] == steps)
+        row = point[2] if point[1] is self.rows else self._copied(point[1], point[2])
+        held = Held(self, row, self.last_step() if told else None)
+        return History.made(self.options.method, held, self.plan, equations, self.options.tol)
+
+    def pack(self, row: int, block: np.ndarray) -> None:
+        """Copy what the next steps depend on, and the point in a row."""
+        self._pack(self._at, row, block)
+
+    def unpack(self, row: int, order: int, block: np.ndarray) -> None:
+        """Put that back, and stand behind the last step, of an order, or 0 where it is given."""
+        self._find_factors()
+        self._unpack(self._at, row, order, block)
 
     def put_back(self, history: History) -> None:
         """Go on with a history; the tables are those of its state."""
         self.pivots, last = put_memory(self, history)
+        self._find_factors()
         self.last_records.forget_changes()
-        self._stand_behind(0, last)
+        direct(stand_behind)(self.state, 0)
+        self._stand_behind(last)
         self._find_crossings(float(self.problem.t0))
 
-    def go_back(self, history: History) -> bool:
-        """Go on with a history of this run, in place and with its tables; return whether it is one that can be."""
+    def go_back(self, history: History) -> tuple[Rows, int] | None:
+        """Go on with a history of this run, in place and with its tables, if it is one that can be.
+
+        Returns
+        -------
+        (Rows, int) or None
+            Where its point stands until the next but one.
+        """
         held = history.numbers
         if not (isinstance(held, Held) and held.belongs_to(self)):
-            return False
-        order = held.put_back(self)
+            return None
+        rows, row, given = self.rows, self.row, held.given
+        held.put_back(self, row)
         self.last_records.forget_changes(held.table)
-        self._stand_behind(order, held.given)
-        self.table = held.table if held.given is None else held.given.idata
-        self.crossings, self.state.n_crossings = list(held.crossings), 0
-        return True
+        self._stand_behind(given)
+        self.table = held.table if given is None else given.idata
+        if self.crossings or held.crossings:
+            self.crossings = held.crossings[:]
+        self.state.n_crossings = 0
+        self._stand(False)
+        return rows, row
 
-    def _stand_behind(self, order: int, last: LastStep | None) -> None:
-        """Stand behind the last step, of an order, or as it is given."""
-        st = self.state
-        direct(stand_behind)(st, order)
-        self._look_at = st.steps + LOOK
-        self.stall = StallWatch(st.steps, st.t)
-        self._given, self._jumped = None if last is None else (int(st.steps), last), None
+    def _stand_behind(self, last: LastStep | None) -> None:
+        """Stand behind the last step, which may be given."""
+        steps = self.state.steps
+        self._look_at = steps + LOOK
+        if self._watched:
+            self.stall, self._watched = StallWatch(steps, self.state.t), False
+        else:
+            self.stall.steps, self.stall.t = steps, self.state.t
+        self._given, self._jumped = None if last is None else (steps, last), None
 
     def last_step(self) -> LastStep:
         """Return the last step as values within it are told."""

@@ -42,15 +42,17 @@ OWN = {
     "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one", "entry_row", "entry_col", "idata",
     "rdata", "stops", "outputs", "y_out", "yp_out", "kept", "kept_out", "record_t", "record_h", "record_order",
     "record_y", "g_new", "g_between", "event_direction", "event_action", "crossing_t", "crossing_event", "crossing_y",
-    "watched", "w_error", "w_newton", "g_old", "event_left",
+    "watched", "w_error", "w_newton", "g_old", "event_left", "work",
 }  # fmt: skip
-"""Arrays of a run that are its own, or scratch, or follow from the state."""
+"""Arrays of a run that are its own, or follow from the state, or are scratch that is written before it is read."""
 ARRAYS = tuple(name for name in RunState.array_members if name not in OWN)
 TABLES = ("idata", "rdata", "g_old", "event_left")
 """Those among them that a run takes along where it goes back itself."""
 PART_SCALARS = ("factored", "t_start", "t_first", "t_last", "failures", "first_failure")
 PART_ARRAYS = ("lu", "scale", "pivots", "guess", "last", "known")
 FACTORS = tuple(LUFactors.array_members)
+WORD = 8
+"""Bytes of a word."""
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -105,96 +107,124 @@ class Continued(Remembers, Protocol):
 class Laid(Continued, Protocol):
     """The same, and where its arrays lie, found once."""
 
-    layout: Layout | None
+    layout: Layout
+    itself: ref
+    row: int
     crossings: list[tuple[float, int]]
     last_records: Any
 
+    def pack(self, row: int, block: np.ndarray) -> None:
+        """Copy its memory, see `standing.pack`."""
+
+    def unpack(self, row: int, order: int, block: np.ndarray) -> None:
+        """Put it back."""
+
 
 class Layout(NamedTuple):
-    """Shape, type and place of arrays of the state of a run among those that are copied, and of those of its part.
+    """Where the memory of a run stands in a block that is copied of it, see `standing.pack`.
 
     Attributes
     ----------
     arrays, part : dict of str to tuple
-    span : slice
-        What is copied of the memory in which all arrays stand.
-    scalars, part_scalars : int
-        Bytes of both structs before the places of their arrays.
+        Shape, type and place in bytes of arrays of its state, and shape and type of those of its part.
+    part_scalars, y, window, factors : int
+        First words of the scalars of the part, of the point, of the window's rows, and of the factors.
     """
 
     arrays: dict[str, tuple[tuple[int, ...], np.dtype, int]]
     part: dict[str, tuple[tuple[int, ...], np.dtype]]
-    span: slice
-    scalars: int
     part_scalars: int
+    y: int
+    window: int
+    factors: int
 
 
 class Held(Mapping[str, np.ndarray]):
     """What a run remembers, as its memory lay: copied in one go, and taken apart by name where somebody asks.
 
-    Copies of seventy arrays one by one take longer than some steps of a small model do.
-
     Parameters
     ----------
     run : HeldRun
         No step of it is open.
+    row : int
+        Where the point stands that this is a state of.
     given : LastStep or None
         Its last step where that cannot be told from its window.
+
+    Attributes
+    ----------
+    y, yp : ndarray
+        The point.
+    mark
+        What the owner of the run notes.
     """
 
-    def __init__(self, run: Laid, given: LastStep | None) -> None:
-        st, factors, part = run.state, run.factors, run.algebraic.part
+    mark: Any = (0, None)
+
+    def __init__(self, run: Laid, row: int, given: LastStep | None) -> None:
+        factors, st = run.factors, run.state
         assert factors is not None
         assert run.pivots is not None
-        self.layout = layout = run.layout or _layout(run)
-        self._run, self._plan, self._factors = ref(run), run.plan, factors
-        self._scalars = bytes(st)[: layout.scalars]
-        self._part_scalars = bytes(part)[: layout.part_scalars]
-        self._block, self._factor_block = _block(st.y)[layout.span].copy(), _block(factors.x).copy()
-        self._part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else []
-        self._counts, self._counted, self._pivots = (run.repivots, run.first_pivots), run.counted.copy(), run.pivots
+        self.layout = layout = run.layout
+        self._run, self._plan, self._factors = run.itself, run.plan, factors
+        n = st.y.shape[0]
+        self._block = block = np.empty(layout.factors + _block(factors.x).size // WORD)
+        run.pack(row, block)
+        first = layout.y
+        self.y, self.yp = block[first : first + n], block[first + n : first + 2 * n]
+        part = run.algebraic.part
+        self._part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else ()
+        self._counts, self._counted, self._pivots = (run.repivots, run.first_pivots), run.counted.tobytes(), run.pivots
         self._order = int(st.record_order[st.n_records - 1]) if given is None else 0
-        self.given, self.table, self.crossings = given, run.last_records.table, list(run.crossings)
+        self.given, self.table, self.crossings = given, run.last_records.table, run.crossings[:]
 
     def belongs_to(self, run: Continued) -> bool:
         """Whether it is of this very run."""
         return self._run() is run
 
-    def put_back(self, run: Laid) -> int:
-        """Let the run it is of remember what it did then; return the order of its last step, 0 where it is given."""
-        st, part, factors = run.state, run.algebraic.part, self._factors
-        run.plan, run.factors = self._plan, factors
-        ctypes.memmove(ctypes.addressof(st), self._scalars, self.layout.scalars)
-        ctypes.memmove(ctypes.addressof(part), self._part_scalars, self.layout.part_scalars)
-        _block(st.y)[self.layout.span] = self._block
-        _block(factors.x)[:] = self._factor_block
-        for name, array in zip(PART_ARRAYS, self._part_arrays, strict=False):
-            getattr(part, name)[...] = array
-        run.counted[:] = self._counted
+    def put_back(self, run: Laid, row: int) -> None:
+        """Let the run it is of remember what it did then, and keep the point in a row."""
+        run.plan, run.factors, run.pivots = self._plan, self._factors, self._pivots
         run.repivots, run.first_pivots = self._counts
-        run.pivots = self._pivots
-        return self._order
+        run.unpack(row, self._order, self._block)
+        for name, array in zip(PART_ARRAYS, self._part_arrays, strict=False):
+            getattr(run.algebraic.part, name)[...] = array
+        run.counted[:] = np.frombuffer(self._counted, dtype=bool)
+
+    @property
+    def rdata(self) -> np.ndarray:
+        """The table of numbers, a copy."""
+        return self._array("rdata")
 
     def _array(self, name: str) -> np.ndarray:
         """Return a copy of an array of the state of the run."""
         shape, kind, offset = self.layout.arrays[name]
         return np.ndarray(shape, kind, self._block, offset).copy()
 
+    def _window(self, newest: int) -> np.ndarray:
+        """Return the window, of which the rows in use have been copied."""
+        n, first = len(self.y), self.layout.window
+        window = np.zeros(WINDOW * n)
+        size = min(HISTORY, WINDOW - newest) * n
+        window[newest * n : newest * n + size] = self._block[first : first + size]
+        return window
+
     def _last(self, newest: int) -> LastStep:
         """Return the last step, from the window."""
         if self.given is not None:
             return self.given
-        n, count = self.layout.arrays["y"][0][0], self._order + 1
-        rows = self._array("window_y")[newest * n : (newest + count) * n].reshape(count, n)
+        n, count = len(self.y), self._order + 1
+        rows = self._window(newest)[newest * n : (newest + count) * n].reshape(count, n)
         nodes = self._array("window_t")[newest : newest + count]
         return LastStep(nodes, rows, self._array("y"), self._array("yp"), self._array("idata"))
 
     @cached_property
     def _numbers(self) -> dict[str, np.ndarray]:
         # only scalars are read
+        first = self.layout.part_scalars
         st, part = (
-            kind.from_buffer_copy(scalars.ljust(ctypes.sizeof(kind), b"\0"))
-            for kind, scalars in ((RunState, self._scalars), (AlgebraicPart, self._part_scalars))
+            kind.from_buffer_copy(scalars.tobytes().ljust(ctypes.sizeof(kind), b"\0"))
+            for kind, scalars in ((RunState, self._block[:first]), (AlgebraicPart, self._block[first : self.layout.y]))
         )
         last, pivots, idata = self._last(st.newest), self._pivots, self._array("idata")
         factors, start = self._factors, _address(_block(self._factors.x))
@@ -202,19 +232,21 @@ class Held(Mapping[str, np.ndarray]):
             "run": np.array([getattr(st, name) for name in SCALARS], dtype=float),
             "part": np.array([getattr(part, name) for name in PART_SCALARS], dtype=float),
             "counts": np.array(self._counts),
-            "counted": self._counted,
+            "counted": np.frombuffer(self._counted, dtype=bool).copy(),
             "pivots": np.array([pivots.drop, pivots.negligible]),
             "pivots matrix": pivots.matrix,
             "pivots counted": np.zeros(0, dtype=bool) if pivots.counted is None else pivots.counted,
+            "run window_y": self._window(st.newest),
         }
-        numbers |= {f"run {name}": self._array(name) for name in ARRAYS}
+        numbers |= {f"run {name}": self._array(name) for name in ARRAYS if name != "window_y"}
         numbers |= {f"part {name}": array for name, array in zip(PART_ARRAYS, self._part_arrays, strict=False)}
         if not self._part_arrays:
             numbers |= {f"part {name}": np.zeros(shape, kind) for name, (shape, kind) in self.layout.part.items()}
         for name in FACTORS:
             array = getattr(factors, name)
             offset = _address(array) - start if array.size else 0
-            numbers[f"factors {name}"] = np.ndarray(array.shape, array.dtype, self._factor_block, offset).copy()
+            place = WORD * self.layout.factors + offset
+            numbers[f"factors {name}"] = np.ndarray(array.shape, array.dtype, self._block, place).copy()
         numbers |= {"last nodes": last.nodes, "last rows": last.rows, "last y": last.y, "last yp": last.yp}
         changed = np.flatnonzero(last.idata != idata)
         return numbers | {"table at": changed, "table": idata[changed]}
@@ -243,24 +275,40 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]
 
 
-def _layout(run: Laid) -> Layout:
-    """Return where the arrays of a run lie that are copied, and keep it there."""
+def words_of(struct: Any) -> np.ndarray:
+    """Return the scalars of a struct as words, to be written to."""
+    return np.frombuffer(struct, dtype=float, count=getattr(type(struct), "words:").offset // WORD)
+
+
+def factor_words(factors: LUFactors) -> np.ndarray:
+    """Return the numbers of factors as words."""
+    block = _block(factors.x)
+    return block[: block.size // WORD * WORD].view(float)
+
+
+def laid_out(run: Remembers) -> tuple[Layout, np.ndarray]:
+    """Return where the memory of a run stands in what is copied of it, and its arrays behind the window as words."""
     st, part = run.state, run.algebraic.part
     block = _block(st.y)
-    start, places = _address(block), {}
-    for name in (*ARRAYS, *TABLES):
-        array = getattr(st, name)
-        assert array.base is block
-        places[name] = array.shape, array.dtype, _address(array) - start, array.nbytes
-    first = min(offset for *_, offset, _ in places.values())
-    last = max(offset + size for *_, offset, size in places.values())
-    run.layout = Layout(
-        {name: (shape, kind, offset - first) for name, (shape, kind, offset, _) in places.items()},
-        {name: (getattr(part, name).shape, getattr(part, name).dtype) for name in PART_ARRAYS},
-        slice(first, last),
-        *(getattr(type(struct), "words:").offset for struct in (st, part)),
-    )
-    return run.layout
+    start, n = _address(block), st.y.shape[0]
+    taken = [getattr(st, name) for name in (*ARRAYS, *TABLES)]
+    assert all(array.base is block for array in taken)
+    behind = [array for array in taken if array is not st.window_t and array is not st.window_y]
+    first = min(_address(array) for array in behind) - start
+    last = max(_address(array) + array.nbytes for array in behind) - start
+    numbers = block[first : first - (first - last) // WORD * WORD].view(float)
+    scalars = words_of(st).size
+    y = scalars + words_of(part).size
+    window_t = y + 2 * n
+    window = window_t + st.window_t.size
+    own = window + HISTORY * n
+    arrays = {}
+    for name, array in zip((*ARRAYS, *TABLES), taken, strict=True):
+        if array is not st.window_y:
+            place = WORD * window_t if array is st.window_t else WORD * own + _address(array) - start - first
+            arrays[name] = array.shape, array.dtype, place
+    of_part = {name: (getattr(part, name).shape, getattr(part, name).dtype) for name in PART_ARRAYS}
+    return Layout(arrays, of_part, scalars, y, window, own + numbers.size), numbers
 
 
 def put_memory(run: Remembers, history: History) -> tuple[Pivots, LastStep]:

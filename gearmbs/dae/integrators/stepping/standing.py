@@ -1,0 +1,173 @@
+"""Where a held run lies in memory, for kernels that are handed one number, and what of it a state takes along.
+
+What is copied for a state are a few stretches of memory, one behind the other, see `pack`: seventy arrays one by one
+would take longer than some steps of a small model do.
+"""
+
+from __future__ import annotations
+
+from numba import float64, int64, types
+
+from gearmbs.dae.integrators.algebraic.part import PART_TYPE
+from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.run_state import STATE_TYPE, WINDOW, copy
+from gearmbs.dae.integrators.stepping.jumps import steer
+from gearmbs.dae.integrators.stepping.reach import reach, stand_behind
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
+from gearmbs.kernels.bound import FUNCTIONS_TYPE
+from gearmbs.kernels.jit import njit
+from gearmbs.kernels.placed import struct_at
+from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
+from gearmbs.kernels.views import matrix_at, vector_at
+
+
+class Standing(Struct):
+    """Addresses of the structs of a run, and its memory as stretches of 64-bit words.
+
+    Attributes
+    ----------
+    scalars, part_scalars : ndarray
+        Those of the state, and of the part that is solved at an instant.
+    numbers : ndarray
+        Arrays of the state that a continuation needs, behind the window.
+    factor_numbers : ndarray
+        Those of the factors.
+    cells : ndarray of int
+        Places of named numbers in the table of numbers.
+    places : ndarray of int, shape (2 p,)
+        Places of inputs among the cells: of the time before the coefficients, and the number of these.
+    scratch : ndarray
+        See `gearmbs.dae.integrators.stepping.jumps.pass_jump`.
+    """
+
+    state: int
+    part: int
+    plan: int
+    factors: int
+    advance: int
+    scalars: Vector
+    part_scalars: Vector
+    numbers: Vector
+    factor_numbers: Vector
+    cells: IntVector
+    places: IntVector
+    scratch: Matrix
+
+
+standing_at = struct_at(Standing.numba_type)
+state_at = struct_at(STATE_TYPE)
+part_at = struct_at(PART_TYPE)
+plan_at = struct_at(PLAN_TYPE)
+factors_at = struct_at(FACTORS_TYPE)
+
+_VEC = float64[::1]
+
+
+@njit(
+    int64(FUNCTIONS_TYPE, int64, float64, int64, int64),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def go_on(bound, standing, t, row, last):
+    """Go on to ``t`` as `reach` does, for a run whose `Standing` is at an address."""
+    own = standing_at(standing)
+    return reach(
+        bound,
+        state_at(own.state),
+        part_at(own.part),
+        plan_at(own.plan),
+        factors_at(own.factors),
+        own.advance,
+        t,
+        row,
+        last,
+    )
+
+
+@njit(
+    int64(FUNCTIONS_TYPE, int64, float64, int64, int64, int64, float64, float64, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def steer_on(bound, standing, t, row, first, count, value, end, values):
+    """Steer as `steer` does, at the point in a row, by the ``count`` places from the ``first`` on."""
+    own = standing_at(standing)
+    st = state_at(own.state)
+    return steer(
+        bound,
+        st,
+        plan_at(own.plan),
+        factors_at(own.factors),
+        t,
+        st.y_out[row],
+        st.yp_out[row],
+        matrix_at(own.places, 2 * first, count, 2),
+        value,
+        end,
+        own.cells,
+        values,
+        own.scratch,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _stretch(block, first, size):
+    return vector_at(block, first, size)
+
+
+@njit(types.void(int64, int64, _VEC), cache=True, nogil=True, error_model="numpy")
+def pack(standing, row, block):
+    """Write what a continuation needs one behind the other.
+
+    Parameters
+    ----------
+    standing : int
+        Address of a `Standing`; no step is open.
+    row : int
+        Where the point stands that the state is one of.
+    block : ndarray
+        See `stretches`.
+    """
+    own = standing_at(standing)
+    st = state_at(own.state)
+    n, k = st.y.shape[0], 0
+    for part in (own.scalars, own.part_scalars, st.y_out[row], st.yp_out[row], st.window_t):
+        copy(part, _stretch(block, k, part.shape[0]))
+        k += part.shape[0]
+    size = min(HISTORY, WINDOW - st.newest) * n
+    copy(vector_at(st.window_y, st.newest * n, size), _stretch(block, k, size))
+    k += HISTORY * n
+    for part in (own.numbers, own.factor_numbers):
+        copy(part, _stretch(block, k, part.shape[0]))
+        k += part.shape[0]
+
+
+@njit(types.void(int64, int64, int64, _VEC), cache=True, nogil=True, error_model="numpy")
+def unpack(standing, row, order, block):
+    """Let a run be as it was when it was packed, stand behind its last step, and keep the point in a row.
+
+    Parameters
+    ----------
+    standing, row, block
+        As of `pack`.
+    order : int
+        See `stand_behind`.
+    """
+    own = standing_at(standing)
+    st = state_at(own.state)
+    n, k = st.y.shape[0], 0
+    for part in (own.scalars, own.part_scalars, st.y_out[row], st.yp_out[row], st.window_t):
+        copy(_stretch(block, k, part.shape[0]), part)
+        k += part.shape[0]
+    size = min(HISTORY, WINDOW - st.newest) * n
+    copy(_stretch(block, k, size), vector_at(st.window_y, st.newest * n, size))
+    k += HISTORY * n
+    for part in (own.numbers, own.factor_numbers):
+        copy(_stretch(block, k, part.shape[0]), part)
+        k += part.shape[0]
+    stand_behind(st, order)
+    for c in range(st.kept.shape[0]):
+        st.kept_out[row, c] = st.rdata[st.kept[c]]
