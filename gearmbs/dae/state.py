@@ -316,8 +316,8 @@ class State:
         ----------
         values : mapping of str to float
             Unknowns by their names, SI: positions, velocities and states of a mechanism, from which momenta,
-            multipliers and loads follow. Values that leave constraints open by more than a little are refused where the
-            run starts.
+            multipliers and loads follow. Values that leave constraints open by more than a little are refused by
+            whoever starts from it: `Simulator.restore`, ``initial=``.
 
         Raises
         ------

@@ -378,13 +378,16 @@ class Drivetrain:
         -----
         UserWarning
             Of drives that cannot carry the loads, of loads by points whose curve leaves them by far or is asked beyond
-            them, of torques on shafts whose speed is prescribed, and of shafts that are counted twice in wheels without
-            a bore.
+            them, of torques on shafts whose speed is prescribed, of torques of a running train that do not begin
+            together, and of shafts that are counted twice in wheels without a bore.
         """
         from gearmbs.drivetrain.build import build
         from gearmbs.drivetrain.kinematics import warn_of_lost_torques, warn_of_tables, warn_of_weak_drives
+        from gearmbs.drivetrain.loads import warn_of_drift
 
         warn_of_tables(self)
+        if self.running:
+            warn_of_drift(self.drives, self.loads, self.run_up)
         warn_of_weak_drives(self)
         warn_of_lost_torques(self)
         return build(self)

@@ -16,8 +16,10 @@ from gearmbs.drivetrain.part import Attached, Part, errors_named, fixed_value, o
 from gearmbs.drivetrain.torque_element import LOST, OWN, ShaftTorque, mean_of_curve, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
+from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.schema.quantities import Measure, OneOf, OverTime
 from gearmbs.units import Quantity
+from gearmbs.wording import warn
 
 Resistance = Annotated[Quantity, Measure("torque", 0)]
 Viscous = Annotated[Quantity, Measure("N*m*s/rad", 0)]
@@ -370,3 +372,29 @@ class TableLoad(Load):
 
 LOADS: dict[str, type[Load]] = {kind.kind: kind for kind in (TorqueLoad, Pump, Brake, Fan, Drag, TableLoad)}
 """Loads by their ``kind``."""
+
+
+def warn_of_drift(drives: Sequence[Any], loads: Sequence[Any], run_up: float) -> None:
+    """Warn of torques of a running drivetrain that balance each other and do not begin together.
+
+    A number comes on over the run-up, an input acts from the start. Nothing is said where a drive holds the speed.
+
+    Warns
+    -----
+    UserWarning
+        With a torque of either kind and the remedy.
+    """
+    if any(drive.kind != "torque" for drive in drives):
+        return
+    parts = [part for part in (*drives, *loads) if part.kind == "torque"]
+    inputs = [part for part in parts if isinstance(part.torque, Input) and part.torque.start != 0.0]
+    numbers = [part for part in parts if fixed_value(part.torque, "torque")]
+    if not (inputs and numbers):
+        return
+    early, late = inputs[0], numbers[0]
+    size = fixed_value(late.torque, "torque")
+    warn(
+        f"{late.label}: its torque of {size:.5g} N m comes on over run_up = {run_up:g} s, that of {early.label}, "
+        f"the input {early.torque.name!r} of {early.torque.start:.5g} N m, acts from the start: the running train "
+        f"drifts from its speed; let both be inputs, torque=make_input({late.name!r}, 'N m', {size:g}), or both numbers"
+    )

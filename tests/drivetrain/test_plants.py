@@ -207,3 +207,34 @@ def test_transmission_error_under_load_counts_from_before_it():
     plant = train.linearize([("torque", "out")], [("transmission_error", "stage")])
     curve = loaded_transmission_error(train.pairs["stage"], torque=300.0, points=40).error
     assert curve.min() * (1.0 - 1e-3) < plant.point.outputs[0] < curve.max() * (1.0 + 1e-3)
+
+
+def running(torque, load):
+    """Return the stage at its speed, with its flanks on each other, under a drive's and a load's torque."""
+    train = stage()
+    motor = TorqueDrive(name="motor", shaft="in", speed="1500 rpm", torque=torque)
+    brake = TorqueLoad(name="brake", shaft="out", torque=load)
+    return train.of_same_bodies(drives=[motor], loads=[brake], running=True)
+
+
+def drift(train: Drivetrain) -> float:
+    """Return by how much the pinion is off its speed at the end of the run-up, as a part of it."""
+    speed = train.build().simulate(train.run_up, rate=1000.0, tol=1e-6).angular_velocity("in")[:, 2]
+    return float(abs(speed[-1] / speed[0] - 1.0))
+
+
+def test_a_running_train_whose_torques_do_not_begin_together_is_told_of():
+    """A number comes on over the run-up, an input acts from the start; of one kind only flank friction slows it."""
+    drive, brake = make_input("drive", "N m", 100.0), make_input("braking", "N m", 300.0)
+    mixed = [(running(drive, 300.0), "brake", "300 N m"), (running(100.0, brake), "motor", "100 N m")]
+    for train, late, size in mixed:
+        with pytest.warns(UserWarning, match=says(f"'{late}'", size, "run_up", "make_input")):
+            moved = drift(train)
+        assert moved > 5.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert drift(running(drive, brake)) < 0.2
+        assert drift(running(100.0, 300.0)) < 0.2
+        # what is not there yet balances nothing
+        running(make_input("later", "N m", 0.0), 300.0).build()
+        stage().build()

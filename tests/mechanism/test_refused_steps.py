@@ -13,6 +13,7 @@ from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.solve.simulate import StopAt
 from gearmbs.studies import Case, case_mechanism
 from tests.mechanism.test_setting import PERIOD, PI, disc, driven, two_discs
+from tests.mechanism.test_stepping import slider_crank
 from tests.says import says
 
 
@@ -265,3 +266,43 @@ def test_what_goes_by_two_names_is_listed_under_both_and_what_needs_another_mode
     for name in ("gears.teeth", "mesh.backlash", "operation.speed"):
         with pytest.raises(ModelError, match=says(name, "another mechanism")):
             sim.set(name, 1.0)
+
+
+def test_states_whose_values_contradict_each_other_are_refused_where_they_are_restored():
+    """By the joint that they leave open, and the simulation goes on from where it stood; small ones are closed."""
+    sim = gm.Simulator(slider_crank(), 1.0)
+    sim.advance(0.2)
+    state = sim.state()
+    sim.advance(0.3)
+    before, points = sim.state(), len(sim.solution().t)
+    for change in ({"R_x(rod)": 0.05}, {"u_x(rod)": 5.0}):
+        ((name, by),) = change.items()
+        with pytest.raises(ModelError, match=says("restore", name, "coincident x")):
+            sim.restore(state.changed({name: state[name] + by}))
+        assert sim.t == 0.3
+        assert len(sim.solution().t) == points
+    sim.advance(0.4)
+    gone = sim.state()
+    sim.restore(before)
+    sim.advance(0.4)
+    np.testing.assert_array_equal(sim.state().y, gone.y)
+    sim.restore(state.changed({"R_x(rod)": state["R_x(rod)"] + 1e-5}))
+    sim.advance(0.4)
+    assert sim.state()["R_x(rod)"] == pytest.approx(gone["R_x(rod)"], abs=1e-4)
+
+
+def test_a_state_of_another_prescribed_speed_is_gone_on_from_with_what_is_set():
+    """The speed that a motion asks for may be set after the state is restored: bodies take it up at once."""
+    m = Mechanism("disc")
+    disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    m.rotation("drive", pin, m.input("speed", "rad/s", 1.0), level="velocity")
+    sim = gm.Simulator(m, 1.0)
+    sim.advance(0.1)
+    state = sim.state()
+    name = next(name for name in state.names if name.startswith("eps_") and abs(state[name]) > 0.5)
+    sim.restore(state.changed({name: 3.0 * state[name]}))
+    sim.set("speed", 3.0)
+    sim.advance(0.2)
+    assert sim.get("angular_velocity", "disc")[2] == pytest.approx(3.0)
+    assert sim.get("joint_angle", "pin") == pytest.approx(0.4, abs=1e-6)

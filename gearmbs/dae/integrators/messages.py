@@ -102,11 +102,18 @@ def _list_indices(rows: np.ndarray) -> str:
     return shown + (", ..." if len(rows) > NAMES_SHOWN else "")
 
 
+def _of_constraint(problem: DAEProblem, row: int) -> str:
+    """Return the name of the constraint that an equation is, "" for another one."""
+    name = problem.names[row] if row < len(problem.names) else ""
+    kind, opened, rest = name.partition("(")
+    return f", '{rest[:-1]}'," if kind in ("lambda", "mu") and opened and rest.endswith(")") else ""
+
+
 def inconsistent(problem: DAEProblem, t: float, worst: int, row: int, jump: float) -> str:
     """Explain initial values that do not satisfy the equations."""
     return (
         f"{Status.INCONSISTENT_START.sentence} At t = {t:.9g} {unknown_name(problem, worst)} would have to jump by "
-        f"about {jump:.3g} in the first instant; equation {row} is violated most. "
+        f"about {jump:.3g} in the first instant; equation {row}{_of_constraint(problem, row)} is violated most. "
         f"{advice(problem, Status.INCONSISTENT_START)}"
     )
 

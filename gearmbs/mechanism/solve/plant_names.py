@@ -14,6 +14,7 @@ from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.inputs import Input, Output
 from gearmbs.mechanism.parts.joints import JOINTS, Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody, centre_marker
+from gearmbs.mechanism.solve.plant_accelerations import Acceleration
 from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
@@ -80,15 +81,6 @@ class Given:
         place = self.element if self.kind == "transmission_error" else self.joints[0]
         others = LEVELS[self.level + 1 :] or LEVELS[-1:]
         return f"give ({self.kind!r}, {getattr(place, 'name', '')!r}, {any_of(map(repr, others))})"
-
-
-@dataclass(frozen=True)
-class Acceleration:
-    """An acceleration that an output asks for, by the names of the states that stand for its components."""
-
-    marker: Marker
-    angular: bool
-    labels: tuple[str, str, str]
 
 
 @dataclass(frozen=True)
@@ -319,17 +311,17 @@ class PlantNames:
         k = "XYZ".index(name[3])
         if along is None:
             return parts[k]
+        if isinstance(along.body, ModalBody):
+            raise ModelError(
+                f"output {text!r}: its components are along axes of '{along.name}' on '{along.body.name}', which "
+                "deforms; take axes of a rigid body or of the ground"
+            )
         place = along.position + along.orientation[:, k]
         tip = own_marker(along.body, f"{along.name} plant tip {k}", along.body.marker, place)
         shown = [f'D{c}("{tip.name}", "{along.name}")' for c in "XYZ"]
         return f"({' + '.join(f'{part}*{cosine}' for part, cosine in zip(parts, shown, strict=True))})"
 
     def _acceleration(self, marker: Marker, angular: bool) -> Acceleration:
-        if isinstance(marker.body, ModalBody):
-            raise ModelError(
-                f"the acceleration of '{marker.name}' on '{marker.body.name}', which deforms, is no output of a plant; "
-                "take its velocity and multiply by s, or measure at a rigid body"
-            )
         key = id(marker), angular
         if key not in self._held:
             labels = tuple(f"plant acceleration {len(self._held)} {c}" for c in AXES)
@@ -554,4 +546,4 @@ def _first_call(text: str, beginnings: Collection[str]) -> tuple[int, int, str] 
     return None
 
 
-__all__ = ["LEVELS", "Acceleration", "Given", "PlantNames", "Told", "has_phase"]
+__all__ = ["LEVELS", "Given", "PlantNames", "Told", "has_phase"]

@@ -5,25 +5,25 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.dae.analyses.coordinates import chosen, spatial
+from gearmbs.dae.analyses.coordinates import chosen
 from gearmbs.dae.analyses.kinematics import Instant
-from gearmbs.dae.analyses.linearisation import Inputs, Reduced, reduce, warn_of_varying
-from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, Realised, lowered, poles_of, realised
+from gearmbs.dae.analyses.linearisation import Inputs, reduce, warn_of_varying
+from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, lowered, poles_of, realised
 from gearmbs.dae.analyses.response import response_of
-from gearmbs.dae.analyses.turning import skew, turning
-from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.analyses.turning import turning
+from gearmbs.dae.equations.rotation import POSE_W
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.checks import check_mechanism, warn_of_stiff_seats
-from gearmbs.mechanism.parts.bodies import Marker, markers_kept
+from gearmbs.mechanism.parts.bodies import markers_kept
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
-from gearmbs.mechanism.solve.plant_names import LEVELS, Acceleration, Given, PlantNames, Told, has_phase
+from gearmbs.mechanism.solve.plant_accelerations import Frame, changed_acceleration, frame_of, told_accelerations
+from gearmbs.mechanism.solve.plant_names import LEVELS, Given, PlantNames, Told, has_phase
 from gearmbs.mechanism.solve.points import instant_at, joint_coordinates, point_of, turns_of
 from gearmbs.progress import waiting
 from gearmbs.wording import warn
@@ -130,43 +130,14 @@ def linearize(
         if isinstance(at, Solution) and (more := turns_of(at, point, instant)):
             whole.turns |= more
             instant = instant_at(whole, point)
-        held = _held(instant, told)
+        wanted = [acceleration for one in told for acceleration in one.accelerations]
+        held = told_accelerations(whole.bodies.values(), instant, wanted)
         if held:
             # expressions look at the accelerations of the operating point
             for state, value in held.items():
                 instant.y[instant.at["z"] + instant.system.state_names.index(state)] = value
             instant.y = instant.settle(instant.y)
         return _plant(whole, instant, given, told, point.state)
-
-
-@dataclass
-class _Frame:
-    """Where a marker of a body is at an instant, global components; the ground has the body -1.
-
-    Attributes
-    ----------
-    body : int
-    place, arm : ndarray, shape (3,)
-        Origin, and origin from the centre of mass, m.
-    axes : ndarray, shape (3, 3)
-    """
-
-    body: int
-    place: np.ndarray
-    arm: np.ndarray
-    axes: np.ndarray
-
-
-def _frame(instant: Instant, marker: Marker | None) -> _Frame:
-    assert marker is not None
-    body = marker.body
-    if body.is_ground:
-        return _Frame(-1, marker.position, np.zeros(3), marker.orientation)
-    number = instant.system.body_names.index(body.name)
-    row = instant.pose()[number]
-    axes = row[POSE_A:POSE_V].reshape(3, 3)
-    arm = axes @ (marker.position - body.com)
-    return _Frame(number, row[POSE_R:POSE_A] + arm, arm, axes @ marker.orientation)
 
 
 class _Columns:
@@ -197,14 +168,14 @@ class _Columns:
 
     def _wrench(self, given: Given, value: np.ndarray) -> None:
         """Write what a force or torque of one does: on the body of I at its origin, the opposite on J's body there."""
-        i = _frame(self.instant, given.i)
-        direction = np.eye(3)[given.axis] if given.j is None else _frame(self.instant, given.j).axes[:, 2]
+        i = frame_of(self.instant, given.i)
+        direction = np.eye(3)[given.axis] if given.j is None else frame_of(self.instant, given.j).axes[:, 2]
         self._push(value, i, i.place, direction, given.kind == "torque", 1.0)
         if given.j is not None:
-            self._push(value, _frame(self.instant, given.j), i.place, direction, given.kind == "torque", -1.0)
+            self._push(value, frame_of(self.instant, given.j), i.place, direction, given.kind == "torque", -1.0)
 
     def _push(
-        self, value: np.ndarray, frame: _Frame, place: np.ndarray, direction: np.ndarray, torque: bool, sign: float
+        self, value: np.ndarray, frame: Frame, place: np.ndarray, direction: np.ndarray, torque: bool, sign: float
     ) -> None:
         if frame.body < 0:
             return
@@ -251,11 +222,11 @@ class _Columns:
             return
         # a turn of I about z_J by what the motion asks for leaves its constraint satisfied
         term = row.terms[0]
-        i, j = _frame(self.instant, term.i), _frame(self.instant, term.j)
+        i, j = frame_of(self.instant, term.i), frame_of(self.instant, term.j)
         moved = self._turned(i, j.axes[:, 2]) if i.body >= 0 else -self._turned(j, j.axes[:, 2])
         value[place] = -float((self.matrix[[place]] @ moved)[0])
 
-    def _turned(self, frame: _Frame, axis: np.ndarray) -> np.ndarray:
+    def _turned(self, frame: Frame, axis: np.ndarray) -> np.ndarray:
         """Return the change of y by a small rotation of a body about an axis through a point fixed in it."""
         out = np.zeros(self.instant.y.size)
         at, start = self.instant.at, self.angle[frame.body]
@@ -269,7 +240,7 @@ class _Columns:
         The force sees the frame of this wheel turned by -u/r about its axis z, at a rate that is fixed in the body.
         """
         instant, element = self.instant, given.element
-        j = _frame(instant, element.j)
+        j = frame_of(instant, element.j)
         if j.body < 0 or self.angle[j.body] < 0:
             raise ModelError(f"input {given.name!r}: the second wheel of '{element.name}' is fixed; give another mesh")
         axis = j.axes[:, 2]
@@ -318,23 +289,6 @@ def _with_outputs(mechanism: Mechanism, names: PlantNames, outputs: Sequence[Any
     return whole, told
 
 
-def _held(instant: Instant, told: Sequence[Told]) -> dict[str, float]:
-    """Return the accelerations that outputs ask for, by the names of the states that stand for them."""
-    asked = [acceleration for one in told for acceleration in one.accelerations]
-    if not asked:
-        return {}
-    acc = instant.system.accelerations(instant.configuration(), instant.t)[0]
-    found: dict[str, float] = {}
-    for one in asked:
-        frame = _frame(instant, one.marker)
-        alpha, spin = acc[frame.body, 3:6], instant.pose()[frame.body, POSE_W:]
-        vector = alpha if one.angular else acc[frame.body, 0:3] + np.cross(alpha, frame.arm)
-        if not one.angular:
-            vector = vector + np.cross(spin, np.cross(spin, frame.arm))
-        found.update(zip(one.labels, vector.tolist(), strict=True))
-    return found
-
-
 def _plant(
     mechanism: Mechanism, instant: Instant, given: Sequence[Given], told: Sequence[Told], state: Any
 ) -> LinearPlant:
@@ -359,7 +313,12 @@ def _plant(
     own = np.array([k for k in range(len(names)) if k not in outputs and k not in held], dtype=int)
     found = realised(reduced, own, np.array(outputs, dtype=int), np.zeros(0, dtype=int))
     if held:
-        rows = np.array([_acceleration(instant, reduced, found, one)[c] for one, c in held.values()])
+        rows = np.array(
+            [
+                changed_acceleration(mechanism.bodies.values(), instant, reduced, found, one)[c]
+                for one, c in held.values()
+            ]
+        )
         found.outputs = found.outputs + reduced.state_state[np.ix_(outputs, list(held))] @ rows
     asked = [Asked(one.name, one.unit, one.level, remedy=one.remedy) for one in given]
     labels = [one.name for one in told]
@@ -402,7 +361,7 @@ def _warn_of_running_teeth(mechanism: Mechanism, instant: Instant) -> None:
     running = []
     for name, element in mechanism.elements.items():
         if has_phase(element):
-            frames = [_frame(instant, marker) for marker in element.markers]
+            frames = [frame_of(instant, marker) for marker in element.markers]
             spins = [abs(instant.pose()[one.body, POSE_W:] @ one.axes[:, 2]) for one in frames if one.body >= 0]
             if max(spins, default=0.0) > TURNS:
                 running.append(f"{name!r} (at {max(spins):.4g} rad/s)")
@@ -419,31 +378,3 @@ def _value(instant: Instant, given: Given) -> float:
     """Return the value of an input of the mechanism; what is added to it else is 0."""
     number = instant.problem.numbers.get(given.name) if given.kind == "input" else None
     return 0.0 if number is None else number.value(instant.rdata, instant.t)
-
-
-def _spatial(instant: Instant, reduced: Reduced, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return displacements and small rotations in global components of all bodies, (bodies, 3, k), from coordinates."""
-    bodies = len(instant.system.body_names)
-    moved, turned = np.split(spatial(instant, reduced.turning, changes)[: 6 * bodies], 2)
-    return moved.reshape(bodies, 3, -1), turned.reshape(bodies, 3, -1)
-
-
-def _acceleration(instant: Instant, reduced: Reduced, found: Realised, asked: Acceleration) -> np.ndarray:
-    """Return the rows (3, n + inputs) of the change of an acceleration.
-
-    With small rotations phi, delta omega = phi' + phi x omega, delta alpha = phi'' + phi' x omega + phi x alpha, and of
-    a point with the arm s, delta s = phi x s, what follows from a + alpha x s + omega x (omega x s).
-    """
-    (_, turn), (_, rate), (moved, bent) = (_spatial(instant, reduced, rows) for rows in found.places)
-    frame = _frame(instant, asked.marker)
-    k = frame.body
-    spin = skew(instant.pose()[k, POSE_W:])
-    alpha = skew(instant.system.accelerations(instant.configuration(), instant.t)[0][k, 3:6])
-    by_rate = rate[k] - spin @ turn[k]
-    by_acceleration = bent[k] - spin @ rate[k] - alpha @ turn[k]
-    if asked.angular:
-        return by_acceleration
-    arm = skew(frame.arm)
-    shift = -arm @ turn[k]
-    out = moved[k] - arm @ by_acceleration + alpha @ shift
-    return out - skew(spin @ frame.arm) @ by_rate - spin @ arm @ by_rate + spin @ spin @ shift

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from operator import itemgetter
 from typing import Any
@@ -14,6 +15,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.state import State, changed_places, check_state, equations_of
+from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.solve.controllers import Control
 from gearmbs.mechanism.solve.told import Point, Told
 
@@ -30,6 +32,7 @@ class Restored(Told):
     _integers: tuple[Any, Any]
     _before: dict[bytes, bytes]
     _controls: list[Control]
+    _functions: list[Any]
     _unmet: list[str]
     _begin: Callable[..., None]
     _stand_at: Callable[[Point, bool], None]
@@ -112,7 +115,8 @@ class Restored(Told):
         Raises
         ------
         ModelError
-            If the state is one of another model, or lies outside the span of this simulator; from within a controller.
+            If the state is one of another model, its values contradict each other, as where joints are open, or it lies
+            outside the span of this simulator; from within a controller. The simulator then stays where it stands.
 
         Warns
         -----
@@ -135,7 +139,7 @@ class Restored(Told):
         if not self._goes_back(state):
             first, origin = self._own_point(state), (self._problem, self._origin)
             kept = self._points[: first + 1] if first is not None else []
-            self._begin(state)
+            self._begin_in(state)
             if kept:
                 # what stood there up to the state, which a jump may follow
                 self._problem, self._origin = origin
@@ -149,6 +153,20 @@ class Restored(Told):
         elif self._unmet:
             self._unmet = []
         self.__dict__["_plain"] = self._is_plain()
+
+    def _begin_in(self, state: State) -> None:
+        """Make a run that starts in a state; raise a ModelError, and stay where it was, if it cannot."""
+        own, before, set_before = self.__dict__, dict(self.__dict__), self._settings.snapshot()
+        self._begin(state)
+        if self._run.started or any(number.prescribes for number in self._base.numbers.values()):
+            # what is set next may let motions ask for the velocities that the state has
+            return
+        with raised_errors(self._functions) if self._functions else nullcontext():
+            failure = self._run.begin()
+        if failure is not None:
+            own.update(before)
+            self._settings.put_back(set_before)
+            raise ModelError(f"restore: {failure[1]}")
 
     def _take_given(self, state: State) -> None:
         """Let what belongs to a state be what has been set."""

@@ -85,6 +85,16 @@ class Settings:
         self.held = rdata[self.cells]
         self.led = {name: t for name in self._inputs if self._own[name].line(self.held, t)[1] != 0.0}
 
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return what is set and what waits, for `put_back`."""
+        return self.held, dict(self.waiting), dict(self.led), set(self.given)
+
+    def put_back(self, snapshot: tuple[Any, ...]) -> None:
+        """Let it be as it was."""
+        self.held, waiting, self.led, given = snapshot
+        self.waiting.update(waiting)
+        self.given.update(given)
+
     def number(self, name: str) -> Number:
         """Return what is set under a name; raise a ModelError if there is nothing."""
         name = getattr(name, "name", name)

@@ -154,8 +154,9 @@ ADVICE = {
         "end the run before."
     ),
     Status.INCONSISTENT_START: (
-        "Joints, motions or centres of mass are elsewhere than in the model that the state is from: make them as "
-        "there, or start this mechanism without the state, from its own position and velocity."
+        "Joints, motions or centres of mass are elsewhere than in the model that the state is from, or some of its "
+        "unknowns were changed and not those that move with them: make them as there, change these, too, or start "
+        "this mechanism without the state, from its own position and velocity."
     ),
     Status.SOLVER_FAILURE: ("Loosen tol, let motions and torques start more smoothly, or take the WSTIFF integrator."),
 }

@@ -71,7 +71,17 @@ _VEC = float64[::1]
     error_model="numpy",
 )
 def go_on(bound, standing, t, row, last):
-    """Go on to ``t`` as `reach` does, for a run whose `Standing` is at an address."""
+    """Go on to a time as `reach` does; return what it does.
+
+    Parameters
+    ----------
+    bound
+        The functions of the DAE.
+    standing : int
+        Address of the run's `Standing`.
+    t, row, last
+        As of `reach`.
+    """
     own = standing_at(standing)
     return reach(
         bound,
@@ -93,7 +103,23 @@ def go_on(bound, standing, t, row, last):
     error_model="numpy",
 )
 def steer_on(bound, standing, t, row, first, count, value, end, values):
-    """Steer as `steer` does, at the point in a row, by the ``count`` places from the ``first`` on."""
+    """Steer as `steer` does; return what it does.
+
+    Parameters
+    ----------
+    bound
+        The functions of the DAE.
+    standing : int
+        Address of the run's `Standing`.
+    t : float
+        Within the last step.
+    row : int
+        Of the outputs: where the values at ``t`` stand.
+    first, count : int
+        The first of the input's places among all, and how many there are.
+    value, end, values
+        As of `steer`.
+    """
     own = standing_at(standing)
     st = state_at(own.state)
     return steer(
