@@ -76,8 +76,8 @@ def predict(value, slope, count, hist, y, yp):
                 yp[i] = yp[i] + b0 * r0[i] + b1 * r1[i] + b2 * r2[i]
 
 
-@njit(types.void(_VEC, int64, _VEC), cache=True, nogil=True, error_model="numpy")
-def divided_difference_weights(nodes, count, weights):
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _divided_difference_weights(nodes, count, weights):
     """Write w with f[t_1 .. t_count] = sum w[j] f(t_j)."""
     for j in range(count):
         product = 1.0
@@ -117,6 +117,25 @@ def combination_norm(weights, count, hist, inv_weight):
     if count == 7:
         return _combination_norm(weights, hist, inv_weight, 7)
     return _combination_norm(weights, hist, inv_weight, HISTORY)
+
+
+@njit(types.void(_VEC, int64, _VEC), cache=True, nogil=True, error_model="numpy")
+def divided_difference_weights(nodes, count, weights):
+    """Write w with f[t_1 .. t_count] = sum w[j] f(t_j); the number of nodes is a constant in most branches."""
+    if count == 2:
+        _divided_difference_weights(nodes, 2, weights)
+    elif count == 3:
+        _divided_difference_weights(nodes, 3, weights)
+    elif count == 4:
+        _divided_difference_weights(nodes, 4, weights)
+    elif count == 5:
+        _divided_difference_weights(nodes, 5, weights)
+    elif count == 6:
+        _divided_difference_weights(nodes, 6, weights)
+    elif count == 7:
+        _divided_difference_weights(nodes, 7, weights)
+    else:
+        _divided_difference_weights(nodes, count, weights)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

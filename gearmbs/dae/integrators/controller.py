@@ -78,12 +78,12 @@ def step_at_order(st, k, h, nodes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def step_reaching(st, k, wanted, h, nodes):
+def step_reaching(st, k, wanted, h, nodes, difference):
     """Return the step size at order k, or zero without a search where it is less than ``wanted``.
 
-    The other parameters are those of `step_at_order`, whose search goes by powers and takes far longer than one error.
+    ``difference`` is the `difference_norm` of the order; the other parameters are those of `step_at_order`, whose
+    search goes by powers and takes far longer than one error.
     """
-    difference = difference_norm(st, k)
     if local_error(wanted, nodes, k, difference) > target(st, k):
         return 0.0
     return step_for_error(h, nodes, k, difference, target(st, k))
@@ -151,15 +151,25 @@ def after_success(st):
         return
     nodes = times_from(st, 0)
     best = k
-    h_best = step_at_order(st, k, h, nodes)
+    here, low = difference_norm(st, k), difference_norm(st, k - 1) if k > 1 else 0.0
+    if k > 1 and (st.caution > 0 or not unchanged) and local_error(h, nodes, k, here) <= target(st, k):
+        # neither longer nor of a higher order, nor shorter; nor lower where the error there, which grows with the step,
+        # is too large already: no search is needed to go on
+        if local_error(h, nodes, k - 1, low) > target(st, k - 1):
+            return
+    h_best = step_for_error(h, nodes, k, here, target(st, k))
     if k > 1:
-        h_low = step_reaching(st, k - 1, h_best, h, nodes)
+        h_low = step_reaching(st, k - 1, h_best, h, nodes, low)
         # see `step_below`
-        if h_low >= h_best and (k == 2 or meets_kinks(st) or step_reaching(st, k - 2, h_best, h, nodes) >= h_best):
+        if h_low >= h_best and (
+            k == 2
+            or meets_kinks(st)
+            or step_reaching(st, k - 2, h_best, h, nodes, difference_norm(st, k - 2)) >= h_best
+        ):
             best = k - 1
             h_best = h_low
     if best == k and k < st.max_order and n_past >= k + 3 and unchanged and st.caution == 0:
-        h_high = step_reaching(st, k + 1, RAISE_GAIN * h_best, h, nodes)
+        h_high = step_reaching(st, k + 1, RAISE_GAIN * h_best, h, nodes, difference_norm(st, k + 1))
         if h_high > RAISE_GAIN * h_best:
             best = k + 1
             h_best = h_high
