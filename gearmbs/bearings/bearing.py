@@ -11,9 +11,10 @@ roller bearings C = 1.1 f_c (i L cos(a))^(7/9) Z^(3/4) d^(29/27) with
     f_c = 207.9 lambda g^(2/9) (1 - g)^(29/27)/(1 + g)^(1/4) (1 + u^(9/2))^(-2/9),
     u = 1.04 ((1 - g)/(1 + g))^(143/108).
 
-The standard fixes f_i = f_o = 0.52 and the reduction factors lambda, whatever the grooves are. Static: of balls the
-load at which the most loaded one, 5 F/(i Z cos a), presses its groove with 4200 MPa; of rollers
-44 (1 - g) i Z L d cos(a). i counts rows; makers count the two paths of four-point bearings as two.
+1.1 is 1.15 of spherical roller bearings. i counts rows; makers count the two paths of four-point bearings as two. The
+standard fixes f_i = f_o = 0.52, of self-aligning ball bearings f_i = 0.53 and the sphere, f_o = (1/g + 1)/2, and the
+reduction factors lambda, whatever the grooves are. Static: of balls the load at which the most loaded one,
+5 F/(i Z cos a), presses its groove with 4200 MPa, or the sphere with 4600 MPa; of rollers 44 (1 - g) i Z L d cos(a).
 
 References
 ----------
@@ -76,6 +77,8 @@ class Bearing(Described):
         Diametral (catalogue) radial internal clearance, m; negative is interference. Each ring has half of it.
     roller_length : float or str, optional
         Effective length of rollers, m; needed for rollers.
+    row_distance : float or str, optional
+        Of the middles of two rows, m; needed of kinds with two that do not meet in the middle.
     bore, outside_diameter, width : float or str, optional
         Boundary dimensions, m.
     dynamic_rating, static_rating : float or str, optional
@@ -111,6 +114,7 @@ class Bearing(Described):
     outer_curvature: Annotated[Quantity, GROOVE] = 0.525
     clearance: Annotated[Quantity, Measure("length")] = 0.0
     roller_length: Length = None
+    row_distance: Length = None
     bore: Boundary = None
     outside_diameter: Boundary = None
     width: Boundary = None
@@ -167,6 +171,11 @@ class Bearing(Described):
             )
         if KINDS[self.kind].angle == "none":
             require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of {self.kind}s it is 0")
+        if KINDS[self.kind].rows in ("parallel", "back to back"):
+            require(
+                self.row_distance is not None,
+                f"Bearing.row_distance is missing; a {self.kind} bearing needs the distance of the middles of its rows",
+            )
         for name, given, usual in (
             ("dynamic_rating", self.dynamic_rating, dynamic_rating),
             ("static_rating", self.static_rating, static_rating),
@@ -232,6 +241,28 @@ class Bearing(Described):
         return KINDS[self.kind].rollers
 
     @property
+    def rows(self) -> int:
+        """Number of rows of elements, which are in phase."""
+        return 1 if KINDS[self.kind].rows == "one" else 2
+
+    @property
+    def offset(self) -> float:
+        """Distance of each row's middle from the bearing's, m: D/2 tan(a) where the lines of contact meet there."""
+        if KINDS[self.kind].rows == "self-aligning":
+            return 0.5 * self.pitch_diameter * math.tan(self.contact_angle)
+        return 0.0 if self.rows == 1 or self.row_distance is None else 0.5 * self.row_distance
+
+    @property
+    def on_sphere(self) -> bool:
+        """Whether balls roll on the sphere of a self-aligning outer ring."""
+        return KINDS[self.kind].rows == "self-aligning" and not self.rollers
+
+    @property
+    def fixed_normals(self) -> bool:
+        """Whether contacts press in directions that no displacement turns: of rollers, and on a sphere."""
+        return self.rollers or self.on_sphere
+
+    @property
     def ratio(self) -> float:
         """gamma = d cos(a)/D."""
         return self.element_diameter * math.cos(self.contact_angle) / self.pitch_diameter
@@ -279,7 +310,8 @@ class Bearing(Described):
     @cached_property
     def outer_contact(self) -> PointContact:
         """Contact of a ball with the outer ring."""
-        return self._groove(self.outer_curvature, -self.ratio / (1.0 + self.ratio))
+        curvature = sphere_curvature(self.ratio) if self.on_sphere else self.outer_curvature
+        return self._groove(curvature, -self.ratio / (1.0 + self.ratio))
 
     def _groove(self, curvature: float, slope: float) -> PointContact:
         require(not self.rollers, f"a {self.kind} bearing has no point contacts")
@@ -339,6 +371,14 @@ STANDARD_GROOVE = 0.52
 """Radius of the inner ring's groove, in ball diameters, that ISO 281 and ISO 76 state their ratings for."""
 PRESSURE = 4.2e9
 """Contact pressure of the static rating of ball bearings, Pa (ISO 76)."""
+SPHERE_GROOVE = 0.53
+"""The same radius of self-aligning ball bearings, and their pressure, Pa; their outer ring is a sphere."""
+SPHERE_PRESSURE = 4.6e9  # ISO 76, of self-aligning ball bearings
+
+
+def sphere_curvature(ratio: float) -> float:
+    """Return the radius of a self-aligning outer ring by the ball's diameter: (1/g + 1)/2, g = d cos(a)/D."""
+    return 0.5 * (1.0 / ratio + 1.0)
 
 
 def dynamic_rating(bearing: Bearing) -> float:
@@ -348,9 +388,17 @@ def dynamic_rating(bearing: Bearing) -> float:
     if bearing.rollers:
         u = 1.04 * ((1 - g) / (1 + g)) ** (143 / 108)
         f_c = 207.9 * factor * g ** (2 / 9) * (1 - g) ** (29 / 27) / (1 + g) ** 0.25 * (1 + u**4.5) ** (-2 / 9)
-        return 1.1 * f_c * (i * 1e3 * bearing.roller_length * cosine) ** (7 / 9) * z**0.75 * d ** (29 / 27)
-    f = STANDARD_GROOVE
-    u = 1.04 * ((1 - g) / (1 + g)) ** 1.72
+        return (
+            1.1
+            * KINDS[bearing.kind].steel
+            * f_c
+            * (i * 1e3 * bearing.roller_length * cosine) ** (7 / 9)
+            * z**0.75
+            * d ** (29 / 27)
+        )
+    f = SPHERE_GROOVE if bearing.on_sphere else STANDARD_GROOVE
+    f_o = sphere_curvature(g) if bearing.on_sphere else f
+    u = 1.04 * ((1 - g) / (1 + g)) ** 1.72 * (f * (2 * f_o - 1) / (f_o * (2 * f - 1))) ** 0.41
     f_c = 39.9 * factor * g**0.3 * (1 - g) ** 1.39 / (1 + g) ** (1 / 3) * (2 * f / (2 * f - 1)) ** 0.41
     f_c *= (1 + u ** (10 / 3)) ** -0.3
     size = d**1.8 if d <= 25.4 else 3.647 * d**1.4
@@ -373,12 +421,15 @@ def static_rating(bearing: Bearing) -> float:
     g, z, cosine = bearing.ratio, KINDS[bearing.kind].rated_rows * bearing.elements, math.cos(bearing.contact_angle)
     if bearing.rollers:
         return 44.0 * (1 - g) * z * 1e6 * bearing.roller_length * bearing.element_diameter * cosine
+    if bearing.on_sphere:
+        sphere = groove_contact(bearing.element_diameter, sphere_curvature(g), -g / (1 + g))
+        return sphere.force_at(SPHERE_PRESSURE) * z * cosine / 5.0
     contact = groove_contact(bearing.element_diameter, STANDARD_GROOVE, g / (1 - g))
     return contact.force_at(PRESSURE) * z * cosine / 5.0
 
 
 def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float]:
-    """Return X and Y of P = X F_r + Y F_a by ISO 281 for a single-row bearing.
+    """Return X and Y of P = X F_r + Y F_a by ISO 281; below F_a = e F_r X is 1, and Y is 0 of single rows.
 
     Raises
     ------
@@ -386,8 +437,8 @@ def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, 
         For cylindrical rollers under axial load, and contact angles outside the standard's table.
     """
     radial, axial = abs(radial), abs(axial)
-    e, x, y = KINDS[bearing.kind].load_factors(bearing, radial, axial)
-    return (1.0, 0.0) if axial <= e * radial else (x, y)
+    e, x, y, *below = KINDS[bearing.kind].load_factors(bearing, radial, axial)
+    return (1.0, below[0] if below else 0.0) if axial <= e * radial else (x, y)
 
 
 def _newtons(load: Quantity, name: str) -> Quantity:

@@ -14,7 +14,7 @@ from typing import Any
 from gearmbs.bearings.boundary import Size, size_of
 from gearmbs.bearings.classes import CLASSES, HYBRID, mean_clearance, named_class
 from gearmbs.bearings.estimate import Rating, estimated, usual_angle
-from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of
+from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of, told_of
 from gearmbs.wording import warn
 
 
@@ -75,6 +75,8 @@ SUFFIX = re.compile(
 precision."""
 APART = re.compile(r"[CE]|2?HRS|MT\d+|GJN|WT|LHT\d+|V[LAT]\d+|TN|S[0-4]|X?\dK|[25]K|2AS|NS7S?|Q\d+|L\d+|P[456]|")
 """The same of those written apart only: design, grease, heat treatment, quality."""
+TAPERED_BORE = re.compile(r"\s*-?(?:E1?|C{1,2}A?|M[AB]?|TVH)?-?\s*K")
+"""Suffixes of self-aligning bearings with a tapered bore."""
 MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO|TIMKEN|NACHI|NKE|ZVL|ZKL|KINEX|SNR|URB|RHP)\s*")
 
 
@@ -112,7 +114,7 @@ def look_up(
         if fixed is not None:
             rated = size_of(fixed.rated, group[1]) if fixed.rated else size
             named = named_class(designation, group[2], changes)
-            return _asked(designation, fixed, changes, named, rating, rated)
+            return _asked(designation, fixed, changes, named, group[2], rating, rated)
     digits = DEEP_GROOVE.match(bare) or re.match(r"^(\d{4,5})", bare)
     series = digits[0] if digits else ""
     size = size_of(*(part for part in digits.groups() if part)) if digits and digits.re is DEEP_GROOVE else None
@@ -149,6 +151,9 @@ def look_up(
                 "give clearance= (diametral)"
             )
         return {"designation": designation.strip(), **changes}
+    told = told_of(re.sub(r"\s", "", bare))
+    if told:
+        raise BearingError(f"designation {designation!r} {told}")
     raise BearingError(
         f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter="
         " and pitch_diameter=, and contact_angle= if it is not 0"
@@ -204,11 +209,17 @@ def _asked(
     fixed: Known,
     changes: dict[str, Any],
     named: str | None,
+    suffixes: str,
     rating: Rating | None,
     size: Size | None,
 ) -> dict[str, Any]:
     """Return the fields of a bearing whose designation fixes some; rollers may be without a length if rated."""
-    own = {**fixed.fields, **_class_of(designation, fixed, named), "designation": designation.strip(), **changes}
+    own = {
+        **fixed.fields,
+        **_class_of(designation, fixed, named, suffixes),
+        "designation": designation.strip(),
+        **changes,
+    }
     missing = [name for name in fixed.asked if own.get(name) is None]
     if not missing or (missing == ["roller_length"] and own.get("dynamic_rating") is not None):
         return own
@@ -230,9 +241,14 @@ def _asked(
     )
 
 
-def _class_of(designation: str, fixed: Known, named: str | None) -> dict[str, float]:
+def _class_of(designation: str, fixed: Known, named: str | None, suffixes: str) -> dict[str, float]:
     """Return the mean clearance of a class that is named; refuse it of bearings that have no radial classes."""
     kind = fixed.fields["kind"]
+    if named is not None and KINDS[kind].rows == "self-aligning" and TAPERED_BORE.match(suffixes):
+        raise BearingError(
+            f"designation {designation!r}: {named} of a tapered bore, K, has limits of its own, which mounting closes; "
+            "give clearance= (diametral) as it is mounted"
+        )
     if not KINDS[kind].unclassed:
         return mean_clearance(named, fixed.fields.get("bore"), KINDS[kind].classes)
     if named is not None:

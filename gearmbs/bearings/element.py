@@ -57,7 +57,8 @@ class RollingBearing(ForceElement):
     sense : {1, -1}
         Direction along z in which the inner ring of an angular contact or tapered bearing presses into the outer one.
     centrifugal : bool
-        Let the elements' own centrifugal load press them outward; of balls both contact angles then differ.
+        Let the elements' own centrifugal load press them outward; of balls both contact angles then differ. For
+        bearings with one row.
     smooth : float or str
         Half width of a smooth transition of contact, m; 0 keeps Hertz's law.
     rolling_friction : float
@@ -222,7 +223,9 @@ def clearance_setting(settings: BearingSettings, tables: BearingTables) -> dict[
     if settings.preload:
         return {}
     bearing, first = settings.bearing, int(tables.integers[B.AT_PATHS])
-    column, slope = (B.PATH_GAP, 0.5 * math.cos(bearing.contact_angle)) if bearing.rollers else (B.PATH_RADIAL, -0.5)
+    column, slope = (
+        (B.PATH_GAP, 0.5 * math.cos(bearing.contact_angle)) if bearing.fixed_normals else (B.PATH_RADIAL, -0.5)
+    )
     places = first + column + B.PATH_COLUMNS * np.arange(int(tables.integers[B.PATHS]))
     found = [(int(at), slope, float(tables.reals[at]) - slope * bearing.clearance) for at in places]
     (at, factor, offset), *others = found

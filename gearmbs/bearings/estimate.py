@@ -31,7 +31,7 @@ ROOM = 0.12
 
 MEASURED = {
     "bore": "length", "outside_diameter": "length", "width": "length", "pitch_diameter": "length",
-    "element_diameter": "length", "roller_length": "length", "dynamic_rating": "force",
+    "element_diameter": "length", "roller_length": "length", "row_distance": "length", "dynamic_rating": "force",
 }  # fmt: skip
 """Fields that elements follow from, and their dimensions: they may be given as texts."""
 
@@ -62,7 +62,7 @@ def estimated(
     found : dict
         Fields that are known: boundary dimensions, and whatever else is.
     missing : list of str
-        Among ``elements``, ``element_diameter`` and ``roller_length``.
+        Among ``elements``, ``element_diameter``, ``roller_length`` and ``row_distance``.
     rating : callable
     usual : Usual, optional
         What is usual of the series, if not what is of the kind.
@@ -84,6 +84,8 @@ def estimated(
     out["elements"] = found.get("elements") or max(FEWEST, min(round(usual.fill * math.pi * pitch / size), most))
     if usual.length:
         out["roller_length"] = found.get("roller_length") or usual.length * found["width"]
+    if usual.apart:
+        out["row_distance"] = found.get("row_distance") or usual.apart * found["width"]
     wanted = found.get("dynamic_rating")
     if wanted is None:
         return {key: value for key, value in out.items() if key in (*missing, "pitch_diameter")}

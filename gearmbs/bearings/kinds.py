@@ -47,12 +47,15 @@ class Usual:
         Effective length of rollers over the width; zero of balls.
     angle : float
         Contact angle where the designation tells none and no maker prints its e, rad.
+    apart : float
+        Distance of two rows over the width.
     """
 
     size: float
     fill: float
     length: float = 0.0
     angle: float = 0.0
+    apart: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,9 @@ class Kind:
         Whether the elements are rollers, in line contact; else balls in grooves.
     angle : {"free", "needed", "none"}
         Whether a bearing may, must or cannot have a contact angle.
+    rows : {"one", "parallel", "back to back", "self-aligning"}
+        How the rows of elements stand: "parallel" two press radially, "back to back" their lines of contact part
+        towards the axis, "self-aligning" they meet in the bearing's middle. Elements of two rows are in phase.
     both_ways : bool
         Balls touch each groove at two points, one for each sense of the axial load.
     one_shoulder : bool
@@ -98,10 +104,12 @@ class Kind:
         Whether a preload is set by moving a ring along the axis; else by a negative clearance.
     reduction : float
         Factor of the dynamic rating by ISO 281.
+    steel : float
+        b_m of ISO 281 by 1.3 for balls and by 1.1 for rollers.
     rated_rows : int
         Rows i that ratings count: makers count the two paths of a four-point bearing so.
     load_factors : callable
-        ``load_factors(bearing, radial, axial)`` returns e, X and Y of ISO 281.
+        ``load_factors(bearing, radial, axial)`` returns e, X and Y of ISO 281, and Y below e where that is not zero.
     designation : re.Pattern, optional
         Beginning of designations: its letters and digits of the series, code of the bore.
     series : dict
@@ -119,12 +127,14 @@ class Kind:
 
     rollers: bool = False
     angle: Literal["free", "needed", "none"]
+    rows: Literal["one", "parallel", "back to back", "self-aligning"] = "one"
     both_ways: bool = False
     one_shoulder: bool = False
     preloaded: bool = False
     reduction: float
+    steel: float = 1.0
     rated_rows: int = 1
-    load_factors: Callable[[Bearing, float, float], tuple[float, float, float]]
+    load_factors: Callable[[Bearing, float, float], tuple[float, ...]]
     designation: re.Pattern[str] | None = None
     series: dict[str, str] = field(default_factory=dict)
     known: Callable[[re.Match[str], dict[str, Any]], Known] | None = None
@@ -147,11 +157,18 @@ ANGULAR = (
 )  # fmt: skip
 """Contact angle in degrees, e, X, Y of single-row angular contact bearings."""
 
+DOUBLE_ANGULAR = (
+    (20.0, 0.57, 1.09, 0.70, 1.63), (25.0, 0.68, 0.92, 0.67, 1.41), (30.0, 0.80, 0.78, 0.63, 1.24),
+    (35.0, 0.95, 0.66, 0.60, 1.07), (40.0, 1.14, 0.55, 0.57, 0.93), (45.0, 1.34, 0.47, 0.54, 0.81),
+)  # fmt: skip
+"""Contact angle in degrees, e, Y below e, X and Y above it of double row angular contact bearings."""
+
 
 def _deep_groove_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
     table = np.array(DEEP_GROOVE)
-    f_0 = bearing.rating_at_rest / (bearing.elements * (1e3 * bearing.element_diameter) ** 2)
-    level = f_0 * axial / bearing.rating_at_rest
+    # f_0 F_a/C_0, with C_0 = f_0 i Z d^2
+    count = KINDS[bearing.kind].rated_rows * bearing.elements
+    level = axial / (count * (1e3 * bearing.element_diameter) ** 2)
     e, y = (float(np.interp(level, table[:, 0], table[:, k])) for k in (1, 2))
     return e, 0.56, y
 
@@ -164,6 +181,25 @@ def _angular_factors(bearing: Bearing, radial: float, axial: float) -> tuple[flo
     )
     e, x, y = (float(np.interp(degrees, table[:, 0], table[:, k])) for k in (1, 2, 3))
     return e, x, y
+
+
+def _double_angular_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+    degrees, table = math.degrees(bearing.contact_angle), np.array(DOUBLE_ANGULAR)
+    require(
+        20.0 <= degrees <= 45.0,
+        f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors are for 20 to 45 deg",
+    )
+    return tuple(float(np.interp(degrees, table[:, 0], table[:, k])) for k in (1, 3, 4, 2))
+
+
+def _self_aligning_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+    slope = math.tan(bearing.contact_angle)
+    return 1.5 * slope, 0.65, 0.65 / slope, 0.42 / slope
+
+
+def _spherical_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+    slope = math.tan(bearing.contact_angle)
+    return 1.5 * slope, 0.67, 0.67 / slope, 0.45 / slope
 
 
 def _cylindrical_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
@@ -258,6 +294,36 @@ def _four_point(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     return Known(fields, ("elements", "element_diameter"))
 
 
+TWO_ROW_ANGLES = {"": 30.0, "A": 30.0, "B": 25.0, "D": 30.0, "E": 30.0}
+"""Contact angle of double row angular contact bearings by the letter behind the digits, degrees."""
+
+
+def _double_angular(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    angle = math.radians(TWO_ROW_ANGLES[found[3] or ""])
+    fields = {**boundary, "pitch_diameter": _middle(boundary), "contact_angle": angle}
+    return Known(fields, ("elements", "element_diameter", "row_distance"))
+
+
+def _double(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    fields = {**boundary, "pitch_diameter": _middle(boundary)}
+    return Known(fields, ("elements", "element_diameter", "row_distance"))
+
+
+def _double_cylindrical(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    known = _double(found, boundary)
+    return replace(known, asked=("elements", "element_diameter", "roller_length", "row_distance"))
+
+
+def _self_aligning(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    fields = {**boundary, "pitch_diameter": _middle(boundary)}
+    return Known(fields, ("elements", "element_diameter", "contact_angle"))
+
+
+def _spherical(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    fields = {**boundary, "pitch_diameter": _middle(boundary)}
+    return Known(fields, ("elements", "element_diameter", "roller_length", "contact_angle"))
+
+
 FULL = Usual(size=0.270, fill=0.97, length=0.60)
 """Cylindrical rollers without a cage, NCF and SL18."""
 DRAWN = Usual(size=0.355, fill=0.75, length=0.75)
@@ -339,7 +405,108 @@ KINDS: dict[str, Kind] = {
         known=_tapered,
         unclassed=SET_WHEN_MOUNTED,
     ),
+    "double row deep groove": Kind(
+        angle="none",
+        rows="parallel",
+        reduction=0.90,
+        rated_rows=2,
+        load_factors=_deep_groove_factors,
+        usual=Usual(size=0.250, fill=0.78, apart=0.5),
+        designation=re.compile(r"^(4[23])(\d\d)(?!\d)"),
+        series={"42": "42", "43": "43"},
+        known=_double,
+    ),
+    "double row angular contact": Kind(
+        angle="needed",
+        rows="back to back",
+        reduction=0.95,
+        rated_rows=2,
+        load_factors=_double_angular_factors,
+        usual=Usual(size=0.250, fill=0.80, apart=0.5),
+        designation=re.compile(r"^(3[23])(\d\d)(?!\d)\s*-?\s*([ABDE])?"),
+        series={"32": "32", "33": "33"},
+        known=_double_angular,
+        unclassed="it is one of axial clearance",
+    ),
+    "self-aligning ball": Kind(
+        angle="needed",
+        rows="self-aligning",
+        reduction=1.0,
+        rated_rows=2,
+        load_factors=_self_aligning_factors,
+        usual=Usual(size=0.250, fill=0.80, angle=math.radians(10.0)),
+        designation=re.compile(r"^(1[23]|2[23])(\d\d)(?!\d)"),
+        series={"12": "12", "13": "13", "22": "22", "23": "23"},
+        known=_self_aligning,
+        classes="self-aligning",
+    ),
+    "double row cylindrical roller": Kind(
+        rollers=True,
+        angle="none",
+        rows="parallel",
+        reduction=0.83,
+        rated_rows=2,
+        load_factors=_cylindrical_factors,
+        usual=Usual(size=0.230, fill=0.85, length=0.30, apart=0.45),
+        designation=re.compile(r"^(NNU?(?:30|49))(\d\d)(?!\d)"),
+        series={"NN30": "NN30", "NNU49": "NNU49"},
+        known=_double_cylindrical,
+        classes="rollers",
+    ),
+    "spherical roller": Kind(
+        rollers=True,
+        angle="needed",
+        rows="self-aligning",
+        reduction=0.83,
+        steel=1.15 / 1.1,
+        rated_rows=2,
+        load_factors=_spherical_factors,
+        usual=Usual(size=0.265, fill=0.82, length=0.36, angle=math.radians(10.0)),
+        designation=re.compile(r"^(2(?:13|22|23|30|31|32|39|40|41))(\d\d)(?!\d)"),
+        series={digits: digits for digits in ("213", "222", "223", "230", "231", "232", "239", "240", "241")},
+        known=_spherical,
+        classes="spherical",
+    ),
 }
+
+NOT_THERE = (
+    (r"5[1-4][1-4]\d\d(?!\d)", "a thrust ball bearing"),
+    (r"8(?:11|12|9[34])\d\d(?!\d)", "a cylindrical roller thrust bearing"),
+    (r"29[2-4]\d\d(?!\d)", "a spherical roller thrust bearing"),
+)
+"""Designations of thrust bearings, of which there is no kind."""
+NOT_TABULATED = (
+    (
+        r"C\d{4}(?!\d)",
+        "a toroidal roller bearing, which gives way along its axis",
+        "one with a spherical roller bearing's kind= and its own numbers carries axially, too",
+    ),
+    (
+        r"(?:BS2-|WS)\d{4}",
+        "a sealed spherical roller bearing of a maker's own width",
+        "give the designation without the letters before it, and width=",
+    ),
+    (
+        r"(?:[RKL]?LS|RMS|N?LRJ|MRJ|[HL]?M|LL|JL?M?)\d+",
+        "an inch bearing; inch sizes are not tabulated",
+        "give kind=, bore=, outside_diameter=, width= and elements=, element_diameter=, pitch_diameter=",
+    ),
+)
+"""Designations of other bearings that are told by name: what they are, and what would do."""
+
+
+def told_of(designation: str) -> str:
+    """Return what is said of a designation of no kind, in capitals; empty if nothing is known of it."""
+    for pattern, name in NOT_THERE:
+        if re.match(pattern, designation):
+            return (
+                f"is {name}, which carries axial loads, and of which there is no kind; hold the shaft along "
+                "its axis by Mechanism.bushing with the axial stiffness, and count its life by the C of its catalogue"
+            )
+    for pattern, name, remedy in NOT_TABULATED:
+        if re.match(pattern, designation):
+            return f"is {name}; {remedy}"
+    return ""
 
 
 def known_of(designation: str, boundary: dict[str, float]) -> Known | None:

@@ -39,6 +39,8 @@ BALL_EXPONENT = 1.5
 ROLLER_EXPONENT = 10.0 / 9.0
 PALMGREN = 3.84e-5
 """mm of approach per contact for Q = 1 N on a line of 1 mm: delta = 3.84e-5 Q^0.9/L^0.8, mm and N, steel."""
+ROUND = 1e-9
+"""Difference of the curvatures by their sum below which a contact is a circle: rounding of equal radii."""
 STEEL = 2.07e11, 0.3
 """Young's modulus, Pa, and Poisson's ratio of that steel, and of bearings where none are given."""
 
@@ -103,7 +105,9 @@ def groove_contact(
     def mismatch(log_ratio: float) -> float:
         return _difference(math.exp(log_ratio)) - difference
 
-    ratio = math.exp(brentq(mismatch, 1e-6, math.log(1e4), xtol=1e-14, rtol=1e-14))
+    # a sphere touches in a circle
+    round_one = mismatch(1e-6) >= 0.0 or abs(difference) < ROUND
+    ratio = math.exp(1e-6 if round_one else brentq(mismatch, 1e-6, math.log(1e4), xtol=1e-14, rtol=1e-14))
     first, second = _integrals(ratio)
     approach = 2.0 * first / math.pi * (math.pi / (2.0 * ratio**2 * second)) ** (1.0 / 3.0)
     modulus = youngs_modulus / (1.0 - poisson_ratio**2)

@@ -54,11 +54,21 @@ class BearingSettings(Described):
         if self.centrifugal:
             require(self.smooth == 0.0, "RollingBearing.smooth: not together with the centrifugal load; leave it 0")
             require(self.stiffness is None, "RollingBearing.stiffness: with centrifugal load each contact has its own")
+            require(
+                self.bearing.rows == 1,
+                f"RollingBearing.centrifugal: of two rows, as of a {self.bearing.kind} bearing, it is not known; "
+                "leave it off",
+            )
         self.defects = as_defects(self.defects)
         for defect in self.defects:
             require(
                 not isinstance(defect, LooseFit),
                 "RollingBearing.defects holds a LooseFit: such a ring is a body; use gearmbs.bearings.add_bearing",
+            )
+            require(
+                self.bearing.rows == 1 or not isinstance(defect, df.SurfaceDefect) or defect.part != df.ELEMENT,
+                f"RollingBearing.defects: a defect of an element is in one row only, and a {self.bearing.kind} bearing "
+                "has two; give it of a ring, or take a bearing with one row",
             )
             defect.check(self.bearing)
 
@@ -101,7 +111,7 @@ def pack(settings: BearingSettings) -> BearingTables:
     spinning = tuple(sorted({d.element for d in surfaces if d.part == df.ELEMENT}))
     integers = np.zeros(B.INTEGERS + 2 * len(paths) + bearing.elements, dtype=np.int64)
     integers[B.ELEMENTS], integers[B.PATHS] = bearing.elements, len(paths)
-    integers[B.KIND] = B.ROLLER if bearing.rollers else B.BALL
+    integers[B.KIND] = B.ROLLER if bearing.fixed_normals else B.BALL
     integers[B.SPINS], integers[B.CENTRIFUGAL] = len(spinning), settings.centrifugal
     parts = [_scalars(settings), paths.ravel(), elements.ravel()]
     integers[B.AT_PATHS] = B.REALS
@@ -114,7 +124,8 @@ def pack(settings: BearingSettings) -> BearingTables:
             rows, of_path = ring
             integers[(B.OUTER_NODES, B.INNER_NODES)[k]] = rows.shape[1]
             first = B.INTEGERS + k * len(paths)
-            integers[first : first + len(paths)] = of_path
+            # of two rows the first has the defects
+            integers[first : first + len(paths) // bearing.rows] = of_path[: len(paths) // bearing.rows]
             parts += [spline_coefficients(row) for row in rows]
             at += sum(part.size for part in parts[-len(rows) :])
     integers[B.AT_SPIN] = at
@@ -210,11 +221,12 @@ def _scalars(settings: BearingSettings) -> np.ndarray:
     reals = np.zeros(B.REALS)
     stiffness, n = series_stiffness(settings), bearing.exponent
     reals[B.STIFFNESS], reals[B.EXPONENT] = stiffness, n
-    typical = (5.0 * TYPICAL_LOAD * bearing.rating / bearing.elements / stiffness) ** (1.0 / n)
+    count = bearing.rows * bearing.elements
+    typical = (5.0 * TYPICAL_LOAD * bearing.rating / count / stiffness) ** (1.0 / n)
     reals[B.DAMPING] = n * settings.damping / typical
     reals[B.CAGE] = bearing.ftf * (1.0 - settings.cage_slip)
     reals[B.SPIN], reals[B.SLIP_TURNS] = bearing.bsf, SLIP_TURNS
-    reals[B.DISTANCE] = 0.0 if bearing.rollers else bearing.groove_distance
+    reals[B.DISTANCE] = 0.0 if bearing.fixed_normals else bearing.groove_distance
     reals[B.SMOOTH], reals[B.SMOOTH_WORK] = settings.smooth, settings.smooth ** (n + 1.0) * transition_work(n)
     reals[B.ROLLING] = settings.rolling_friction * 0.5 * bearing.pitch_diameter
     # 1e-7 f_0 (nu n)^(2/3) D^3 in N mm, 1/min and mm
@@ -233,7 +245,7 @@ def _scalars(settings: BearingSettings) -> np.ndarray:
     reals[B.OUTER_TILT : B.OUTER_TILT + 2] = outer / math.sqrt(1.0 + float(outer @ outer))
     reals[B.MASS_RADIUS] = 0.5 * bearing.element_mass * bearing.pitch_diameter
     reals[B.INNER_STIFFNESS], reals[B.OUTER_STIFFNESS] = bearing.contact_stiffness
-    if not bearing.rollers:
+    if not bearing.fixed_normals:
         d = bearing.element_diameter
         reals[B.INNER_REACH], reals[B.OUTER_REACH] = (
             (bearing.inner_curvature - 0.5) * d,
@@ -264,19 +276,50 @@ def _elements(settings: BearingSettings) -> np.ndarray:
 def _paths(settings: BearingSettings) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows of the paths, and their places along a roller."""
     bearing = settings.bearing
+    if KINDS[bearing.kind].rows == "self-aligning":
+        require(
+            not settings.preload,
+            f"RollingBearing.preload: a {bearing.kind} bearing is preloaded by a negative clearance",
+        )
+        return _rays(bearing), np.zeros(2)
     if bearing.rollers:
         return _roller_paths(settings)
     angle, distance = bearing.contact_angle, bearing.groove_distance
     reach = (bearing.inner_curvature - 0.5) * bearing.element_diameter
     rows = []
-    for sign in (1.0, -1.0) if KINDS[bearing.kind].both_ways else (float(settings.sense),):
+    for sign, place in _senses(settings):
         radial = distance * math.cos(angle) - 0.5 * bearing.clearance
         axial = sign * distance * math.sin(angle)
         radius = 0.5 * bearing.pitch_diameter + reach * math.cos(angle)
-        rows.append([radial, axial, radius, sign * reach * math.sin(angle), 1.0, 0.0])
+        rows.append([radial, axial, radius, place + sign * reach * math.sin(angle), 1.0, 0.0])
     if settings.preload:
         _preload_balls(settings, rows)
     return np.array(rows), np.zeros(len(rows))
+
+
+def _senses(settings: BearingSettings) -> tuple[tuple[float, float], ...]:
+    """Return the sense along the axis and the height of each path of a ball."""
+    bearing = settings.bearing
+    if bearing.rows == 2:
+        # back to back: the row below presses upward
+        return (1.0, -bearing.offset), (-1.0, bearing.offset)
+    return ((1.0, 0.0), (-1.0, 0.0)) if KINDS[bearing.kind].both_ways else ((float(settings.sense), 0.0),)
+
+
+def _rays(bearing: Bearing) -> np.ndarray:
+    """Return the paths of both rows of a self-aligning bearing: their lines of contact meet in its middle.
+
+    The outer raceway is a sphere about it, so that normals are fixed in the outer ring, and at the radius R and the
+    height R tan(a) a tilt moves nothing along them.
+    """
+    rows = np.zeros((2, B.PATH_COLUMNS))
+    cosine, radius = math.cos(bearing.contact_angle), 0.5 * bearing.pitch_diameter
+    for row, sign in zip(rows, (-1.0, 1.0)):
+        height = sign * bearing.offset
+        row[B.PATH_RADIUS], row[B.PATH_HEIGHT], row[B.PATH_SHARE] = radius, height, 1.0
+        row[B.PATH_RADIAL], row[B.PATH_AXIAL] = cosine, cosine * height / radius
+        row[B.PATH_GAP] = 0.5 * bearing.clearance * cosine
+    return rows
 
 
 def _preload_balls(settings: BearingSettings, rows: list[list[float]]) -> None:
@@ -311,10 +354,14 @@ def _roller_paths(settings: BearingSettings) -> tuple[np.ndarray, np.ndarray]:
     assert length is not None
     place = length * ((np.arange(count) + 0.5) / count - 0.5)
     sense, cosine, sine = float(settings.sense), math.cos(angle), math.sin(angle)
-    rows = np.zeros((count, B.PATH_COLUMNS))
+    across = np.zeros(count)
+    if bearing.rows == 2:
+        place = np.tile(place, 2)
+        across = np.repeat([-bearing.offset, bearing.offset], count)
+    rows = np.zeros((place.size, B.PATH_COLUMNS))
     rows[:, B.PATH_RADIAL], rows[:, B.PATH_AXIAL] = cosine, sense * sine
     rows[:, B.PATH_RADIUS] = 0.5 * bearing.pitch_diameter - place * sine
-    rows[:, B.PATH_HEIGHT] = sense * place * cosine
+    rows[:, B.PATH_HEIGHT] = sense * place * cosine + across
     rows[:, B.PATH_SHARE] = 1.0 / count
     rows[:, B.PATH_GAP] = 0.5 * bearing.clearance * cosine + crown(bearing, place)
     if settings.preload:

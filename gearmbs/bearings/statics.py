@@ -301,7 +301,7 @@ class BearingState:
     stiffness : ndarray, shape (5, 5)
         d load/d displacement.
     element_loads : ndarray, shape (Z,)
-        Normal force of each element on the inner ring, N; of four-point bearings the sum of both contacts' vectors.
+        Normal force of each element on the inner ring, N; of four points and of two rows the sum of both vectors.
     element_angles : ndarray, shape (Z,)
         Where each element is, rad from x.
     contact_angles : ndarray, shape (Z,)
@@ -489,7 +489,8 @@ class BearingStatics:
             return self._pressed(there, cage_angle)
 
         # X and Y are about as long as the groove centres are apart, those of rollers about as the gap
-        reach = self.bearing.groove_distance if not self.bearing.rollers else 1e-2 * self.bearing.element_diameter
+        bearing = self.bearing
+        reach = 1e-2 * bearing.element_diameter if bearing.fixed_normals else bearing.groove_distance
         axis = reals[B.INNER_AXIS : B.INNER_AXIS + 3].copy()
         return Equilibrium(force, axis, wanted, radius, reach).solve(place)
 
@@ -505,7 +506,7 @@ class BearingStatics:
             place[:2] = wanted[:2] / radial * (gap + approach)
         if axial:
             free = 0.0
-            if not bearing.rollers and bearing.clearance > 0.0:
+            if not bearing.fixed_normals and bearing.clearance > 0.0:
                 radial_distance = bearing.groove_distance * np.cos(bearing.contact_angle) - 0.5 * bearing.clearance
                 free = np.sqrt(max(bearing.groove_distance**2 - radial_distance**2, 0.0))
             place[2] = np.sign(axial) * (free + approach)
