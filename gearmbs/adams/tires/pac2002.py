@@ -31,6 +31,8 @@ COEFFICIENTS = set(
     "QEZ4 QEZ5 QHZ1 QHZ2 QHZ3 QHZ4 SSZ1 SSZ2 SSZ3 SSZ4 QTZ1".split()
 )
 MODES = {0, 1, 2, 3, 4, 11, 12, 13, 14}
+DIVIDING = ("VXLOW", "LONGVL", "LFZO", "LCZ", "LCX", "LCY", "LMUX", "LMUY", "LKX", "LKY")
+"""What others are divided by, 1 where it is not given."""
 LOWEST_SPEED = 1.0
 """m/s: VXLOW where it is not given, as in the files that ADAMS brings."""
 LARGEST_SLIP = 3.0
@@ -82,8 +84,11 @@ class _Formula:
         for name in ("UNLOADED_RADIUS", "VERTICAL_STIFFNESS", "FNOMIN", "PCX1", "PCY1", "PKX1", "PKY2", *relaxing):
             if not self.k(name) > 0.0 and (self.mode or name[0] != "P"):
                 raise TireError(f"{tire.name}: {name} = {self.k(name):g} must be positive")
-        if not self.low > 0.0:
-            raise TireError(f"{tire.name}: VXLOW = {self.low:g} must be positive")
+        if self.k("PKY1") == 0.0 and self.mode:
+            raise TireError(f"{tire.name}: PKY1 = 0 must not be zero")
+        for name in DIVIDING:
+            if not tire.number(name, 1.0) > 0.0:
+                raise TireError(f"{tire.name}: {name} = {tire.number(name, 1.0):g} must be positive")
 
     def var(self, name: str, function: str) -> str:
         """Make a VARIABLE."""

@@ -130,6 +130,8 @@ def make_tire(m: Deckmaker, item: Item) -> None:
         made = hub_forces(tire, friction, hub, side == "right", variable, state, rate)
     except TireError as error:
         raise ViewError(str(error)) from error
+    except ArithmeticError as error:
+        raise ViewError(f"{tire.name}: numbers too large or too small to compute with ({error})") from error
     names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
     functions = "\\\\".join(f"{name} = {function}" for name, function in zip(names, made))
     m.add(

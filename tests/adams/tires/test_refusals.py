@@ -36,6 +36,7 @@ REFUSED = {
     "lag of PAC89": (PAC89.format(mode=14), FLAT, ("USE_MODE", "14", "give 1")),
     "side": (TEXT.replace("'LEFT'", "'SYMMETRIC'"), FLAT, ("TYRESIDE", "SYMMETRIC", "give LEFT")),
     "stiffness": (TEXT.replace("= 2e5", "= 0"), FLAT, ("VERTICAL_STIFFNESS", "0", "positive")),
+    "factor": (TEXT.replace("LKY = 1.1", "LKY = 0"), FLAT, ("LKY", "0", "positive")),
     "missing": (TEXT.replace("FNOMIN = 4000", ""), FLAT, ("FNOMIN", "tire.tir", "missing")),
     "unit": (TEXT.replace("'meter'", "'parsec'"), FLAT, ("LENGTH", "parsec", "one of")),
     "twice": (TEXT + "PCX1 = 2\n", FLAT, ("PCX1", "tire.tir", "twice")),
