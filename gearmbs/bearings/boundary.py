@@ -3,7 +3,8 @@
 They stand in ``designations.csv``, one row for a size of a series: bore d, outside diameter D and width B (of tapered
 roller bearings T, of thrust bearings H), mm; C and C_0, kN, and the limit e = 1.5 tan(a) of the load factors where a
 maker prints them, and whose they are; of needle roller bearings the raceway F on the inner ring. Dimensions are those
-of ISO 15, ISO 355 and ISO 104, which all makers keep: each row is in two catalogues.
+of ISO 15, ISO 355 and ISO 104, which all makers keep: each row is in two catalogues, or in one and in the dimension
+series that the standard gives it.
 
 Ratings are those of one maker's public catalogue (URB, 2017); of four-point, double row angular contact, full
 complement and needle roller bearings, which that has not, of DAS Lager, NKE and FBJ. Others differ by their steel and

@@ -241,3 +241,13 @@ def test_four_point_bearings_are_rated_as_two_rows():
 def test_a_rating_that_is_given_counts():
     bearing = by_name("6305", dynamic_rating="23.4 kN")
     assert (bearing.rating, bearing.rating_source) == (23.4e3, "")
+
+
+@pytest.mark.parametrize(
+    ("name", "plan"),
+    [("60/22", (22, 44, 12)), ("60/32-2Z/C3", (32, 58, 13)), ("62/28", (28, 58, 16)), ("63/22", (22, 56, 16))],
+)
+def test_odd_bores_stand_behind_a_stroke(name, plan):
+    bearing = by_name(name)
+    assert (bearing.bore, bearing.outside_diameter, bearing.width) == pytest.approx([1e-3 * part for part in plan])
+    assert bearing.clearance == pytest.approx(20e-6 if "C3" in name else 0.0, abs=5e-6)
