@@ -117,6 +117,11 @@ class Sampled:
     _unmet: list[str]
     _origin: State | None
 
+    @property
+    def awaited(self) -> list[str]:
+        """Inputs that had controllers in the state gone on from, and that have none yet."""
+        return list(self._unmet)
+
     def control(self, name: str, function: Callable[[float, Any], Any], sample_time: float) -> None:
         """Let a function give an input its value at sample times, which is held in between.
 

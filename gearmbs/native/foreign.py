@@ -1,0 +1,301 @@
+"""FMUs of other programs in a simulation: as controllers, drives and forces that set its inputs.
+
+An FMU for Co-Simulation is a sampled system. At a sample it has gone on from the one before with the inputs of then
+held, is told those of now, and its outputs set inputs of the simulator until the next sample:
+
+    x_k = step(x_{k-1}, u_{k-1}, T),   y_k = output(x_k, u_k),   u_{k} read from the simulation at t_k.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import weakref
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.dae.problem import ModelError
+from gearmbs.units import powers_of
+from gearmbs.wording import did_you_mean
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism import Simulator
+
+Source = float | str | tuple[Any, ...] | Callable[[float, Any], float]
+"""What an input of an FMU follows: a number, the name of an output, what `Simulator.get` takes, or a function."""
+
+REAL = ("Real", "Float64", "Float32")
+"""Types of variables that can be connected."""
+KINDS = {
+    "Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String",
+    "Float64": "Float64", "Float32": "Float32", "Int32": "Int32", "Int64": "Int64", "UInt32": "UInt32",
+}  # fmt: skip
+"""What the functions that set a type of variables are called by."""
+
+
+class ForeignFMU:
+    """An FMU for Co-Simulation, version 2.0 or 3.0, whose outputs set inputs of a `gearmbs.Simulator`.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the FMU. Its binary for this system is run in this process: use those whose makers you trust.
+    inputs : mapping of str to float, str, tuple or callable
+        What inputs of the FMU follow, by their names: a number; the name of an output of the model; what
+        :meth:`gearmbs.Simulator.get` takes, as ``("angular_velocity", "disc")``, with a component "x", "y" or "z"
+        behind where that is a vector; or a function of the time and the simulator. In SI units: they are brought to the
+        units that the FMU states, and its outputs from them.
+    start : mapping of str to float, optional
+        Values of parameters and start values, in the FMU's own units.
+
+    Raises
+    ------
+    ModelError
+        If FMPy is not installed, the file is no FMU for Co-Simulation, has no binary for this system or no such
+        variables, or does not start.
+
+    See Also
+    --------
+    gearmbs.native.export : Models as FMUs.
+    """
+
+    def __init__(
+        self, path: str | Path, inputs: Mapping[str, Source] | None = None, *, start: Mapping[str, Any] | None = None
+    ) -> None:
+        fmpy = _fmpy()
+        file = Path(path)
+        self.name = file.name
+        if not file.is_file():
+            raise ModelError(f"{file}: there is no such file; give the path of an FMU")
+        folder = tempfile.mkdtemp(prefix="gearmbs-fmu-")
+        # the folder goes when nobody has the FMU any more, also at the end of the program
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        try:
+            self._told = fmpy.read_model_description(str(file))
+            fmpy.extract(str(file), unzipdir=folder)
+        except Exception as error:
+            raise ModelError(f"{self.name}: it cannot be read as an FMU: {error}") from None
+        able = self._told.coSimulation
+        if able is None:
+            raise ModelError(f"{self.name}: it is no FMU for Co-Simulation; export it for that")
+        self.version = str(self._told.fmiVersion)
+        self._second = self.version.startswith("2")
+        if not (self._second or self.version.startswith("3")):
+            raise ModelError(f"{self.name}: it is of FMI {self.version}; export it by 2.0 or 3.0")
+        self._variables = {variable.name: variable for variable in self._told.modelVariables}
+        self._units = {unit.name: unit for unit in self._told.unitDefinitions}
+        self._sources = dict(inputs or {})
+        for name in self._sources:
+            self._check(name, "input", self.inputs)
+        self._start = dict(start or {})
+        for name in self._start:
+            self._check(name, "variable", list(self._variables))
+        self._folder, self._able = folder, able
+        self._fmu: Any = None
+        self._t = 0.0
+        # only where an FMU can: the simulator asks by these whether its controllers remember
+        saved = able.canGetAndSetFMUstate and able.canSerializeFMUstate
+        if saved:
+            self.state, self.restore = self._state, self._restore
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the inputs that are real numbers."""
+        return self._named("input")
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the outputs that are real numbers."""
+        return self._named("output")
+
+    @property
+    def parameters(self) -> list[str]:
+        """Names of the parameters."""
+        return [name for name, one in self._variables.items() if one.causality == "parameter"]
+
+    def control(self, simulator: Simulator, outputs: Mapping[str, str], sample_time: Any) -> None:
+        """Let outputs of the FMU set inputs of a simulator at sample times, from its present time on.
+
+        Parameters
+        ----------
+        simulator : Simulator
+        outputs : mapping of str to str
+            Outputs of the FMU by the names of the inputs and parameters that they set.
+        sample_time : float or str
+            s; the communication step of the FMU.
+
+        Raises
+        ------
+        ModelError
+            For names that are not there, and as :meth:`gearmbs.Simulator.control` does.
+
+        Notes
+        -----
+        If the FMU can save its state, it is in the simulator's: ``restore`` takes both back.
+        """
+        if not outputs:
+            raise ModelError(f"{self.name}: outputs is empty; give outputs of it by the names of inputs that they set")
+        for output in outputs.values():
+            self._check(output, "output", self.outputs)
+        first, *others = outputs.items()
+        begun = self._told.defaultExperiment.startTime if self._told.defaultExperiment is not None else None
+        # one that takes over from a state is started where it was made for: its time comes with its state
+        taken_over = first[0] in simulator.awaited and hasattr(self, "state")
+        self._begin(float(begun or 0.0) if taken_over else simulator.t)
+        value = self._setter(first[1])
+        simulator.control(first[0], _First(value, self) if hasattr(self, "state") else value, sample_time)
+        for name, output in others:
+            simulator.control(name, self._setter(output), sample_time)
+
+    def _named(self, causality: str) -> list[str]:
+        return [n for n, one in self._variables.items() if one.causality == causality and one.type in REAL]
+
+    def _check(self, name: str, what: str, known: list[str]) -> None:
+        if name not in known:
+            meant = did_you_mean(name, known, otherwise=f"it has {', '.join(known) or 'none'}")
+            raise ModelError(f"{self.name}: there is no {what} {name!r}; {meant}")
+
+    def _begin(self, t: float) -> None:
+        """Start the FMU at a time with what its inputs follow left at their start values."""
+        from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi3 import FMU3Slave
+
+        if self._fmu is not None:
+            raise ModelError(f"{self.name}: it runs in a simulation already; make another ForeignFMU for this one")
+        token = self._told.guid if self._second else self._told.instantiationToken
+        kind = FMU2Slave if self._second else FMU3Slave
+        try:
+            made = kind(
+                guid=token, unzipDirectory=self._folder, modelIdentifier=self._able.modelIdentifier, instanceName="fmu"
+            )
+            made.instantiate()
+            if self._second:
+                made.setupExperiment(startTime=t)
+                self._put(made, self._start)
+                made.enterInitializationMode()
+            else:
+                self._put(made, self._start)
+                made.enterInitializationMode(startTime=t)
+            made.exitInitializationMode()
+        except Exception as error:
+            raise ModelError(f"{self.name}: it does not start at t = {t:g} s: {error}") from None
+        self._fmu, self._t = made, t
+        weakref.finalize(self, _end, made)
+
+    def _put(self, fmu: Any, values: Mapping[str, Any]) -> None:
+        """Set variables of any type, in their own units."""
+        for name, value in values.items():
+            variable = self._variables[name]
+            getattr(fmu, f"set{KINDS[variable.type]}")([variable.valueReference], [value])
+
+    def _unit(self, name: str) -> tuple[float, float]:
+        """Return the SI value of a variable's unit, and of its zero."""
+        variable = self._variables[name]
+        unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+        defined = self._units.get(unit)
+        if defined is not None and defined.baseUnit is not None:
+            return float(defined.baseUnit.factor), float(defined.baseUnit.offset)
+        known = powers_of(unit) if unit else None
+        return (1.0 if known is None else known[0]), 0.0
+
+    def _follow(self, name: str, source: Source, t: float, simulator: Simulator) -> float:
+        """Return the present value of what an input follows, in the FMU's unit."""
+        if callable(source):
+            value = source(t, simulator)
+        elif isinstance(source, str):
+            value = simulator.get("output", source)
+        elif isinstance(source, tuple):
+            *asked, last = source
+            part = "xyz".find(last) if len(asked) > 1 and isinstance(last, str) and len(last) == 1 else -1
+            value = np.asarray(simulator.get(*asked))[part] if part >= 0 else simulator.get(*source)
+        else:
+            value = source
+        found = np.asarray(value, dtype=float)
+        if found.ndim or not np.isfinite(found):
+            raise ModelError(
+                f"{self.name}: its input {name!r} follows {source!r}, which is {value!r} at t = {t:.6g} s; it must be "
+                "one finite number, of vectors a component"
+            )
+        factor, offset = self._unit(name)
+        return (float(found) - offset) / factor
+
+    def _go_to(self, t: float, simulator: Simulator) -> None:
+        """Go on to a time with the inputs of the last sample held, and tell the FMU those of now."""
+        if t > self._t:
+            try:
+                self._fmu.doStep(currentCommunicationPoint=self._t, communicationStepSize=t - self._t)
+            except Exception as error:
+                raise ModelError(f"{self.name}: its step from t = {self._t:.6g} to {t:.6g} s failed: {error}") from None
+            self._t = t
+        values = {name: self._follow(name, source, t, simulator) for name, source in self._sources.items()}
+        self._put(self._fmu, values)
+
+    def _told_of(self, name: str) -> float:
+        """Return an output in SI units."""
+        variable = self._variables[name]
+        take = getattr(self._fmu, f"get{KINDS[variable.type]}")
+        factor, offset = self._unit(name)
+        return float(take([variable.valueReference])[0]) * factor + offset
+
+    def _setter(self, output: str) -> Callable[[float, Any], float]:
+        """Return a function that gives an input the value of an output; whoever comes first makes the step."""
+
+        def value(t: float, simulator: Any) -> float:
+            self._go_to(t, simulator)
+            return self._told_of(output)
+
+        return value
+
+    def _state(self) -> list[float]:
+        """Return the time and the bytes of the FMU's state, as numbers."""
+        take, pack, free = (
+            (self._fmu.getFMUstate, self._fmu.serializeFMUstate, self._fmu.freeFMUstate)
+            if self._second
+            else (self._fmu.getFMUState, self._fmu.serializeFMUState, self._fmu.freeFMUState)
+        )
+        kept = take()
+        try:
+            return [self._t, *pack(kept)]
+        finally:
+            free(kept)
+
+    def _restore(self, numbers: np.ndarray) -> None:
+        self._t = float(numbers[0])
+        data = bytes(numbers[1:].astype(np.uint8))
+        unpack, put, free = (
+            (self._fmu.deSerializeFMUstate, self._fmu.setFMUstate, self._fmu.freeFMUstate)
+            if self._second
+            else (self._fmu.deserializeFMUState, self._fmu.setFMUState, self._fmu.freeFMUState)
+        )
+        kept = unpack(data)
+        try:
+            put(kept)
+        finally:
+            free(kept)
+
+
+class _First:
+    """What sets the first input of a simulator: with it the FMU's state is in that of the simulator."""
+
+    def __init__(self, value: Callable[[float, Any], float], fmu: ForeignFMU) -> None:
+        self._value, self.state, self.restore = value, fmu.state, fmu.restore
+
+    def __call__(self, t: float, simulator: Any) -> float:
+        return self._value(t, simulator)
+
+
+def _end(fmu: Any) -> None:
+    """End an FMU that nobody has any more."""
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def _fmpy() -> Any:
+    try:
+        import fmpy
+    except ImportError:
+        raise ModelError("FMUs of other programs are run with FMPy; install it: pip install 'gearmbs[fmu]'") from None
+    return fmpy
