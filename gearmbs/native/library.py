@@ -149,7 +149,7 @@ def export(
         if version is None:
             library = write_whole(folder / f"{stem}.so", made.read_bytes())
             library.chmod(0o755)
-            for file in ("gearmbs.h", "example.c"):
+            for file in ("gearmbs.h", "example.c", "example.cpp"):
                 (folder / file).write_bytes(_source(file))
         else:
             rdata, t = begun.run.state.rdata, begun.point.t

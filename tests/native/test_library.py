@@ -19,6 +19,7 @@ from tests.native.support import Instance, Library
 from tests.says import says
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
+CPP = shutil.which("c++") or shutil.which("g++")
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")]
 
 PAIR_END = 0.02
@@ -277,6 +278,23 @@ def test_the_example(pair, tmp_path):
         assert float(t) == pytest.approx(instance.t)
         assert float(value) == instance.outputs()[0]
         assert unit == "m"
+
+
+@pytest.mark.skipif(CPP is None, reason="no C++ compiler is installed")
+def test_the_example_in_cpp(pair, tmp_path):
+    """Instances of threads go on from one state as one instance does, and print what it holds."""
+    _, made, library = pair
+    program = tmp_path / "example"
+    command = [CPP, "-std=c++17", "-pthread", "-Wall", "-Wextra", "-Werror", str(made.folder / "example.cpp")]
+    subprocess.run([*command, str(made.library), "-o", str(program), f"-Wl,-rpath,{made.folder}"], check=True)
+    lines = subprocess.check_output([program], text=True).splitlines()
+    instance = Instance(library)
+    instance.advance(0.5 * PAIR_END)
+    instance.advance(PAIR_END)
+    values = instance.outputs()
+    assert len(lines) == len(made.outputs)
+    for name, value, line in zip(made.outputs, values, lines, strict=True):
+        assert line.startswith(f"{name} {value:.17g}")
 
 
 def test_what_cannot_be_exported_is_refused(tmp_path):
