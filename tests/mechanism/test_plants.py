@@ -577,10 +577,14 @@ def test_what_turns_freely_is_exact_at_all_frequencies(drag):
     exact = np.array([first, s * second, -couple * twist * 2.0 / 3.0, s**2 * first / 3.0])
     exact = exact.transpose(2, 0, 1)
     answer = plant.frequency_response(f)
+    # the fast pole, known to its rounding, beside which s is looked at; some units of it are lost on the way
+    fast = np.sqrt(3e8 * (1.0 / one + 1.0 / two))
+    allowed = 1e-9 + 16.0 * np.finfo(float).eps * fast / np.abs(s)
     for found in (answer, np.array([plant.transfer(each) for each in s])):
-        np.testing.assert_allclose(found[:, :3], exact[:, :3], rtol=3e-7)
-        # what the shaft takes of the torque, and the torque
-        np.testing.assert_allclose(found[:, 3], exact[:, 3], rtol=3e-7, atol=1e-14 / one)
+        for given, wanted, share in zip(found, exact, allowed, strict=True):
+            np.testing.assert_allclose(given[:3], wanted[:3], rtol=share)
+            # what the shaft takes of the torque, and the torque
+            np.testing.assert_allclose(given[3], wanted[3], rtol=share, atol=1e-14 / one)
     # beside a slow pole the polynomials have what rounding leaves
     for j in range(0 if drag else 2):
         for k in range(3):
