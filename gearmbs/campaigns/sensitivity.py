@@ -471,7 +471,10 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
     if plan.design == "morris":
         return morris_effects(values, points, names, places=plan.places(points))
     if plan.design in TWO_LEVELS:
-        return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
+        # the high end of numbers is that of their values, wherever it stands among them
+        at = np.rint(plan.places(points))
+        at = np.where(np.isnan(at) | (np.ptp(at, axis=0) == 0.0), points, at)
+        return main_effects(2.0 * at - 1.0, values, names, interactions=plan.design == "factorial")
     if plan.design == "grid":
         # crossed choices, which take no coordinate, were refused above
         varied = [k for k, count in enumerate(plan.counts()) if count > 1]

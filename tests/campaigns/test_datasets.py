@@ -231,6 +231,9 @@ def test_a_reference_takes_out_what_a_sensor_makes_of_every_state():
     np.testing.assert_allclose(found[~faulty & ~reference], 0.0, atol=0.06)
     with pytest.raises(CampaignError, match=says("reference", "b", "healthy")):
         against_reference(x, sensor, reference & (sensor == "a"))
+    np.testing.assert_array_equal(against_reference(x, sensor, reference.astype(int)), found)
+    with pytest.raises(CampaignError, match=says("reference", "80 rows")):
+        against_reference(x, sensor, np.flatnonzero(reference))
 
 
 @pytest.mark.parametrize("part", [np.nan, -0.1, 1.0])
@@ -251,6 +254,7 @@ def test_no_specimen_is_in_two_splits():
     held = withhold(split, severity, 0.4, 0.6)
     assert ((severity[held == "train"] < 0.4) | (severity[held == "train"] > 0.6)).all()
     np.testing.assert_array_equal(held == "test", split == "test")
+    np.testing.assert_array_equal(withhold(list(split), severity, 0.4, 0.6), held)
     assert shared_groups(random_split(groups.size), groups)[("test", "train")] >= 40
     with pytest.raises(CampaignError, match=says("split", "2 groups", "0.5")):
         split_by_group(np.array([1, 1, 2]), test=0.5, validation=0.5)
@@ -353,6 +357,24 @@ def made_rows(count=40, each=6, clean=lambda state, x: x):
     return rows.iloc[generator.permutation(len(rows))].reset_index(drop=True)
 
 
+def test_rows_in_another_order_are_the_same_rows():
+    """They keep their former numbers, and their own speeds and teeth; what is longer than a record is refused."""
+    rows = made_rows(4, 2)
+    speed = [np.full(800, value) for value in np.linspace(50.0, 300.0, len(rows))]
+    rows = rows.assign(speed=speed, sampling_rate=RATE, severity=0.5, teeth=[[20 + k, 40] for k in range(len(rows))])
+    moved = rows.sample(frac=1.0, random_state=1)
+    assert list(moved.index) != list(rows.index)
+    plain, found = (feature_table(given, window=0.05) for given in (rows, moved))
+    np.testing.assert_array_equal(found[0], plain[0][moved.index])
+    np.testing.assert_array_equal(found[1], moved["state"])
+    part = feature_table(rows[rows["state"] == "b"], window=0.05)
+    np.testing.assert_array_equal(part[0], plain[0][plain[1] == "b"])
+    with pytest.raises(CampaignError, match=says("window", "0.2 s", "shorter")):
+        feature_table(rows, window=0.2)
+    with pytest.raises(CampaignError, match=says("window", "0.2 s", "shorter")):
+        recording_features(make_signal(np.ones((800, 1)), RATE, units="m/s^2"), shaft=20.0, teeth=20, window=0.2)
+
+
 def spoilt(state, x):
     """Return a signal that goes on from its end to its beginning, and of one state is clipped and sounds too high."""
     spectrum = np.fft.rfft(x)
@@ -372,7 +394,9 @@ def test_artefacts_tell_nothing_where_there_are_none():
 @pytest.mark.slow
 def test_artefacts_are_found():
     rows = made_rows(clean=spoilt)
-    found = artefact_leaks(rows.assign(point=rows["point"] + 1000 * (rows["state"] == "b")), folds=3)
+    rows = rows.assign(point=rows["point"] + 1000 * (rows["state"] == "b"))
+    # rows of a data set in another order are the same rows
+    found = artefact_leaks(rows.sample(frac=1.0, random_state=1), folds=3)
     assert all(one.low > 0.6 for one in found.values()), found
 
 

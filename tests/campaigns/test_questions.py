@@ -572,3 +572,12 @@ def test_points_of_another_design_are_refused():
             main_effects(wrong, coded[:, 0], NAMES)
     with pytest.raises(CampaignError, match=says("50", "determine", "leave out")):
         fit_chaos(np.full((50, 2), 0.3), np.arange(50.0), NAMES[:2])
+
+
+@pytest.mark.parametrize("values", [(1, 2, 10), (10, 1)])
+def test_the_high_end_of_numbers_is_the_larger(tmp_path, values):
+    subject = FunctionSubject(adding, {"a": 1.0, "b": 2.0})
+    factors = [Factor("a", values=values), Factor("b", 1.0, 3.0)]
+    campaign = Campaign(tmp_path / "c", make_plan(subject, factors, "factorial"))
+    campaign.run(workers=0)
+    np.testing.assert_allclose(campaign.sensitivity("s").effect[["a", "b"]], [9.0, 2.0])

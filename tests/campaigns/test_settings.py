@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from gearmbs.campaigns import (
     Campaign,
     CampaignError,
     CampaignWarning,
+    Choice,
     DeckSubject,
     Factor,
     FunctionSubject,
@@ -64,7 +66,34 @@ def test_designs_of_two_levels_take_no_names_without_order(design):
 
     with pytest.raises(CampaignError, match=says(design, "3 values", "grid")):
         plan("a", "b", "c")
-    assert plan(0.0, 1.0).size == plan(0.0, 0.5, 1.0).size
+    assert plan(0.0, 1.0).size == plan(0.0, 0.5, 1.0).size == plan(1.0, 0.5, 0.0).size
+    with pytest.raises(CampaignError, match=says(design, "0.5", "1.0", "ascending")):
+        plan(0.5, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("design", "options", "most"),
+    [
+        ("factorial", {}, 2),
+        ("central composite", {}, 3),
+        ("box behnken", {}, 3),
+        ("morris", {}, 4),
+        ("morris", {"levels": 6}, 6),
+        ("sobol", {}, 9),
+    ],
+)
+def test_alternatives_are_not_left_out_in_silence(design, options, most):
+    """What has no order and has more alternatives than a design takes is refused, names and choices alike."""
+    n = {"n": 4} if design in ("morris", "sobol") else {}
+    for count in (most, most + 1):
+        names = [f"v{k}" for k in range(count)]
+        for last in (Factor(ranges()[2].path, values=names), Choice(ranges()[2].path, {name: 1.0 for name in names})):
+            ask = partial(make_plan, function(), [*ranges()[:2], last], design, options=options, **n)
+            if count == most or design == "sobol":
+                assert ask().size > 0
+            else:
+                with pytest.raises(CampaignError, match=says(ranges()[2].path, f"{count} values", design, "order")):
+                    ask()
 
 
 def test_what_is_of_ranges_stands_beside_no_values():

@@ -47,6 +47,8 @@ def artefact_leaks(rows: pd.DataFrame, *, folds: int = 5, seed: int = 0) -> dict
     folds : int
         Parts of the specimens, each of which is tested by classifiers trained on the others.
     """
+    # a part of the rows, or rows in another order, keep their former numbers
+    rows = rows.reset_index(drop=True)
     names = [name for name in rows.columns if name.startswith("signal.")]
     signals = [(k, name) for name in names for k in range(len(rows)) if rows[name][k] is not None]
     owner = np.array([k for k, _ in signals])

@@ -125,7 +125,12 @@ def recording_features(signal: xr.DataArray, *, shaft: float, teeth: int, window
     from gearmbs.signals import rate_of
 
     rate = rate_of(signal)
-    size = int(window * rate)
+    size = round(window * rate)
+    if not 0 < size <= signal.sizes["time"]:
+        raise CampaignError(
+            f"features: window = {window:g} s is none of a recording of {signal.sizes['time'] / rate:g} s; give a "
+            "shorter one"
+        )
     parts = windows(signal.transpose("channel", "time").values, size).reshape(-1, size)
     return np.array([features(part, rate, shaft, teeth) for part in parts])
 
@@ -140,15 +145,19 @@ def feature_table(rows: pd.DataFrame, *, window: float = 0.25) -> tuple[np.ndarr
     window : float
         s.
     """
+    # a part of the rows, or rows in another order, keep their former numbers
+    rows = rows.reset_index(drop=True)
     found, owner = [], []
     for name in (name for name in rows.columns if name.startswith("signal.")):
         for k, x in enumerate(rows[name]):
             if x is None:
                 continue
             rate, shaft = rows["sampling_rate"][k], float(np.mean(rows["speed"][k])) / (2.0 * np.pi)
-            for part in windows(np.asarray(x, dtype=float), int(window * rate + 0.5)):
+            for part in windows(np.asarray(x, dtype=float), round(window * rate)):
                 found.append(features(part, rate, shaft, rows["teeth"][k][0]))
                 owner.append(k)
+    if not found:
+        raise CampaignError(f"features: no signal is as long as the window of {window:g} s; give a shorter one")
     labels = rows.iloc[owner]
     return np.array(found), *(labels[name].to_numpy() for name in ("state", "specimen", "severity"))
 
@@ -170,9 +179,13 @@ def against_reference(x: np.ndarray, owners: np.ndarray, reference: np.ndarray) 
     Raises
     ------
     CampaignError
-        If an owner has no row of reference.
+        If an owner has no row of reference, or rows are given by anything but a truth value each.
     """
     found = np.asarray(x, dtype=float).copy()
+    truths = np.asarray(reference)
+    if truths.shape != (len(found),) or not np.isin(truths, (0, 1)).all():
+        raise CampaignError(f"reference: give true or false for each of the {len(found)} rows")
+    reference = truths.astype(bool)
     for name in np.unique(owners):
         mine = np.asarray(owners) == name
         if not np.any(mine & reference):

@@ -61,6 +61,7 @@ def withhold(split: np.ndarray, severity: np.ndarray, low: float, high: float) -
     """
     if not (isinstance(low, Real) and isinstance(high, Real) and low <= high):
         raise CampaignError(f"withhold: from {low!r} to {high!r}; give the lower end first")
+    split = np.asarray(split)
     inside = (np.asarray(severity) >= low) & (np.asarray(severity) <= high)
     return np.where((split == "train") & inside, "withheld", split)
 

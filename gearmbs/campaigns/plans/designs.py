@@ -24,6 +24,9 @@ ANALYSES = ("saltelli", "morris")
 TWO_LEVELS = ("factorial", "plackett burman")
 """Designs that take the ends of what a factor has."""
 
+MOST_LEVELS = dict.fromkeys(TWO_LEVELS, 2) | {"central composite": 3, "box behnken": 3}
+"""Of how many places of a factor a design takes values."""
+
 DESIGNS = (
     "grid",
     "list",
@@ -91,8 +94,7 @@ def morris(n: int, dimensions: int, seed: int, levels: int = 4, first: int = 0) 
     every
     coordinate once, in random order and direction.
     """
-    delta = levels / (2.0 * (levels - 1.0))
-    starts = np.arange(levels // 2) / (levels - 1.0)
+    starts, delta = morris_starts(levels)
     points = np.empty((n, dimensions + 1, dimensions))
     for k in range(n):
         generator = np.random.default_rng([seed, first + k])
@@ -105,6 +107,11 @@ def morris(n: int, dimensions: int, seed: int, levels: int = 4, first: int = 0) 
             at[axis] += delta if up[axis] else -delta
             points[k, step + 1] = at
     return points.reshape(-1, dimensions)
+
+
+def morris_starts(levels: int) -> tuple[np.ndarray, float]:
+    """Return where the lower ends of a Morris design's steps are, and how long these are."""
+    return np.arange(levels // 2) / (levels - 1.0), levels / (2.0 * (levels - 1.0))
 
 
 def grid(counts: Sequence[int]) -> np.ndarray:

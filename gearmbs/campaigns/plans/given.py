@@ -13,6 +13,7 @@ import numpy as np
 from gearmbs.campaigns.plans import designs
 from gearmbs.campaigns.plans.factors import (
     AnyFactor,
+    Choice,
     Factor,
     Specimens,
     check_kinds,
@@ -164,13 +165,8 @@ def _consistent(plan: Plan) -> None:
                     f"factor {f.path!r}: its {len(found)} values are {', '.join(map(str, found))}, some of them twice; "
                     "give it fewer levels, or values that are different"
                 )
-    for f in plan.factors if plan.design in designs.TWO_LEVELS else ():
-        # of numbers the ends are meant; of names nothing tells which two
-        if isinstance(f, Factor) and len(f.values) > 2 and not all(isinstance(v, int | float) for v in f.values):
-            raise CampaignError(
-                f"factor {f.path!r}: a {plan.design} design takes two of its {len(f.values)} values, which have no "
-                "order; give it two, or take a grid"
-            )
+    for f in plan.factors:
+        _all_taken(f, plan)
     drawn = [f for f in plan.factors if isinstance(f, Specimens)]
     if alike := [f.name for f in drawn if [other.seed for other in drawn].count(f.seed) > 1]:
         raise CampaignError(
@@ -189,6 +185,40 @@ def _consistent(plan: Plan) -> None:
             f"n = {plan.n}: the points of a {plan.design} design follow from factors and options; leave n out"
         )
     chosen(FAILURE_POLICIES, plan.on_failure, "", CampaignError, "on_failure")
+
+
+def _all_taken(factor: AnyFactor, plan: Plan) -> None:
+    """Refuse a factor of which a design of few levels would leave out alternatives, none of which is an end."""
+    if isinstance(factor, Factor):
+        alternatives: Sequence[Any] = factor.values
+        ordered = all(isinstance(v, int | float) for v in alternatives)
+    else:
+        alternatives = list(factor.options) if isinstance(factor, Choice) else range(factor.draws)
+        ordered = False
+    count, most = len(alternatives), designs.MOST_LEVELS.get(plan.design)
+    if ordered and plan.design in designs.TWO_LEVELS and count > 2:
+        ends = alternatives[0], alternatives[-1]
+        if sorted(ends) != [min(alternatives), max(alternatives)]:
+            raise CampaignError(
+                f"factor {factor.name!r}: a {plan.design} design takes the first and the last of its values, {ends[0]} "
+                f"and {ends[1]}, which are not the least and the largest; give them in ascending order"
+            )
+    if ordered or crossed(factor):
+        return
+    if most is not None and count > most:
+        raise CampaignError(
+            f"factor {factor.name!r}: a {plan.design} design takes {most} of its {count} values, which have no order; "
+            f"give it {most}, or take a grid"
+        )
+    if plan.design == "morris" and not isinstance(factor, Specimens):
+        levels = int(plan.options.get("levels", 4))
+        starts, delta = designs.morris_starts(levels)
+        reached = np.minimum((np.r_[starts, starts + delta] * count).astype(int), count - 1)
+        if np.unique(reached).size < count:
+            raise CampaignError(
+                f"factor {factor.name!r}: a morris design of {levels} levels never takes some of its {count} values, "
+                f"which have no order; give it options={{'levels': {count + count % 2}}}"
+            )
 
 
 def _variant(factor: AnyFactor) -> tuple:
