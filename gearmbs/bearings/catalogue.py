@@ -75,8 +75,8 @@ SUFFIX = re.compile(
 precision."""
 APART = re.compile(r"[CE]|2?HRS|MT\d+|GJN|WT|LHT\d+|V[LAT]\d+|TN|S[0-4]|X?\dK|[25]K|2AS|NS7S?|Q\d+|L\d+|P[456]|")
 """The same of those written apart only: design, grease, heat treatment, quality."""
-TAPERED_BORE = re.compile(r"\s*-?(?:E1?|C{1,2}A?|M[AB]?|TVH)?-?\s*K")
-"""Suffixes of self-aligning bearings with a tapered bore."""
+TAPERED_BORE = re.compile(r"(?:^|[^A-Z0-9]|[A-JL-Z]|RS\d?|Z)K(?!\d{3})")
+"""Among the suffixes: a tapered bore, K, alone, "K/C3", behind other letters, "CCK", or before them, "KTN9"."""
 MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO|TIMKEN|NACHI|NKE|ZVL|ZKL|KINEX|SNR|URB|RHP)\s*")
 
 
@@ -109,6 +109,12 @@ def look_up(
     bare = re.sub(r"^([A-Z]+(?:18(?=\s+\d))?)\s+(?=\d)", r"\1", re.sub(r"^SL\s+18", "SL18", bare))
     group = series_of(bare)
     if group is not None:
+        other = re.match(r"\s*/\s*(\d+(?:\.\d+)?)(?![A-Z0-9])", group[2])
+        if other is not None and "bore" not in changes:
+            raise BearingError(
+                f"designation {designation!r}: {other[1]} behind its size names another bore or raceway, which is not "
+                "tabulated; leave it away and give bore="
+            )
         size = size_of(*group[:2])
         fixed = known_of(bare, {} if size is None else size.boundary)
         if fixed is not None:
@@ -244,7 +250,8 @@ def _asked(
 def _class_of(designation: str, fixed: Known, named: str | None, suffixes: str) -> dict[str, float]:
     """Return the mean clearance of a class that is named; refuse it of bearings that have no radial classes."""
     kind = fixed.fields["kind"]
-    if named is not None and KINDS[kind].rows == "self-aligning" and TAPERED_BORE.match(suffixes):
+    tapers = KINDS[kind].rows == "self-aligning" or kind.endswith("cylindrical roller")
+    if named is not None and tapers and TAPERED_BORE.search(suffixes):
         raise BearingError(
             f"designation {designation!r}: {named} of a tapered bore, K, has limits of its own, which mounting closes; "
             "give clearance= (diametral) as it is mounted"

@@ -161,7 +161,8 @@ DOUBLE_ANGULAR = (
     (20.0, 0.57, 1.09, 0.70, 1.63), (25.0, 0.68, 0.92, 0.67, 1.41), (30.0, 0.80, 0.78, 0.63, 1.24),
     (35.0, 0.95, 0.66, 0.60, 1.07), (40.0, 1.14, 0.55, 0.57, 0.93), (45.0, 1.34, 0.47, 0.54, 0.81),
 )  # fmt: skip
-"""Contact angle in degrees, e, Y below e, X and Y above it of double row angular contact bearings."""
+"""Contact angle in degrees, e, Y below e, X and Y above it of double row angular contact bearings, and of four-point
+bearings, whose ratings count two rows."""
 
 
 def _deep_groove_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
@@ -294,8 +295,9 @@ def _four_point(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     return Known(fields, ("elements", "element_diameter"))
 
 
-TWO_ROW_ANGLES = {"": 30.0, "A": 30.0, "B": 25.0, "D": 30.0, "E": 30.0}
-"""Contact angle of double row angular contact bearings by the letter behind the digits, degrees."""
+TWO_ROW_ANGLES = {"": 30.0, "A": 30.0, "B": 25.0, "BD": 30.0, "D": 45.0, "DA": 45.0, "DNR": 40.0, "E": 30.0}
+"""Contact angle of double row angular contact bearings by the letters behind the digits, degrees; with a split inner
+ring, D, it is larger."""
 
 
 def _double_angular(found: re.Match[str], boundary: dict[str, Any]) -> Known:
@@ -353,7 +355,7 @@ KINDS: dict[str, Kind] = {
         both_ways=True,
         reduction=0.95,
         rated_rows=2,
-        load_factors=_angular_factors,
+        load_factors=_double_angular_factors,
         usual=Usual(size=0.300, fill=0.80),
         designation=re.compile(r"^QJ\s*([23])(\d\d)(?!\d)"),
         series={"2": "QJ2", "3": "QJ3"},
@@ -423,7 +425,7 @@ KINDS: dict[str, Kind] = {
         rated_rows=2,
         load_factors=_double_angular_factors,
         usual=Usual(size=0.250, fill=0.80, apart=0.5),
-        designation=re.compile(r"^(3[23])(\d\d)(?!\d)\s*-?\s*([ABDE])?"),
+        designation=re.compile(r"^(3[23])(\d\d)(?!\d)\s*-?\s*(BD|DA|DNR|[ABDE])?"),
         series={"32": "32", "33": "33"},
         known=_double_angular,
         unclassed="it is one of axial clearance",

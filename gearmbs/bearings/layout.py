@@ -263,3 +263,25 @@ def spline_coefficients(values: np.ndarray) -> np.ndarray:
     inner = np.fft.irfft(np.fft.rfft(values) / response, nodes)
     # the kernel begins one node before the interval
     return np.take(inner, np.arange(-1, nodes + MARGIN - 1), mode="wrap")
+
+
+def one_element(integers: np.ndarray, rows: int, row: int, element: int) -> np.ndarray:
+    """Return the integers of a bearing of one element in one row of a bearing's.
+
+    Parameters
+    ----------
+    integers : ndarray
+    rows : int
+        Number of its rows.
+    row, element : int
+    """
+    paths = int(integers[PATHS])
+    own = paths // rows
+    first = INTEGERS + own * row
+    rings = [integers[at : at + own] for at in (first, first + paths)]
+    spin = integers[INTEGERS + 2 * paths + element :][:1]
+    one = np.concatenate([integers[:INTEGERS], *rings, spin])
+    one[ELEMENTS], one[PATHS] = 1, own
+    one[AT_ELEMENTS] += ELEMENT_COLUMNS * element
+    one[AT_PATHS] += PATH_COLUMNS * own * row
+    return one

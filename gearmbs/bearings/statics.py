@@ -300,11 +300,12 @@ class BearingState:
         Forces (N) and moments (N m) on the inner ring that hold it there.
     stiffness : ndarray, shape (5, 5)
         d load/d displacement.
-    element_loads : ndarray, shape (Z,)
-        Normal force of each element on the inner ring, N; of four points and of two rows the sum of both vectors.
-    element_angles : ndarray, shape (Z,)
+    element_loads : ndarray, shape (Z,) or (2 Z,)
+        Normal force of each element on the inner ring, N; of four points the sum of both vectors, of two rows those of
+        the first, at negative z, and then of the second.
+    element_angles : ndarray, as many
         Where each element is, rad from x.
-    contact_angles : ndarray, shape (Z,)
+    contact_angles : ndarray, as many
         Angle of each normal force against the radial plane, rad; NaN without force.
     """
 
@@ -545,18 +546,14 @@ class BearingStatics:
     def _state(
         self, place: np.ndarray, load: np.ndarray, stiffness: np.ndarray, cage_angle: float | None
     ) -> BearingState:
-        tables, z = self.tables, self.bearing.elements
+        tables, z, rows = self.tables, self.bearing.elements, self.bearing.rows
         start = self.settings.cage_angle if cage_angle is None else cage_angle
         at = int(tables.integers[B.AT_ELEMENTS])
-        angles = start + tables.reals[at + B.ELEMENT_PLACE : at + B.ELEMENT_COLUMNS * z : B.ELEMENT_COLUMNS]
-        loads, contact = np.zeros(z), np.full(z, np.nan)
-        paths = int(tables.integers[B.PATHS])
-        spins = B.INTEGERS + 2 * paths
-        for j in range(z):
-            # a bearing of one element
-            integers = tables.integers.copy()
-            integers[B.ELEMENTS], integers[B.AT_ELEMENTS] = 1, at + B.ELEMENT_COLUMNS * j
-            integers[spins] = tables.integers[spins + j]
+        places = tables.reals[at + B.ELEMENT_PLACE : at + B.ELEMENT_COLUMNS * z : B.ELEMENT_COLUMNS]
+        angles = np.tile(start + places, rows)
+        loads, contact = np.zeros(rows * z), np.full(rows * z, np.nan)
+        for j in range(rows * z):
+            integers = B.one_element(tables.integers, rows, *divmod(j, z))
             one = BearingTables(integers, tables.reals, tables.spinning)
             force, _ = self._load(place, cage_angle, one)
             radial = force[0] * np.cos(angles[j]) + force[1] * np.sin(angles[j])

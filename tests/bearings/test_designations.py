@@ -7,7 +7,7 @@ import warnings
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError
-from gearmbs.bearings.bearing import dynamic_rating, rating_life
+from gearmbs.bearings.bearing import dynamic_rating, equivalent_load, rating_life
 from gearmbs.bearings.boundary import SAME, size_of, sizes
 from tests.says import says
 
@@ -236,6 +236,11 @@ def test_four_point_bearings_are_rated_as_two_rows():
     assert dynamic_rating(bearing) == pytest.approx(2.0**0.7 * dynamic_rating(single))
     assert by_name("QJ 210").rating == pytest.approx(62.2e3)
     assert dynamic_rating(bearing) == pytest.approx(62.2e3, rel=0.12)
+    # so their load is that of two rows, as printed: 1.07 Fa, and Fr + 0.66 Fa up to Fa/Fr = 0.95
+    assert equivalent_load(bearing, 0.0, 1000.0) == pytest.approx(1070.0)
+    assert equivalent_load(bearing, 1000.0, 2000.0) == pytest.approx(0.6 * 1000.0 + 1.07 * 2000.0)
+    assert equivalent_load(bearing, 1000.0, 900.0) == pytest.approx(1000.0 + 0.66 * 900.0)
+    assert equivalent_load(single, 0.0, 1000.0) == pytest.approx(660.0)
 
 
 def test_a_rating_that_is_given_counts():

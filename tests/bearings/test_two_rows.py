@@ -179,12 +179,61 @@ def test_classes_of_self_aligning_bearings_are_their_own(name, clearance):
     assert by_name(name).clearance == pytest.approx(clearance, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["22316 EK/C3", "1210 K/C3"])
+@pytest.mark.parametrize(
+    "name",
+    ["22316 EK/C3", "1210 K/C3", "22210-E1-XL-K/C3", "22210EAKE4/C3", "22210CAMKE4/C3", "22210RHKW33/C3",
+     "22210-BEA-XL-K-MB1/C3", "2210-2RS-K-TVH/C3", "2210 E-2RS1KTN9/C3", "NN 3010 KTN9/SP/C3", "NU2210 K/C3"],
+)  # fmt: skip
 def test_classes_of_tapered_bores_are_not_known(name):
     with pytest.raises(BearingError, match=says("C3", "clearance=")):
         by_name(name)
     assert by_name(name, clearance="50 um").clearance == pytest.approx(50e-6)
-    assert by_name(name.split("/")[0]).clearance == 0.0
+    assert by_name(name.replace("/C3", "")).clearance == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "clearance"), [("22210-E1-XL-C3", 65e-6), ("2210-2RS-TVH/C3", 34.5e-6), ("NU2210 ECP/C3", 65e-6)]
+)
+def test_classes_beside_tapered_bores_are_those_of_the_standard(name, clearance):
+    assert by_name(name).clearance == pytest.approx(clearance, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "angle"),
+    [("3206 A", 30), ("3206-B-TVH", 25), ("3206-BD-XL-TVH", 30), ("3306-DA", 45), ("3308 D", 45), ("3308 DNRCBM", 40)],
+)
+def test_contact_angles_by_the_letters_of_two_rows(name, angle):
+    """As printed by two makers: B 25 and BD 30 degrees; 45 with a split inner ring, 40 with a snap ring, too."""
+    assert math.degrees(by_name(name).contact_angle) == pytest.approx(angle)
+
+
+def test_another_bore_behind_the_size_is_asked_for():
+    """22205/20 has a bore of 20 mm, 22205 of 25."""
+    with pytest.raises(BearingError, match=says("20", "bore=")):
+        by_name("22205/20 E")
+    assert by_name("22205/20 E", bore="20 mm").bore == pytest.approx(20e-3)
+    assert by_name("22205/C3").bore == pytest.approx(25e-3)
+    assert by_name("22205 E/W33").bore == pytest.approx(25e-3)
+
+
+@pytest.mark.parametrize("bearing", [BACK, BALLS, ALIGNING, SPHERICAL, ROLLERS], ids=lambda bearing: bearing.kind)
+def test_elements_of_each_row_have_their_own_force(bearing):
+    """Under a radial load both rows are alike: as many elements carry, and the largest has, what one row tells."""
+    state = BearingStatics(bearing, slices=1).at([25e-6, 0.0, 0.0])
+    first, second = state.element_loads.reshape(2, bearing.elements)
+    assert first == pytest.approx(second, rel=1e-12)
+    a, reach = bearing.contact_angle, 0.0 if bearing.fixed_normals else bearing.groove_distance
+    loads = []
+    for angle in 2.0 * math.pi * np.arange(bearing.elements) / bearing.elements:
+        moved = 25e-6 * math.cos(angle) - 0.5 * bearing.clearance
+        if reach:
+            delta = math.hypot(reach * math.cos(a) + moved, reach * math.sin(a)) - reach
+        else:
+            delta = moved * math.cos(a)
+        loads.append(bearing.stiffness * max(delta, 0.0) ** bearing.exponent)
+    assert first == pytest.approx(loads, rel=1e-6)
+    assert state.largest == pytest.approx(max(loads), rel=1e-6)
+    assert state.loaded == 2 * sum(load > 0.0 for load in loads)
 
 
 @pytest.mark.parametrize("part", ["inner", "outer"])
