@@ -22,6 +22,7 @@ from gearmbs.schema.quantities import Measure
 from gearmbs.signals import fixed_sensor
 from gearmbs.studies.case.section import CaseError
 from gearmbs.studies.case.tooth_faults import tooth_fault
+from gearmbs.studies.run.recorder import TURN_BEFORE
 from gearmbs.units import Quantity, to_si
 
 MEMBERS = ("sun", "carrier", "ring")
@@ -159,11 +160,13 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     solution = mechanism.simulate(begin + run.duration, **options)
     if solution.status is not Status.SUCCESS:
         raise RuntimeError(f"{gears.name}: {solution.message}")
-    fine = solution.t >= begin - 0.5 / run.rate / OVERSAMPLING
-    kept = np.flatnonzero(fine)[::OVERSAMPLING]
+    first = int(np.searchsorted(solution.t, begin - 0.5 / run.rate / OVERSAMPLING))
+    before = _rows_before(run, solution.t[:first])
+    fine, kept = slice(before.size, None), slice(before.size, None, OVERSAMPLING)
     planets = range(1, gears.planets + 1)
     # all bodies and forces at all outputs would need far more memory than what is wanted of them
-    told = _joined([_wanted(run, mechanism, part) for part in solution.parts()])
+    rows = np.concatenate([before, np.arange(first, solution.t.size)])
+    told = _joined([_wanted(run, mechanism, part) for part in solution.parts(rows)])
     both = {"sun": told["sun"], "ring": told["ring"]}
     motion: dict[str, Any] = {}
     if run.rim is not None:
@@ -183,7 +186,7 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     share = np.divide(both["sun"], total, out=np.zeros_like(both["sun"]), where=total != 0)
     mean = {m: float(w.mean()) for m, w in spin.items()}
     rates = gears.frequencies(sun=mean["sun"], carrier=mean["carrier"])
-    time = solution.t[kept] - begin
+    time = solution.t[first::OVERSAMPLING] - begin
     # what `analyse` can tell faults of
     plain = gears.planet_at_ring is None and run.held == "ring"
     return xr.Dataset(
@@ -210,6 +213,20 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
             **{f"frequency_{name}": value for name, value in rates.items()},
         },
     )
+
+
+def _rows_before(run: PlanetaryRun, t: np.ndarray) -> np.ndarray:
+    """Return the numbers of the output times before a record that are evaluated, to count turns from the start on.
+
+    All of them where the speeds of the set follow from its loads.
+    """
+    known = {member: to_si(speed, "angular speed", member) for member, speed in run.speeds.items()}
+    known |= {run.held: 0.0} if run.held else {}
+    if len(known) != 2:
+        return np.arange(t.size)
+    fastest = max(abs(speed) for speed in run.gears.speeds(**known).values())
+    interval = np.floor(t * fastest / (2.0 * np.pi * TURN_BEFORE))
+    return np.flatnonzero(np.diff(interval, prepend=-1.0) > 0.0)
 
 
 def _wanted(run: PlanetaryRun, mechanism: Mechanism, part: Solution) -> dict[str, np.ndarray]:

@@ -1,6 +1,7 @@
 """Planetary sets from files, on the command line, and what backlash and a defect do together."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,6 +122,25 @@ def test_a_differential_set_turns_freely():
     speeds = data["speed"].isel(time=-1)
     sun, carrier, ring = (float(speeds.sel(member=m)) for m in ("sun", "carrier", "ring"))
     assert (sun - carrier) * 24 == pytest.approx(-(ring - carrier) * 84, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("driven", ["carrier turns at a speed", "carrier turns as its load lets it"])
+def test_turns_before_the_record_count(driven):
+    run = replace(differential(), settling=0.105)
+    if driven == "carrier turns at a speed":
+        run = replace(run, speeds={"carrier": "1200 rpm"}, torques={"sun": "-11 N m"}, held="ring")
+    data = run_planetary(run)
+    whole = run.mechanism().simulate(0.135, rate=4 * run.rate, tol=run.tolerance)
+    angle = np.unwrap(np.arctan2(*whole.orientation("carrier")[:, [1, 0], 0].T))
+    count = data.sizes["time"]
+    kept = slice(whole.t.size - 4 * count + 3, None, 4)
+    assert data["carrier_angle"].values == pytest.approx(angle[kept], rel=1e-9)
+    if driven == "carrier turns at a speed":
+        assert float(data["carrier_angle"][0]) == pytest.approx(40 * np.pi * (0.11 - 0.5 * run.run_up), rel=1e-6)
+    # the broken tooth of the sun is known after several turns
+    force = whole.diagnostics("sun-planet 2")["normal_force"][kept]
+    assert data["force"].sel(mesh="sun", planet=2).values == pytest.approx(force, rel=1e-6, abs=1e-3)
 
 
 @pytest.mark.slow
