@@ -17,7 +17,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +32,8 @@ from gearmbs.units import Quantity, to_si
 ROOM = 1.25
 """Largest deflection of the table by that of the largest torque: dynamic forces exceed it, and further ones are
 extrapolated."""
+HALVINGS = 20
+"""Of the search for where teeth touch: to a millionth of the backlash, far below the distance of two deflections."""
 FEWEST_LAGS = 9
 """Least number of deflections of a flank: a table of fewer is no curve of contact that sets in."""
 COLUMNS = ("torque (N.m)", "phase (pitches of the driver)", "driver angle (rad)", "transmission error (m)",
@@ -192,12 +194,14 @@ def mesh_tables(
     mesh = StaticMesh(pair, slices)
     radius, side = geometry.driven.base_radius, mesh.turning
     yielding = ROOM * max(float(np.abs(one.error).max()) for one in found)
-    lag = _lags(yielding, to_si(geometry.normal_backlash, "length", "backlash"), lags)
-    force = np.empty((phase.size, lag.size))
-    for row, step in zip(force, phase, strict=True):
+
+    def carried(step: float, lag: float) -> float:
         angle = step * mesh.rotation * math.tau / geometry.driver.teeth
-        ideal = mesh.ideal_angle(angle)
-        row[:] = [-side * mesh.torque(angle, ideal + side * one / radius)[0] / radius for one in lag]
+        return -side * mesh.torque(angle, mesh.ideal_angle(angle) + side * lag / radius)[0] / radius
+
+    apart = max(to_si(geometry.normal_backlash, "length", "backlash"), 0.0)
+    lag = _lags(yielding, *_touching(carried, phase, yielding, apart), lags)
+    force = np.array([[carried(step, one) for one in lag] for step in phase])
     return MeshTables(
         phase,
         loads,
@@ -213,14 +217,40 @@ def mesh_tables(
     )
 
 
-def _lags(yielding: float, backlash: float, count: int) -> np.ndarray:
-    """Return deflections, m: equally spaced into either flank from where perfect ones touch, the backlash between."""
-    one = np.linspace(0.0, yielding, count)
-    # teeth without backlash touch on both flanks at zero
-    apart = max(backlash, 0.0)
-    other = -apart - one[::-1]
-    between = [-0.5 * apart] if apart > 0.0 else []
-    return np.concatenate([other if between else other[:-1], between, one])
+def _touching(
+    carried: Callable[[float, float], float], phase: np.ndarray, yielding: float, apart: float
+) -> tuple[float, float, float]:
+    """Return the lag to which the other flanks are pressed, the largest at which they touch anywhere, and the least at
+    which those at work do, m.
+
+    Perfect teeth touch where the backlash `apart` ends; those that stand forward or back do so within it.
+    """
+    far, other, work = -apart - yielding, -apart, 0.0
+    for step in phase:
+        # the force rises with the lag: below zero, none, above zero
+        if carried(step, 0.0) > 0.0:
+            work = min(work, _edge(lambda lag, step=step: carried(step, lag) > 0.0, far, 0.0))
+        if apart > 0.0 and carried(step, -apart) < 0.0:
+            other = max(other, _edge(lambda lag, step=step: carried(step, lag) >= 0.0, -apart, yielding))
+    return far, other, work
+
+
+def _edge(beyond: Callable[[float], bool], low: float, high: float) -> float:
+    """Return where a condition begins to hold, from below, by bisection."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if beyond(middle) else (middle, high)
+    return 0.5 * (low + high)
+
+
+def _lags(yielding: float, far: float, other: float, work: float, count: int) -> np.ndarray:
+    """Return deflections, m: equally spaced into either flank from where the first tooth touches, what is between them
+    free."""
+    if work <= other:
+        # somewhere there is no room between the flanks, as of teeth without backlash at zero
+        return np.union1d(np.linspace(far, 0.0, count), np.linspace(min(other, 0.0), yielding, count))
+    flanks = [np.linspace(far, other, count), np.linspace(work, yielding, count)]
+    return np.union1d(np.concatenate(flanks), [0.5 * (other + work), 0.0])
 
 
 def _headed(phase: np.ndarray, columns: np.ndarray) -> np.ndarray:

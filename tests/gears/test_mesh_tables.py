@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from gearmbs.cli import app
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error, mesh_tables
 from gearmbs.gears.faults import PitchError
+from gearmbs.gears.transmission import StaticMesh
 from tests.says import says
 
 
@@ -57,6 +58,32 @@ def test_faults_are_in_tables_of_a_whole_turn():
     # it meshes for as many pitches as the contact ratio says, loaded somewhat longer
     assert off.sum() / 6 == pytest.approx(sound.contact_ratio, abs=0.6)
     assert apart[off].max() <= 10e-6 * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("amount", ["-10 um", "10 um", "40 um"])
+def test_teeth_out_of_place_touch_within_the_backlash(amount):
+    """A tooth that stands forward, or back on the other flanks, carries where sound ones have room: as the kernel says,
+    at lags that are none of the table. A sound pair has nothing there."""
+    sound = pair()
+    broken = sound.with_changes(faults=(PitchError(wheel="driver", amount=amount, tooth=3),))
+    table = mesh_tables(broken, ["100 N m", "300 N m"], points=4, cycles=24)
+    mesh = StaticMesh(broken, None)
+    radius, gap = table.base_radii[1], sound.geometry.normal_backlash
+    lags = np.linspace(-gap, 0.0, 14)[1:-1]
+    exact = np.empty((table.phase.size, lags.size))
+    for row, phase in zip(exact, table.phase, strict=True):
+        angle = phase * mesh.rotation * 2 * np.pi / table.teeth[0]
+        ideal = mesh.ideal_angle(angle)
+        row[:] = [-mesh.turning * mesh.torque(angle, ideal + mesh.turning * lag / radius)[0] / radius for lag in lags]
+    assert np.abs(exact).max() > 0.01 * table.force.max()
+    found = np.array([np.interp(lags, table.deflection, row) for row in table.force])
+    np.testing.assert_allclose(found, exact, rtol=0, atol=5e-3 * table.force.max())
+    # where the search finds the tooth carry the whole load, ahead of the ratio
+    error = loaded_transmission_error(broken, "170 N m", 4, cycles=24).error
+    carried = [np.interp(170.0 / radius, row, table.deflection) for row in table.force]
+    np.testing.assert_allclose(carried, error, rtol=0.02, atol=1e-8)
+    free = (sound_table := mesh_tables(sound, ["300 N m"], points=4)).deflection
+    assert not sound_table.force[:, (free > -gap) & (free < 0.0)].any()
 
 
 def read_modelica(text, name):
