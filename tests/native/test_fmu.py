@@ -249,6 +249,39 @@ def test_derivatives_of_outputs_by_inputs(version, tmp_path):
         one.end()
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_derivatives_by_numbers_that_are_small_in_their_unit(version, tmp_path):
+    """A torque that bends within a thousandth of a unit of some numbers, and over many units of others, in closed form,
+    at the start, and after a state is put back."""
+    m = gm.Mechanism("bent")
+    disc = m.body("disc", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    for name, unit, value in (("wave", "N m", 2e-4), ("gap", "m", 1e-5), ("none", "m", 0.0), ("wide", "N m", 1e6)):
+        m.input(name, unit, value)
+    m.torque("drive", disc, "SIN(wave/1E-4) + (gap/1E-4)**3 + TANH((none+2E-6)/1E-5) + SQRT(wide)")
+    m.output("torque", ("load", "drive", "tz"))
+    made = export(m, tmp_path / "bent", t_end=1.0, target=version)
+    names = ["wave", "gap", "none", "wide"]
+    exact = np.array([np.cos(2.0) / 1e-4, 3.0 * 0.1**2 / 1e-4, (1.0 - np.tanh(0.2) ** 2) / 1e-5, 0.5e-3])
+    driven = Driven(str(made.library), tmp_path / "driven")
+
+    def check():
+        for name, wanted in zip(names, exact, strict=True):
+            assert driven.derivative(["torque"], [name], [1.0])[0] == pytest.approx(wanted, rel=1e-6)
+        along = np.array([1e-5, 2e-5, -1e-6, 1e5])
+        found = driven.derivative(["torque"], names, along)[0]
+        assert found == pytest.approx(along @ exact, rel=1e-6)
+
+    driven.begin()
+    check()
+    driven.step(0.1)
+    state = driven.save()
+    driven.step(0.1)
+    driven.restore(state)
+    check()
+    driven.end()
+
+
 def test_derivatives_are_those_of_outputs(made, tmp_path):
     from fmpy.fmi1 import FMICallException
 

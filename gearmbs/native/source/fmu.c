@@ -9,9 +9,13 @@
 
 static const double SAME_TIME = 1e-9; /* part of the time within which importers may have rounded it */
 
-/* Part of a value, or of one in its unit, by which it is moved for a derivative. Differences of fourth order miss less
-   than its fourth power of what is smooth, and a part in 1e13 of the values is moved by rounding. */
-static const double MOVED = 1e-3;
+/* Part of a value, or of one in its unit, by which it is moved for a derivative at first, and by what it is divided when
+   outputs bend within it, as of numbers that are small in their unit: as long as that brings differences of second
+   order over one and two steps nearer to each other. Those of fourth order miss less than the part that they may differ
+   by, squared, of what is smooth. */
+static const double MOVED = 1e-3, FINER = 10.0, ALIKE = 1e-6;
+static const double ROUNDED = 1e-12; /* part of a value below which differences of it are those of rounding */
+enum { FINEST = 12 };
 
 static double span_of(double t) { return SAME_TIME * (t > 1.0 ? t : 1.0); }
 
@@ -98,11 +102,29 @@ static int moved(fmu *self, const void *state, const unsigned *known, size_t col
     return code == GEARMBS_OK ? back : code;
 }
 
+/* Write differences of outputs over one step and over two, of second order. */
+static int differences(fmu *self, const void *state, const unsigned *unknowns, size_t rows, const unsigned *known,
+                       size_t columns, const double *from, const double *along, double step, double *one, double *two) {
+    static const double SIDES[] = {1.0, -1.0};
+    int code = GEARMBS_OK;
+    for (size_t r = 0; r < rows; r++) one[r] = two[r] = 0.0;
+    for (int width = 1; width <= 2; width++)
+        for (int side = 0; side < 2 && code == GEARMBS_OK; side++) {
+            double *sum = width == 1 ? one : two;
+            code = moved(self, state, known, columns, from, along, SIDES[side] * width * step);
+            for (size_t r = 0; r < rows && code == GEARMBS_OK; r++)
+                sum[r] += SIDES[side] / (2.0 * width * step) * self->outputs[unknowns[r] - gearmbs_numbers()];
+        }
+    return code;
+}
+
+static double size_of(double value) { return value < 0.0 ? -value : value; }
+
 /* Write the derivative of outputs at the present time along a direction of the numbers that can be set, the motion so
-   far held: f' = (8 (f(h) - f(-h)) - (f(2 h) - f(-2 h))) / (12 h) + O(h^4). */
+   far held: with d(h) = (f(h) - f(-h)) / (2 h) it is f' = (4 d(h) - d(2 h)) / 3 + O(h^4), h that of least
+   |d(h) - d(2 h)|. */
 int fmu_derivative(fmu *self, const unsigned *unknowns, size_t rows, const unsigned *known, size_t columns,
                    const double *along, double *values) {
-    static const double STEPS[] = {1.0, -1.0, 2.0, -2.0}, WEIGHTS[] = {8.0, -8.0, -1.0, 1.0};
     size_t numbers = gearmbs_numbers();
     double step = 0.0;
     for (size_t k = 0; k < rows; k++)
@@ -112,19 +134,29 @@ int fmu_derivative(fmu *self, const unsigned *unknowns, size_t rows, const unsig
         if (known[k] >= numbers) return fmu_refuse(self, "Derivatives are those by inputs and parameters.");
     for (size_t k = 0; k < rows; k++) values[k] = 0.0;
     void *state = malloc(gearmbs_state_size());
-    double *from = malloc((columns + 1) * sizeof *from);
+    double *from = malloc((columns + 3 * rows + 1) * sizeof *from);
     int code = state == NULL || from == NULL ? GEARMBS_NO_ROOM : gearmbs_save(self->instance, state);
     for (size_t k = 0; k < columns && code == GEARMBS_OK; k++) {
         code = gearmbs_number(self->instance, known[k], &from[k]);
         /* the largest step that moves no number by more than its part */
-        double size = from[k] < 0.0 ? -from[k] : from[k], rate = along[k] < 0.0 ? -along[k] : along[k];
+        double size = size_of(from[k]), rate = size_of(along[k]);
         double own = rate > 0.0 ? MOVED * (size > 1.0 ? size : 1.0) / rate : 0.0;
         if (own > 0.0 && (step == 0.0 || own < step)) step = own;
     }
-    for (int k = 0; k < 4 && step > 0.0 && code == GEARMBS_OK; k++) {
-        code = moved(self, state, known, columns, from, along, STEPS[k] * step);
-        for (size_t r = 0; r < rows && code == GEARMBS_OK; r++)
-            values[r] += WEIGHTS[k] / (12.0 * step) * self->outputs[unknowns[r] - numbers];
+    int open = step > 0.0;
+    for (int k = 0; k < FINEST && open && code == GEARMBS_OK; k++, step /= FINER) {
+        double *one = from + columns, *two = one + rows, *apart = two + rows;
+        code = differences(self, state, unknowns, rows, known, columns, from, along, step, one, two);
+        open = 0;
+        for (size_t r = 0; r < rows && code == GEARMBS_OK; r++) {
+            double miss = size_of(one[r] - two[r]), scale = size_of(one[r]);
+            if (k == 0 || miss < apart[r]) {
+                apart[r] = miss;
+                values[r] = (4.0 * one[r] - two[r]) / 3.0;
+            }
+            double rounding = ROUNDED * size_of(self->outputs[unknowns[r] - numbers]) / step;
+            if (!(apart[r] <= ALIKE * scale || apart[r] <= rounding)) open = 1;
+        }
     }
     free(state);
     free(from);
