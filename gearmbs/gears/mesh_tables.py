@@ -19,6 +19,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -228,18 +229,19 @@ def _touching(
     far, other, work = -apart - yielding, -apart, 0.0
     for step in phase:
         # the force rises with the lag: below zero, none, above zero
-        if carried(step, 0.0) > 0.0:
-            work = min(work, _edge(lambda lag, step=step: carried(step, lag) > 0.0, far, 0.0))
-        if apart > 0.0 and carried(step, -apart) < 0.0:
-            other = max(other, _edge(lambda lag, step=step: carried(step, lag) >= 0.0, -apart, yielding))
+        at_step = partial(carried, float(step))
+        if at_step(0.0) > 0.0:
+            work = min(work, _edge(lambda force: force > 0.0, at_step, far, 0.0))
+        if apart > 0.0 and at_step(-apart) < 0.0:
+            other = max(other, _edge(lambda force: force >= 0.0, at_step, -apart, yielding))
     return far, other, work
 
 
-def _edge(beyond: Callable[[float], bool], low: float, high: float) -> float:
-    """Return where a condition begins to hold, from below, by bisection."""
+def _edge(beyond: Callable[[float], bool], force: Callable[[float], float], low: float, high: float) -> float:
+    """Return from where a force over the lag is beyond what is asked, by bisection."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if beyond(middle) else (middle, high)
+        low, high = (low, middle) if beyond(force(middle)) else (middle, high)
     return 0.5 * (low + high)
 
 

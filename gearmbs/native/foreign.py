@@ -4,6 +4,8 @@ An FMU for Co-Simulation is a sampled system. At a sample it has gone on from th
 held, is told those of now, and its outputs set inputs of the simulator until the next sample:
 
     x_k = step(x_{k-1}, u_{k-1}, T),   y_k = output(x_k, u_k),   u_{k} read from the simulation at t_k.
+
+All its outputs are those of one u_k, read before any of them sets an input. It is initialised with u_0.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.dae.problem import ModelError
-from gearmbs.units import powers_of
-from gearmbs.wording import did_you_mean
+from gearmbs.units import powers_of, to_si
+from gearmbs.wording import did_you_mean, warn
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Simulator
@@ -27,8 +29,13 @@ if TYPE_CHECKING:
 Source = float | str | tuple[Any, ...] | Callable[[float, Any], float]
 """What an input of an FMU follows: a number, the name of an output, what `Simulator.get` takes, or a function."""
 
+PLAIN = ("1", "-")
+"""Units of numbers without one."""
 REAL = ("Real", "Float64", "Float32")
 """Types of variables that can be connected."""
+SLACK = 1e-3
+"""Part of a sample time within which a step is a whole one: samples are multiples of it but for rounding, of the
+shortest that there may be some 2e-4."""
 KINDS = {
     "Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String",
     "Float64": "Float64", "Float32": "Float32", "Int32": "Int32", "Int64": "Int64", "UInt32": "UInt32",
@@ -95,11 +102,14 @@ class ForeignFMU:
             self._check(name, "variable", list(self._variables))
         self._folder, self._able = folder, able
         self._fmu: Any = None
-        self._t = 0.0
+        self._t = self._period = 0.0
+        # whether it waits in initialisation for its first inputs; shared with what ends it
+        self._phase = {"waits": False}
         # only where an FMU can: the simulator asks by these whether its controllers remember
         saved = able.canGetAndSetFMUstate and able.canSerializeFMUstate
         if saved:
             self.state, self.restore = self._state, self._restore
+        self._rolled_back = saved
 
     @property
     def inputs(self) -> list[str]:
@@ -134,21 +144,26 @@ class ForeignFMU:
 
         Notes
         -----
-        If the FMU can save its state, it is in the simulator's: ``restore`` takes both back.
+        Inputs are read before any output sets one. If the FMU can save its state, it is in the simulator's: ``restore``
+        takes both back. Where it does not go back, as from a state taken before, its next sample is refused.
         """
         if not outputs:
             raise ModelError(f"{self.name}: outputs is empty; give outputs of it by the names of inputs that they set")
-        for output in outputs.values():
+        for name, output in outputs.items():
             self._check(output, "output", self.outputs)
-        first, *others = outputs.items()
+            simulator.number(name)
+        for name in (*self._sources, *outputs.values()):
+            self._unit(name, told=True)
+        first = next(iter(outputs))
         begun = self._told.defaultExperiment.startTime if self._told.defaultExperiment is not None else None
         # one that takes over from a state is started where it was made for: its time comes with its state
-        taken_over = first[0] in simulator.awaited and hasattr(self, "state")
-        self._begin(float(begun or 0.0) if taken_over else simulator.t)
-        value = self._setter(first[1])
-        simulator.control(first[0], _First(value, self) if hasattr(self, "state") else value, sample_time)
-        for name, output in others:
-            simulator.control(name, self._setter(output), sample_time)
+        taken_over = first in simulator.awaited and hasattr(self, "state")
+        self._period = to_si(sample_time, "time", "sample_time")
+        self._begin(float(begun or 0.0) if taken_over else simulator.t, taken_over)
+        lead = _First(self, list(outputs.values()))
+        setters: list[_First | _Next] = [lead, *(_Next(lead, k) for k in range(1, len(outputs)))]
+        for name, one in zip(outputs, setters, strict=True):
+            simulator.control(name, one if self._rolled_back else one.value, sample_time)
 
     def _named(self, causality: str) -> list[str]:
         return [n for n, one in self._variables.items() if one.causality == causality and one.type in REAL]
@@ -158,8 +173,8 @@ class ForeignFMU:
             meant = did_you_mean(name, known, otherwise=f"it has {', '.join(known) or 'none'}")
             raise ModelError(f"{self.name}: there is no {what} {name!r}; {meant}")
 
-    def _begin(self, t: float) -> None:
-        """Start the FMU at a time with what its inputs follow left at their start values."""
+    def _begin(self, t: float, taken_over: bool) -> None:
+        """Let the FMU begin at a time: it waits for its first inputs, unless its state is that of another one."""
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
@@ -172,18 +187,22 @@ class ForeignFMU:
                 guid=token, unzipDirectory=self._folder, modelIdentifier=self._able.modelIdentifier, instanceName="fmu"
             )
             made.instantiate()
-            if self._second:
-                made.setupExperiment(startTime=t)
-                self._put(made, self._start)
-                made.enterInitializationMode()
-            else:
-                self._put(made, self._start)
-                made.enterInitializationMode(startTime=t)
-            made.exitInitializationMode()
+            self._initialise(made, t)
+            if taken_over:
+                made.exitInitializationMode()
         except Exception as error:
             raise ModelError(f"{self.name}: it does not start at t = {t:g} s: {error}") from None
-        self._fmu, self._t = made, t
-        weakref.finalize(self, _end, made)
+        self._fmu, self._t, self._phase["waits"] = made, t, not taken_over
+        weakref.finalize(self, _end, made, self._phase)
+
+    def _initialise(self, made: Any, t: float) -> None:
+        """Bring a fresh instance to its initialisation at a time, with its start values."""
+        self._put(made, self._start)
+        if self._second:
+            made.setupExperiment(startTime=t)
+            made.enterInitializationMode()
+        else:
+            made.enterInitializationMode(startTime=t)
 
     def _put(self, fmu: Any, values: Mapping[str, Any]) -> None:
         """Set variables of any type, in their own units."""
@@ -191,14 +210,19 @@ class ForeignFMU:
             variable = self._variables[name]
             getattr(fmu, f"set{KINDS[variable.type]}")([variable.valueReference], [value])
 
-    def _unit(self, name: str) -> tuple[float, float]:
-        """Return the SI value of a variable's unit, and of its zero."""
+    def _unit(self, name: str, told: bool = False) -> tuple[float, float]:
+        """Return the SI value of a variable's unit, and of its zero; let a unit that is not known be told."""
         variable = self._variables[name]
         unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
         defined = self._units.get(unit)
         if defined is not None and defined.baseUnit is not None:
             return float(defined.baseUnit.factor), float(defined.baseUnit.offset)
-        known = powers_of(unit) if unit else None
+        known = powers_of(unit.replace(".", " ")) if unit else None
+        if told and unit and known is None and unit not in PLAIN:
+            warn(
+                f"{self.name}: it does not say what the unit {unit!r} of {name!r} is in SI units, so it counts as one "
+                "of them; convert in a function or a gain, or export it with its units"
+            )
         return (1.0 if known is None else known[0]), 0.0
 
     def _follow(self, name: str, source: Source, t: float, simulator: Simulator) -> float:
@@ -222,16 +246,51 @@ class ForeignFMU:
         factor, offset = self._unit(name)
         return (float(found) - offset) / factor
 
-    def _go_to(self, t: float, simulator: Simulator) -> None:
-        """Go on to a time with the inputs of the last sample held, and tell the FMU those of now."""
-        if t > self._t:
-            try:
-                self._fmu.doStep(currentCommunicationPoint=self._t, communicationStepSize=t - self._t)
-            except Exception as error:
-                raise ModelError(f"{self.name}: its step from t = {self._t:.6g} to {t:.6g} s failed: {error}") from None
-            self._t = t
+    def _sample(self, t: float, simulator: Simulator, outputs: list[str]) -> list[float]:
+        """Go on to a time with the inputs of the last sample held, tell the FMU those of now; return outputs, SI."""
+        if self._phase["waits"] and t != self._t:
+            self._again(t)
+        elif not self._phase["waits"]:
+            self._step(t)
+        # read before any output sets an input: all outputs are those of the same inputs
         values = {name: self._follow(name, source, t, simulator) for name, source in self._sources.items()}
-        self._put(self._fmu, values)
+        try:
+            self._put(self._fmu, values)
+            if self._phase["waits"]:
+                self._fmu.exitInitializationMode()
+                self._phase["waits"] = False
+        except Exception as error:
+            raise ModelError(f"{self.name}: it does not take its inputs at t = {t:.6g} s: {error}") from None
+        return [self._told_of(name) for name in outputs]
+
+    def _step(self, t: float) -> None:
+        """Make the step to the next sample."""
+        size = t - self._t
+        if not -SLACK * self._period <= size <= (1.0 + SLACK) * self._period:
+            raise ModelError(
+                f"{self.name}: it stands at t = {self._t:.6g} s, the simulation at {t:.6g} s, and it was not in the "
+                "state gone on from; take states after control(...), with the same sample_time, of an FMU that can "
+                "save its own, or make a new simulator and a new ForeignFMU"
+            )
+        if size <= SLACK * self._period:
+            return
+        try:
+            # a simulator may go back behind the present time if the FMU can
+            told = self._fmu.doStep(self._t, size, not self._rolled_back)
+        except Exception as error:
+            raise ModelError(f"{self.name}: its step from t = {self._t:.6g} to {t:.6g} s failed: {error}") from None
+        if told is not None and told[1]:
+            raise ModelError(f"{self.name}: it asks to end the simulation at t = {t:.6g} s; let t_end be earlier")
+        self._t = t
+
+    def _again(self, t: float) -> None:
+        """Let the FMU begin anew, at a time."""
+        try:
+            self._fmu.reset()
+            self._initialise(self._fmu, t)
+        except Exception as error:
+            raise ModelError(f"{self.name}: it does not start at t = {t:g} s: {error}") from None
+        self._t, self._phase["waits"] = t, True
 
     def _told_of(self, name: str) -> float:
         """Return an output in SI units."""
@@ -240,17 +299,10 @@ class ForeignFMU:
         factor, offset = self._unit(name)
         return float(take([variable.valueReference])[0]) * factor + offset
 
-    def _setter(self, output: str) -> Callable[[float, Any], float]:
-        """Return a function that gives an input the value of an output; whoever comes first makes the step."""
-
-        def value(t: float, simulator: Any) -> float:
-            self._go_to(t, simulator)
-            return self._told_of(output)
-
-        return value
-
     def _state(self) -> list[float]:
-        """Return the time and the bytes of the FMU's state, as numbers."""
+        """Return the time and the bytes of the FMU's state, as numbers; before its first sample the time alone."""
+        if self._phase["waits"]:
+            return [self._t]
         take, pack, free = (
             (self._fmu.getFMUstate, self._fmu.serializeFMUstate, self._fmu.freeFMUstate)
             if self._second
@@ -263,7 +315,9 @@ class ForeignFMU:
             free(kept)
 
     def _restore(self, numbers: np.ndarray) -> None:
-        self._t = float(numbers[0])
+        if len(numbers) == 1:
+            self._again(float(numbers[0]))
+            return
         data = bytes(numbers[1:].astype(np.uint8))
         unpack, put, free = (
             (self._fmu.deSerializeFMUstate, self._fmu.setFMUstate, self._fmu.freeFMUstate)
@@ -272,24 +326,55 @@ class ForeignFMU:
         )
         kept = unpack(data)
         try:
+            if self._phase["waits"]:
+                self._fmu.exitInitializationMode()
             put(kept)
+            self._t, self._phase["waits"] = float(numbers[0]), False
         finally:
             free(kept)
 
 
 class _First:
-    """What sets the first input of a simulator: with it the FMU's state is in that of the simulator."""
+    """What sets the first input of a simulator: it samples the FMU, whose state is with it in that of the simulator."""
 
-    def __init__(self, value: Callable[[float, Any], float], fmu: ForeignFMU) -> None:
-        self._value, self.state, self.restore = value, fmu.state, fmu.restore
+    def __init__(self, fmu: ForeignFMU, outputs: list[str]) -> None:
+        self._fmu, self._outputs, self.values = fmu, outputs, [float("nan")] * len(outputs)
+        if hasattr(fmu, "state"):
+            self.state, self.restore = fmu.state, fmu.restore
 
     def __call__(self, t: float, simulator: Any) -> float:
-        return self._value(t, simulator)
+        return self.value(t, simulator)
+
+    def value(self, t: float, simulator: Any) -> float:
+        """Return the first output of a sample that is made."""
+        self.values = self._fmu._sample(t, simulator, self._outputs)
+        return self.values[0]
 
 
-def _end(fmu: Any) -> None:
+class _Next:
+    """What sets another input: to what the same sample gave. In states it has its sample times alone."""
+
+    def __init__(self, first: _First, place: int) -> None:
+        self._first, self._place = first, place
+
+    def __call__(self, t: float, simulator: Any) -> float:
+        return self.value(t, simulator)
+
+    def value(self, t: float, simulator: Any) -> float:
+        """Return what the sample gave that the first input has made."""
+        return self._first.values[self._place]
+
+    def state(self) -> list[float]:
+        return []
+
+    def restore(self, numbers: np.ndarray) -> None:
+        """The FMU goes back with the first input."""
+
+
+def _end(fmu: Any, phase: Mapping[str, bool]) -> None:
     """End an FMU that nobody has any more."""
-    fmu.terminate()
+    if not phase["waits"]:
+        fmu.terminate()
     fmu.freeInstance()
 
 

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import warnings
 import zipfile
 
 import numpy as np
@@ -171,3 +172,134 @@ def test_mistakes_are_told(integrator, tmp_path):
     used.control(simulator(), {"load": "speed"}, PERIOD)
     with pytest.raises(ModelError, match=says("already", "another", "ForeignFMU")):
         used.control(simulator(), {"load": "speed"}, PERIOD)
+
+
+@pytest.fixture(scope="module", params=VERSIONS)
+def two_outputs(request, tmp_path_factory):
+    """The integrator with its torque beside its speed: that follows the input at once."""
+    m, _ = disc("both", 1.0 / GAIN, 0.0)
+    m.output("torque", ("load", "drive", "tz"))
+    return export(m, tmp_path_factory.mktemp(request.param), t_end=5.0, target=request.param).library
+
+
+def two_inputs(**options):
+    m, _ = disc("plant", 2.0, 1.0)
+    m.torque("second", m.bodies["disc"], m.input("other", "N m", 0.5))
+    return gm.Simulator(m, t_end=2.0, records=False, tol=1e-9, **options)
+
+
+OUTPUTS = {"load": "speed", "other": "torque"}
+
+
+def test_all_outputs_are_those_of_inputs_read_once(two_outputs):
+    """What an input follows is read before any output sets an input, once a sample."""
+    sim, read = two_inputs(), []
+
+    def both(t, sim):
+        read.append((t, sim.get("input", "load"), sim.get("input", "other")))
+        return read[-1][1] + 2.0 * read[-1][2]
+
+    ForeignFMU(two_outputs, {"load": both}).control(sim, OUTPUTS, PERIOD)
+    sim.advance(3.5 * PERIOD)
+    load, other, speed, u, exact = 1.0, 0.5, 0.0, 0.0, []
+    for k in range(4):
+        speed += GAIN * u * PERIOD if k else 0.0
+        exact.append((k * PERIOD, load, other))
+        u = load + 2.0 * other
+        load, other = speed, u
+    np.testing.assert_allclose(read, exact, rtol=1e-6, atol=1e-9)
+    assert sim.get("input", "other") == pytest.approx(other, rel=1e-6)
+
+
+def test_all_outputs_go_on_at_their_samples_in_another_simulator(two_outputs):
+    """From a state between two samples both inputs are set at the samples of before."""
+    sim = two_inputs()
+    ForeignFMU(two_outputs, {"load": error}).control(sim, OUTPUTS, PERIOD)
+    sim.advance(50.6 * PERIOD)
+    state = sim.state()
+    other = two_inputs(initial=state)
+    assert other.awaited == list(OUTPUTS)
+    ForeignFMU(two_outputs, {"load": error}).control(other, OUTPUTS, PERIOD)
+    for k in range(1, 40):
+        for one in (sim, other):
+            one.advance(50.6 * PERIOD + 0.003 * k)
+        assert [one.get("output", "speed") for one in (sim, other)] == [sim.get("output", "speed")] * 2
+        assert other.get("input", "other") == sim.get("input", "other")
+
+
+def test_an_fmu_that_did_not_go_back_is_refused(integrator, tmp_path):
+    """With a state of before it was there; from one of before its first sample it begins anew."""
+    sim = simulator()
+    before = sim.state()
+    ForeignFMU(integrator, {"load": error}).control(sim, {"load": "speed"}, PERIOD)
+    begun = sim.state()
+    sim.advance(0.5)
+    first = sim.get("output", "speed")
+    sim.restore(begun)
+    sim.advance(0.5)
+    assert sim.get("output", "speed") == first
+    sim.restore(before)
+    with pytest.raises(ModelError, match=says("0.49", "states after", "sample_time")):
+        sim.advance(0.6)
+    # one that cannot save its state goes back within its last sample alone
+    plain = changed(integrator, tmp_path / "plain.fmu", r'canGetAndSetFMU[sS]tate="true"', "")
+    sim = simulator()
+    ForeignFMU(plain, {"load": error}).control(sim, {"load": "speed"}, PERIOD)
+    sim.advance(30.2 * PERIOD)
+    state = sim.state()
+    sim.advance(30.8 * PERIOD)
+    sim.restore(state)
+    sim.advance(32.5 * PERIOD)
+    sim.restore(state)
+    with pytest.raises(ModelError, match=says("0.32", "states after", "save")):
+        sim.advance(0.5)
+
+
+def spied(name, function, calls):
+    """A method that notes its calls."""
+
+    def noted(self, *args, **kwargs):
+        calls.append((name, args))
+        return function(self, *args, **kwargs)
+
+    return noted
+
+
+def test_it_is_initialised_with_its_first_inputs(integrator, monkeypatch):
+    import fmpy.fmi2
+    import fmpy.fmi3
+
+    calls = []
+    for kind, put in ((fmpy.fmi2.FMU2Slave, "setReal"), (fmpy.fmi3.FMU3Slave, "setFloat64")):
+        for name in (put, "exitInitializationMode", "doStep"):
+            monkeypatch.setattr(kind, name, spied(name, getattr(kind, name), calls))
+    sim = simulator()
+    sim.advance(0.1)
+    with pytest.raises(ModelError, match=says("start", "0.1")):
+        # it was exported to begin at zero
+        ForeignFMU(integrator, {"load": 7.0}).control(sim, {"load": "speed"}, PERIOD)
+    sim = simulator()
+    calls.clear()
+    ForeignFMU(integrator, {"load": 7.0}).control(sim, {"load": "speed"}, PERIOD)
+    sim.advance(1.5 * PERIOD)
+    assert [name for name, _ in calls] == [calls[0][0], "exitInitializationMode", "doStep", calls[0][0]]
+    assert calls[0][1][1] == [7.0]
+    # it may be asked to go back behind the beginning of a step
+    assert calls[2][1][2] is False
+
+
+def test_units_that_are_not_described_are_told(integrator, tmp_path):
+    files = []
+    for unit in ("1/min", "rpm"):
+        named = changed(integrator, tmp_path / "named.fmu", r'unit="rad/s"', f'unit="{unit}"')
+        alone = rf'<Unit name="{unit}" />'
+        files.append(changed(named, tmp_path / f"{len(files)}.fmu", r'(?s)<Unit name="rad/s">.*?</Unit>', alone))
+    turns, known = files
+    with pytest.warns(UserWarning, match=says("1/min", "speed", "SI units")):
+        ForeignFMU(turns, {"load": 1.0}).control(simulator(), {"load": "speed"}, PERIOD)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sim = simulator()
+        ForeignFMU(known, {"load": 1.0}).control(sim, {"load": "speed"}, PERIOD)
+    sim.advance(10.5 * PERIOD)
+    assert sim.get("input", "load") == pytest.approx(GAIN * 0.1 * 2 * np.pi / 60, rel=1e-6)
