@@ -72,6 +72,10 @@ class Contact:
     deflection: str
     fz: str
 
+    def heading(self, low: float) -> str:
+        """Return 1 of a tire that rolls forwards and -1 backwards, where the trail is ahead; between at low speeds."""
+        return within(f"{self.vx}*{n(1.0 / low)}", -1.0, 1.0)
+
 
 @dataclass(frozen=True)
 class Wrench:

@@ -40,6 +40,8 @@ LARGEST_SLIP = 3.0
 STANDING_DAMPING = 770.0
 """N s/m at the nominal load: what a tire that stands adds to its elasticity along the road, fading out up to VXLOW; of
 the passenger car in Pacejka's book."""
+LEAST_RELAXING = 0.01
+"""Of the nominal load: with less the relaxation lengths, which are in proportion to it, are those of this."""
 LEAST_STIFFNESS = 1e-3
 """Of the ratio of lateral slip stiffness to load: it divides the longitudinal one."""
 
@@ -163,6 +165,7 @@ class _Formula:
             along = f"MAX({speed}, {n(self.low)})"
             kappa, alpha = f"-{vsx}/{along}", f"ATAN({vsy}/{along})"
         else:
+            load = self.var("relaxing_load", f"MAX({n(LEAST_RELAXING * self.nominal)}, {load})")
             sigma_x = self.var(
                 "relaxation_x",
                 f"{load}*{linear(k('PTX1'), (k('PTX2'), self.dfz))}*EXP({n(-k('PTX3'))}*{self.dfz})"
@@ -313,12 +316,13 @@ class _Formula:
             f"{linear(k('QDZ1'), (k('QDZ2'), dfz))}*(1 + {n(k('QDZ3'))}*{gamma} + {n(k('QDZ4'))}*({gamma})**2)"
             f"*{n(self.r0 / self.nominal * scale('LTR'))}*{self.fz}"
         )
-        trail = self.var("trail", f"{peak}*{magic(b, both[0], e, c, 'COS')}*COS({alpha})")
+        cosine = f"COS({alpha})*{self.contact.heading(self.low)}"
+        trail = self.var("trail", f"{peak}*{magic(b, both[0], e, c, 'COS')}*{cosine}")
         slope = f"({n(k('QBZ9') * stiff)} + {n(k('QBZ10') * self.cy)}*{self.by})"
         residual = (
             f"{self.fz}*({n(scale('LRES'))}*{linear(k('QDZ6'), (k('QDZ7'), dfz))} + "
             f"{linear(k('QDZ8'), (k('QDZ9'), dfz))}*{gamma})*{n(self.r0 * self.muy)}"
-            f"*COS(ATAN({slope}*{both[1]}))*COS({alpha})"
+            f"*COS(ATAN({slope}*{both[1]}))*{cosine}"
         )
         torque = f"-{trail}*({fy} - {self.fz}*{swept}) + {residual}"
         if combined:

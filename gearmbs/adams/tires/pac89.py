@@ -110,7 +110,7 @@ def pac89(tire: PropertyFile, contact: Contact, friction: float) -> Wrench:
     moved = f"{fy}/{n(k('LATERAL_STIFFNESS'))}"
     turns = f"MAX(-1, MIN(1, {c.spin}*{n(k('UNLOADED_RADIUS') / low)}))"
     my = f"-{n(k('ROLLING_RESISTANCE'))}*{c.fz}*{c.loaded}*{turns}" if k("ROLLING_RESISTANCE") else "0"
-    return Wrench(fx, f"-{fy}", f"-{c.fz}*{moved}", my, f"-({held}*({mz}) + {fx}*{moved})")
+    return Wrench(fx, f"-{fy}", f"-{c.fz}*{moved}", my, f"-({held}*{c.heading(low)}*({mz}) + {fx}*{moved})")
 
 
 def _curve(var: Callable[[str, str], str], name: str, c: float, peak: str, slope: str, x: str, e: str) -> str:

@@ -39,16 +39,28 @@ ANGLE = {
     "deg": math.pi / 180,
 }
 TIME = {"sec": 1.0, "second": 1.0, "seconds": 1.0, "s": 1.0, "millisecond": 1e-3, "ms": 1e-3}
-UNITS = {"LENGTH": LENGTH, "FORCE": FORCE, "ANGLE": ANGLE, "TIME": TIME}
-DIMENSIONS = {
-    **dict.fromkeys(("UNLOADED_RADIUS", "WIDTH", "RIM_RADIUS", "RIM_WIDTH"), (0, 1, 0, 0)),
-    **dict.fromkeys(("VERTICAL_STIFFNESS", "LATERAL_STIFFNESS"), (1, -1, 0, 0)),
-    "VERTICAL_DAMPING": (1, -1, 1, 0),
-    **dict.fromkeys(("FNOMIN", "FZMIN", "FZMAX"), (1, 0, 0, 0)),
-    **dict.fromkeys(("VXLOW", "LONGVL"), (0, 1, -1, 0)),
-    **dict.fromkeys(("ALPMIN", "ALPMAX", "CAMMIN", "CAMMAX"), (0, 0, 0, 1)),
+MASS = {
+    "kg": 1.0,
+    "kilogram": 1.0,
+    "gram": 1e-3,
+    "g": 1e-3,
+    "pound_mass": 0.45359237,
+    "lbm": 0.45359237,
+    "slug": 14.59390294,
+    "megagram": 1e3,
+    "tonne": 1e3,
 }
-"""Powers of force, length, time and angle of what has a unit; all else is without one, or in units of its formula."""
+UNITS = {"LENGTH": LENGTH, "FORCE": FORCE, "ANGLE": ANGLE, "TIME": TIME, "MASS": MASS}
+DIMENSIONS = {
+    **dict.fromkeys(("UNLOADED_RADIUS", "WIDTH", "RIM_RADIUS", "RIM_WIDTH"), (0, 1, 0, 0, 0)),
+    **dict.fromkeys(("VERTICAL_STIFFNESS", "LATERAL_STIFFNESS"), (1, -1, 0, 0, 0)),
+    "VERTICAL_DAMPING": (1, -1, 1, 0, 0),
+    "MBELT": (0, 0, 0, 0, 1),
+    **dict.fromkeys(("FNOMIN", "FZMIN", "FZMAX"), (1, 0, 0, 0, 0)),
+    **dict.fromkeys(("VXLOW", "LONGVL"), (0, 1, -1, 0, 0)),
+    **dict.fromkeys(("ALPMIN", "ALPMAX", "CAMMIN", "CAMMAX"), (0, 0, 0, 1, 0)),
+}
+"""Powers of force, length, time, angle and mass of what has a unit; all else has none, or those of its formula."""
 WITHOUT_EFFECT = ("MDI_HEADER", "UNITS", "EXTERNAL_GRAPHICS", "GRAPHICS", "SHAPE")
 """Sections that say nothing of forces on a flat road."""
 _SECTION = re.compile(r"\[(\w+)\]")
@@ -141,6 +153,8 @@ def read_property_file(path: Path) -> PropertyFile:
         raw[name] = value
         found.sections.setdefault(section, []).append(name)
     units = [_unit(path.name, quantity, raw.get(quantity)) for quantity in ("FORCE", "LENGTH", "TIME", "ANGLE")]
+    # of the belt alone: files without one need no unit
+    units.append(_unit(path.name, "MASS", raw.get("MASS")) if raw.get("MBELT") else 1.0)
     for name, value in raw.items():
         try:
             number = float(value.lower().replace("d", "e"))
@@ -149,7 +163,7 @@ def read_property_file(path: Path) -> PropertyFile:
             continue
         if not math.isfinite(number):
             raise TireError(f"{path.name}: {name} = {value[:30]} is no finite number")
-        powers = DIMENSIONS.get(name, (0, 0, 0, 0))
+        powers = DIMENSIONS.get(name, (0, 0, 0, 0, 0))
         found.numbers[name] = number * math.prod(unit**power for unit, power in zip(units, powers))
     return found
 

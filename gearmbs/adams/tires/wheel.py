@@ -100,6 +100,8 @@ def hub_forces(
     w, t, r = hub.wheel, hub.tip, hub.road
     speed, arm = hub.length / hub.time, hub.arm
     radius, stiffness = tire.number("UNLOADED_RADIUS"), tire.number("VERTICAL_STIFFNESS")
+    if kind == "PAC2002":
+        stiffness *= tire.number("LCZ", 1.0)
     sx, sy, sz = (f"(D{axis}({t}, {w}, {r})/{n(arm)})" for axis in "XYZ")
     flat = variable("axle_flat", root(f"{sx}**2 + {sy}**2"))
     # along the wheel and across it: (sy, -sx)/flat and (sx, sy)/flat

@@ -130,6 +130,72 @@ def test_load_is_stiffness_and_damping_and_never_pulls(tmp_path, text):
         assert np.abs(found[name][lifted]).max() == 0.0
 
 
+def test_a_tire_with_relaxation_leaves_the_road_and_comes_back(tmp_path):
+    """Without load its relaxation lengths are zero, and nothing may be divided by them: forces are none there."""
+    motion = driven(f"{SPEED}*TIME", "0.5*TIME", "0.04*SIN(20*TIME) - 0.01", "56*TIME")
+    found, result = ran(tmp_path, PAC2002.format(mode=14), motion, end=0.6, steps=150)
+    load = found["vertical_force"]
+    lifted = 0.29 + 0.04 * np.sin(20 * result.t) > R0 + 1e-3
+    assert lifted.sum() > 10
+    for name in ("force_along", "force_across", "torque_along", "torque_across", "torque_up"):
+        assert np.isfinite(found[name]).all(), name
+        assert np.abs(found[name][lifted]).max() < 1e-5 * load.max(), name
+    # back on the road it carries no more than friction holds, and as at once what it carries in a steady state
+    assert (np.abs(found["force_across"]) <= 1.6 * load + 1e-9).all()
+    k = int(np.argmax(load))
+    most = float(load[k])
+    made = pac2002(56 * rolling_radius(most) / SPEED - 1, math.atan(0.5 / SPEED), 0.0, most, SPEED)
+    assert found["force_across"][k] == pytest.approx(made["fy"], rel=0.1)
+
+
+def test_a_factor_of_the_stiffness_is_one_of_the_load(tmp_path):
+    load = 4000.0
+    soft = PAC2002.format(mode=4).replace("LMUX = 0.95", "LMUX = 0.95\nLCZ = 0.8")
+    stiff = PAC2002.format(mode=4).replace("VERTICAL_STIFFNESS = 2e5", "VERTICAL_STIFFNESS = 1.6e5")
+    motion = motion_of(0.02, 0.03, 0.0, load, rolling_radius(load))
+    found = []
+    for k, text in enumerate((soft, stiff)):
+        (tmp_path / str(k)).mkdir()
+        found.append(ran(tmp_path / str(k), text, motion)[0])
+    assert found[0]["vertical_force"][-1] == pytest.approx(0.8 * load)
+    for name in ("force_along", "force_across", "torque_up"):
+        assert found[0][name][-1] == pytest.approx(found[1][name][-1], rel=1e-12)
+
+
+@pytest.mark.parametrize("text", [PAC2002.format(mode=4), PAC89.format(mode=2)], ids=["PAC2002", "PAC89"])
+def test_a_tire_turns_into_its_way_in_either_direction(tmp_path, text):
+    """What the slip angle changes of the torque about the vertical turns the wheel's plane towards its velocity."""
+    for speed in (SPEED, -SPEED):
+        torque, force = [], []
+        for across in (-0.5, 0.5):
+            folder = tmp_path / f"{speed} {across}"
+            folder.mkdir()
+            loaded = R0 - 4000.0 / KZ
+            radius = rolling_radius(4000.0) if "PAC2002" in text else loaded
+            motion = driven(f"{speed}*TIME", f"{across}*TIME", repr(loaded - 0.3), f"{speed / radius!r}*TIME")
+            found, _ = ran(folder, text, motion, end=0.2)
+            torque.append(found["torque_up"][-1])
+            force.append(found["force_across"][-1])
+        assert force[0] > 0.0 > force[1]
+        assert (torque[1] - torque[0]) * speed > 10.0 * abs(speed)
+
+
+def test_the_belts_mass_is_in_the_unit_of_the_file(tmp_path):
+    load, alpha = 4000.0, 0.02
+    motion = motion_of(0.0, alpha, 0.0, load, rolling_radius(load))
+    torques = {}
+    for unit, mass in (("kg", 5), ("gram", 5000), ("gram", 5)):
+        folder = tmp_path / f"{unit} {mass}"
+        folder.mkdir()
+        text = (
+            PAC2002.format(mode=14).replace("MASS = 'kg'", f"MASS = '{unit}'").replace("MBELT = 5.0", f"MBELT = {mass}")
+        )
+        torques[unit, mass] = ran(folder, text, motion)[0]["torque_up"][0]
+    assert torques["gram", 5000] == pytest.approx(torques["kg", 5], rel=1e-12)
+    turned = 0.2 * 5.0 * SPEED * SPEED * math.tan(alpha)
+    assert torques["kg", 5] - torques["gram", 5] == pytest.approx(0.999 * turned, rel=1e-6)
+
+
 def test_a_tire_on_the_other_side_is_its_mirror_image(tmp_path):
     (tmp_path / "l").mkdir()
     (tmp_path / "r").mkdir()
