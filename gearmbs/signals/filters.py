@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
@@ -106,21 +106,27 @@ def convolve_valid(values: np.ndarray, taps: np.ndarray, every: int = 1) -> np.n
     -------
     ndarray, shape (ceil((n - m + 1) / every),)
     """
-    lap = taps.size - 1
+    return _each_of_several(values, taps, every) if every > 1 else next(convolutions(values, taps[None]))
+
+
+def convolutions(values: np.ndarray, filters: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the fully supported parts of convolutions of values with filters, (k, m), from one transform of them."""
+    length = filters.shape[1]
+    lap = length - 1
     count = values.size - lap
-    if every > 1:
-        return _each_of_several(values, taps, every)
     # about where the transforms cost least a sample
-    size = 1 << (min(8 * taps.size, values.size) - 1).bit_length()
+    size = 1 << (min(8 * length, values.size) - 1).bit_length()
     step = size - lap
     pieces = -(-count // step)
     padded = np.zeros((pieces - 1) * step + size)
     padded[: values.size] = values
     rows = np.lib.stride_tricks.sliding_window_view(padded, size)[::step]
-    # the first supported sample comes first
-    shifted = np.roll(np.pad(taps, (0, size - taps.size)), -lap)
-    spectrum = np.fft.rfft(rows, axis=1) * np.fft.rfft(shifted)
-    return np.fft.irfft(spectrum, size, axis=1)[:, :step].ravel()[:count]
+    spectrum = np.fft.rfft(rows, axis=1)
+    for taps in filters:
+        # the first supported sample comes first
+        shifted = np.zeros(size)
+        shifted[size - lap :], shifted[: length - lap] = taps[:lap], taps[lap:]
+        yield np.fft.irfft(spectrum * np.fft.rfft(shifted), size, axis=1)[:, :step].ravel()[:count]
 
 
 def _each_of_several(values: np.ndarray, taps: np.ndarray, every: int) -> np.ndarray:
@@ -295,14 +301,27 @@ def bandpass_taps(rate: float, low: float, high: float, transition: float, atten
     return kaiser_taps((low - transition / 2, high + transition / 2), transition, rate, "bandpass", attenuation)
 
 
-def filtered_mean_square(column: np.ndarray, taps: np.ndarray, count: int) -> float:
-    """Mean square of the first `count` fully supported samples of the filtered, mean-free column, block by block."""
-    mean = column.mean()
-    total = 0.0
-    for start in range(0, count, BLOCK):
-        stop = min(start + BLOCK, count)
-        piece = convolve_valid(column[start : stop + taps.size - 1] - mean, taps)
-        total += float(piece @ piece)
+def filtered_mean_squares(columns: np.ndarray, filters: np.ndarray, count: int) -> np.ndarray:
+    """Mean squares of the first `count` fully supported samples of mean-free columns behind filters, block by block.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (columns, n)
+    filters : ndarray, shape (filters, m)
+    count : int
+
+    Returns
+    -------
+    ndarray, shape (filters, columns)
+    """
+    lap = filters.shape[1] - 1
+    total = np.zeros((len(filters), len(columns)))
+    for c, column in enumerate(columns):
+        mean = column.mean()
+        for start in range(0, count, BLOCK):
+            stop = min(start + BLOCK, count)
+            for k, piece in enumerate(convolutions(column[start : stop + lap] - mean, filters)):
+                total[k, c] += np.einsum("n,n->", piece, piece)
     return total / count
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.filters import bandpass_taps, filtered_mean_square, kaiser_order
+from gearmbs.signals.filters import bandpass_taps, filtered_mean_squares, kaiser_order
 from gearmbs.signals.signal.signal import check_teeth, common_unit, mesh_frequency, rate_of, units_of
 
 if TYPE_CHECKING:
@@ -65,22 +65,36 @@ def band_rms(
     -------
     xarray.DataArray of dimension (channel,)
     """
-    return _per_channel(signal, _band_levels(signal, rate_of(signal), frequency, half_width, transition, period))
+    fundamental = 1.0 / period if period else frequency
+    levels = _band_levels(signal, rate_of(signal), [frequency], half_width, transition, fundamental)
+    return _per_channel(signal, levels[0])
 
 
 def _band_levels(
-    signal: xr.DataArray, rate: float, frequency: float, half_width: float, transition: float, period: float | None
+    signal: xr.DataArray,
+    rate: float,
+    centres: Sequence[float],
+    half_width: float,
+    transition: float,
+    fundamental: float,
 ) -> np.ndarray:
-    """RMS of each channel, sampled at ``rate`` (Hz), in a band; see `band_rms`."""
+    """RMS of each channel, sampled at ``rate``, in bands about ``centres``, over whole periods; all in Hz.
+
+    See `band_rms`. Shape (bands, channels).
+    """
     n = signal.sizes["time"]
-    taps = bandpass_taps(rate, frequency - half_width, frequency + half_width, transition, ATTENUATION_DB)
-    if n < taps.size:
-        raise SignalError(
-            f"signal: has {n} samples, the band-pass at {frequency:g} Hz needs at least {taps.size}; "
-            "give a longer record or a wider transition band"
-        )
-    count = whole_period_count(n - taps.size + 1, rate, 1.0 / period if period else frequency)
-    return np.array([math.sqrt(filtered_mean_square(column, taps, count)) for column in signal.values.T])
+    filters = []
+    for centre in centres:
+        filters.append(bandpass_taps(rate, centre - half_width, centre + half_width, transition, ATTENUATION_DB))
+        if n < filters[-1].size:
+            raise SignalError(
+                f"signal: has {n} samples, the band-pass at {centre:g} Hz needs at least {filters[-1].size}; "
+                "give a longer record or a wider transition band"
+            )
+    # all of one length, which the transition decides
+    bank = np.stack(filters)
+    count = whole_period_count(n - bank.shape[1] + 1, rate, fundamental)
+    return np.sqrt(filtered_mean_squares(signal.values.T, bank, count))
 
 
 def order_rms(
@@ -186,7 +200,7 @@ def gmf_rms(
     turns = max(0, math.floor((count - taps + 1) * turn / rate)), _whole_periods(count, turn / rate)
     in_band, in_orders = (per_turn if whole else 1 for whole in turns)
     widths = half_width * gmf, TRANSITION * gmf
-    by_band = np.stack([_band_levels(signal, rate, k * gmf, *widths, in_band / gmf) for k in multiples])
+    by_band = _band_levels(signal, rate, list(multiples * gmf), *widths, gmf / in_band)
     least = math.ceil(MIN_PERIODS / in_orders)
     by_orders = order_rms(signal, gmf / in_orders, list(multiples * in_orders), least=least).values
     units = common_unit(signal)
