@@ -109,7 +109,11 @@ def paths_of(ints, reals, states, want, work, j, c, s, plain, load):
     sums = vector_at(work, B.S_PLANE_SUMS, B.PLANE_SUMS)
     law, profile = vector_at(work, B.S_LAW, B.LAW), vector_at(work, B.S_PROFILE, 6)
     chi, presses = reals[B.DAMPING], False
+    # an element of a row has so many paths; what presses on it so far
+    own, pressed = ints[B.PATHS] // ints[B.ROWS], 0.0
     for path in range(ints[B.PATHS]):
+        if path % own == 0:
+            pressed = 0.0
         p = ints[B.AT_PATHS] + B.PATH_COLUMNS * path
         radius, height = reals[p + B.PATH_RADIUS], reals[p + B.PATH_HEIGHT]
         h = -reals[ints[B.AT_ELEMENTS] + B.ELEMENT_COLUMNS * j + B.ELEMENT_OVERSIZE]
@@ -148,8 +152,12 @@ def paths_of(ints, reals, states, want, work, j, c, s, plain, load):
                 D.contact_slopes(plane, law, profile, radius, height, chi, sums)
         if want & DIAGNOSTICS:
             work[B.S_SUMS + 2] += law[0] * chi * rate * rate
-            work[B.S_SUMS + 3] = max(work[B.S_SUMS + 3], law[0] * factor)
-            work[B.S_SUMS + 4] += 1.0 / ints[B.PATHS]
+            if pressed == 0.0:
+                work[B.S_SUMS + 4] += 1.0
+            # slices of a roller share its load along one normal; of a ball's two lines the one with more is told
+            force = law[0] * factor
+            pressed = pressed + force if ints[B.KIND] == B.ROLLER else max(pressed, force)
+            work[B.S_SUMS + 3] = max(work[B.S_SUMS + 3], pressed)
             work[B.S_SUMS + 5] = max(work[B.S_SUMS + 5], delta)
     return presses
 

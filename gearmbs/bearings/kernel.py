@@ -164,7 +164,7 @@ def bearing_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
         diagnostics[0], diagnostics[1] = work[B.S_SUMS + 1], work[B.S_SUMS + 2]
         diagnostics[2] = -friction * speed
         diagnostics[3], diagnostics[4], diagnostics[5] = work[B.S_SUMS], work[B.S_SUMS + 3], work[B.S_SUMS + 5]
-        diagnostics[6] = np.ceil(work[B.S_SUMS + 4] - 1e-9)
+        diagnostics[6] = work[B.S_SUMS + 4]
     if want & DERIVATIVES:
         local_jacobian(ints, reals, frames, work, by_total, by_speed)
         to_global_jacobian(ints, reals, frames, work, wrench, jac)

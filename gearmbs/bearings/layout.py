@@ -31,7 +31,9 @@ AT_SPIN = 12
 SLIP_NODES = 13
 """Nodes of the cage's random slip, 0: none, and its place among the reals."""
 AT_SLIP = 14
-INTEGERS = 15
+ROWS = 15
+"""Rows of elements, which share the paths of an element equally, one row's after the other's."""
+INTEGERS = 16
 """Behind: for each path its row of the outer and of the inner profiles or -1; for each element its spin or -1."""
 
 STIFFNESS = 0
@@ -115,7 +117,8 @@ S_CAGE_SLOPE = 26
 S_CENTRE = 27
 """Centre of a four-point bearing's ball, whose two paths share it, radially and along the axis."""
 S_SUMS = 29
-"""Sums over the elements: normal forces, energy, damping power, largest force, number loaded, largest deflection."""
+"""Sums over the elements: normal forces, energy, damping power, largest force of an element,
+number of elements loaded, largest deflection."""
 SUMS = 6
 S_LAW = 35
 """Results of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load, then of
@@ -281,7 +284,7 @@ def one_element(integers: np.ndarray, rows: int, row: int, element: int) -> np.n
     rings = [integers[at : at + own] for at in (first, first + paths)]
     spin = integers[INTEGERS + 2 * paths + element :][:1]
     one = np.concatenate([integers[:INTEGERS], *rings, spin])
-    one[ELEMENTS], one[PATHS] = 1, own
+    one[ELEMENTS], one[PATHS], one[ROWS] = 1, own, 1
     one[AT_ELEMENTS] += ELEMENT_COLUMNS * element
     one[AT_PATHS] += PATH_COLUMNS * own * row
     return one

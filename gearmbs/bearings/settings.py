@@ -110,7 +110,7 @@ def pack(settings: BearingSettings) -> BearingTables:
     rings = [df.profile_rows(surfaces, bearing, part, heights) for part in (df.OUTER, df.INNER)]
     spinning = tuple(sorted({d.element for d in surfaces if d.part == df.ELEMENT}))
     integers = np.zeros(B.INTEGERS + 2 * len(paths) + bearing.elements, dtype=np.int64)
-    integers[B.ELEMENTS], integers[B.PATHS] = bearing.elements, len(paths)
+    integers[B.ELEMENTS], integers[B.PATHS], integers[B.ROWS] = bearing.elements, len(paths), bearing.rows
     integers[B.KIND] = B.ROLLER if bearing.fixed_normals else B.BALL
     integers[B.SPINS], integers[B.CENTRIFUGAL] = len(spinning), settings.centrifugal
     parts = [_scalars(settings), paths.ravel(), elements.ravel()]

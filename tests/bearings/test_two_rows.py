@@ -9,7 +9,7 @@ import pytest
 from gearmbs.bearings import Bearing, BearingError, BearingStatics, OffSize, RollingBearing, Waviness
 from gearmbs.bearings.bearing import dynamic_rating, equivalent_load, load_factors, rating_life, static_rating
 from gearmbs.bearings.boundary import size_of
-from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism import Mechanism, static_equilibrium
 from tests.says import says
 
 GIVEN = {"elements": 13, "element_diameter": 8e-3, "pitch_diameter": 46e-3, "clearance": "6 um"}
@@ -280,3 +280,28 @@ def test_what_is_not_there_is_told_by_name(name, told):
 
 def test_sizes_of_thrust_bearings_are_kept_for_lives_by_hand():
     assert size_of("511", "05").dynamic_rating == pytest.approx(18.2e3, rel=0.2)
+
+
+SINGLE = Bearing(kind="cylindrical roller", roller_length="9 mm", **GIVEN)
+
+
+@pytest.mark.parametrize(
+    "bearing", [BACK, BALLS, ALIGNING, SPHERICAL, ROLLERS, SINGLE], ids=lambda bearing: bearing.kind
+)
+def test_diagnostics_of_a_mechanism_count_elements_and_not_their_slices(bearing):
+    """At rest under a load the elements that carry, and the largest force of one, are those of the bearing alone."""
+    m = Mechanism("ring")
+    ring = m.body("ring", 0.2, (1e-4, 1e-4, 1e-4))
+    m.add(RollingBearing("bearing", ring.marker(), m.ground.marker(), bearing=bearing))
+    m.joint("orientation", "held", ring, m.ground)
+    if bearing.contact_angle == 0.0:
+        m.joint("inplane", "middle", ring.marker(), m.ground.marker())
+    load = np.array([900.0, 350.0, 0.0])
+    m.load("pull", ring.marker(), m.ground.marker(), **{f"f{c}": str(f) for c, f in zip("xy", load)})
+    told = static_equilibrium(m).solution.diagnostics("bearing")
+    state = BearingStatics(bearing).under(load)
+    assert state.loaded == np.sum(state.element_loads > 0.0)
+    assert told["loaded_elements"][-1] == state.loaded
+    assert told["largest_element_force"][-1] == pytest.approx(state.largest, rel=1e-5)
+    # the share of an element: at least that of even ones, at most the whole
+    assert np.hypot(*load[:2]) / (bearing.rows * bearing.elements) < state.largest < np.hypot(*load[:2])
