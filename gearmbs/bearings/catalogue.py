@@ -250,8 +250,7 @@ def _asked(
 def _class_of(designation: str, fixed: Known, named: str | None, suffixes: str) -> dict[str, float]:
     """Return the mean clearance of a class that is named; refuse it of bearings that have no radial classes."""
     kind = fixed.fields["kind"]
-    tapers = KINDS[kind].rows == "self-aligning" or kind.endswith("cylindrical roller")
-    if named is not None and tapers and TAPERED_BORE.search(suffixes):
+    if named is not None and KINDS[kind].tapers and TAPERED_BORE.search(suffixes):
         raise BearingError(
             f"designation {designation!r}: {named} of a tapered bore, K, has limits of its own, which mounting closes; "
             "give clearance= (diametral) as it is mounted"

@@ -123,6 +123,8 @@ class Kind:
         Why a class of radial clearance says nothing of such bearings; empty if it does.
     classes : str
         Table of the classes of radial clearance, see `gearmbs.bearings.classes`.
+    tapers : bool
+        Whether a K among the suffixes is a tapered bore, whose classes have limits of their own.
     """
 
     rollers: bool = False
@@ -137,6 +139,7 @@ class Kind:
     load_factors: Callable[[Bearing, float, float], tuple[float, ...]]
     designation: re.Pattern[str] | None = None
     series: dict[str, str] = field(default_factory=dict)
+    tapers: bool = False
     known: Callable[[re.Match[str], dict[str, Any]], Known] | None = None
     unclassed: str = ""
     classes: str = "balls"
@@ -363,6 +366,7 @@ KINDS: dict[str, Kind] = {
         unclassed="it is one of axial clearance",
     ),
     "cylindrical roller": Kind(
+        tapers=True,
         rollers=True,
         angle="none",
         reduction=0.83,
@@ -431,6 +435,7 @@ KINDS: dict[str, Kind] = {
         unclassed="it is one of axial clearance",
     ),
     "self-aligning ball": Kind(
+        tapers=True,
         angle="needed",
         rows="self-aligning",
         reduction=1.0,
@@ -443,6 +448,7 @@ KINDS: dict[str, Kind] = {
         classes="self-aligning",
     ),
     "double row cylindrical roller": Kind(
+        tapers=True,
         rollers=True,
         angle="none",
         rows="parallel",
@@ -456,6 +462,7 @@ KINDS: dict[str, Kind] = {
         classes="rollers",
     ),
     "spherical roller": Kind(
+        tapers=True,
         rollers=True,
         angle="needed",
         rows="self-aligning",

@@ -142,7 +142,9 @@ def test_forces_and_derivatives(name):
     found = [*(part.copy() for part in found), probe.work[at : at + n + 1]]
     for told, exact in zip(found, (value, slopes[:, :n], slopes[:, n : 2 * n], slopes[:, -1])):
         for row, right in zip(told, exact):
-            assert row == pytest.approx(right, abs=CLOSE * abs(right).max())
+            # a moment that a bearing has not, as self-aligning ones, is what rounding leaves of forces at their arms
+            least = n * np.finfo(float).eps * abs(np.asarray(exact)).max()
+            assert row == pytest.approx(right, abs=CLOSE * abs(right).max() + least)
 
 
 SETTINGS = {
