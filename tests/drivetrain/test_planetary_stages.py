@@ -820,7 +820,7 @@ def test_the_steady_motion_of_planets_on_axes_that_stand_repeats_itself_after_a_
     mesh = 1.0 / train.kinematics.mesh_frequency("set")
     motion = gm.steady(train)
     assert motion.orbit.period == pytest.approx(mesh, rel=1e-12)
-    record = run_train(train, RunSettings(settling=0.06, duration=0.02, tolerance=1e-7))
+    record = run_train(train, RunSettings(settling=0.06, duration=0.02, tolerance=1e-8))
     t = motion.solution.t
     for name in ("set sun-planet 1", "set planet 3-ring"):
         force, found = motion.solution.contact(name)["normal_force"], record.sel(mesh=name)
