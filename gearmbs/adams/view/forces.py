@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 
 from gearmbs.adams.view.deckmaker import JOINTS, Deckmaker
+from gearmbs.adams.view.geometry.masses import bodies_of
+from gearmbs.adams.view.geometry.solids import extrusion_outline, link_outline, plate_outline
 from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.masses import bodies_of
 from gearmbs.adams.view.model import PARTS, Item
-from gearmbs.adams.view.solids import extrusion_outline, link_outline, plate_outline
 from gearmbs.adams.view.statements import refuse
 from gearmbs.adams.view.values import fixed
 from gearmbs.adams.write.text import listed, number

@@ -8,8 +8,8 @@ import numpy as np
 
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.deckmaker import JOINTS, PART_KEYWORDS, PRIMITIVES, Deckmaker, place, translated
+from gearmbs.adams.view.geometry.masses import mass_of_geometry
 from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.masses import mass_of_geometry
 from gearmbs.adams.view.model import Item
 from gearmbs.adams.view.values import is_ground
 from gearmbs.adams.write.text import listed, number

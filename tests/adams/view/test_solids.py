@@ -10,7 +10,7 @@ import pytest
 
 from gearmbs.adams import parse_script, parse_view, read_view, run_deck
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.view import masses, solids
+from gearmbs.adams.view.geometry import masses, solids
 from tests.says import says
 
 CELLS = 120

@@ -6,9 +6,7 @@ import numpy as np
 
 from gearmbs.adams.view.deckmaker import Deckmaker
 from gearmbs.adams.view.expressions import text_of
-from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.model import Item
-from gearmbs.adams.view.solids import (
+from gearmbs.adams.view.geometry.solids import (
     REMEDY,
     Moments,
     block_corner,
@@ -20,6 +18,8 @@ from gearmbs.adams.view.solids import (
     polyhedron,
     prism,
 )
+from gearmbs.adams.view.lexer import ViewError
+from gearmbs.adams.view.model import Item
 
 PRISMS = {
     "block": block_outline, "link": link_outline, "plate": plate_outline, "extrusion": extrusion_outline,

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from gearmbs.adams.view import frames
-from gearmbs.adams.view.combined import combined, taken_off
 from gearmbs.adams.view.deckmaker import Deckmaker
+from gearmbs.adams.view.geometry.combined import combined, taken_off
+from gearmbs.adams.view.geometry.solids import REMEDY, SHAPES, Moments, need, polyhedron
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
-from gearmbs.adams.view.solids import REMEDY, SHAPES, Moments, need, polyhedron
 from gearmbs.adams.write.text import listed, number
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.meshes import read_triangles

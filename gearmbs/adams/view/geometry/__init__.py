@@ -1,0 +1,1 @@
+"""Solids of command files: their outlines, and the masses that View makes of them."""
