@@ -125,8 +125,7 @@ class Campaign:
             work, with the reason; or with ``on_failure="stop"`` at the first failed case.
         """
         from gearmbs.campaigns.cluster import DaskRunner
-        from gearmbs.studies.run.engine import here, processes
-        from gearmbs.studies.run.parallel import available_cores
+        from gearmbs.studies.run.engine import available_cores, here, processes
 
         where: Any
         if workers is not None:

@@ -124,7 +124,32 @@ def _stamp(path: Path) -> tuple[int, int, int]:
     return about.st_mtime_ns, about.st_ctime_ns, about.st_size
 
 
-_seen: dict[tuple[str, ...], tuple[Code, list[_Source]]] = {}
+@dataclass
+class _Seen:
+    """The code of some modules as it was read, and whether this process has loaded it so."""
+
+    code: Code
+    files: list[_Source]
+    as_loaded: bool = False
+
+    def stands(self) -> bool:
+        """Return whether all files look as they did."""
+        # looked at twice a unit of a campaign: a look at a file and nothing else
+        try:
+            for place, stamp in self._looks:
+                about = os.stat(place)
+                if (about.st_mtime_ns, about.st_ctime_ns, about.st_size) != stamp:
+                    return False
+        except OSError:
+            return False
+        return True
+
+    @functools.cached_property
+    def _looks(self) -> list[tuple[str, tuple[int, int, int]]]:
+        return [(str(source.path), source.stamp) for source in self.files]
+
+
+_seen: dict[tuple[str, ...], _Seen] = {}
 _looked_at: set[_Source] = set()
 """Sources that this process, or the one that it was forked from, has not loaded in another form."""
 
@@ -146,12 +171,12 @@ def code_of(modules: Iterable[str] = ()) -> Code:
     """
     names = tuple(sorted(set(modules)))
     known = _seen.get(names)
-    if known is not None and all(_stamped(source) for source in known[1]):
-        return known[0]
+    if known is not None and known.stands():
+        return known.code
     new, files = _read(names)
-    if known is not None and new != known[0]:
-        raise CodeChanged(f"the code was edited while this process was at work: {known[0].differences(new)}")
-    _seen[names] = new, files
+    if known is not None and new != known.code:
+        raise CodeChanged(f"the code was edited while this process was at work: {known.code.differences(new)}")
+    _seen[names] = _Seen(new, files)
     return new
 
 
@@ -165,19 +190,14 @@ def running_code(modules: Iterable[str] = ()) -> Code:
     """
     names = tuple(sorted(set(modules)))
     code = code_of(names)
-    for source in _seen[names][1]:
+    seen = _seen[names]
+    for source in () if seen.as_loaded else seen.files:
         if source not in _looked_at:
             if not as_loaded(source.name, source.path, source.stamp):
                 raise CodeChanged(f"{source.name} was edited after this process had loaded it; start it again")
             _looked_at.add(source)
+    seen.as_loaded = True
     return code
-
-
-def _stamped(source: _Source) -> bool:
-    try:
-        return _stamp(source.path) == source.stamp
-    except OSError:
-        return False
 
 
 def _read(names: Iterable[str]) -> tuple[Code, list[_Source]]:

@@ -112,6 +112,11 @@ def outcome(work: Work, job: Any, report: Callable[[float], None]) -> tuple[str,
         return FAILURE, error
 
 
+def available_cores() -> int:
+    """Return the number of cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
 def silent(_fraction: float) -> None:
     """Report no progress."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -16,7 +15,7 @@ from gearmbs.progress import bars
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
 from gearmbs.studies.run.claims import Claim, claimed
-from gearmbs.studies.run.engine import processes, run_jobs, threads
+from gearmbs.studies.run.engine import available_cores, processes, run_jobs, threads
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
 from gearmbs.studies.run.store import RecordFolder, file_stem, record_size
 from gearmbs.wording import warn
@@ -24,11 +23,6 @@ from gearmbs.wording import warn
 
 class StorageWarning(UserWarning):
     """A record could not be written where it was wanted; the message says where it is."""
-
-
-def available_cores() -> int:
-    """Return the number of cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
 def run_named(
