@@ -194,6 +194,10 @@ def make_sensor(m: Deckmaker, item: Item) -> None:
     )
 
 
+COLUMNS = (2, 3, 4, 6, 7, 8)
+"""Functions of a request that are free: the first and the fifth are sizes of the three behind them."""
+
+
 def make_request(m: Deckmaker, item: Item) -> None:
     """REQUEST."""
     item.used |= {"comment", "component_names", "component_labels", "results_name", "title", "motion_rframe"}
@@ -205,7 +209,9 @@ def make_request(m: Deckmaker, item: Item) -> None:
         names = (("i_marker_name", "I"), ("j_marker_name", "J"), ("r_marker_name", "RM"))
         m.add(item, f"REQUEST/{m.id(item)}", kind.upper(), *(m.ref(item, key, word) for key, word in names))
     elif variables := m.values.refs(item, "variable_name"):
-        functions = [f"F{k + 2} = VARVAL({m.id(one)})" for k, one in enumerate(variables[:3])]
+        if len(variables) > len(COLUMNS):
+            raise ViewError(f"{len(variables)} variables; a request holds {len(COLUMNS)}, give the others another one")
+        functions = [f"F{k} = VARVAL({m.id(one)})" for k, one in zip(COLUMNS, variables)]
         m.add(item, f"REQUEST/{m.id(item)}", *functions)
     else:
         functions = [found for k in range(1, 9) if (found := m.expression(item, f"f{k}", f"F{k}")) is not None]

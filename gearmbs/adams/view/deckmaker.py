@@ -315,7 +315,7 @@ class Deckmaker:
                 points.insert(0, r)
             if len(points) != count or len(given) % 3:
                 raise ViewError(f"{key}: these are no points of three coordinates", item.line)
-            a = frames.directed(key, points, self.db.axis)
+            a = frames.directed(key, points, item.fields[key].sequence)
         found = [self.new_marker(item, part, a, r) for part in parts if part is not None]
         return f"I = {found[0]}", f"J = {found[1]}"
 

@@ -28,6 +28,10 @@ from gearmbs.adams.view.vocabulary import Row, argument_of
 
 REFERRING = ("marker", "marker_name", "part_name")
 """Endings of arguments that name markers and parts."""
+GIVEN_MASS = ("mass", "inertia_marker", "ixx", "iyy", "izz", "ixy", "izx", "iyz")
+"""What a part has by its geometry instead, when a command gives it a material or a density only."""
+NUMBERLESS = {"adams_id", "ground_part", "material_type", "planar"}
+"""Arguments of parts that hold no numbers with units."""
 VALUES = ("real_value", "integer_value", "string_value", "object_value")
 
 
@@ -44,15 +48,15 @@ class Editor:
     database : Database
     values : Values
     overrides : dict of str to float
-    overridden : set of str
-        Those of them that there are variables for.
+    overridden : dict of str to set of str
+        Those of them that there are variables for, with the full names of these.
     """
 
     def __init__(self, variables: Mapping[str, float] | None = None) -> None:
         self.database = Database()
         self.values = Values(self.database)
         self.overrides = {name.lower(): float(value) for name, value in (variables or {}).items()}
-        self.overridden: set[str] = set()
+        self.overridden: dict[str, set[str]] = {}
 
     def _arguments(self, command: Command, row: Row) -> dict[str, Stored]:
         """Return the arguments of a command by their full names."""
@@ -117,6 +121,10 @@ class Editor:
             rename(self.database, item, text_of((self._now(new) or [""])[0]), line)
         if "ground_part" in fields:
             self._ground(item, fields, line)
+        if fields.keys() & {"density", "material_type"} and "mass" not in fields:
+            # the last command decides: from now on the mass is that of the geometry
+            for key in GIVEN_MASS:
+                item.fields.pop(key, None)
         placed = {key: one for key, one in fields.items() if key in ("location", "orientation", "relative_to")}
         if item.kind in PLACED and item.kind != "model":
             self._place(item, fields)
@@ -282,7 +290,8 @@ class Editor:
         for key in ("location", *ORIENTATIONS):
             if key not in fields:
                 continue
-            stored = replace(fields[key], frame=self.database.frame, sequence=self.database.sequence)
+            meant = self.database.axis if key.endswith("_orientation") else self.database.sequence
+            stored = replace(fields[key], frame=self.database.frame, sequence=meant)
             if key == "location" and self.database.coordinates != "car" and not stored.live:
                 given = self._triple(stored, f"the location of {item.path}")
                 point = frames.COORDINATES[self.database.coordinates](given, self.database.units.radian)
@@ -338,8 +347,12 @@ class Editor:
         if len(held) > 1:
             raise ViewError(f"{' '.join(row.words)}: give one of {', '.join(held)}", line)
         override = next((key for key in self.overrides if _meant(item, key)), None)
-        if override is not None:
-            self.overridden.add(override)
+        if override is not None and loop is None:
+            self.overridden.setdefault(override, set()).add(item.path)
+            now = [one for stored in held.values() for one in self._now(stored)]
+            if len(now) > 1 or any(isinstance(one, (str, Item)) for one in now):
+                what = f"{len(now)} values" if len(now) > 1 else text_of(now[0])[:40]
+                raise ViewError(f"variables: {item.path} holds {what}; a number takes the place of one number", line)
             item.fields["real_value"] = fixed(self.overrides[override], line=line)
         elif held and "index" in given:
             self._member(item, given["index"], next(iter(held.items())), line)
@@ -370,9 +383,10 @@ class Editor:
                 if quantity in words:
                     before = db.units.names[quantity]
                     db.units.choose(quantity, words[quantity], line)
-                    numbers = any(item.kind not in ("model", "variable", "part") for item in db)
-                    if db.units.names[quantity] != before and numbers:
-                        raise ViewError(f"the unit of {quantity} is changed after numbers were given in it", line)
+                    if db.units.names[quantity] != before and (quantity in db.units.converted or self._has_numbers()):
+                        raise ViewError(
+                            f"the unit of {quantity} is changed after numbers were given in it; choose it before", line
+                        )
             if "coordinate_system_type" in words:
                 given_type = words["coordinate_system_type"][:30].lower()
                 if given_type[:3] not in frames.COORDINATES:
@@ -397,6 +411,17 @@ class Editor:
                 if part is not None:
                     db.part = part
 
+    def _has_numbers(self) -> bool:
+        """Return whether anything holds numbers in the units of the moment: of variables those that have a unit."""
+        for item in self.database:
+            if item.kind == "variable" and self.values.word(item, "units", "no_units") not in ("no_units", ""):
+                return True
+            if item.kind not in ("model", "variable", "part") or (
+                item.kind == "part" and set(item.fields) - NUMBERLESS
+            ):
+                return True
+        return False
+
     def _number(self, stored: Stored, line: int) -> float:
         found = self._now(stored)
         value = found[0] if found else None
@@ -417,4 +442,4 @@ def _fixed_before(item: Item, key: str) -> Stored | None:
 
 def _meant(item: Item, key: str) -> bool:
     path = item.path.lower()
-    return path == key or path.endswith("." + key.lstrip("."))
+    return path == key or (not key.startswith(".") and path.endswith("." + key))

@@ -50,19 +50,21 @@ def parse(text: str, units: Units, line: int = 0) -> Tree:
         If it has no such form.
     """
     try:
-        return _parsed(text, tuple(units.names.items()))
+        tree, converted = _parsed(text, tuple(units.names.items()))
     except ViewError as error:
         raise ViewError(str(error), line) from error
+    units.converted |= converted
+    return tree
 
 
 @lru_cache(maxsize=1024)
-def _parsed(text: str, units: tuple[tuple[str, str], ...]) -> Tree:
-    """Return the tree of an expression; loops ask for the same ones again and again."""
+def _parsed(text: str, units: tuple[tuple[str, str], ...]) -> tuple[Tree, frozenset[str]]:
+    """Return the tree of an expression and the quantities of its units; loops ask for the same ones again and again."""
     parser = _Parser(text, Units(dict(units)))
     tree = parser.level(0)
     if parser.kind:
         raise parser.error(f"{parser.token!r} is not expected")
-    return tree
+    return tree, frozenset(parser.units.converted)
 
 
 class _Parser:
@@ -225,6 +227,7 @@ class _Parser:
 
     def factor(self, quantity: str, si: float) -> float:
         """Return how many of the model's units a unit is."""
+        self.units.converted.add(quantity)
         return si / self.units.si(quantity)
 
 

@@ -26,7 +26,11 @@ MOST_COMMANDS = 300_000
 MOST_ERRORS = 50
 DEEPEST_CALLS = 20
 """Macros and files within each other."""
-_PARAMETER = re.compile(r"\$'?([A-Za-z_]\w*)'?((?::[A-Za-z]+=[^:\s]*)*)")
+_PARAMETER = re.compile(
+    r"\$(?:'(?P<quoted>[A-Za-z_]\w*)(?P<within>(?::[A-Za-z]+=[^:'\s]*)*)'|(?P<plain>[A-Za-z_]\w*))"
+    r"(?P<behind>(?::[A-Za-z]+=[^:\s]*)*)"
+)
+"""A parameter of a macro with its qualifiers: $length:t=real:d=5, $'length:t=real:d=5' or $'length'."""
 
 
 @dataclass
@@ -343,9 +347,10 @@ class Interpreter(Editor):
         words = tuple(text_of(called or name.rsplit(".", 1)[-1]).lower().split())
         parameters: dict[str, str] = {}
         for match in _PARAMETER.finditer(text):
-            options = dict(one.split("=", 1) for one in match.group(2).split(":") if "=" in one)
+            qualifiers = f"{match['within'] or ''}{match['behind']}"
+            options = dict(one.split("=", 1) for one in qualifiers.split(":") if "=" in one)
             default = next((v for k, v in options.items() if k.lower() in ("d", "default")), None)
-            key = match.group(1).lower()
+            key = (match["quoted"] or match["plain"]).lower()
             if key != "_self" and (key not in parameters or default is not None):
                 parameters[key] = default if default is not None else parameters.get(key, "")
         self.macros[words] = Macro(text, line, parameters)
@@ -363,7 +368,7 @@ class Interpreter(Editor):
             values[names[0]] = ", ".join(_written(one) for one in found)
 
         def filled(match: re.Match[str]) -> str:
-            return values.get(match.group(1).lower(), match.group())
+            return values.get((match["quoted"] or match["plain"]).lower(), match.group())
 
         body = "\n".join(line for line in macro.text.splitlines() if not line.lstrip().startswith("!"))
         self._nested(_PARAMETER.sub(filled, body), command.line)

@@ -36,7 +36,14 @@ def unit_named(word: str, quantity: str | None = None) -> tuple[str, str, float]
 
 @dataclass
 class Units:
-    """The units of numbers: names and SI values by quantity."""
+    """The units of numbers: names and SI values by quantity.
+
+    Attributes
+    ----------
+    names : dict of str to str
+    converted : set of str
+        Quantities in whose units numbers with units behind them have been brought.
+    """
 
     names: dict[str, str] = field(
         default_factory=lambda: {
@@ -47,6 +54,7 @@ class Units:
             "angle": "DEGREES",
         }
     )
+    converted: set[str] = field(default_factory=set)
 
     def si(self, quantity: str) -> float:
         """Return the SI value of the unit of a quantity."""

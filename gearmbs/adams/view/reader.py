@@ -125,6 +125,10 @@ def parse_view(
     missing = [name for name in run.overrides if name not in run.overridden]
     if missing and not errors:
         errors += [Diagnostic(ERROR, f"there is no variable {name}", file, 0) for name in missing]
+    for name, paths in run.overridden.items():
+        if len(paths) > 1 and not errors:
+            which = " and ".join(sorted(paths))
+            errors.append(Diagnostic(ERROR, f"variables: {name} may be {which}; give the full name of one", file, 0))
     chosen = _chosen(run, model)
     if chosen is None and not errors:
         errors.append(Diagnostic(ERROR, "no model is created; write 'model create model_name = ...'", file, 0))

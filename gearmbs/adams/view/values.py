@@ -43,7 +43,7 @@ class Stored:
     frame : Item or None
         Of a place: what its numbers are relative to.
     sequence : str
-        Of an orientation: how its angles are meant.
+        Of an orientation: how its angles are meant, such as body313; of one by points which axis and plane they give.
     before : Stored or None
         What was held before: it counts where expressions depend on each other in a circle.
     """
