@@ -10,9 +10,17 @@ import functools
 import math
 import re
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearmbs.wording import closest
+
+# What is taken for a quantity: a number in SI, text with a unit, or a quantity of pint, which those load who use it.
+if TYPE_CHECKING:
+    from pint import Quantity as _PintQuantity
+
+    QuantityLike = float | str | _PintQuantity
+else:
+    QuantityLike = Any
 
 # A field that takes a float in SI or text with a unit, and holds the float once its object is built.
 Quantity = Any

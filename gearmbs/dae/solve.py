@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.methods import those_that
@@ -50,14 +51,14 @@ def _event_rules(events: Sequence[Callable]) -> dict[str, Any]:
 def solve_dae(
     fun: Callable | DAEProblem,
     t_span: tuple[float, float],
-    y0: np.ndarray | None = None,
-    yp0: np.ndarray | None = None,
+    y0: npt.ArrayLike | None = None,
+    yp0: npt.ArrayLike | None = None,
     *,
     method: str | None = None,
     rtol: float | None = None,
-    atol: float | np.ndarray = 1e-8,
+    atol: npt.ArrayLike = 1e-8,
     events: Callable | Sequence[Callable] | None = None,
-    t_eval: np.ndarray | None = None,
+    t_eval: npt.ArrayLike | None = None,
     options: Options | None = None,
     **more: Any,
 ) -> DAEResult:
@@ -135,7 +136,7 @@ def solve_dae(
 
 
 def _checked_problem(
-    problem: DAEProblem, t0: float, y0: np.ndarray | None, events: Any, of_equations: Mapping[str, Any]
+    problem: DAEProblem, t0: float, y0: npt.ArrayLike | None, events: Any, of_equations: Mapping[str, Any]
 ) -> DAEProblem:
     """Return the problem; refuse what a DAEProblem says itself."""
     if y0 is not None or of_equations.get("jac") is not None or events is not None:
@@ -148,10 +149,10 @@ def _checked_problem(
 def _posed(
     fun: Callable,
     t_span: tuple[float, float],
-    y0: np.ndarray | None,
-    yp0: np.ndarray | None,
+    y0: npt.ArrayLike | None,
+    yp0: npt.ArrayLike | None,
     rtol: float | None,
-    atol: float | np.ndarray,
+    atol: npt.ArrayLike,
     events: Callable | Sequence[Callable] | None,
     of_equations: Mapping[str, Any],
     chosen: Options,
@@ -181,7 +182,7 @@ def _posed(
 
 
 def _run_at_outputs(
-    problem: DAEProblem, options: Options, t_span: tuple[float, float], t_eval: np.ndarray | None
+    problem: DAEProblem, options: Options, t_span: tuple[float, float], t_eval: npt.ArrayLike | None
 ) -> DAEResult:
     """Run an integrator that wants the start among its outputs; without ``t_eval`` at evenly spaced times."""
     times = np.linspace(*t_span, DEFAULT_OUTPUTS) if t_eval is None else np.asarray(t_eval, dtype=float)

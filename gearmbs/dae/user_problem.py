@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from numba.extending import is_jitted
 from scipy.sparse import csc_array, issparse
 
@@ -402,9 +403,7 @@ def _check_derivatives(problem: DAEProblem, functions: _UserFunctions, span: flo
         )
 
 
-def _start(
-    y0: np.ndarray, atol: float | np.ndarray, scale: float | np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _start(y0: npt.ArrayLike, atol: npt.ArrayLike, scale: npt.ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return initial values, absolute tolerances and scales as vectors; raise a ValueError if they cannot be that."""
     y0 = np.array(y0, dtype=float).ravel()
     if len(y0) == 0:
@@ -418,12 +417,12 @@ def _start(
 def as_problem(
     fun: Callable,
     t0: float,
-    y0: np.ndarray,
-    yp0: np.ndarray | None,
+    y0: npt.ArrayLike,
+    yp0: npt.ArrayLike | None,
     span: float,
     *,
     p: np.ndarray | None = None,
-    atol: float | np.ndarray = 1e-8,
+    atol: npt.ArrayLike = 1e-8,
     scale: float | np.ndarray = 1.0,
     error_mask: np.ndarray | None = None,
     differential: np.ndarray | None = None,

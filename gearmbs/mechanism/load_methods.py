@@ -21,6 +21,7 @@ from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import Load
 from gearmbs.mechanism.parts.modal import ModalBody, ShapedMarker
 from gearmbs.mechanism.parts.quantities import Vector, expression_text, keeps_given, quantity, vector
+from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson, SolidContact
@@ -51,7 +52,7 @@ class LoadMethods:
             return str(value)
         return expression_text(value, SI_UNITS[dimension], label, self.units.factor(dimension))
 
-    def _number(self, label: str, field: str, value: float, dimension: str | None = None) -> float:
+    def _number(self, label: str, field: str, value: QuantityLike, dimension: str | None = None) -> float:
         """Return a number in the mechanism's units; ``dimension`` is that of the field's name by default."""
         dimension = dimension or FIELDS.get(field, field)
         return quantity(value, SI_UNITS[dimension], f"{label}: {field}", self.units.factor(dimension))
@@ -117,10 +118,10 @@ class LoadMethods:
         i: Marker,
         j: Marker,
         *,
-        stiffness: float,
-        damping: float = 0.0,
-        length: float | None = None,
-        preload: float = 0.0,
+        stiffness: QuantityLike,
+        damping: QuantityLike = 0.0,
+        length: QuantityLike | None = None,
+        preload: QuantityLike = 0.0,
     ) -> LineSpring:
         """Connect two markers by a spring (N/m) and damper (N s/m) along the line between them.
 
@@ -142,10 +143,10 @@ class LoadMethods:
         i: Marker,
         j: Marker,
         *,
-        stiffness: float,
-        damping: float = 0.0,
-        angle: float = 0.0,
-        preload: float = 0.0,
+        stiffness: QuantityLike,
+        damping: QuantityLike = 0.0,
+        angle: QuantityLike = 0.0,
+        preload: QuantityLike = 0.0,
     ) -> AxisSpring:
         """Connect two markers by a rotational spring (N m/rad) and damper (N m s/rad) about z of J."""
         label = f"torsion spring '{name}'"
@@ -245,13 +246,13 @@ class LoadMethods:
         i: Marker,
         j: Marker,
         *,
-        length: float,
-        area: float,
+        length: QuantityLike,
+        area: QuantityLike,
         second_moments: Vector,
-        modulus: float,
-        shear_modulus: float,
+        modulus: QuantityLike,
+        shear_modulus: QuantityLike,
         shear_ratios: tuple[float, float] = (0.0, 0.0),
-        damping_ratio: float = 0.0,
+        damping_ratio: QuantityLike = 0.0,
     ) -> Beam:
         """Connect two markers by a massless Timoshenko beam from J to I along x of J.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, Unpack
 
 import numpy.typing as npt
 
@@ -26,7 +26,14 @@ from gearmbs.mechanism.parts.modal import ModalBody, Mode, ShapeIntegrals, Shape
 from gearmbs.mechanism.parts.point_mass import PointMass, make_point_mass
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, reader, vector
 from gearmbs.mechanism.value_methods import ValueMethods
-from gearmbs.units import truth
+from gearmbs.units import QuantityLike, truth
+
+if TYPE_CHECKING:
+    from gearmbs.dae.analyses.modes import Modes
+    from gearmbs.dae.analyses.plant import LinearPlant
+    from gearmbs.dae.analyses.statics import StaticResult
+    from gearmbs.dae.results.solution import Solution
+    from gearmbs.mechanism.solve.keywords import SimulateOptions
 
 E = TypeVar("E", bound=ForceElement)
 
@@ -115,7 +122,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
     def body(
         self,
         name: str,
-        mass: float = 0.0,
+        mass: QuantityLike = 0.0,
         inertia: npt.ArrayLike = (0.0, 0.0, 0.0),
         *,
         com: Vector = (0.0, 0.0, 0.0),
@@ -155,7 +162,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
     def point_mass(
         self,
         name: str,
-        mass: float,
+        mass: QuantityLike,
         *,
         at: Vector = (0.0, 0.0, 0.0),
         velocity: Vector = (0.0, 0.0, 0.0),
@@ -194,7 +201,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
     def modal_body(
         self,
         name: str,
-        mass: float,
+        mass: QuantityLike,
         inertia: npt.ArrayLike,
         modes: Sequence[Mode],
         shapes: Shapes,
@@ -235,7 +242,13 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
 
     @keeps_given
     def torque(
-        self, name: str, on: Body | Marker, function: float | TimeFunction, *, axis: Vector = (0, 0, 1), reaction=None
+        self,
+        name: str,
+        on: Body | Marker,
+        function: QuantityLike | TimeFunction,
+        *,
+        axis: Vector = (0, 0, 1),
+        reaction=None,
     ) -> Torque:
         """Apply a torque f(t) in N m about an axis fixed in the reacting body (default: ground).
 
@@ -378,7 +391,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
 
     @keeps_given
     def friction(
-        self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters
+        self, name: str, joint: jt.Joint, mu_static: QuantityLike, mu_dynamic: QuantityLike, **parameters: Any
     ) -> list[FrictionForce]:
         """Add dry friction to a revolute, translational, cylindrical, spherical or universal joint.
 
@@ -435,25 +448,27 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
 
         return compile_mechanism(self, quantity(t0, "time", "t"))
 
-    def simulate(self, t_end: float, **options):
+    def simulate(self, t_end: QuantityLike, **options: Unpack[SimulateOptions]) -> Solution:
         """Integrate from 0 to ``t_end`` seconds; see :func:`gearmbs.mechanism.simulate`."""
         from gearmbs.mechanism.solve.simulate import simulate
 
         return simulate(self, t_end, **options)
 
-    def linear_modes(self, **options):
+    def linear_modes(self, *, t: float = 0.0, at: StaticResult | str = "initial") -> Modes:
         """Return the natural frequencies and mode shapes; see :func:`gearmbs.mechanism.linear_modes`."""
         from gearmbs.mechanism.solve.analyses import linear_modes
 
-        return linear_modes(self, **options)
+        return linear_modes(self, t=t, at=at)
 
-    def linearize(self, inputs, outputs, **options):
+    def linearize(
+        self, inputs: Sequence[Any], outputs: Sequence[Any], *, at: Any = "initial", t: float | None = None
+    ) -> LinearPlant:
         """Return the linear plant between inputs and outputs; see :func:`gearmbs.mechanism.linearize`."""
         from gearmbs.mechanism.solve.plants import linearize
 
-        return linearize(self, inputs, outputs, **options)
+        return linearize(self, inputs, outputs, at=at, t=t)
 
-    def measures(self, solution):
+    def measures(self, solution: Solution) -> Any:
         """Return what can be measured on a solution of this mechanism; its methods offer it by name."""
         from gearmbs.mechanism.solve.measures import Measures
 

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, expm, hessenberg, matrix_balance, schur, solve_sylvester
 
 from gearmbs.dae.analyses.coordinates import JointCoordinate
@@ -160,7 +161,7 @@ class LinearPlant:
             return self.own_response.at(s)
         return self.C @ np.linalg.solve(s * np.eye(n) - self.A, self.B.astype(complex)) + self.D
 
-    def frequency_response(self, f: np.ndarray) -> np.ndarray:
+    def frequency_response(self, f: npt.ArrayLike) -> np.ndarray:
         """Return C (2 pi i f - A)^-1 B + D.
 
         Parameters

@@ -40,6 +40,7 @@ from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Load, State
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
@@ -516,7 +517,9 @@ DIMENSIONS = {
 """Dimension of each parameter with a unit, for texts and in the function language."""
 
 
-def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict, units: Units) -> JointFriction:
+def friction_of(
+    name: str, mu_static: QuantityLike, mu_dynamic: QuantityLike, parameters: dict, units: Units
+) -> JointFriction:
     """Return the parameters of a friction given as keywords; texts with a unit become numbers in ``units``.
 
     Raises

@@ -29,7 +29,7 @@ from gearmbs.mechanism.parts.quantities import (
     rotation_matrix,
     vector,
 )
-from gearmbs.units import shown
+from gearmbs.units import QuantityLike, shown
 from gearmbs.wording import did_you_mean
 
 
@@ -259,7 +259,7 @@ class Body(OwnAttributes):
 
 def make_body(
     name: str,
-    mass: float,
+    mass: QuantityLike,
     inertia: Any,
     com: Vector,
     position: Vector,

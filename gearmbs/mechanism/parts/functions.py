@@ -11,6 +11,7 @@ import numpy as np
 from gearmbs.dae.equations.loads import time_functions as tf
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.quantities import any_quantity, expression_text, quantity
+from gearmbs.units import QuantityLike
 
 RATES = ("angular speed", "speed", "rad/s^2", "acceleration", "dimensionless")
 """Dimensions that the rate of a ramp may have."""
@@ -68,13 +69,13 @@ class TimeFunction:
         return self.text
 
 
-def constant(value: float) -> TimeFunction:
+def constant(value: QuantityLike) -> TimeFunction:
     """Return the constant function."""
     value = any_quantity(value, "constant")
     return TimeFunction(tf.CONSTANT, (value,), f"{value:g}")
 
 
-def step(t0: float, f0: float, t1: float, f1: float, quintic: bool = False) -> TimeFunction:
+def step(t0: QuantityLike, f0: QuantityLike, t1: QuantityLike, f1: QuantityLike, quintic: bool = False) -> TimeFunction:
     """Return ADAMS's STEP (cubic) or STEP5 (quintic) from f0 before t0 to f1 after t1."""
     t0, t1 = quantity(t0, "time", "step: t0"), quantity(t1, "time", "step: t1")
     f0, f1 = any_quantity(f0, "step: f0"), any_quantity(f1, "step: f1")
@@ -85,7 +86,9 @@ def step(t0: float, f0: float, t1: float, f1: float, quintic: bool = False) -> T
     return TimeFunction(kind, (t0, f0, t1, f1), f"{name}(TIME, {t0:g}, {f0:g}, {t1:g}, {f1:g})")
 
 
-def ramp(rate: float, over: float = 0.0, start: float = 0.0, quintic: bool = False) -> TimeFunction:
+def ramp(
+    rate: QuantityLike, over: QuantityLike = 0.0, start: QuantityLike = 0.0, quintic: bool = False
+) -> TimeFunction:
     """Return the angle (or displacement) whose rate rises smoothly from 0 to ``rate`` during ``over`` seconds.
 
     The rate is STEP(TIME, 0, 0, over, rate), so the function is its integral, in closed form.
@@ -101,7 +104,9 @@ def ramp(rate: float, over: float = 0.0, start: float = 0.0, quintic: bool = Fal
     return TimeFunction(kind, (0.0, 0.0, over, rate, start), text)
 
 
-def harmonic(amplitude: float, omega: float, phase: float = 0.0, offset: float = 0.0) -> TimeFunction:
+def harmonic(
+    amplitude: QuantityLike, omega: QuantityLike, phase: QuantityLike = 0.0, offset: QuantityLike = 0.0
+) -> TimeFunction:
     """Return offset + amplitude sin(omega t + phase)."""
     amplitude, offset = any_quantity(amplitude, "harmonic: amplitude"), any_quantity(offset, "harmonic: offset")
     omega, phase = quantity(omega, "angular speed", "harmonic: omega"), quantity(phase, "angle", "harmonic: phase")
@@ -303,7 +308,7 @@ def expression(text: str) -> TimeFunction:
 
 
 def as_function(
-    value: float | str | TimeFunction, unit: str = "dimensionless", field: str = "function"
+    value: QuantityLike | TimeFunction, unit: str = "dimensionless", field: str = "function"
 ) -> TimeFunction:
     """Return ``value`` as a function of time.
 

@@ -18,6 +18,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker, OwnAttributes
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given, quantity, vector
+from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.parts.elements import ForceElement, Load
@@ -286,36 +287,54 @@ class JointMethods:
                 raise ModelError(f"{label}: the rows of JOINTS[{kind!r}] fail with {reason}") from error
             return self._add_joint(Joint(name, kind, mi, mj, rows))
 
-    def fixed(self, name, i, j, **where) -> Joint:
+    def fixed(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
+    ) -> Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
-        return self.joint("fixed", name, i, j, **where)
+        return self.joint("fixed", name, i, j, at=at, axis=axis)
 
-    def revolute(self, name, i, j, **where) -> Joint:
+    def revolute(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
+    ) -> Joint:
         """Add a revolute joint: rotation about the common z axis. See :meth:`joint`."""
-        return self.joint("revolute", name, i, j, **where)
+        return self.joint("revolute", name, i, j, at=at, axis=axis)
 
-    def spherical(self, name, i, j, **where) -> Joint:
+    def spherical(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
+    ) -> Joint:
         """Add a spherical joint: a common point. See :meth:`joint`."""
-        return self.joint("spherical", name, i, j, **where)
+        return self.joint("spherical", name, i, j, at=at, axis=axis)
 
-    def cylindrical(self, name, i, j, **where) -> Joint:
+    def cylindrical(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
+    ) -> Joint:
         """Add a cylindrical joint: rotation about and translation along z_J. See :meth:`joint`."""
-        return self.joint("cylindrical", name, i, j, **where)
+        return self.joint("cylindrical", name, i, j, at=at, axis=axis)
 
-    def translational(self, name, i, j, **where) -> Joint:
+    def translational(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
+    ) -> Joint:
         """Add a translational joint along z_J. See :meth:`joint`."""
-        return self.joint("translational", name, i, j, **where)
+        return self.joint("translational", name, i, j, at=at, axis=axis)
 
-    def universal(self, name, i, j, **where) -> Joint:
+    def universal(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
+        axis_j: Vector | None = None,
+    ) -> Joint:  # fmt: skip
         """Add a universal joint whose cross arms are z_I and z_J: ``axis`` and ``axis_j``. See :meth:`joint`."""
-        return self.joint("universal", name, i, j, **where)
+        return self.joint("universal", name, i, j, at=at, axis=axis, axis_j=axis_j)
 
-    def planar(self, name, i, j, **where) -> Joint:
+    def planar(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
+    ) -> Joint:
         """Add a planar joint: motion in the xy plane of J. See :meth:`joint`."""
-        return self.joint("planar", name, i, j, **where)
+        return self.joint("planar", name, i, j, at=at, axis=axis)
 
     @keeps_given
-    def screw(self, name, i, j, *, pitch: float, at: Vector | None = None, axis: Vector | None = None) -> Joint:
+    def screw(
+        self, name: str, i: Body | Marker, j: Body | Marker, *, pitch: QuantityLike, at: Vector | None = None,
+        axis: Vector | None = None,
+    ) -> Joint:  # fmt: skip
         """Add a screw joint: I advances ``pitch`` metres along z_J a turn."""
         pitch = quantity(pitch, "length", f"joint '{name}': pitch")
         mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
@@ -323,7 +342,7 @@ class JointMethods:
             return self._add_joint(Joint(name, "screw", mi, mj, screw_rows(mi, mj, pitch)))
 
     @keeps_given
-    def distance(self, name: str, i: Marker, j: Marker, length: float | None = None) -> Joint:
+    def distance(self, name: str, i: Marker, j: Marker, length: QuantityLike | None = None) -> Joint:
         """Keep the origins of two markers ``length`` metres apart (default: as they are)."""
         self._check_name(name)
         if length is None:
@@ -334,7 +353,7 @@ class JointMethods:
         row = Row(f"distance {length:g} m", (Term(terms.DISTANCE, i, j),), constant(length))
         return self._add_joint(Joint(name, "distance", i, j, [row]))
 
-    def coupler(self, name: str, parts: list[tuple[Joint, float]], offset: float | None = None) -> Joint:
+    def coupler(self, name: str, parts: list[tuple[Joint, float]], offset: QuantityLike | None = None) -> Joint:
         """Couple joint coordinates linearly: sum of coefficient x coordinate stays at its initial value.
 
         A coordinate is the angle (rad) of a revolute or cylindrical joint or the displacement (m) of a
@@ -364,7 +383,7 @@ class JointMethods:
         return self.coupler(name, [(first, quantity(ratio, "dimensionless", f"gear '{name}': ratio")), (second, -1.0)])
 
     @keeps_given
-    def rack_pinion(self, name: str, pinion: Joint, rack: Joint, radius: float) -> Joint:
+    def rack_pinion(self, name: str, pinion: Joint, rack: Joint, radius: QuantityLike) -> Joint:
         """Let the rack's joint move ``radius`` metres along its z_J for each radian of the pinion's.
 
         The radius is negative where a positive turn drives the rack against its z axis.
@@ -376,8 +395,8 @@ class JointMethods:
 
     @keeps_given
     def rotation(
-        self, name: str, joint: Joint, function: float | str | TimeFunction, *, level: str = "displacement",
-        start: float | None = None, rate: float = 0.0,
+        self, name: str, joint: Joint, function: QuantityLike | TimeFunction, *, level: str = "displacement",
+        start: QuantityLike | None = None, rate: QuantityLike = 0.0,
     ) -> Joint:  # fmt: skip
         """Prescribe the rotation of I about z_J of a joint as a function of time.
 
@@ -400,8 +419,8 @@ class JointMethods:
 
     @keeps_given
     def translation(
-        self, name: str, joint: Joint, function: float | str | TimeFunction, *, level: str = "displacement",
-        start: float | None = None, rate: float = 0.0,
+        self, name: str, joint: Joint, function: QuantityLike | TimeFunction, *, level: str = "displacement",
+        start: QuantityLike | None = None, rate: QuantityLike = 0.0,
     ) -> Joint:  # fmt: skip
         """Prescribe the displacement of I along z_J of a joint; as :meth:`rotation`, in m, m/s or m/s^2."""
         self._check_joint(name, joint, ("translational", "cylindrical"))
@@ -435,8 +454,8 @@ class JointMethods:
         return mi, mj
 
     def _prescribed(
-        self, name: str, function: float | str | TimeFunction, level: str, start: float | None, rate: float,
-        term: Term, unit: str,
+        self, name: str, function: QuantityLike | TimeFunction, level: str, start: QuantityLike | None,
+        rate: QuantityLike, term: Term, unit: str,
     ) -> Prescribed | None:  # fmt: skip
         """Return what a motion is given by, None for its displacement."""
         if level == "displacement":
@@ -498,7 +517,9 @@ def _markers_kept_if_added(used: tuple[Marker, ...], given: tuple[Body | Marker,
         raise
 
 
-def _displacement(name: str, function: float | str | TimeFunction, given: Prescribed | None, unit: str) -> TimeFunction:
+def _displacement(
+    name: str, function: QuantityLike | TimeFunction, given: Prescribed | None, unit: str
+) -> TimeFunction:
     """Return the displacement of a motion, whatever its function gives."""
     if given is None:
         return as_function(function, unit, f"motion '{name}'")

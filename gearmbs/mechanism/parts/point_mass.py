@@ -14,7 +14,7 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import AXIS_TORQUE, COMPONENTS, Load
 from gearmbs.mechanism.parts.quantities import Vector, quantity, rotation_matrix, vector
-from gearmbs.units import shown
+from gearmbs.units import QuantityLike, shown
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.parts.elements import ForceElement
@@ -87,7 +87,7 @@ def _is_zero(text: str) -> bool:
 
 
 def make_point_mass(
-    name: str, mass: float, at: Vector, velocity: Vector, com: Vector, orientation: npt.ArrayLike | None
+    name: str, mass: QuantityLike, at: Vector, velocity: Vector, com: Vector, orientation: npt.ArrayLike | None
 ) -> PointMass:
     """Return a checked point mass; see :meth:`gearmbs.mechanism.Mechanism.point_mass`."""
     label = f"point mass '{name}'"

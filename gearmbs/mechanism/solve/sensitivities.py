@@ -26,6 +26,7 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.simulate import prepared, simulate
+from gearmbs.units import QuantityLike
 from gearmbs.wording import any_of, did_you_mean, warn
 
 TIGHTER = 0.1
@@ -107,14 +108,14 @@ class Sensitivities:
 def forward_sensitivities(
     build: Callable[..., Mechanism],
     parameters: Mapping[str, Any],
-    t_end: float,
+    t_end: QuantityLike,
     *,
-    t_start: float = 0.0,
+    t_start: QuantityLike = 0.0,
     formulation: str = "SI2",
     tol: float | None = None,
     rate_scale: float | None = None,
     lump: bool | None = None,
-    **options,
+    **options: Any,
 ) -> Sensitivities:
     """Simulate a mechanism and differentiate the run by parameters of it.
 

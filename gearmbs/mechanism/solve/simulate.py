@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from gearmbs._lazy import uncollected
 from gearmbs.dae.equations import layout as tables
@@ -38,7 +39,9 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantities, quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.controllers import warn_of_unmet
+from gearmbs.mechanism.solve.keywords import IntegratorOptions, StopAt
 from gearmbs.progress import time_bar
+from gearmbs.units import QuantityLike
 from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
@@ -46,24 +49,6 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
 
 # Ends of a simulation where an expression passes a value.
-
-
-@dataclass(frozen=True)
-class StopAt:
-    """End where a state passes a value.
-
-    Attributes
-    ----------
-    state : str
-        Name of a state of the mechanism; an algebraic one holds any expression, see `Mechanism.algebraic_state`.
-    value : float
-    direction : int
-        1: rising only, -1: falling only, 0: either.
-    """
-
-    state: str
-    value: float = 0.0
-    direction: int = 0
 
 
 @njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
@@ -165,12 +150,12 @@ ADVICE = {
 
 def simulate(
     mechanism: Mechanism,
-    t_end: float,
+    t_end: QuantityLike,
     *,
-    rate: float | None = None,
-    t_eval: np.ndarray | None = None,
+    rate: QuantityLike | None = None,
+    t_eval: npt.ArrayLike | None = None,
     every_step: bool = False,
-    t_start: float = 0.0,
+    t_start: QuantityLike = 0.0,
     integrator: str = DEFAULT,
     formulation: str = "SI2",
     tol: float | None = None,
@@ -184,7 +169,7 @@ def simulate(
     continued: bool = False,
     initial: State | None = None,
     inputs: Mapping[str, Any] | None = None,
-    **options,
+    **options: Unpack[IntegratorOptions],
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
 
@@ -261,6 +246,7 @@ def simulate(
         than the loads press them; if a function of the user fails, its
         ``solution`` has what was computed until then.
     """
+    settings: dict[str, Any] = {**options}
     if watch and consumer is None:
         raise ModelError("watch: what it names is handed to a consumer; give consumer=, too")
     if consumer is not None and not every_step:
@@ -274,12 +260,12 @@ def simulate(
 
         if every_step or stops or consumer is not None:
             raise ModelError("inputs: a run with inputs has no every_step, consumer or stops; give rate or t_eval")
-        checked(integrator, tol, options)
+        checked(integrator, tol, settings)
         return simulate_led(
             mechanism, t_eval, inputs, integrator=integrator, formulation=formulation, tol=tol, rate_scale=rate_scale,
-            lump=lump, initial=initial, advice=advice, progress=progress, **options,
+            lump=lump, initial=initial, advice=advice, progress=progress, **settings,
         )  # fmt: skip
-    name = checked(integrator, tol, options)
+    name = checked(integrator, tol, settings)
     check_stops(stops)
     # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
     INTEGRATORS[name].load()
@@ -293,24 +279,24 @@ def simulate(
             warn_of_unmet(initial.controllers)
         # events in what is left of the last step would be missed
         history = None if stops else initial.history_for(problem, name, tol)
-        options |= starting_options(name, history)
+        settings |= starting_options(name, history)
         problem = initial.problem(problem, history)
         # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there
         led = {name: number for name, number in problem.numbers.items() if number.slope(problem.rdata) != 0.0}
         for number in led.values():
             number.write(problem.rdata, initial.t, number.value(problem.rdata, initial.t))
         if led:
-            options.pop("history", None)
+            settings.pop("history", None)
         if any(number.prescribes for number in led.values()):
-            options["check_start"] = False
+            settings["check_start"] = False
     if stops:
         if lump or not INTEGRATORS[name].can("event_action"):
             able = any_of(those_that("event_action"))
             raise ModelError(f"stops: they need the integrator {able}, and lump=False")
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
-        options.update(stop_options(stops))
+        settings.update(stop_options(stops))
     t_model = t_start if initial is None else initial.t_model
-    options |= with_brief_changes(system, t_model, float(t_eval[-1]), options)
+    settings |= with_brief_changes(system, t_model, float(t_eval[-1]), settings)
     problem.advice = {**ADVICE, **(advice or {})}
     held, lumping = locking_remark(mechanism, system), lumping if asked else ""
     remark = " ".join(text for text in (held, lumping) if text)
@@ -324,7 +310,7 @@ def simulate(
     result = None
     try:
         with bar as report, raised_errors(mechanism.functions.values()):
-            result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **options)
+            result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **settings)
     except ModelError as error:
         if result is not None and stream is None:
             cut = replace(result, status=Status.USER_ERROR, message=str(error))
@@ -437,7 +423,7 @@ def _prepared(
 
 
 def _output_times(
-    start: float, end: float, rate: float | None, given: np.ndarray | None, every_step: bool, held: bool
+    start: float, end: float, rate: QuantityLike | None, given: npt.ArrayLike | None, every_step: bool, held: bool
 ) -> np.ndarray:
     """Return the output times; see `simulate`."""
     if every_step and (rate is not None or given is not None):

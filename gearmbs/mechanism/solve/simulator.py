@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from time import perf_counter
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
@@ -44,7 +44,11 @@ from gearmbs.mechanism.solve.simulate import (
     with_stops,
 )
 from gearmbs.mechanism.solve.told import Point
+from gearmbs.units import QuantityLike
 from gearmbs.wording import any_of
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.solve.keywords import IntegratorOptions
 
 NOTHING = nullcontext()
 """Null context, used when the mechanism has no functions of Python."""
@@ -129,9 +133,9 @@ class Simulator(Sampled, Restored):
     def __init__(
         self,
         mechanism: Mechanism,
-        t_end: float,
+        t_end: QuantityLike,
         *,
-        t_start: float = 0.0,
+        t_start: QuantityLike = 0.0,
         integrator: str = DEFAULT,
         formulation: str = "SI2",
         tol: float | None = None,
@@ -141,8 +145,9 @@ class Simulator(Sampled, Restored):
         records: bool = True,
         stops: Sequence[StopAt] = (),
         advice: Mapping[Status, str] | None = None,
-        **options: Any,
+        **options: Unpack[IntegratorOptions],
     ) -> None:
+        settings: dict[str, Any] = {**options}
         check_mechanism(mechanism)
         for what, given in (("lump", lump), ("records", records)):
             if not isinstance(given, bool | np.bool_ | None):
@@ -152,11 +157,11 @@ class Simulator(Sampled, Restored):
         if not (np.isfinite(self.t_end) and self.t_end > t_start):
             raise ModelError(f"t_end = {self.t_end} s; it must be later than the start {t_start} s")
         tol, rate_scale = chosen_accuracy(mechanism, (t_start, self.t_end), tol, rate_scale)
-        name = checked(integrator, tol, options, OWN)
+        name = checked(integrator, tol, settings, OWN)
         if not INTEGRATORS[name].compiled:
             raise ModelError(f"integrator: {name} cannot be held between calls; take {any_of(those_that('history'))}")
         for option in REFUSED:
-            if option in options:
+            if option in settings:
                 raise ModelError(f"Simulator has no option {option!r}; simulate() and initial= have what it is for")
         INTEGRATORS[name].load()
         check_stops(stops)
@@ -169,7 +174,7 @@ class Simulator(Sampled, Restored):
             mechanism, t_model, lump, formulation, rate_scale, initial is not None
         )
         self._base.advice = {**ADVICE, **(advice or {})}
-        options |= with_brief_changes(self._system, t_model, self.t_end, options)
+        settings |= with_brief_changes(self._system, t_model, self.t_end, settings)
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []
@@ -183,8 +188,8 @@ class Simulator(Sampled, Restored):
             first = int(self._base.idata[T.H_Z])
             self._watched = partial(with_stops, names=mechanism.state_names, first=first, stops=stops)
             self._watched(self._base)
-            options["event_direction"] = [stop.direction for stop in stops]
-        self._options = Options.gather(name, None, {"corrector": "modified", "tol": tol, **options})
+            settings["event_direction"] = [stop.direction for stop in stops]
+        self._options = Options.gather(name, None, {"corrector": "modified", "tol": tol, **settings})
         self._records = records
         self._integers: tuple[Any, Any] = None, None
         """A table of integers, and what differs in it from that of the model, of the last state."""

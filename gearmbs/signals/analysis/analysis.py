@@ -79,6 +79,20 @@ def analyse(signal: Any, *, planetary: Any, **settings: Any) -> PlanetaryReport:
 @overload
 def analyse(
     signal: Any,
+    teeth: int | Sequence[int],
+    *,
+    rate: Given | None = None,
+    units: Units | None = None,
+    channels: Sequence[str] | None = None,
+    gaps: str | None = None,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> AnalysisReport: ...
+
+
+@overload
+def analyse(
+    signal: Any,
     teeth: int | Sequence[int] | None = None,
     *,
     rate: Given | None = None,

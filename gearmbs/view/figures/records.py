@@ -354,7 +354,7 @@ MOST_TICKS = 60
 
 
 def average_plot(
-    averages: xr.DataArray | Mapping[str, xr.DataArray],
+    averages: xr.DataArray | Mapping[str, xr.DataArray] | None,
     *,
     teeth: int | None = None,
     title: str | None = None,
@@ -388,6 +388,8 @@ def average_plot(
     ValueError
         If there is no average, no angle, more than one channel, or `teeth` is no whole number.
     """
+    if averages is None:
+        raise ValueError("averages: None, so the report has none; its `missing` says why")
     named = averages if isinstance(averages, Mapping) else {"": averages}
     if not named:
         raise ValueError("averages: empty; give at least one average")
