@@ -6,12 +6,15 @@ import os
 import shutil
 import tempfile
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 
 @contextmanager
@@ -189,3 +192,46 @@ def json_value(value: Any, other: Callable[[Any], Any] = str) -> Any:
 def python_scalar(value: Any) -> Any:
     """Return a scalar of numpy as Python's; anything else as it is."""
     return value.item() if isinstance(value, np.generic) else value
+
+
+def arrow_column(values: Sequence[Any] | np.ndarray, kind: pa.DataType | None = None) -> pa.Array:
+    """Return values as a column of a table of Arrow, the same as ``pyarrow.array(values, kind)``.
+
+    That imports pandas before anything else, for which a process that only writes tables waits a third of a second; so
+    columns of numbers and of texts are made of their memory.
+
+    Parameters
+    ----------
+    values : sequence or ndarray
+    kind : pyarrow.DataType, optional
+        Default by the values.
+    """
+    import pyarrow as pa
+
+    numbers = {float: (pa.float64(), np.float64), int: (pa.int64(), np.int64)}
+    if isinstance(values, np.ndarray):
+        for arrow, own in numbers.values():
+            if values.dtype == own and values.ndim == 1 and kind in (None, arrow):
+                memory = pa.py_buffer(np.ascontiguousarray(values))
+                return pa.Array.from_buffers(arrow, len(values), [None, memory])
+        if not (values.ndim == 1 and values.dtype.kind in "OU"):
+            return pa.array(values, type=kind)
+    listed = list(values) if not isinstance(values, np.ndarray) else values.tolist()
+    there = [value for value in listed if value is not None]
+    types = {type(value) for value in there}
+    parts: list[Any] = []
+    if types == {str} and kind in (None, pa.string()):
+        texts = [b"" if value is None else value.encode() for value in listed]
+        ends = np.cumsum([0, *map(len, texts)])
+        # offsets of this kind of text have 32 bits
+        if ends[-1] < 2**31:
+            kind, parts = pa.string(), [ends.astype(np.int32), b"".join(texts)]
+    elif len(types) == 1 and (found := numbers.get(types.pop())) and kind in (None, found[0]):
+        with suppress(OverflowError):
+            parts = [np.array([0 if value is None else value for value in listed], dtype=found[1])]
+            kind = found[0]
+    if not parts:
+        return pa.array(values, type=kind)
+    missing = len(there) < len(listed)
+    known = pa.py_buffer(np.packbits([value is not None for value in listed], bitorder="little")) if missing else None
+    return pa.Array.from_buffers(kind, len(listed), [known, *map(pa.py_buffer, parts)])

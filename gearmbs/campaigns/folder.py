@@ -30,7 +30,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +40,7 @@ from gearmbs.campaigns.plans.plan import ALONG, FORMAT, TAKEN, Plan
 from gearmbs.campaigns.settings import CampaignError, CampaignWarning, local, whole
 from gearmbs.campaigns.signals import Signals, write_store
 from gearmbs.campaigns.subjects.base import SignalSpec
-from gearmbs.files import to_disk, whole_file, write_whole
+from gearmbs.files import arrow_column, to_disk, whole_file, write_whole
 from gearmbs.studies.run.claims import owner, take, told
 
 if TYPE_CHECKING:
@@ -226,11 +226,12 @@ class Folder:
             f'case {index}: no record is kept; it is not done yet, or the plan keeps none (keep "record")'
         )
 
-    def taken(self) -> set[str]:
-        """Return the names whose place no number may take: those of the plan's columns, of what is known of cases, of
-        signals and their axes. A number of such a name has ``result.`` before it."""
+    @cached_property
+    def taken(self) -> frozenset[str]:
+        """The names whose place no number may take: those of the plan's columns, of what is known of cases, of signals
+        and their axes. A number of such a name has ``result.`` before it."""
         signals = {spec.name + ending for spec in self.specs for ending in ("", *ALONG)}
-        return {*self.cases(0)[0], *TAKEN, *signals}
+        return frozenset({*self.cases(0)[0], *TAKEN, *signals})
 
     def stored_signals(self, spec: SignalSpec, slots: np.ndarray) -> Signals:
         """Return the signals of some slots, which are read when they are asked for."""
@@ -570,7 +571,8 @@ def write_cases(store: Path, plan: Plan, unit: int, n: int, before: list[Extent]
         units = first_unit + (count + np.arange(size)) // unit
         name = _block_name(len(before), len(digests))
         with whole_file(store / "cases" / name, durable=store) as part:
-            table = pa.table({"index": index, "unit": units, **columns})
+            columns = {"index": index, "unit": units, **columns}
+            table = pa.table({name: arrow_column(values) for name, values in columns.items()})
             pq.write_table(table, part, compression="zstd", write_page_checksum=True)
             digests[name] = hashlib.sha256(part.read_bytes()).hexdigest()
         count += size

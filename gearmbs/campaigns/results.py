@@ -168,7 +168,8 @@ def open_dataset(folder: Folder, table: pd.DataFrame | None = None) -> xr.Datase
     )
     if not folder.specs:
         return data
-    from gearmbs.campaigns.signals import check_store, signal_variable
+    from gearmbs.campaigns.signals import check_store
+    from gearmbs.campaigns.stored.variables import signal_variable
 
     try:
         check_store(folder.signals, folder.specs, folder.unit_size, folder.unit_count)

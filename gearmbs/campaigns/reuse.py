@@ -94,7 +94,7 @@ class Reuse:
                 self._tables = {at: folder.unit_table(unit).to_pylist()}
             row = self._tables[at][k]
             planned = folder.cases(unit)[0]
-            taken = folder.taken()
+            taken = folder.taken
             numbers = {
                 # a name that a column of that plan had taken
                 n.removeprefix("result.") if n.removeprefix("result.") in taken else n: float(v)

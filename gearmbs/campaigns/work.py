@@ -35,7 +35,7 @@ from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
 from gearmbs.campaigns.subjects.base import DIED, DONE, FAILED, MEMORY, TIME, Kept, Outcome
 from gearmbs.campaigns.surroundings import DISK, MOST_TRIED, Lacking, carries_out, refusal
-from gearmbs.files import whole_file, write_whole
+from gearmbs.files import arrow_column, whole_file, write_whole
 from gearmbs.studies.run.claims import Claim, Claimed, claimed
 from gearmbs.studies.run.code import CodeChanged, running_code
 from gearmbs.studies.run.engine import Refused, deaf
@@ -48,6 +48,10 @@ GUARD_AFTER = 2
 
 SILENT = 30.0
 """Seconds beyond its last that a process of its own is given to end itself, which one that is stopped does not."""
+
+JUST_NOW = 1.0
+"""Seconds for which a look at the sources holds when a unit is begun; there is another one before its results are
+entered, which finds whatever was edited since."""
 
 _folders: dict[str, Folder] = {}
 
@@ -123,7 +127,7 @@ class CaseRunner:
                 record = self.subject.run(thing, check, plan.keep)
                 kept = self.subject.reduce(thing, record, plan.keep)
             check_signals(self.folder.specs, kept.signals)
-            taken = self.folder.taken()
+            taken = self.folder.taken
             for name in kept.numbers:
                 if name in taken and f"result.{name}" in kept.numbers:
                     raise CampaignError(f"results: {name!r} is called 'result.{name}', as another one is; rename one")
@@ -341,9 +345,9 @@ def end_guards() -> None:
 _admitted: set[tuple[str, str, bool, int]] = set()
 
 
-def _code(folder: Folder, mix: bool) -> str:
-    """Return the digest of the code that this process runs, if it may work on the campaign."""
-    digest = (code := folder_code(folder, running_code)).digest
+def _code(folder: Folder, mix: bool, within: float = 0.0) -> str:
+    """Return the digest of the code that this process runs, if it may work on the campaign; see `code_of`."""
+    digest = (code := folder_code(folder, partial(running_code, within=within))).digest
     first = folder.path / "codes" / "first.json"
     key = str(folder.path), digest, mix, first.stat().st_mtime_ns if first.exists() else 0
     if key not in _admitted:
@@ -353,7 +357,7 @@ def _code(folder: Folder, mix: bool) -> str:
 
 
 def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
-    code = _code(folder, mix)
+    code = _code(folder, mix, within=JUST_NOW)
     started, clock, cpu = time.time(), time.monotonic(), time.process_time()
     rows = folder.cases(unit)
     # a worker process ends with a case that does not heed its limit; for others, and threads that sleep, a child does
@@ -482,11 +486,11 @@ def store(folder: Folder, unit: int, rows: list[dict[str, Any]], results: list[C
     columns["id"] = [r.key for r in results]
     for name in ("status", "message", "advice"):
         columns[name] = [getattr(r.outcome, name) for r in results]
-    table = {name: pa.array(values) for name, values in columns.items()}
-    taken = folder.taken()
+    table = {name: arrow_column(values) for name, values in columns.items()}
+    taken = folder.taken
     for name in dict.fromkeys(key for r in results for key in r.kept.numbers):
         column = f"result.{name}" if name in taken else name
-        table[column] = pa.array([r.kept.numbers.get(name) for r in results], type=pa.float64())
+        table[column] = arrow_column([r.kept.numbers.get(name) for r in results], pa.float64())
     with whole_file(folder.table(unit), durable=folder.path) as part:
         pq.write_table(pa.table(table), part, compression="zstd", write_page_checksum=True)
         digests["table"] = hashlib.sha256(part.read_bytes()).hexdigest()

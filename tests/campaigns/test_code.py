@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 import subprocess
 import sys
@@ -128,6 +129,43 @@ def test_a_module_counts_with_what_belongs_to_it(modules):
         code_of(["nowhere_at_all.model"])
 
 
+PROCESSOR = """
+import sys
+from gearmbs.studies.run import code
+print(code.processor(), "numba" in sys.modules, code._processor(), sep="|")
+"""
+
+
+@pytest.mark.slow
+def test_the_processor_is_remembered_as_it_is_found_out(tmp_path):
+    """Without the compiler, by options and files that the compiler heeds; in the plain mode it is found out anew."""
+    found = {}
+    for options in ({}, {"NUMBA_CPU_NAME": "generic"}, {"GEARMBS_COMPILER": "plain"}):
+        environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), **options}
+        for again in (False, True):
+            command = [sys.executable, "-c", PROCESSOR]
+            told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+            remembered, loaded, known = told.stdout.strip().split("|")
+            assert remembered == known
+            assert loaded == str(not again or "GEARMBS_COMPILER" in options)
+        found[repr(options)] = known
+    assert len(set(found.values())) == 3
+
+
+def test_what_the_processor_depends_on(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    known = {code._host()}
+    for name in ("NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "GEARMBS_COMPILER"):
+        with monkeypatch.context() as patch:
+            patch.setenv(name, "own")
+            known.add(code._host())
+    (tmp_path / ".numba_config.yaml").write_text("cpu_name: generic")
+    known.add(code._host())
+    (tmp_path / ".numba_config.yaml").unlink()
+    assert code._host() in known
+    assert len(known) == 5
+
+
 def test_an_edit_in_the_middle_is_refused_by_name(modules, tmp_path, monkeypatch):
     """Refused; gone on with if that is told, which is then told; or done again."""
     campaign = made(modules, tmp_path / "c")
@@ -194,6 +232,8 @@ def test_an_edit_under_a_worker_makes_it_refuse(modules, tmp_path, monkeypatch):
     helper = modules / "helper.py"
     text = helper.read_text()
     helper.write_text(text.replace("1.0", "2.5"))
+    # a look before will do to begin a unit; at its end there is another one
+    assert running_code([*campaign.plan.subject.modules()], within=math.inf).sources
     with pytest.raises(CodeChanged, match=says("edited while", f"{modules.name}.helper")):
         running_code([*campaign.plan.subject.modules()])
     monkeypatch.setattr(code, "_seen", {})
@@ -203,6 +243,25 @@ def test_an_edit_under_a_worker_makes_it_refuse(modules, tmp_path, monkeypatch):
     helper.write_text('"""Texts."""\n' + text)
     monkeypatch.setattr(code, "_seen", {})
     assert running_code([*campaign.plan.subject.modules()]).sources
+
+
+def test_a_unit_under_which_a_source_is_edited_is_not_done(modules, tmp_path, monkeypatch):
+    """However short ago the sources were looked at when it began."""
+    campaign = made(modules, tmp_path / "c")
+    helper, run = modules / "helper.py", FunctionSubject.run
+
+    def edited(self, thing, progress, keep):
+        helper.write_text(helper.read_text().replace("1.0", "2.5"))
+        return run(self, thing, progress, keep)
+
+    monkeypatch.setattr(FunctionSubject, "run", edited)
+    with pytest.raises(CampaignError, match=says(f"{modules.name}.helper", "edited")):
+        campaign.work(1, 4)
+    assert campaign.status().units_done == 0
+    # as long as nothing is, the twin is
+    monkeypatch.setattr(FunctionSubject, "run", run)
+    helper.write_text(helper.read_text().replace("2.5", "1.0"))
+    assert campaign.work(1, 4).units_done == 1
 
 
 BEFORE = '''

@@ -23,10 +23,12 @@ import functools
 import hashlib
 import importlib.util
 import json
+import math
 import os
 import platform
 import sys
 import sysconfig
+import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -131,10 +133,14 @@ class _Seen:
     code: Code
     files: list[_Source]
     as_loaded: bool = False
+    looked: float = -math.inf
 
-    def stands(self) -> bool:
-        """Return whether all files look as they did."""
-        # looked at twice a unit of a campaign: a look at a file and nothing else
+    def stands(self, within: float = 0.0) -> bool:
+        """Return whether all files look as they did, or did so within the last seconds."""
+        now = time.monotonic()
+        if now - self.looked < within:
+            return True
+        # looked at for each unit of a campaign: a look at a file and nothing else
         try:
             for place, stamp in self._looks:
                 about = os.stat(place)
@@ -142,6 +148,7 @@ class _Seen:
                     return False
         except OSError:
             return False
+        self.looked = now
         return True
 
     @functools.cached_property
@@ -154,13 +161,15 @@ _looked_at: set[_Source] = set()
 """Sources that this process, or the one that it was forked from, has not loaded in another form."""
 
 
-def code_of(modules: Iterable[str] = ()) -> Code:
+def code_of(modules: Iterable[str] = (), within: float = 0.0) -> Code:
     """Return the code by which this process simulates.
 
     Parameters
     ----------
     modules : iterable of str
         Modules beyond the package's that take part, with what they import.
+    within : float
+        A look at the sources so many seconds ago will do.
 
     Raises
     ------
@@ -171,7 +180,7 @@ def code_of(modules: Iterable[str] = ()) -> Code:
     """
     names = tuple(sorted(set(modules)))
     known = _seen.get(names)
-    if known is not None and known.stands():
+    if known is not None and known.stands(within):
         return known.code
     new, files = _read(names)
     if known is not None and new != known.code:
@@ -180,8 +189,8 @@ def code_of(modules: Iterable[str] = ()) -> Code:
     return new
 
 
-def running_code(modules: Iterable[str] = ()) -> Code:
-    """Return the code by which this process simulates, after a look whether that is what it has loaded.
+def running_code(modules: Iterable[str] = (), within: float = 0.0) -> Code:
+    """Return the code by which this process simulates, after a look whether that is what it has loaded; see `code_of`.
 
     Raises
     ------
@@ -189,7 +198,7 @@ def running_code(modules: Iterable[str] = ()) -> Code:
         If a source was edited since it was loaded, and what that changed can be seen or cannot be told.
     """
     names = tuple(sorted(set(modules)))
-    code = code_of(names)
+    code = code_of(names, within)
     seen = _seen[names]
     for source in () if seen.as_loaded else seen.files:
         if source not in _looked_at:
@@ -354,11 +363,14 @@ def _imports(name: str, path: Path, source: bytes) -> list[str]:
 
 
 class _Memory:
-    """Digests of sources by those of their raw bytes: a tree of all of the package takes some seconds to read."""
+    """What takes time to find out, by all that it depends on, in a file of the user's.
 
-    def __init__(self) -> None:
+    Digests of sources by those of their raw bytes: a tree of all of the package takes some seconds to read.
+    """
+
+    def __init__(self, name: str = "sources.json") -> None:
         home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-        self.path = Path(home, "gearmbs", "sources.json")
+        self.path = Path(home, "gearmbs", name)
         self.known, self.new = dict[str, str](), dict[str, str]()
         with suppress(OSError, ValueError):
             known = json.loads(self.path.read_text())
@@ -404,6 +416,39 @@ def _check(known: Mapping[str, str]) -> str:
 @functools.cache
 def processor() -> str:
     """Return the processor that kernels are made for, with its instructions as a digest."""
+    if "numba" in sys.modules:
+        return _processor()
+    # who only drives, or simulates without kernels, loads no compiler for it
+    memory, key = _Memory("processors.json"), _host()
+    if key not in memory.known:
+        found = _processor()
+        if os.environ.get("GEARMBS_COMPILER") == "plain":
+            return found
+        memory.known[key] = memory.new[key] = found
+        memory.keep()
+    return memory.known[key]
+
+
+def _host() -> str:
+    """Return a digest of all that the processor that kernels are made for depends on."""
+    import llvmlite.binding
+
+    options = sorted(item for item in os.environ.items() if item[0].startswith(("NUMBA_", "GEARMBS_COMPILER")))
+    # numba reads its options from there, too
+    file = Path(".numba_config.yaml")
+    beside = file.read_text() if file.is_file() else ""
+    makers = [path.read_bytes() for path in sorted((PACKAGE / "kernels").rglob("*.py"))]
+    makers.append(Path(__file__).read_bytes())
+    host = [llvmlite.binding.get_host_cpu_name()]
+    # of some processors there is no list
+    with suppress(RuntimeError):
+        host.append(llvmlite.binding.get_host_cpu_features().flatten())
+    versions = platform.python_version(), _installed_as("numba"), _installed_as("llvmlite")
+    what = [hashlib.sha256(source).hexdigest() for source in makers], host, versions, options, beside
+    return hashlib.sha256(repr(what).encode()).hexdigest()[:32]
+
+
+def _processor() -> str:
     from gearmbs.kernels import PLAIN
 
     if PLAIN:
