@@ -149,47 +149,51 @@ class State:
     @classmethod
     def held(
         cls,
-        problem: DAEProblem,
-        names: tuple[str, ...],
+        of_model: Mapping[str, Any],
         t: float,
         point: Any,
         history: History,
         integers: tuple[np.ndarray, np.ndarray],
+        before: np.ndarray,
         given: np.ndarray | None,
     ) -> State:
-        """Return the state of a problem that a run is under way with, as `of` does, in a quarter of the time.
+        """Return the state of a problem that a run is under way with, as `of` does, in a tenth of the time.
 
         Parameters
         ----------
-        problem : DAEProblem
-        names : tuple of str
-            Of its unknowns.
+        of_model : mapping
+            ``names``, ``t_model`` and ``sizes``.
         t : float
         point
-            Has ``y``, ``yp`` and ``rdata``, its own, of which the last is looked through when it is asked for.
+            Has ``point``, unknowns and rates, and ``rdata``, copies made where somebody asks for them.
         history : History
         integers, given
             As of `of`.
+        before : ndarray
+            The problem's table of numbers.
         """
-        y, yp, made = point.y, point.yp, cls.__new__(cls)
-        made.__dict__.update(
-            t=t, y=y, yp=yp, names=names, t_model=float(problem.t0), integers=integers,
-            sizes=(len(problem.idata), len(problem.rdata)), history=history, controllers={},
-            told=(t, y.tobytes(), yp.tobytes()), _later=(point, problem.rdata, given),
-        )  # fmt: skip
+        made = cls.__new__(cls)
+        own = made.__dict__
+        own.update(of_model)
+        own["t"], own["history"], own["integers"], own["controllers"] = t, history, integers, {}
+        own["_later"] = point, before, given
         return made
 
     def __getattr__(self, name: str) -> Any:
-        if name == "reals" and "_later" in self.__dict__:
-            point, before, given = self.__dict__.pop("_later")
-            found = changed_places(point.rdata[: len(before)], before, given)
-            self.__dict__["reals"] = found
-            return found
+        own = self.__dict__
+        if "_later" in own and name in ("y", "yp", "reals"):
+            point, before, given = own["_later"]
+            if name == "reals":
+                own[name] = changed_places(point.rdata[: len(before)], before, given)
+            else:
+                own["y"], own["yp"] = y, yp = point.point
+                own["told"] = own["t"], y.tobytes(), yp.tobytes()
+            return own[name]
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def __getstate__(self) -> dict[str, Any]:
-        self.reals  # noqa: B018
-        return self.__dict__
+        self.y, self.reals  # noqa: B018
+        return {name: value for name, value in self.__dict__.items() if name != "_later"}
 
     @classmethod
     def of(
@@ -285,6 +289,9 @@ class State:
     @property
     def is_own(self) -> bool:
         """Whether time, unknowns and rates are those that the history belongs to."""
+        if "y" not in self.__dict__:
+            # nobody has seen them yet
+            return True
         return self.told == (self.t, self.y.tobytes(), self.yp.tobytes())
 
     def check(self, problem: DAEProblem) -> None:

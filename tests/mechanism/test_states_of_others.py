@@ -1,5 +1,7 @@
 """States that go on in mechanisms with other numbers: bodies keep positions and velocities, whatever their inertia."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -154,3 +156,31 @@ def test_what_was_set_goes_with_a_state_though_it_is_what_the_model_had():
         plant = other.linearize(["load"], [("joint_angle", "pin")], at=state)
         assert plant.point.inputs == [load]
         assert plant.dc_gain == pytest.approx(1.0 / k, rel=1e-9)
+
+
+def test_looking_at_a_state_changes_nothing_and_writing_into_it_that_state_alone():
+    """What a state tells is copied where somebody asks for it; its history stays what it was."""
+    m = pendulum()
+    m.torque("push", m.bodies["rod"], m.input("push", "N m"))
+    sim = gm.Simulator(m, 1.0)
+    sim.set("push", 0.5, 1)
+    sim.advance(0.3)
+    unseen, seen, written = sim.state(), sim.state(), sim.state()
+    before = seen.y.copy()
+    copied = pickle.loads(pickle.dumps(sim.state()))
+    ends = []
+    for state in (unseen, seen, copied, unseen):
+        sim.restore(state)
+        assert sim.get("input", "push") == 0.5
+        sim.set("push", 0.2)
+        sim.advance(0.7)
+        ends.append(sim.state().y)
+    for end in ends[1:]:
+        np.testing.assert_array_equal(end, ends[0])
+    np.testing.assert_array_equal(unseen.y, before)
+    np.testing.assert_array_equal(unseen.reals[1], copied.reals[1])
+    written.y[:] = before
+    assert written.is_own
+    written.yp[-1] += 1.0
+    assert not written.is_own
+    assert unseen.is_own

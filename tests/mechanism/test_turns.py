@@ -174,3 +174,20 @@ def test_a_plant_begins_at_the_turns_that_have_been_made(at, lump):
     assert plant.A[1, 0] == pytest.approx(-(3.0 + 0.15 * angle**2) / 2.0, rel=1e-9)
     assert plant.C[0, 0] == pytest.approx(2.0 * angle, rel=1e-9)
     assert plant.point.outputs[0] == pytest.approx(sim.get("output", "energy"), rel=1e-9)
+
+
+@pytest.mark.parametrize("counted", [True, False])
+def test_a_state_knows_the_turns_that_something_counts(counted):
+    """10 rad: an algebraic state counts them, an output does not, as the page on steps says."""
+    m = Mechanism("wheel")
+    wheel = m.body("wheel", mass=1.0, inertia=(1.0, 1.0, 1.0), angular_velocity=(0.0, 0.0, 10.0))
+    m.revolute("pin", wheel, m.ground, axis=(0, 0, 1))
+    (m.algebraic_state if counted else m.output)("turned", "AZ(pin.I, pin.J)")
+    sim = gm.Simulator(m, 2.0)
+    for t in np.linspace(0.0, 1.0, 21)[1:].tolist():
+        sim.advance(t)
+    state, angle = sim.state(), 10.0 if counted else 10.0 - 4.0 * np.pi
+    assert sim.get("joint_angle", "pin") == pytest.approx(10.0, abs=1e-6)
+    assert gm.Simulator(m, 2.0, initial=state).get("joint_angle", "pin") == pytest.approx(angle, abs=1e-6)
+    plant = m.linearize([("torque", "pin")], [("joint_angle", "pin")], at=state)
+    assert plant.point.outputs == pytest.approx([angle], abs=1e-6)

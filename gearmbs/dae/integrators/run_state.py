@@ -463,8 +463,7 @@ def record_history(st, first):
         st.record_h[p] = 0.0
         st.record_order[p] = 0
         if st.keep_rows:
-            for i in range(hist.shape[1]):
-                st.record_y[p, i] = hist[j, i]
+            copy(hist[j], st.record_y[p])
         st.n_records = p + 1
 
 

@@ -85,6 +85,12 @@ class Settings:
         self.held = rdata[self.cells]
         self.led = {name: t for name in self._inputs if self._own[name].line(self.held, t)[1] != 0.0}
 
+    def go_back(self, held: np.ndarray, led: tuple[str, ...], t: float) -> None:
+        """Let that be held which was at an earlier time, at which the lines of some inputs end."""
+        self.waiting.clear()
+        self.given.clear()
+        self.held, self.led = held, dict.fromkeys(led, t)
+
     def snapshot(self) -> tuple[Any, ...]:
         """Return what is set and what waits, for `put_back`."""
         return self.held, dict(self.waiting), dict(self.led), set(self.given)

@@ -197,7 +197,12 @@ class Simulator(Sampled, Restored):
         """Unknowns before jumps of velocities, by those behind them, of which states have been made."""
         self._equations = ""
         """Digest of the model as assembled, which takes longer than the rest of a state; made with the first."""
-        self._names = tuple(self._base.names)
+        self._of_model = {
+            "names": tuple(self._base.names),
+            "t_model": float(self._base.t0),
+            "sizes": (len(self._base.idata), len(self._base.rdata)),
+        }
+        """Of its states."""
         numbers, aliases = self._base.numbers, self._base.aliases
         self.numbers = MappingProxyType({**numbers} | {alias: numbers[name] for alias, name in aliases.items()})
         self._settings = Settings(numbers, aliases, {**mechanism.bodies, **mechanism.elements})

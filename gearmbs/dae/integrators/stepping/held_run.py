@@ -154,6 +154,8 @@ class HeldRun(Run):
         self._at = ctypes.addressof(self._standing)
         self._placed: Any = None
         """The factors whose place is known."""
+        self.words = self.layout.factors
+        """Length of what a state takes, see `Held`."""
         if options.history is not None:
             self.put_back(options.history)
 
@@ -168,7 +170,8 @@ class HeldRun(Run):
         if factors is not self._placed and factors is not None and plan is not None:
             standing, self._placed = self._standing, factors
             standing.plan, standing.factors = ctypes.addressof(plan), ctypes.addressof(factors)
-            standing.factor_numbers = factor_words(factors)
+            standing.factor_numbers = numbers = factor_words(factors)
+            self.words = self.layout.factors + numbers.size
 
     # --- points -------------------------------------------------------------------------------------
 
@@ -428,9 +431,9 @@ class HeldRun(Run):
         held = Held(self, row, self.last_step() if told else None)
         return History.made(self.options.method, held, self.plan, equations, self.options.tol)
 
-    def pack(self, row: int, block: np.ndarray) -> None:
-        """Copy what the next steps depend on, and the point in a row."""
-        self._pack(self._at, row, block)
+    def pack(self, row: int, block: np.ndarray) -> int:
+        """Copy what the next steps depend on, and the point in a row; return the order of the last step."""
+        return self._pack(self._at, row, block)
 
     def unpack(self, row: int, order: int, block: np.ndarray) -> None:
         """Put that back, and stand behind the last step, of an order, or 0 where it is given."""
@@ -463,8 +466,7 @@ class HeldRun(Run):
         self._stand_behind(given)
         self.table = held.table if given is None else given.idata
         if self.crossings or held.crossings:
-            self.crossings = held.crossings[:]
-        self.state.n_crossings = 0
+            self.crossings = list(held.crossings)
         self._stand(False)
         return rows, row
 

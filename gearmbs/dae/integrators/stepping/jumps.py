@@ -254,7 +254,11 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
     """
     n = st.y.shape[0]
     gamma = st.gamma_factored
-    times, rows = times_from(st, 0), rows_from(st, 0)
+    times = times_from(st, 0)
+    # looked up once: the compiler cannot tell that nothing written below is a member
+    res, delta, w_error = st.res, st.delta, st.w_error
+    jac_slope, entry_row, entry_col = st.jac_slope, st.entry_row, st.entry_col
+    carried, n_carried = st.carried, st.n_carried
     solve(plan, factors, b, d)
     st.solves += 1
     for i in range(n):
@@ -264,27 +268,42 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
     reach = t - times[min(st.order + int(integrated), st.n_past - 1)]
     scale = reach if integrated else 1.0
     low, high = 1.0, 1.0 + gamma * reach
-    moves, unseen = scale * high * weighted_max(d, st.w_error), _unseen_turn(st) if integrated else UNSEEN
+    moves, unseen = scale * high * weighted_max(d, w_error), _unseen_turn(st) if integrated else UNSEEN
     for m in range(terms):
-        before = d if m == 0 else g[m - 1]
-        if scale * high * weighted_max(before, st.w_error) <= unseen:
+        own, before = g[m], d if m == 0 else g[m - 1]
+        if scale * high * weighted_max(before, w_error) <= unseen:
             terms = m
             break
         low, high = high, ((2.0 * m + 3.0 + gamma * reach) * high - (m + 1.0) * low) / (m + 2.0)
-        st.res[:] = 0.0
-        for k in range(st.n_carried):
-            p = st.carried[k]
-            st.res[st.entry_row[p]] += gamma * st.jac_slope[p] * before[st.entry_col[p]]
-        solve(plan, factors, st.res, st.delta)
-        st.solves += 1
         for i in range(n):
-            g[m, i] = st.delta[i] if m == 0 else before[i] - st.delta[i]
+            res[i] = 0.0
+        for k in range(n_carried):
+            p = carried[k]
+            res[entry_row[p]] += gamma * jac_slope[p] * before[entry_col[p]]
+        solve(plan, factors, res, delta)
+        st.solves += 1
+        if m == 0:
+            copy(delta, own)
+        else:
+            for i in range(n):
+                own[i] = before[i] - delta[i]
+    _add_answer(st, t, d, g, terms, integrated)
+    return moves
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_answer(st, t, d, g, terms, integrated):
+    """Add the series of an answer to the past and to the point at ``t``; the parameters are those of `_follow`."""
+    n, gamma = st.y.shape[0], st.gamma_factored
+    times, rows = times_from(st, 0), rows_from(st, 0)
+    yp, differential = st.yp, st.differential
     # unknowns with a rate go on from where they are: the series begins with what it leaves of zero
     for i in range(n):
-        if st.differential[i] != 0.0:
-            d[i] = 0.0
-            for m in range(terms):
-                d[i] += g[m, i]
+        d[i] = 0.0 if differential[i] != 0.0 else d[i]
+    for m in range(terms):
+        own = g[m]
+        for i in range(n):
+            d[i] += own[i] if differential[i] != 0.0 else 0.0
     for j in range(st.n_past):
         past = times[j] - t
         x = gamma * past
@@ -304,6 +323,6 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
     if not integrated:
         # L_m' = -m at 0
         for m in range(terms):
+            own, rate = g[m], gamma * (m + 1.0)
             for i in range(n):
-                st.yp[i] += gamma * (m + 1.0) * g[m, i] * st.differential[i]
-    return moves
+                yp[i] += rate * own[i] * differential[i]

@@ -108,12 +108,13 @@ class Laid(Continued, Protocol):
     """The same, and where its arrays lie, found once."""
 
     layout: Layout
+    words: int
     itself: ref
     row: int
     crossings: list[tuple[float, int]]
     last_records: Any
 
-    def pack(self, row: int, block: np.ndarray) -> None:
+    def pack(self, row: int, block: np.ndarray) -> int:
         """Copy its memory, see `standing.pack`."""
 
     def unpack(self, row: int, order: int, block: np.ndarray) -> None:
@@ -153,30 +154,24 @@ class Held(Mapping[str, np.ndarray]):
 
     Attributes
     ----------
-    y, yp : ndarray
-        The point.
     mark
         What the owner of the run notes.
     """
 
-    mark: Any = (0, None)
+    mark: Any = None
 
     def __init__(self, run: Laid, row: int, given: LastStep | None) -> None:
-        factors, st = run.factors, run.state
+        factors, pivots, part = run.factors, run.pivots, run.algebraic.part
         assert factors is not None
-        assert run.pivots is not None
-        self.layout = layout = run.layout
-        self._run, self._plan, self._factors = run.itself, run.plan, factors
-        n = st.y.shape[0]
-        self._block = block = np.empty(layout.factors + _block(factors.x).size // WORD)
-        run.pack(row, block)
-        first = layout.y
-        self.y, self.yp = block[first : first + n], block[first + n : first + 2 * n]
-        part = run.algebraic.part
+        assert pivots is not None
+        self.layout, self._run = run.layout, run.itself
+        self._plan, self._factors, self._pivots = run.plan, factors, pivots
+        self._block = block = np.empty(run.words)
+        order = run.pack(row, block)
+        self._order = order if given is None else 0
         self._part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else ()
-        self._counts, self._counted, self._pivots = (run.repivots, run.first_pivots), run.counted.tobytes(), run.pivots
-        self._order = int(st.record_order[st.n_records - 1]) if given is None else 0
-        self.given, self.table, self.crossings = given, run.last_records.table, run.crossings[:]
+        self._counts, self._counted = (run.repivots, run.first_pivots), run.counted.tobytes()
+        self.given, self.table, self.crossings = given, run.last_records.table, tuple(run.crossings)
 
     def belongs_to(self, run: Continued) -> bool:
         """Whether it is of this very run."""
@@ -189,7 +184,19 @@ class Held(Mapping[str, np.ndarray]):
         run.unpack(row, self._order, self._block)
         for name, array in zip(PART_ARRAYS, self._part_arrays, strict=False):
             getattr(run.algebraic.part, name)[...] = array
-        run.counted[:] = np.frombuffer(self._counted, dtype=bool)
+        if run.counted.tobytes() != self._counted:
+            run.counted[:] = np.frombuffer(self._counted, dtype=bool)
+
+    @property
+    def point(self) -> tuple[np.ndarray, np.ndarray]:
+        """Unknowns and rates at the point, copies."""
+        first, last = self.layout.y, self.layout.y + 2 * self._unknowns
+        y, yp = self._block[first:last].reshape(2, -1)
+        return y.copy(), yp.copy()
+
+    @property
+    def _unknowns(self) -> int:
+        return self.layout.arrays["y"][0][0]
 
     @property
     def rdata(self) -> np.ndarray:
@@ -203,7 +210,7 @@ class Held(Mapping[str, np.ndarray]):
 
     def _window(self, newest: int) -> np.ndarray:
         """Return the window, of which the rows in use have been copied."""
-        n, first = len(self.y), self.layout.window
+        n, first = self._unknowns, self.layout.window
         window = np.zeros(WINDOW * n)
         size = min(HISTORY, WINDOW - newest) * n
         window[newest * n : newest * n + size] = self._block[first : first + size]
@@ -213,7 +220,7 @@ class Held(Mapping[str, np.ndarray]):
         """Return the last step, from the window."""
         if self.given is not None:
             return self.given
-        n, count = len(self.y), self._order + 1
+        n, count = self._unknowns, self._order + 1
         rows = self._window(newest)[newest * n : (newest + count) * n].reshape(count, n)
         nodes = self._array("window_t")[newest : newest + count]
         return LastStep(nodes, rows, self._array("y"), self._array("yp"), self._array("idata"))

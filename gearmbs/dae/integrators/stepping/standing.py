@@ -140,13 +140,34 @@ def steer_on(bound, standing, t, row, first, count, value, end, values):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _stretch(block, first, size):
-    return vector_at(block, first, size)
+def _pass_on(part, block, first, taking):
+    """Copy a stretch of memory to its place in a block, or back; return where the next one stands there."""
+    size = part.shape[0]
+    place = vector_at(block, first, size)
+    if taking:
+        copy(part, place)
+    else:
+        copy(place, part)
+    return first + size
 
 
-@njit(types.void(int64, int64, _VEC), cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
+def _walk(own, st, row, block, taking):
+    """Copy what a continuation needs to a block, one stretch behind the other, or back from it."""
+    k = 0
+    for part in (own.scalars, own.part_scalars, st.y_out[row], st.yp_out[row], st.window_t):
+        k = _pass_on(part, block, k, taking)
+    # the scalars, which are there by now, tell which rows are in use
+    n = st.y.shape[0]
+    _pass_on(vector_at(st.window_y, st.newest * n, min(HISTORY, WINDOW - st.newest) * n), block, k, taking)
+    k += HISTORY * n
+    for part in (own.numbers, own.factor_numbers):
+        k = _pass_on(part, block, k, taking)
+
+
+@njit(int64(int64, int64, _VEC), cache=True, nogil=True, error_model="numpy")
 def pack(standing, row, block):
-    """Write what a continuation needs one behind the other.
+    """Write what a continuation needs one behind the other; return the order of the last step.
 
     Parameters
     ----------
@@ -155,20 +176,12 @@ def pack(standing, row, block):
     row : int
         Where the point stands that the state is one of.
     block : ndarray
-        See `stretches`.
+        See `gearmbs.dae.integrators.stepping.memory.Layout`.
     """
     own = standing_at(standing)
     st = state_at(own.state)
-    n, k = st.y.shape[0], 0
-    for part in (own.scalars, own.part_scalars, st.y_out[row], st.yp_out[row], st.window_t):
-        copy(part, _stretch(block, k, part.shape[0]))
-        k += part.shape[0]
-    size = min(HISTORY, WINDOW - st.newest) * n
-    copy(vector_at(st.window_y, st.newest * n, size), _stretch(block, k, size))
-    k += HISTORY * n
-    for part in (own.numbers, own.factor_numbers):
-        copy(part, _stretch(block, k, part.shape[0]))
-        k += part.shape[0]
+    _walk(own, st, row, block, True)
+    return st.record_order[st.n_records - 1]
 
 
 @njit(types.void(int64, int64, int64, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -184,16 +197,8 @@ def unpack(standing, row, order, block):
     """
     own = standing_at(standing)
     st = state_at(own.state)
-    n, k = st.y.shape[0], 0
-    for part in (own.scalars, own.part_scalars, st.y_out[row], st.yp_out[row], st.window_t):
-        copy(_stretch(block, k, part.shape[0]), part)
-        k += part.shape[0]
-    size = min(HISTORY, WINDOW - st.newest) * n
-    copy(_stretch(block, k, size), vector_at(st.window_y, st.newest * n, size))
-    k += HISTORY * n
-    for part in (own.numbers, own.factor_numbers):
-        copy(_stretch(block, k, part.shape[0]), part)
-        k += part.shape[0]
+    _walk(own, st, row, block, False)
+    st.n_crossings = 0
     stand_behind(st, order)
     for c in range(st.kept.shape[0]):
         st.kept_out[row, c] = st.rdata[st.kept[c]]
