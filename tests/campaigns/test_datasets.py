@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -40,6 +41,7 @@ from gearmbs.campaigns.datasets import (
 )
 from gearmbs.campaigns.datasets.baseline import NAMES
 from gearmbs.campaigns.datasets.layers import STOP
+from gearmbs.campaigns.datasets.make import _individuals
 from gearmbs.signals import ModalPath, Mode, accelerometer, make_signal
 from tests.campaigns.models import Ringing
 from tests.says import says
@@ -428,6 +430,20 @@ def test_plans_of_all_gearboxes_have_margins_and_all_specimens():
         data_set_plan(48, gearbox=wrong, specimens=2)
 
 
+def test_gearboxes_of_one_file_have_their_own_names_and_the_same_individuals():
+    """Dealt out apart, one individual would be in training under the one name and in the test under the other."""
+
+    def drawn(seed=0, **other):
+        plan = data_set_plan(48, gearbox=replace(GEARBOXES["one stage"], **other), specimens=2, seed=seed)
+        return plan.subject.base()["name"], _individuals(SimpleNamespace(plan=plan))
+
+    one, slow, others = drawn(), drawn(name="slow", speed=("500 rpm", "700 rpm")), drawn(seed=1)
+    assert (one[0], slow[0]) == ("one stage", "slow")
+    assert one[1] == slow[1] != others[1]
+    two = data_set_plan(48, gearbox="two stages", specimens=2)
+    assert _individuals(SimpleNamespace(plan=two)) != one[1]
+
+
 def ringing(path):
     """Return a campaign of six specimens in two states that is done at once."""
     factors = [
@@ -502,13 +518,15 @@ def test_bearings_with_defects_are_sources_in_all_states():
 
 @pytest.mark.slow
 def test_from_plan_to_files(tmp_path):
-    box = GEARBOXES["one stage"]
+    box = replace(GEARBOXES["one stage"], name="bench 1/2")
     plan = data_set_plan(48, gearbox=box, specimens=2, duration=0.1, bearing_defects=True, unit=6)
     campaign = Campaign(tmp_path / "c", plan)
     campaign.run(workers=0)
     assert campaign.failed().empty, campaign.failed().message.tolist()
     paths = write_data_set(campaign, tmp_path / "data", test=0.5, validation=0.0)
+    assert "plan-bench-1-2.json" in {path.name for path in paths}
     rows = read_data_set(tmp_path / "data")
+    assert rows.gearbox.unique().tolist() == ["bench 1/2"]
     assert sorted(rows.state.unique()) == ["broken", "chipped", "cracked", "healthy", "pitted", "worn"]
     assert rows.loc[rows.state == "healthy", "severity"].eq(0).all()
     for name in ("signal.sensor_1", "clean.sensor_4", "speed"):

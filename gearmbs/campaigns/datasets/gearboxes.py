@@ -51,6 +51,7 @@ class Gearbox:
     Attributes
     ----------
     name : str
+        Of the column ``gearbox``, whatever the file calls it.
     file : Path
         Drivetrain in TOML, with accelerometers and one speed sensor, at the shaft of the driver.
     mesh : str
@@ -243,7 +244,7 @@ def data_set_plan(
             f"{len(box.accelerometers)} sensors, too few for {specimens} specimens; ask for {each * specimens} signals "
             "of each gearbox or fewer specimens"
         )
-    tables = {**box.tables, "run": dict(box.tables.get("run", {}))}
+    tables = {**box.tables, "name": box.name, "run": dict(box.tables.get("run", {}))}
     rate = box.rate
     before, after = layers.margins(duration, rate)
     tables["run"] |= {"rate": rate, "duration": duration + (before + after) / rate}

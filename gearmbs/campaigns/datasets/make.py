@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import zlib
 from collections.abc import Sequence
@@ -289,9 +290,12 @@ def write_data_set(
     codes = [f"{box}: {told}" for box, campaign in zip(boxes, given, strict=True) for told in _codes(campaign)]
     card = write_card(out, title, files, facts, layers.as_dict(), codes)
     paths = [card, write_croissant(out, title, files, url, published)]
-    for number, (box, campaign) in enumerate(zip(boxes, given, strict=True)):
-        again = f"-{number + 1}" if box in boxes[:number] else ""
-        paths.append(out / f"plan-{box.replace(' ', '-')}{again}.json")
+    plans: list[Path] = []
+    for box, campaign in zip(boxes, given, strict=True):
+        name = re.sub(r"[^\w.]+", "-", box)
+        free = (out / f"plan-{name}{again}.json" for again in ("", *(f"-{k + 2}" for k in range(len(plans)))))
+        plans.append(next(path for path in free if path not in plans))
+        paths.append(plans[-1])
         shutil.copy(campaign.path / "plan.json", paths[-1])
         for digest in code_counts(campaign.folder):
             if known_code(campaign.folder, digest) is not None:
@@ -301,9 +305,14 @@ def write_data_set(
 
 
 def _individuals(campaign: Campaign) -> str:
-    """Return what the individuals of a campaign are drawn from, but for how many they are."""
-    drawn = [replace(factor, draws=1) for factor in campaign.plan.factors if isinstance(factor, Specimens)]
-    return digest_of([_source(campaign).name, campaign.plan.subject.kind, *(asdict(factor) for factor in drawn)])
+    """Return what the individuals of a campaign are drawn from, but for how many they are.
+
+    Gearboxes of the same wheels and meshes share them, whatever they are called and however they are driven.
+    """
+    plan = campaign.plan
+    drawn = [asdict(replace(factor, draws=1)) for factor in plan.factors if isinstance(factor, Specimens)]
+    base = plan.subject.base()
+    return digest_of([plan.subject.kind, base.get("wheels"), base.get("meshes"), *drawn])
 
 
 def _codes(campaign: Campaign) -> list[str]:
