@@ -171,13 +171,17 @@ def test_files_that_a_deck_names_count(tmp_path):
     (tmp_path / "m.mat").write_text("one")
     (tmp_path / "more.acf").write_text("a\nsimulate/dynamics, end=1, steps=10\n")
     first = key()
+    files = subject.files()
     (tmp_path / "m.mat").write_text("another")
     second = key()
+    # whoever asks once more sees them as they are now
+    assert subject.files() != files
     (tmp_path / "more.acf").write_text("a\nsimulate/dynamics, end=2, steps=10\n")
     assert len({first, second, key()}) == 3
     (tmp_path / "m.mat").write_text("one")
     (tmp_path / "more.acf").write_text("a\nsimulate/dynamics, end=1, steps=10\n")
     assert key() == first
+    assert subject.files() == files
 
 
 def test_files_that_changed_after_cases_were_done_are_refused(tmp_path):

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -167,9 +167,14 @@ class DeckSubject(Subject):
             found["commands"] = commands
         return found
 
+    @cached_property
+    def _base_thing(self) -> dict[str, Any]:
+        # which files it names is asked for twice a unit, and a large deck takes a while to read
+        return self.check(self.base(), "deck")
+
     def files(self) -> dict[str, str]:
         """Return digests of the files that the deck names, of the commands that its script takes, of routines."""
-        thing = self.check(self.base(), "deck")
+        thing = self._base_thing
         found = dict(_named_files(thing["deck"]))
         if thing["script"] is not None and (commands := _included(thing["script"], self.name)):
             found["the commands of FILE/COMMAND"] = commands
