@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Never
 
 import numpy as np
 
@@ -288,34 +288,39 @@ class JointMethods:
             return self._add_joint(Joint(name, kind, mi, mj, rows))
 
     def fixed(
-        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
-    ) -> Joint:
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
+        **more: Never,
+    ) -> Joint:  # fmt: skip
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
-        return self.joint("fixed", name, i, j, at=at, axis=axis)
+        return self.joint("fixed", name, i, j, at=at, axis=axis, **more)
 
     def revolute(
-        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
-    ) -> Joint:
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
+        **more: Never,
+    ) -> Joint:  # fmt: skip
         """Add a revolute joint: rotation about the common z axis. See :meth:`joint`."""
-        return self.joint("revolute", name, i, j, at=at, axis=axis)
+        return self.joint("revolute", name, i, j, at=at, axis=axis, **more)
 
     def spherical(
-        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
-    ) -> Joint:
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
+        **more: Never,
+    ) -> Joint:  # fmt: skip
         """Add a spherical joint: a common point. See :meth:`joint`."""
-        return self.joint("spherical", name, i, j, at=at, axis=axis)
+        return self.joint("spherical", name, i, j, at=at, axis=axis, **more)
 
     def cylindrical(
-        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
-    ) -> Joint:
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
+        **more: Never,
+    ) -> Joint:  # fmt: skip
         """Add a cylindrical joint: rotation about and translation along z_J. See :meth:`joint`."""
-        return self.joint("cylindrical", name, i, j, at=at, axis=axis)
+        return self.joint("cylindrical", name, i, j, at=at, axis=axis, **more)
 
     def translational(
-        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
-    ) -> Joint:
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
+        **more: Never,
+    ) -> Joint:  # fmt: skip
         """Add a translational joint along z_J. See :meth:`joint`."""
-        return self.joint("translational", name, i, j, at=at, axis=axis)
+        return self.joint("translational", name, i, j, at=at, axis=axis, **more)
 
     def universal(
         self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
@@ -325,10 +330,11 @@ class JointMethods:
         return self.joint("universal", name, i, j, at=at, axis=axis, axis_j=axis_j)
 
     def planar(
-        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None
-    ) -> Joint:
+        self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
+        **more: Never,
+    ) -> Joint:  # fmt: skip
         """Add a planar joint: motion in the xy plane of J. See :meth:`joint`."""
-        return self.joint("planar", name, i, j, at=at, axis=axis)
+        return self.joint("planar", name, i, j, at=at, axis=axis, **more)
 
     @keeps_given
     def screw(
