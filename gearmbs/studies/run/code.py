@@ -419,7 +419,10 @@ def processor() -> str:
     if "numba" in sys.modules:
         return _processor()
     # who only drives, or simulates without kernels, loads no compiler for it
-    memory, key = _Memory("processors.json"), _host()
+    host = host_lines()
+    if not host:
+        return _processor()
+    memory, key = _Memory("processors.json"), _host(host)
     if key not in memory.known:
         found = _processor()
         if os.environ.get("GEARMBS_COMPILER") == "plain":
@@ -429,22 +432,33 @@ def processor() -> str:
     return memory.known[key]
 
 
-def _host() -> str:
-    """Return a digest of all that the processor that kernels are made for depends on."""
-    import llvmlite.binding
+CPUINFO = Path("/proc/cpuinfo")
+OF_HOST = (
+    "vendor_id", "cpu family", "model", "model name", "stepping", "flags",
+    "CPU implementer", "CPU architecture", "CPU variant", "CPU part", "Features",
+)  # fmt: skip
+"""What Linux tells of a processor that a compiler tells processors apart by: of x86, then of ARM."""
 
+
+def host_lines() -> list[str]:
+    """Return what the system tells of its processors, each line once; nothing where it tells nothing."""
+    try:
+        lines = CPUINFO.read_text().splitlines()
+    except OSError:
+        return []
+    return sorted({line for line in lines if line.partition(":")[0].strip() in OF_HOST})
+
+
+def _host(lines: list[str]) -> str:
+    """Return a digest of all that the processor that kernels are made for depends on."""
     options = sorted(item for item in os.environ.items() if item[0].startswith(("NUMBA_", "GEARMBS_COMPILER")))
     # numba reads its options from there, too
     file = Path(".numba_config.yaml")
     beside = file.read_text() if file.is_file() else ""
     makers = [path.read_bytes() for path in sorted((PACKAGE / "kernels").rglob("*.py"))]
     makers.append(Path(__file__).read_bytes())
-    host = [llvmlite.binding.get_host_cpu_name()]
-    # of some processors there is no list
-    with suppress(RuntimeError):
-        host.append(llvmlite.binding.get_host_cpu_features().flatten())
     versions = platform.python_version(), _installed_as("numba"), _installed_as("llvmlite")
-    what = [hashlib.sha256(source).hexdigest() for source in makers], host, versions, options, beside
+    what = [hashlib.sha256(source).hexdigest() for source in makers], lines, versions, options, beside
     return hashlib.sha256(repr(what).encode()).hexdigest()[:32]
 
 
