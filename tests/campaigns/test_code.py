@@ -165,7 +165,9 @@ def test_what_the_processor_depends_on(tmp_path, monkeypatch):
     assert code._host(code.host_lines()) in known
     assert len(known) == 5
     other = tmp_path / "cpuinfo"
-    other.write_text("processor : 0\nmodel : 1\nflags : fpu\ncpu MHz : 3000.1\n\nprocessor : 1\nmodel : 1\nflags : fpu\n")
+    other.write_text(
+        "processor : 0\nmodel : 1\nflags : fpu\ncpu MHz : 3000.1\n\nprocessor : 1\nmodel : 1\nflags : fpu\n"
+    )
     monkeypatch.setattr(code, "CPUINFO", other)
     assert code.host_lines() == ["flags : fpu", "model : 1"]
     monkeypatch.setattr(code, "CPUINFO", tmp_path / "nothing")
