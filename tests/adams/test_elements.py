@@ -137,9 +137,14 @@ def test_primitives_and_planar_joint():
     assert one.request(2)[5, 1] == pytest.approx(one.t[5] ** 2, rel=0.02)
 
 
-def test_point_motion_and_general_constraint():
+@pytest.mark.parametrize(
+    "constraint",
+    ["DZ(20,10)-DX(20,10)**2", "DZ(20,10)-DX(20,10)**2+0*JPRIM(1,0,6,0)"],
+    ids=["of positions", "with a torque times nothing"],
+)
+def test_point_motion_and_general_constraint(constraint):
     body = BLOCK + "JPRIM/1,ORIENTATION,I=20,J=10\nMOTION/1,I=20,J=10,X,FUNCTION=0.1*SIN(3*TIME)\n"
-    body += "MOTION/2,I=20,J=10,Y,FUNCTION=0.2*TIME**2\nGCON/1,I=20,FUNCTION=DZ(20,10)-DX(20,10)**2\n"
+    body += f"MOTION/2,I=20,J=10,Y,FUNCTION=0.2*TIME**2\nGCON/1,I=20,FUNCTION={constraint}\n"
     result = run(model(body + "REQUEST/1,D,I=20,J=10\nREQUEST/2,F2=MOTION(2,0,3,0)\\F3=GCON(1,0,4,0)"), 1.0)
     t = result.t
     x = 0.1 * np.sin(3 * t)

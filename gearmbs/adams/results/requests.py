@@ -18,7 +18,7 @@ from gearmbs.dae.equations.kinematics import AXES as ANGLE_NAMES
 from gearmbs.dae.results.frames import frame_motion, known_turns
 from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit
-from gearmbs.mechanism.compile import starting_angles
+from gearmbs.mechanism.compile import scope_of, starting_angles
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.series import expression_values
 from gearmbs.mechanism.language.syntax import Scope
@@ -243,7 +243,8 @@ class RequestEvaluator:
         if not rows:
             return np.zeros((m, 6))
         lam = self.solution.multipliers[:, rows[0]]
-        tape = compile_expression(self.model.mechanism.constraints[name], self.scope)
+        # the constraint is the mechanism's, in its own names
+        tape = compile_expression(self.model.mechanism.constraints[name], scope_of(self.model.mechanism)[0])
         grad = np.zeros((m, tape.gradient_size))
         _gradient_series(
             tape.ints, tape.floats, self.solution.t, self.kin, self.marker_body, self.marker_frame, np.zeros(1),

@@ -338,15 +338,18 @@ def make_contact(m: Deckmaker, item: Item) -> None:
     coulomb = m.values.word(item, "coulomb_friction", "off").upper()
     if m.yes(item, "no_friction"):
         coulomb = "OFF"
-    item.used |= {"augmented_lagrangian_formulation", "stiction", "max_stiction_deformation"}
+    item.used |= {"max_stiction_deformation"}
     item.used |= {f"{side}_{what}" for side in "ij" for what in ("flip_normal", "flip_geometry_name")}
     rubbing = [m.real(item, key, word) for key, word in RUBBING]
+    if m.yes(item, "stiction"):
+        rubbing += ["STICTION = ON", m.real(item, "max_stiction_deformation", "MAX_STICTION_DEFORMATION")]
     m.add(
         item,
         f"CONTACT/{m.id(item)}",
         *sides,
         law,
         *(m.real(item, key, word) for key, word in LAW),
+        "AUGMENTED_LAGRANGIAN_FORMULATION" if m.yes(item, "augmented_lagrangian_formulation") else None,
         *([f"COULOMB_FRICTION = {coulomb}", *rubbing] if coulomb != "OFF" else []),
     )
 

@@ -317,6 +317,28 @@ contact create contact_name = .m.C i_geometry_name = .m.P.S j_geometry_name = .m
 """
 
 
+STICKING = """   coulomb_friction = on mu_static = 0.3 mu_dynamic = 0.2 stiction_transition_velocity = 0.01 &
+   friction_transition_velocity = 0.1 stiction = {stiction} max_stiction_deformation = 1E-5
+"""
+
+
+@pytest.mark.parametrize("stiction", ["on", "off"])
+def test_a_contact_that_sticks_is_remarked_on(tmp_path, stiction):
+    places, triangles = unwelded_box()
+    rows = [f"{len(places)} {len(triangles)} 1.000000", *(" ".join(f"{x:.6f}" for x in p) for p in places)]
+    (tmp_path / "hull.shl").write_text("\n".join([*rows, *(f"3 {a + 1} {b + 1} {c + 1}" for a, b, c in triangles)]))
+    path = tmp_path / "a.cmd"
+    contact = RESTING.rstrip("\n") + " &\n" + STICKING.format(stiction=stiction)
+    text = PART + SHELL % "2, 1.5, 2" + "marker create marker_name = .m.ground.O location = 1, 1.5, 0.0009\n" + contact
+    path.write_text(text)
+    deck = read_view(path).deck
+    assert not deck.unsupported
+    told = [
+        d for d in deck.diagnostics if re.search(says("CONTACT/1", "STICTION", "MAX_STICTION_DEFORMATION"), d.message)
+    ]
+    assert len(told) == (stiction == "on")
+
+
 @pytest.mark.slow
 def test_a_shell_touches_with_its_facets(tmp_path):
     """A box of 48 kg on a floor: its force is its weight."""
