@@ -13,6 +13,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from gearmbs._lazy import Guessed
 from gearmbs.units import Given
 
 PLOTS = {
@@ -46,7 +47,7 @@ TABLES = {
 """Functions that make tables of objects for notebooks, for classes that do not do so themselves."""
 
 
-class Written:
+class Written(Guessed):
     """What dataclasses share that show themselves as they were written: fields at their defaults left out, quantities
     with the units that the user gave."""
 
@@ -108,7 +109,7 @@ def _code(value: Any) -> str:
     return repr(value)
 
 
-class Shown:
+class Shown(Guessed):
     """What objects that show themselves share."""
 
     def plot(self, **options: Any) -> Any:

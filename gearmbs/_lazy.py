@@ -10,9 +10,9 @@ import importlib
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 # the interpreter looks for cycles among all modules once more while it ends, which takes as long as importing them
 atexit.register(gc.freeze)
@@ -30,6 +30,70 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
+OTHER_WORDS: dict[str, dict[str, str]] = {
+    "gearmbs": {
+        "read": "read_signal(path), read_deck(path) or read_pulses(path)",
+        "load": "load_case(path) or read_signal(path)",
+        "run": "run_case(case), run_train(train) or run_deck(deck)",
+        "solve": "simulate(mechanism, t_end) or solve_dae(problem, ...)",
+        "reduce": "reduce_model(model, ...), or Shaft(...).modal_model(...)",
+        "modes": "linear_modes(mechanism)",
+        "plot": "the plot() of an object",
+    },
+}
+"""What to write for names of packages that other programs use."""
+
+
+class NoAttribute(AttributeError):
+    """A name that is none, told with what it may have meant.
+
+    Most of those who ask for an attribute in vain are programs that never read the message, which is made when it is.
+
+    Parameters
+    ----------
+    owner : str
+        What has no such attribute, as messages name it.
+    name : str
+        The name.
+    known : callable
+        Returns the names that there are.
+    others : mapping of str to str
+        What to write for names that other programs use.
+    """
+
+    def __init__(self, owner: str, name: str, known: Callable[[], Iterable[str]], others: Mapping[str, str]) -> None:
+        super().__init__(owner, name)
+        # the interpreter adds a guess of its own to errors that know neither a name nor an object
+        self.name = name
+        self._known = known
+        self._others = others
+
+    def __str__(self) -> str:
+        from gearmbs.wording import attribute_meant
+
+        owner, name = self.args
+        said = f"{owner} has no attribute {name!r}"
+        if name in self._others:
+            return f"{said}; write {self._others[name]}"
+        return said + attribute_meant(name, [one for one in self._known() if one[0] != "_"])
+
+    def __reduce__(self) -> tuple[type, tuple[str]]:
+        return AttributeError, (str(self),)
+
+
+class Guessed:
+    """What objects share that tell what an unknown attribute may have meant."""
+
+    other_words: ClassVar[Mapping[str, str]] = {}
+    """What to write for names that other programs use."""
+
+    if not TYPE_CHECKING:  # type checkers would take any name for one that there is
+
+        def __getattr__(self, name: str) -> object:
+            kind = type(self)
+            raise NoAttribute(f"{kind.__name__} object", name, lambda: dir(self), kind.other_words)
+
+
 class _LatePackage(ModuleType):
     """A package whose public names are found when asked for.
 
@@ -42,7 +106,9 @@ class _LatePackage(ModuleType):
     def __getattr__(self, name: str) -> object:
         home = self._homes.get(name)
         if home is None:
-            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+            raise NoAttribute(
+                f"module {self.__name__!r}", name, lambda: self._homes, OTHER_WORDS.get(self.__name__, {})
+            )
         with uncollected():
             if home == ".":
                 value: object = importlib.import_module(f".{name}", self.__name__)

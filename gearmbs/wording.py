@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterable
@@ -39,6 +40,30 @@ def of_adams(path: str | Path) -> str:
 def closest(name: object, known: Iterable[str], count: int = 1, alike: float = ALIKE) -> list[str]:
     """Return up to ``count`` known names that are most like another, the most alike first."""
     return difflib.get_close_matches(str(name), list(known), count, alike)
+
+
+def attribute_meant(name: str, known: Iterable[str], count: int = 4) -> str:
+    """Return the end of a message about a guessed name of a program: names that share words with it, or are alike.
+
+    Examples
+    --------
+    >>> attribute_meant("spring", ["body", "spring_damper", "torsion_spring"])
+    '; did you mean spring_damper or torsion_spring?'
+    >>> attribute_meant("velocty", ["position", "velocity"])
+    '; did you mean velocity?'
+    """
+    known = list(known)
+    shared = {one: len(_words(name) & _words(one)) for one in known}
+    best = max(shared.values(), default=0)
+    sharing = [one for one in known if best and shared[one] == best]
+    # one wrong letter of seven leaves 0.86
+    near = closest(name, known, alike=0.85) or sharing[:count] or closest(name, known)
+    return f"; did you mean {any_of(near)}?" if near else ""
+
+
+def _words(name: str) -> set[str]:
+    """Return the words of a name in small letters, as gear and pair of GearPair and gear_pair."""
+    return {word.lower() for word in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)}
 
 
 def did_you_mean(

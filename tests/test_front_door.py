@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import importlib
 import os
+import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -157,3 +159,46 @@ def test_a_run_imports_only_what_it_uses(call, unused):
     code += f"print({unused!r} & {{*sys.modules}})"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/") == "set()\n"
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "meant"),
+    [
+        (gm, "read_any", "read_signal"),
+        (gm, "Gear", "GearPair"),
+        (gm, "read", "read_deck"),
+        (gm.signals, "spectrogramm", "spectrogram"),
+        (gm.Mechanism(), "spring", "spring_damper or torsion_spring"),
+        (gm.Mechanism(), "hinge", "revolute"),
+        (gm.Mechanism(), "simulat", "simulate"),
+        (gm.GearPair.paper(), "pressure_angle", "working_pressure_angle"),
+        (gm.Shaft([gm.ShaftSection("200 mm", "30 mm")]), "reduce", "modal_model"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_guessed_name_is_answered_with_what_there_is(owner, name, meant):
+    with pytest.raises(AttributeError) as told:
+        getattr(owner, name)
+    assert name in str(told.value)
+    assert meant in str(told.value)
+    assert told.value.name == name
+    assert not hasattr(owner, name)
+    assert str(pickle.loads(pickle.dumps(told.value))) == str(told.value)
+
+
+@pytest.mark.parametrize("kind", [gm.Mechanism, gm.Shaft, gm.Solution, gm.Drivetrain])
+def test_names_of_other_programs_are_none_here_and_what_is_named_instead_is(kind):
+    for name, instead in kind.other_words.items():
+        assert not hasattr(kind, name)
+        # these two are set on the object
+        assert any(hasattr(kind, word) or word in ("t", "result") for word in re.findall(r"\w+", instead))
+
+
+def test_names_of_other_programs_are_none_at_the_front_door():
+    from gearmbs._lazy import OTHER_WORDS
+
+    for package, words in OTHER_WORDS.items():
+        module = importlib.import_module(package)
+        for name, instead in words.items():
+            assert not hasattr(module, name)
+            assert any(hasattr(module, word) or word == "plot" for word in re.findall(r"\w+", instead))

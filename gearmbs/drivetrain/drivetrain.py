@@ -63,6 +63,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
+from gearmbs._lazy import Guessed
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
 from gearmbs.drivetrain.connections import BEARINGS, COUPLINGS, Bearing, Coupling
 from gearmbs.drivetrain.drives import DRIVES, Drive, SpeedDrive
@@ -107,7 +108,7 @@ KINDS: dict[str, type[Part]] = {
 
 
 @dataclass(frozen=True)
-class Drivetrain:
+class Drivetrain(Guessed):
     """Shafts, the wheels on them, and all that holds, turns and loads them; see `gearmbs.drivetrain`.
 
     Every part has a name. Where shafts are, how wheels are turned at the start, which way and how fast everything

@@ -197,6 +197,12 @@ class Shaft(Written):
     0.2 m, 1.1098 kg
     """
 
+    other_words: ClassVar[dict[str, str]] = {
+        "reduce": "modal_model(...), which keeps modes and seats",
+        "modes": "modal_model(...)",
+        "mass": "model().mass_properties().mass",
+    }
+
     sections: Sequence[ShaftSection]
     discs: Sequence[Disc] = ()
     seats: dict[str, Quantity] = field(default_factory=dict)

@@ -89,6 +89,21 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         "gravity": reader("acceleration", vector),
         "lump": truth,
     }
+    other_words: ClassVar[Mapping[str, str]] = {
+        "hinge": "revolute(...)",
+        "pin": "revolute(...)",
+        "slider": "translational(...)",
+        "prismatic": "translational(...)",
+        "ball": "spherical(...)",
+        "weld": "fixed(...)",
+        "motor": "rotation(...) for a motion that is given, axis_torque(...) for a torque",
+        "motion": "rotation(...) or translation(...)",
+        "damper": "spring_damper(...) with stiffness=0",
+        "sensor": "output(...)",
+        "run": "simulate(t_end)",
+        "solve": "simulate(t_end)",
+        "modes": "linear_modes()",
+    }
 
     def __init__(self, name: str = "mechanism", gravity: Vector = (0.0, 0.0, 0.0)) -> None:
         self.name = name

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -93,6 +93,17 @@ class Solution(Measured, Shown):
     given : ndarray of int or None
         Places of numbers that were set in the run, which belong to its states.
     """
+
+    other_words: ClassVar[Mapping[str, str]] = {
+        "time": "t",
+        "times": "t",
+        "y": "result.y",
+        "force": "load(name) of a load, reaction(name) of a joint",
+        "forces": "load(name) of a load, reaction(name) of a joint",
+        "torque": "load(name) of a load, reaction(name) of a joint",
+        "data": "to_dataset()",
+        "to_dataframe": "to_dataset().to_dataframe()",
+    }
 
     inside: Mapping[float, float] = MappingProxyType({})
     at_steps: Mapping[tuple[str, str], Any] = MappingProxyType({})

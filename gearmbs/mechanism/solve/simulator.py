@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
-from gearmbs._lazy import uncollected
+from gearmbs._lazy import Guessed, uncollected
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
@@ -72,7 +72,7 @@ class Begun(NamedTuple):
     cells: np.ndarray
 
 
-class Simulator(Sampled, Restored):
+class Simulator(Sampled, Restored, Guessed):
     """A simulation that goes from one communication point to the next.
 
     The run behind it is that of `gearmbs.mechanism.simulate` with the same arguments: its steps pass the points, where
