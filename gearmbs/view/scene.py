@@ -21,6 +21,8 @@ from gearmbs.view.render import Camera, render
 AZIMUTH, ELEVATION = 38.0, 22.0
 UP = (0.0, 1.0, 0.0)
 
+STEPS = 65535
+"""Steps of the grid that points of pages are on, in each direction: what two bytes hold."""
 BORDER = 1.0
 """Height of heading and legend, inches."""
 ARROW = 0.22
@@ -324,32 +326,35 @@ def _hull(points: np.ndarray) -> np.ndarray:
 
 
 def _part(part: Part) -> dict:
-    """Return a part with one vertex for each point and normal."""
+    """Return a part with one vertex for each point and normal.
+
+    Points are on a grid of 65535 steps a direction, so that one of a wheel of 200 mm is within 2 um of its place, and
+    what counts points has as few bytes as they need.
+    """
     normals = np.rint(corner_normals(part.mesh).reshape(-1, 3) * 127.0).astype(np.int8)
     owners = part.mesh.triangles.reshape(-1, 1)
     rows, index = np.unique(np.hstack([owners, normals.astype(np.int64)]), axis=0, return_inverse=True)
-    padded = np.zeros((len(rows), 4), dtype=np.int8)
-    padded[:, :3] = rows[:, 1:]
+    counting = "<u2" if len(rows) <= STEPS else "<u4"
+    low = part.mesh.vertices.min(axis=0)
+    step = np.maximum(np.ptp(part.mesh.vertices, axis=0) / STEPS, np.finfo(float).tiny)
     poses = np.concatenate([part.axes.reshape(-1, 9), part.origins], axis=1)
-    ends = feature_ends(part.mesh)
+    where = np.empty(len(part.mesh.vertices), dtype=np.int64)
+    where[rows[:, 0]] = np.arange(len(rows))
     bending = {}
     if part.deflection is not None and len(part.deflection.shapes):
         bend = part.deflection.reduced()
-        where = np.empty(len(part.mesh.vertices), dtype=np.int64)
-        where[rows[:, 0]] = np.arange(len(rows))
-        bending = {
-            "shapes": packed(bend.shapes[:, rows[:, 0]]),
-            "coordinates": packed(bend.coordinates),
-            "ends": packed(where[ends], "<u4"),
-        }
+        bending = {"shapes": packed(bend.shapes[:, rows[:, 0]]), "coordinates": packed(bend.coordinates)}
     return {
         "name": part.name,
         "colour": [round(c, 4) for c in to_rgb(part.colour)],
         "opacity": part.opacity,
-        "points": packed(part.mesh.vertices[rows[:, 0]]),
-        "normals": packed(padded, "i1"),
-        "index": packed(index.reshape(-1), "<u4"),
-        "edges": packed(part.mesh.vertices[ends]),
+        "points": packed(np.rint((part.mesh.vertices[rows[:, 0]] - low) / step), "<u2"),
+        "low": rounded(low, 12),
+        "step": rounded(step, 12),
+        "normals": packed(rows[:, 1:], "i1"),
+        "bytes": int(counting[-1]),
+        "index": packed(index.reshape(-1), counting),
+        "ends": packed(where[feature_ends(part.mesh)], counting),
         "poses": packed(poses),
         **bending,
     }

@@ -1,8 +1,11 @@
+import base64
 import re
 
 import numpy as np
 import pytest
 
+from gearmbs.campaigns.datasets import GEARBOXES
+from gearmbs.drivetrain import Drivetrain
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import make_case, simulate_case
@@ -191,6 +194,28 @@ def test_pages_fetch_nothing_and_escape_titles(scene, tmp_path):
     assert not re.search(r"(?:src|href)\s*=|https?://|@import|url\(", text)
     assert "<script>alert" not in text
     assert scene._repr_html_().startswith("<iframe srcdoc=")
+
+
+def unpacked(text, kind):
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+def test_pages_hold_the_solids_within_a_step_of_their_grid(scene):
+    """65535 steps a direction: half a step is 0.8 um of a wheel of 100 mm."""
+    for part, held in zip(scene.parts, scene.page().data["parts"]):
+        counting = f"<u{held['bytes']}"
+        points = np.array(held["low"]) + unpacked(held["points"], "<u2").reshape(-1, 3) * np.array(held["step"])
+        triangles = points[unpacked(held["index"], counting)].reshape(-1, 3, 3)
+        half = 0.5 * np.ptp(part.mesh.vertices, axis=0) / 65535
+        assert np.all(np.abs(triangles - part.mesh.corners) <= half * (1 + 1e-6) + 1e-9)
+        ends = points[unpacked(held["ends"], counting)].reshape(-1, 2, 3)
+        assert np.all(np.abs(ends - feature_edges(part.mesh)) <= half * (1 + 1e-6) + 1e-9)
+
+
+def test_a_page_of_four_wheels_is_small():
+    train = Drivetrain.from_file(GEARBOXES["two stages"].file)
+    page = mechanism_scene(train.build()).page()
+    assert len(page.to_html()) < 1e6
 
 
 def test_plotly_figure(scene):

@@ -3,15 +3,23 @@
 (function () {
   const data = JSON.parse(document.getElementById("data").textContent);
   const canvas = document.getElementById("view");
-  const parts = data.parts.map((p) => ({
-    name: p.name, colour: p.colour, opacity: p.opacity, visible: true,
-    points: decode(p.points, Float32Array), normals: decode(p.normals, Int8Array),
-    index: decode(p.index, Uint32Array), edges: decode(p.edges, Float32Array), poses: decode(p.poses, Float32Array),
-    bend: p.shapes && {
-      shapes: decode(p.shapes, Float32Array), coordinates: decode(p.coordinates, Float32Array),
-      ends: decode(p.ends, Uint32Array), start: decode(p.points, Float32Array), frame: -1,
-    },
-  }));
+  const parts = data.parts.map((p) => {
+    const counting = p.bytes === 2 ? Uint16Array : Uint32Array;
+    const points = Float32Array.from(decode(p.points, Uint16Array), (v, k) => p.low[k % 3] + v * p.step[k % 3]);
+    // four bytes a normal, as WebGL likes them
+    const short = decode(p.normals, Int8Array), normals = new Int8Array(short.length / 3 * 4);
+    for (let k = 0; k < short.length; k++) normals[k + Math.floor(k / 3)] = short[k];
+    const ends = decode(p.ends, counting), edges = new Float32Array(3 * ends.length);
+    ends.forEach((end, k) => { for (let r = 0; r < 3; r++) edges[3 * k + r] = points[3 * end + r]; });
+    return {
+      name: p.name, colour: p.colour, opacity: p.opacity, visible: true, points, normals, ends, edges,
+      index: Uint32Array.from(decode(p.index, counting)), poses: decode(p.poses, Float32Array),
+      bend: p.shapes && {
+        shapes: decode(p.shapes, Float32Array), coordinates: decode(p.coordinates, Float32Array),
+        start: Float32Array.from(points), frame: -1,
+      },
+    };
+  });
   // Points, normals and edges of a part that bends, at an instant; whether they are others than before.
   function deflect(p, frame) {
     const b = p.bend;
@@ -33,7 +41,7 @@
       const length = Math.hypot(sum[3 * m], sum[3 * m + 1], sum[3 * m + 2]);
       if (length > 0) for (let r = 0; r < 3; r++) n[4 * m + r] = Math.round(127 * sum[3 * m + r] / length);
     }
-    b.ends.forEach((end, k) => { for (let r = 0; r < 3; r++) p.edges[3 * k + r] = at[3 * end + r]; });
+    p.ends.forEach((end, k) => { for (let r = 0; r < 3; r++) p.edges[3 * k + r] = at[3 * end + r]; });
     return true;
   }
   const up = data.up;
