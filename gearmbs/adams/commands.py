@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -37,7 +37,10 @@ def adams(
         bool | None,
         typer.Option(help="Solve motions again at a hundredth of ERROR and compare; default: if that is quick."),
     ] = None,
-    simulation: Annotated[str | None, typer.Option(help="Which simulation of a .cmd; default: its last.")] = None,
+    simulation: Annotated[
+        str | None,
+        typer.Option(help="Which simulation of a .cmd; default: all that it runs itself, else its last script."),
+    ] = None,
     variable: Annotated[
         list[str] | None, typer.Option(help="NAME=VALUE of a design variable of a .cmd; may be given again.")
     ] = None,
@@ -52,7 +55,7 @@ def adams(
 ) -> None:
     """Run an ADAMS deck, or a command file of View; write .req, .res, .msg and NetCDF."""
     with guarded(), ExitStack() as stack:
-        from gearmbs.adams import DeckError, load_routines, read_script, reading_from, run_deck
+        from gearmbs.adams import load_routines, read_script, reading_from
 
         stack.enter_context(reading_from(*(read_from or [])))
         if not model.is_file():
@@ -62,18 +65,23 @@ def adams(
             for path in viewed.save(to_deck):
                 typer.echo(f"wrote {path}")
             return
-        held: Script | None = None
+        if simulation is not None and (script is not None or end is not None):
+            fail(f"--simulation {simulation} has its own commands and end; give it, or a script, or --end")
+        held: dict[str, Script] = {}
         if viewed is not None and script is None and end is None:
             held = _held(viewed, simulation)
-        if script is None and end is None and held is None:
+        if script is None and end is None and not held:
             fail(f"give a script (.acf), or --end and --steps: gearmbs adams {model} --end 5 --steps 500")
-        commands = read_script(script) if script is not None else held
-        prefix = out or (commands.output(model) if commands is not None and held is None else model.with_suffix(""))
-        try:
-            result = run_deck(
+        commands = read_script(script) if script is not None else None
+        prefix = out or (commands.output(model) if commands is not None else model.with_suffix(""))
+        # what the file runs last, and it alone, has the name of the model
+        last = next(reversed(held), "")
+        for name in held or [""]:
+            _run(
+                model,
+                prefix if name == last else prefix.with_name(f"{prefix.name}_{name}"),
                 model if viewed is None else viewed,
-                commands,
-                prefix,
+                held.get(name, commands),
                 end=end,
                 steps=steps,
                 tol=tolerance,
@@ -83,22 +91,30 @@ def adams(
                 routines=None if routines is None else load_routines(routines),
                 check=check,
             )
-        except DeckError as error:
-            if error.result is not None and error.result.segments:
-                typer.echo(f"wrote what was computed to {', '.join(map(str, error.result.files(prefix)))}")
-            raise
-        except KeyboardInterrupt as interrupt:
-            partial = getattr(interrupt, "result", None)
-            if partial is None:
-                end_interrupted(f"the simulation of {model} was interrupted; files that were not whole are not there")
-            result = partial
-        for message in result.messages:
-            typer.echo(str(message))
-        if result.interrupted:
-            end_interrupted(f"wrote {', '.join(str(path) for path in result.files(prefix))}")
-        if not result.success:
-            fail(f"{model}: the analysis did not finish; see {prefix}.msg")
-        typer.echo(f"wrote {prefix}.req, .res, .msg, .nc")
+
+
+def _run(model: Path, prefix: Path, given: Path | ViewModel, commands: Script | None, **options: Any) -> None:
+    """Run a deck by a script; say what there is to say, and what was written."""
+    from gearmbs.adams import DeckError, run_deck
+
+    try:
+        result = run_deck(given, commands, prefix, **options)
+    except DeckError as error:
+        if error.result is not None and error.result.segments:
+            typer.echo(f"wrote what was computed to {', '.join(map(str, error.result.files(prefix)))}")
+        raise
+    except KeyboardInterrupt as interrupt:
+        partial = getattr(interrupt, "result", None)
+        if partial is None:
+            end_interrupted(f"the simulation of {model} was interrupted; files that were not whole are not there")
+        result = partial
+    for message in result.messages:
+        typer.echo(str(message))
+    if result.interrupted:
+        end_interrupted(f"wrote {', '.join(str(path) for path in result.files(prefix))}")
+    if not result.success:
+        fail(f"{model}: the analysis did not finish; see {prefix}.msg")
+    typer.echo(f"wrote {prefix}.req, .res, .msg, .nc")
 
 
 def _viewed(model: Path, variable: list[str], needed: bool) -> ViewModel | None:
@@ -122,14 +138,15 @@ def _viewed(model: Path, variable: list[str], needed: bool) -> ViewModel | None:
     return read_view(model, values)
 
 
-def _held(viewed: ViewModel, name: str | None) -> Script | None:
-    """Return a simulation of a command file."""
+def _held(viewed: ViewModel, name: str | None) -> dict[str, Script]:
+    """Return a simulation of a command file by its name, or those that the file runs itself, or its last script."""
     if name is None:
-        return viewed.script
+        names = viewed.own or tuple(viewed.scripts)[-1:]
+        return {one: viewed.scripts[one] for one in names}
     if name not in viewed.scripts:
         there = ", ".join(viewed.scripts) or "none"
         fail(f"--simulation {name}: it is not among those of the file: {there}")
-    return viewed.scripts[name]
+    return {name: viewed.scripts[name]}
 
 
 def plant(

@@ -11,7 +11,7 @@ from pathlib import Path
 from gearmbs.adams.analysis import failed, linear, simulate
 from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.doors import read_model
-from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
+from gearmbs.adams.errors import ERROR, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.parse.deck import Deck
@@ -45,7 +45,7 @@ def run_deck(
         The model; a path may be that of a command file of View.
     acf : path or Script, optional
         Commands; without them one dynamic analysis is run up to ``end``, or, without that, the simulation that a
-        command file of View holds.
+        command file of View holds. One of the ``scripts`` of a ViewModel is run with the model as it was then.
     out : path, optional
         Prefix of the files to write (.req, .res, .msg, .nc).
     end : float, optional
@@ -81,11 +81,15 @@ def run_deck(
         whose files are written.
     """
     model = read_model(Path(adm)) if isinstance(adm, (str, Path)) else adm
+    several: Diagnostic | None = None
     if isinstance(model, ViewModel):
         if acf is None and (end, steps, dtout) == (None, None, None):
             acf = model.script
-        model = model.deck
+            several = _several(model)
+        model = model.deck_for(acf if isinstance(acf, Script) else None)
     deck = bound(model, routines, allow_unsupported)
+    if several is not None:
+        deck = replace(deck, diagnostics=[*deck.diagnostics, several])
     script = _script(acf, end, steps, dtout)
     if script.unsupported and not allow_unsupported:
         raise DeckError(script.unsupported)
@@ -101,6 +105,15 @@ def run_deck(
         if result.segments and result.segments[-1].interrupted:
             result.interrupted = _interruption(result)
     return result
+
+
+def _several(view: ViewModel) -> Diagnostic | None:
+    """Return a remark if a command file runs several analyses, of which the last is run."""
+    if len(view.own) < 2:
+        return None
+    which = f"this is the last, {view.own[-1]}; before it: {', '.join(view.own[:-1])}"
+    message = f"the file runs {len(view.own)} analyses, each from the design; {which}: scripts[...] of the model"
+    return Diagnostic(WARNING, message, view.deck.file, 0)
 
 
 @contextmanager

@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.adams.errors import UNSUPPORTED, WARNING, Diagnostic
+from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.grammar import RawStatement
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import DEGREE, JOINTS, PARTS, Item
+from gearmbs.adams.view.simulations.activity import Activity
 from gearmbs.adams.view.values import ORIENTATIONS, Values, is_ground
 from gearmbs.adams.view.vocabulary import ROWS
 from gearmbs.adams.write.text import listed, number, wrapped
@@ -36,6 +38,8 @@ KEYWORDS = {
     "request": "REQUEST", "modal_force": "MFORCE",
 }  # fmt: skip
 """Statements by kinds of objects; graphics have ids of their own when contacts name them."""
+ELEMENTS = frozenset(kind for kind, keyword in KEYWORDS.items() if keyword in st.switched("acts"))
+"""Kinds of objects that act on parts, and go with these and with their markers."""
 SPACES = {"POINT_MASS": "PART", "FLEX_BODY": "PART"}
 """Statements whose ids are those of others, too."""
 IDLE = {row.kind: {name for name, acts in row.arguments.items() if not acts} for row in ROWS}
@@ -88,6 +92,8 @@ class Deckmaker:
         Objects, by Python's id, that are left out, and why: what needs them is, too.
     parasolids : list of (str, int)
         Files with geometry that the command file reads, with their lines.
+    activity : Activity
+        What is on and off.
     bodies : dict of Path to list of Body
         What they hold, once it is read.
     """
@@ -118,12 +124,15 @@ class Deckmaker:
         self.centres: dict[int, np.ndarray] = {}
         inside = model.path.lower() + "."
         self.items = [item for key, item in self.db.items.items() if key.startswith(inside)]
+        self.activity = Activity(values, ELEMENTS)
         self._number()
 
     def start_again(self) -> None:
         """Forget the statements, not what is left out."""
         self.statements, self.problems = [], list(self.failed.values())
         self.graphics, self.at_points, self.measured, self.centres = {}, {}, {}, {}
+        for group, why in self.activity.doubts:
+            self.unsupported(group, why)
 
     def beside(self, name: str) -> Path | None:
         """Return a file in the folder of the command file by its name, whatever the case of its letters."""
@@ -187,13 +196,8 @@ class Deckmaker:
         return self.ids[id(item)]
 
     def active(self, item: Item) -> bool:
-        """Return whether an object and all that it belongs to are handed to the solver."""
-        one: Item | None = item
-        while one is not None:
-            if not one.active:
-                return False
-            one = self.db.items.get(one.parent.lower())
-        return True
+        """Return whether an object is handed to the solver."""
+        return self.activity.cause(item) is None
 
     # What statements are made of.
 
@@ -323,7 +327,7 @@ class Deckmaker:
         """Make the statements of all active objects of some kinds."""
         wanted = set(kinds)
         for item in self.items:
-            if item.kind not in wanted or id(item) in self.failed or not self.active(item):
+            if item.kind not in wanted or id(item) in self.failed or self._off(item):
                 continue
             before = len(self.statements)
             try:
@@ -340,6 +344,14 @@ class Deckmaker:
             unread = set(item.fields) - item.used - IDLE.get(item.kind, set()) - NAMING
             for key in sorted(unread):
                 self.unsupported(item, f"{key} is not modelled", item.fields[key].line)
+
+    def _off(self, item: Item) -> bool:
+        """Return whether an object is off; say so if it is with what it needs."""
+        cause = self.activity.cause(item)
+        alone = cause is None or cause is item or cause.kind == "group" or item.path.startswith(f"{cause.path}.")
+        if cause is not None and not alone:
+            self.remark(item, f"it is off with {cause.path}, which it needs")
+        return cause is not None
 
 
 def place(a: np.ndarray, r: np.ndarray, origin: str = "QP") -> tuple[str | None, str | None]:

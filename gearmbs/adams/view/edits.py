@@ -23,6 +23,7 @@ from gearmbs.adams.view.model import (
     Item,
 )
 from gearmbs.adams.view.renaming import rename
+from gearmbs.adams.view.simulations.activity import needed
 from gearmbs.adams.view.values import ORIENTATIONS, Stored, Values, fixed, is_ground
 from gearmbs.adams.view.vocabulary import Row, argument_of
 
@@ -30,6 +31,7 @@ REFERRING = ("marker", "marker_name", "part_name")
 """Endings of arguments that name markers and parts."""
 GIVEN_MASS = ("mass", "inertia_marker", "ixx", "iyy", "izz", "ixy", "izx", "iyz")
 """What a part has by its geometry instead, when a command gives it a material or a density only."""
+ON, OFF = ("on", "yes", "true", "1"), ("off", "no", "false", "0")
 NUMBERLESS = {"adams_id", "ground_part", "material_type", "planar"}
 """Arguments of parts that hold no numbers with units."""
 VALUES = ("real_value", "integer_value", "string_value", "object_value")
@@ -98,18 +100,53 @@ class Editor:
         return found
 
     def _attributes(self, row: Row, given: dict[str, Stored], line: int) -> None:
-        if "active" not in given:
-            return
-        word = text_of((self._now(given["active"]) or [""])[0]).lower()
-        if word in ("no_opinion", "no_op"):
-            return
-        active = word in ("on", "yes", "true", "1")
+        """Switch objects on or off."""
+        active = self._switched(row, given, "active", line)
+        others = [key for key in ("dependents_active", "member_dependents_active") if key in given]
+        found = self._members_of(row, given, line) if active is not None or others else []
+        for key in others:
+            self._check_dependents(row, key, self._switched(row, given, key, line), active, found, line)
+        self.database.version += 1
+        for item in found if active is not None else []:
+            item.active, item.told = bool(active), self.database.version
+            item.fields.pop("expr_active", None)
+
+    def _switched(self, row: Row, given: dict[str, Stored], key: str, line: int) -> bool | None:
+        """Return whether an argument switches on or off, None if it leaves all as it is."""
+        word = text_of((self._now(given[key]) or [""])[0]).lower() if key in given else "no_opinion"
+        if word not in (*ON, *OFF, "no_opinion", "no_op"):
+            raise ViewError(f"{' '.join(row.words)}: {key} = {word[:40]}; give on, off or no_opinion", line)
+        return None if word.startswith("no_op") else word in ON
+
+    def _members_of(self, row: Row, given: dict[str, Stored], line: int) -> list[Item]:
+        """Return the objects that attributes are given."""
+        found = []
         for one in self._now(given[row.naming]) if row.naming in given else []:
             item = one if isinstance(one, Item) else self.database.find(text_of(one))
             if item is not None:
-                item.active = active
+                found.append(item)
             elif row.words[0] != "geometry":
                 raise ViewError(f"{' '.join(row.words)}: there is no {text_of(one)[:80]}", line)
+        return found
+
+    def _check_dependents(
+        self, row: Row, key: str, wanted: bool | None, active: bool | None, found: list[Item], line: int
+    ) -> None:
+        """See that what needs an object is switched as asked for: what needs something that is off, is off here, too.
+
+        Raises
+        ------
+        ViewError
+            If that is not what is asked for.
+        """
+        if wanted is None or (wanted is False and active is False):
+            return
+        command = " ".join(row.words)
+        if wanted is not active:
+            raise ViewError(f"{command}: {key} without active as well; name what is to be switched", line)
+        for other in self.database:
+            if not other.active and any(one in found for several in needed(self.values, other) for one in several):
+                raise ViewError(f"{command}: {key} = on: {other.path} is off itself; switch it on by its name", line)
 
     def _object(self, row: Row, given: dict[str, Stored], line: int) -> None:
         """Make or change an object."""
@@ -145,6 +182,8 @@ class Editor:
         if row.kind == "model":
             self._new_model(item, line)
         self.database.version += 1
+        if "expr_active" in fields:
+            item.active, item.told = True, self.database.version
 
     def _meant_now(self, key: str, stored: Stored) -> Stored:
         """Return what names markers or parts with their full names: short ones mean those of the current part."""
@@ -376,6 +415,7 @@ class Editor:
 
     def _defaults(self, row: Row, given: dict[str, Stored], line: int) -> None:
         db = self.database
+        db.version += 1
         what = row.words[1]
         words = {key: text_of((self._now(value) or [""])[0]) for key, value in given.items()}
         if what == "units":

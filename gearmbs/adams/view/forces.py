@@ -192,7 +192,9 @@ def _size(m: Deckmaker, shape: Item, *pairs: tuple[str, str]) -> list[str]:
 def _solid(m: Deckmaker, shape: Item) -> list[str | None]:
     """Return the arguments of the GRAPHICS of a solid that touches others."""
     kind = shape.kind
-    if kind != "csg" and any(one.active for one in shape.children.values()):
+    if not m.active(shape):
+        raise ViewError(f"{shape.path} is not active; take it out of the contact")
+    if kind != "csg" and any(m.active(one) for one in shape.children.values()):
         raise ViewError(f"{shape.path} has features, which cannot touch here; leave them out, or give a mesh in a file")
     marker = m.ref(shape, "center_marker", "CM", ("marker",))
     if kind == "block":

@@ -263,6 +263,13 @@ class Interpreter(Editor):
                 members.append(item if item is not None else one)
         return [one for one in members if kinds is None or not isinstance(one, Item) or one.kind in kinds]
 
+    def _grouped(self, given: Mapping[str, Stored], line: int) -> Stored:
+        """Return the objects of a group, those of one type where their names are patterns."""
+        names = self._now(given["objects_in_group"])
+        patterns = any("*" in text_of(one) for one in names)
+        kind = given.get("type_filter") if patterns else None
+        return fixed(*self._members(names, {} if kind is None else {"type": kind}), line=line)
+
     def _command(self, command: Command) -> None:
         if self._called(command):
             return
@@ -283,6 +290,8 @@ class Interpreter(Editor):
         elif row.kind == "variable":
             self._variable(row, given, command.line)
         elif row.kind:
+            if row.kind == "group" and "objects_in_group" in given:
+                given["objects_in_group"] = self._grouped(given, command.line)
             self._object(row, given, command.line)
         elif row.words[0] == "defaults":
             self._defaults(row, given, command.line)
@@ -291,12 +300,17 @@ class Interpreter(Editor):
         elif row.words == ("file", "parasolid", "read"):
             name = text_of((self._now(given["file_name"]) or [""])[0]) if "file_name" in given else ""
             self.parasolids.append((name, command.line))
+            self.database.version += 1
             if set(given) & {"part_name", "location", "orientation", "relative_to"}:
                 raise ViewError(
                     "file parasolid read: geometry is read as it was written, without a part or a place", command.line
                 )
         else:
-            self.runs.append((row, {key: self._now(value) for key, value in given.items()}, command.line))
+            self._simulation(row, {key: self._now(value) for key, value in given.items()}, command.line)
+
+    def _simulation(self, row: Row, given: dict[str, Any], line: int) -> None:
+        """Take note of a simulation; see `gearmbs.adams.view.simulations.runs.Simulator`."""
+        self.runs.append((row, given, line))
 
     def _text_of_file(self, name: str, line: int) -> str:
         """Return the text of a file in the folder of this one.

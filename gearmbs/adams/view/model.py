@@ -92,7 +92,9 @@ class Item:
     fields : dict
         What was stored, by argument: `gearmbs.adams.view.values.Stored`.
     active : bool
-        Whether it is handed to the solver.
+        Whether it is switched on itself: see `gearmbs.adams.view.simulations.activity`.
+    told : int
+        The database's version when a command switched it on or off last; 0 if none has.
     used : set of str
         Arguments that its statement has asked for.
     """
@@ -102,6 +104,7 @@ class Item:
     line: int = 0
     fields: dict[str, Any] = field(default_factory=dict)
     active: bool = True
+    told: int = 0
     used: set[str] = field(default_factory=set)
     frame: Any = None
     children: dict[str, Item] = field(default_factory=dict, repr=False)

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError, Diagnostic
-from gearmbs.adams.parse.commands import Script, parse_script
+from gearmbs.adams.parse.commands import Script
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import COMMANDS_OF_VIEW, deck_of, is_deck, is_script, read_file
 from gearmbs.adams.view import data, forces, instances, machinery, measures, statements, tires
 from gearmbs.adams.view.deckmaker import PART_KEYWORDS, Deckmaker, Made
-from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.interpreter import Interpreter
-from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.model import Item
-from gearmbs.adams.write.text import number
+from gearmbs.adams.view.model import PARTS, Item
+from gearmbs.adams.view.simulations.changes import same
+from gearmbs.adams.view.simulations.runs import Analysis, Simulator, named
 from gearmbs.files import write_whole
 
 
@@ -33,10 +31,17 @@ class ViewModel:
     text : str
         These statements as they are written into an .adm file.
     scripts : dict of str to Script
-        Its simulations by name, those that it runs itself under the numbers of their lines.
+        Its simulations by name: its scripts, each from the model as the file leaves it, and then what it runs itself,
+        each from the model as it was then: under the name that it was saved under, else Run_1, Run_2 and so on, and
+        Last_Run for the last.
     variables : dict of str to float
         Its design variables with one number each: what ``variables`` of `read_view` may change.
     name : str
+    own : tuple of str
+        Names of what the file runs itself, in order: each starts from the design.
+    models : dict of str to tuple of (Deck, str)
+        Deck and text of those simulations whose model is another than that of ``deck``, which is the one that the file
+        leaves.
     """
 
     deck: Deck
@@ -44,9 +49,18 @@ class ViewModel:
     scripts: dict[str, Script] = field(default_factory=dict)
     variables: dict[str, float] = field(default_factory=dict)
     name: str = ""
+    own: tuple[str, ...] = ()
+    models: dict[str, tuple[Deck, str]] = field(default_factory=dict)
+
+    def deck_for(self, script: Script | None) -> Deck:
+        """Return the deck of one of the simulations: the model as it was then; that of ``deck`` of other scripts."""
+        name = next((name for name, one in self.scripts.items() if one is script), "")
+        return self.models[name][0] if name in self.models else self.deck
 
     def save(self, path: str | Path) -> list[Path]:
         """Write the deck, and its simulations beside it as NAME.acf; return the files.
+
+        A simulation whose model is another, since commands between changed it, has its own deck beside its script.
 
         Parameters
         ----------
@@ -58,8 +72,13 @@ class ViewModel:
         write_whole(path, self.text)
         for name, script in self.scripts.items():
             stem = re.sub(r"\W+", "_", name)
+            model = path.stem
+            if name in self.models:
+                model = f"{path.stem}_{stem}"
+                written.append(path.with_name(f"{model}.adm"))
+                write_whole(written[-1], self.models[name][1])
             written.append(path.with_name(f"{path.stem}_{stem}.acf"))
-            lines = [path.stem, f"{path.stem}_{stem}", *(command.text for command in script), "STOP"]
+            lines = [model, f"{path.stem}_{stem}", *(command.text for command in script), "STOP"]
             write_whole(written[-1], "\n".join(lines) + "\n")
         return written
 
@@ -78,7 +97,8 @@ def read_view(path: str | Path, variables: Mapping[str, float] | None = None, mo
     variables : mapping of str to float, optional
         Values of design variables instead of those in the file, by full names or their ends.
     model : str, optional
-        Which model becomes the deck, where the file makes several; default: the last with a part.
+        Which model becomes the deck, where the file makes several, and whose simulations are read; default: the model
+        of the last simulation of the file, else its default model, else the last with a part.
 
     Returns
     -------
@@ -119,59 +139,116 @@ def parse_view(
         raise DeckError(
             [Diagnostic(ERROR, f"this is of the solver, not of View: {kind}, `run_deck` runs them", file, 1)]
         )
-    run = Interpreter(folder, variables)
+
+    def asked_for(one: Item) -> bool:
+        return model is None or one.name.lower() == model.lower().lstrip(".")
+
+    def made(run: Interpreter, one: Item) -> Deckmaker:
+        return _made(run, one, file)
+
+    run = Simulator(made, file, folder, variables, asked_for)
     run.run(text)
-    errors = [Diagnostic(ERROR, str(error), file, max(error.line, 0)) for error in run.errors]
+    _raise(run, file)
     missing = [name for name in run.overrides if name not in run.overridden]
-    if missing and not errors:
-        errors += [Diagnostic(ERROR, f"there is no variable {name}", file, 0) for name in missing]
+    wrong = [f"there is no variable {name}" for name in missing]
     for name, paths in run.overridden.items():
-        if len(paths) > 1 and not errors:
+        if len(paths) > 1 and not missing:
             which = " and ".join(sorted(paths))
-            errors.append(Diagnostic(ERROR, f"variables: {name} may be {which}; give the full name of one", file, 0))
-    chosen = _chosen(run, model)
-    if chosen is None and not errors:
-        errors.append(Diagnostic(ERROR, "no model is created; write 'model create model_name = ...'", file, 0))
-    if errors:
-        raise DeckError(errors)
-    assert chosen is not None
-    maker = _made(run, chosen, file)
-    made = maker.statements
-    title = f"ADAMS/View model name: {chosen.name}"
-    deck = deck_of([one.raw() for one in made], title, file)
-    deck.diagnostics += maker.problems
-    if run.ignored:
-        what = ", ".join(f"{word} {len(lines)}" for word, lines in sorted(run.ignored.items()))
-        first = min(min(lines) for lines in run.ignored.values())
-        deck.diagnostics.append(Diagnostic(IGNORED, f"commands without effect on the motion: {what}", file, first))
-    lines = [title, "!", *(line for one in made for line in one.lines()), "END"]
+            wrong.append(f"variables: {name} may be {which}; give the full name of one")
+    models = [one for one in run.database.of("model") if asked_for(one)]
+    chosen = run.default_model() if model is None else next(iter(models), None)
+    if model is None and run.analyses:
+        chosen = run.analyses[-1].model
+    if chosen is None and not wrong:
+        there = ", ".join(one.name for one in run.database.of("model"))
+        message = f"there is no model {str(model)[:60]}; there is {there}"
+        wrong.append(message if there else "no model is created; write 'model create model_name = ...'")
+    if wrong or chosen is None:
+        raise DeckError([Diagnostic(ERROR, message, file, 0) for message in wrong])
+
+    # scripts that change the model start from it as the file leaves it, each for itself
+    def again(path: str) -> list[Analysis]:
+        return _read_again(text, Simulator(made, file, folder, variables, asked_for, quiet=True), path)
+
+    scripts = _of_scripts(run, chosen, again)
+    own = named(run.analyses, list(scripts))
+    maker = run.made(chosen)
+    deck, written = _deck(maker.statements, maker.problems, chosen, run, file)
     values = {}
     for item in run.database.of("variable"):
         value = run.values.variable(item) if item.line and "real_value" in item.fields else None
         if isinstance(value, (int, float)):
             values[item.path] = float(value)
-    return ViewModel(deck, "\n".join(lines) + "\n", _scripts(run, chosen, file), values, chosen.name)
+    view = ViewModel(deck, written, variables=values, name=chosen.name, own=tuple(own))
+    for name, analysis in (scripts | own).items():
+        view.scripts[name] = analysis.script(file)
+        if analysis.model is not chosen or not same(analysis.statements, maker.statements):
+            view.models[name] = _deck(analysis.statements, analysis.problems, analysis.model, run, file)
+    return view
 
 
-def _chosen(run: Interpreter, name: str | None) -> Item | None:
-    models = run.database.of("model")
-    if name is not None:
-        return next((one for one in models if one.name.lower() == name.lower().lstrip(".")), None)
-    top = [one for one in models if one.path.count(".") == 1]
-    full = [one for one in top if any(part.path.lower().startswith(f"{one.path.lower()}.") for part in run.parts())]
-    return next(reversed(full or top), None)
+def _raise(run: Interpreter, file: str) -> None:
+    """Raise what is wrong with commands, if anything is."""
+    if run.errors:
+        raise DeckError([Diagnostic(ERROR, str(error), file, max(error.line, 0)) for error in run.errors])
+
+
+def _read_again(text: str, run: Simulator, path: str) -> list[Analysis]:
+    """Return the analyses of a script that changes the model, which the file is read again for."""
+    run.run(text)
+    run.quiet = False
+    item = run.database.items.get(path.lower())
+    found = run.aside(item) if item is not None else []
+    _raise(run, run.file)
+    return found
+
+
+def _of_scripts(run: Simulator, model: Item, again: Callable[[str], list[Analysis]]) -> dict[str, Analysis]:
+    """Return what the scripts of a model do, by their names, each from the design on."""
+    found: dict[str, Analysis] = {}
+    for item in run.database.of("script"):
+        if run.database.model_of(item) is not model:
+            continue
+        analyses = run.aside(item) if run.only_simulates(item) else again(item.path)
+        _raise(run, run.file)
+        for k, one in enumerate(analyses, 1):
+            if one.commands:
+                found[item.name if k == len(analyses) else f"{item.name}_{k}"] = one
+    return found
+
+
+def _deck(
+    made: Sequence[Made], problems: Sequence[Diagnostic], model: Item, run: Interpreter, file: str
+) -> tuple[Deck, str]:
+    """Return the deck of a model's statements, and its text."""
+    title = f"ADAMS/View model name: {model.name}"
+    deck = deck_of([one.raw() for one in made], title, file)
+    deck.diagnostics += problems
+    if run.ignored:
+        what = ", ".join(f"{word} {len(lines)}" for word, lines in sorted(run.ignored.items()))
+        first = min(min(lines) for lines in run.ignored.values())
+        deck.diagnostics.append(Diagnostic(IGNORED, f"commands without effect on the motion: {what}", file, first))
+    lines = [title, "!", *(line for one in made for line in one.lines()), "END"]
+    return deck, "\n".join(lines) + "\n"
 
 
 def _made(run: Interpreter, model: Item, file: str) -> Deckmaker:
-    """Return a model's statements, and what is left out with all that needs it."""
-    machinery.weigh(run.database, run.values)
-    tires.weigh(run.database, run.values)
+    """Return a model's statements, and what is left out with all that needs it; the model stays as it is."""
+    db = run.database
+    before = set(db.items)
+    fields = [(part, dict(part.fields)) for part in db.of(*PARTS)]
+    machinery.weigh(db, run.values)
+    tires.weigh(db, run.values)
     maker = Deckmaker(run.values, model, file, measures.variable_of, run.parasolids, run.folder)
-    before = -1
-    while len(maker.failed) > before:
-        before = len(maker.failed)
+    count = -1
+    while len(maker.failed) > count:
+        count = len(maker.failed)
         maker.start_again()
         _statements(maker)
+    for part, held in fields:
+        part.fields = held
+    for key in [key for key in db.items if key not in before]:
+        db.remove(db.items[key])
     return maker
 
 
@@ -193,99 +270,3 @@ def _statements(maker: Deckmaker) -> None:
         maker.problems[k] = Diagnostic(severity, f"{problem.message}; it is left out", problem.file, problem.line)
     for key in maker.failed.keys() - known:
         del maker.failed[key]
-
-
-# Simulations.
-
-
-def _scripts(run: Interpreter, model: Item, file: str) -> dict[str, Script]:
-    """Return the simulations of a model by name."""
-    found: dict[str, Script] = {}
-    for item in run.database.of("script"):
-        if run.database.model_of(item) is not model:
-            continue
-        try:
-            lines = _script_lines(run, item)
-        except ViewError as error:
-            raise DeckError([Diagnostic(ERROR, str(error), file, error.line or item.line)]) from error
-        if lines:
-            found[item.name] = _script(lines, file, item.line)
-    own: list[str] = []
-    for row, given, line in run.runs:
-        if row.words[-1] == "scripted":
-            name = text_of((given.get("sim_script_name") or [""])[0]).rsplit(".", 1)[-1]
-            held = next((key for key in found if key.lower() == name.lower()), None)
-            if held is not None:
-                found[held] = found.pop(held)
-            continue
-        own += _simulation(row.words[-1], {key: value[0] for key, value in given.items() if value}, line)
-    if own:
-        found["the file itself"] = _script(own, file, run.runs[-1][2])
-    return found
-
-
-def _script(lines: list[str], file: str, line: int) -> Script:
-    if any(re.match(r"\s*FILE\b", one, re.IGNORECASE) for one in lines):
-        message = "in the simulation: FILE reads and writes elsewhere; give the commands themselves"
-        raise DeckError([Diagnostic(ERROR, message, file, line)])
-    try:
-        return parse_script("\n".join(lines), file)
-    except DeckError as error:
-        raise DeckError(
-            [Diagnostic(d.severity, f"in the simulation: {d.message}", file, line) for d in error.diagnostics]
-        ) from error
-
-
-def _script_lines(run: Interpreter, item: Item) -> list[str]:
-    values = run.values
-    for key in ("solver_commands", "commands"):
-        if key not in item.fields:
-            continue
-        pieces = [text_of(one) for one in values.values(item, key)]
-        lines = [line for piece in pieces for line in piece.splitlines()]
-        if key == "solver_commands":
-            return [line for line in lines if line.strip() and not line.lstrip().startswith("!")]
-        found: list[str] = []
-        inner = Interpreter(None)
-        inner.database.model, inner.values = run.database.model, values
-        inner.database.items, inner.database.by_name = run.database.items, run.database.by_name
-        inner.run("\n".join(lines))
-        if inner.errors:
-            raise ViewError(f"in the simulation {item.path}: {inner.errors[0]}", item.line)
-        for row, arguments, line in inner.runs:
-            if row.words[-1] == "scripted":
-                other = run.database.find(text_of((arguments.get("sim_script_name") or [""])[0]), ("script",))
-                found += _script_lines(run, other) if other is not None and other is not item else []
-            found += _simulation(row.words[-1], {key: value[0] for key, value in arguments.items() if value}, line)
-        return found
-    given: dict[str, Any] = {key: values.values(item, key)[0] for key in item.fields if key != "adams_id"}
-    return _simulation("transient", given, item.line)
-
-
-def _simulation(kind: str, given: dict[str, Any], line: int) -> list[str]:
-    """Return a simulation as commands of the solver."""
-    if kind == "equilibrium":
-        return ["SIMULATE/STATICS"]
-    if kind == "assemble":
-        return ["SIMULATE/INITIAL_CONDITIONS"]
-    if kind == "eigensolution":
-        return ["LINEAR/EIGENSOL"]
-    if kind not in ("transient",) or not {"end_time", "duration"} & given.keys():
-        return []
-    word = text_of(given.get("type", "dynamic")).lower()
-    analysis = {"kinematic": "KINEMATICS", "static": "STATICS", "quasi_static": "STATICS"}.get(word, "DYNAMICS")
-    words = [f"SIMULATE/{analysis}"]
-    for key, keyword in (
-        ("end_time", "END"),
-        ("duration", "DURATION"),
-        ("number_of_steps", "STEPS"),
-        ("step_size", "DTOUT"),
-    ):
-        value = given.get(key)
-        if value is None:
-            continue
-        if not isinstance(value, (int, float)):
-            raise DeckError([Diagnostic(ERROR, f"{key} = {text_of(value)[:40]} is no number", "", line)])
-        words.append(f"{keyword}={number(int(value) if keyword == 'STEPS' else value)}")
-    first = ["SIMULATE/STATICS"] if text_of(given.get("initial_static", "no")).lower() in ("yes", "on", "true") else []
-    return [*first, ", ".join(words)]

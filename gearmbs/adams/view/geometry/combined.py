@@ -129,7 +129,7 @@ def taken_off(m: Deckmaker, block: Item, line: int) -> Moments:
         Of a feature of another kind or solid, of unequal radii, and where two of them meet.
     """
     total = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
-    features = [one for one in block.children.values() if one.active]
+    features = [one for one in block.children.values() if m.active(one)]
     refused = ViewError(f"{block.path} has features, whose mass is not computed; {REMEDY}", line)
     if features and (block.kind != "block" or not all("radius1" in one.fields for one in features)):
         raise refused

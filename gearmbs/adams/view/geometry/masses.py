@@ -160,7 +160,7 @@ def moments_of(m: Deckmaker, item: Item, marker: Item | None) -> Moments | None:
     a, r = m.values.pose(item)
     shells = []
     for one in item.children.values():
-        if not one.active:
+        if not m.active(one):
             continue
         if one.kind == "csg":
             total += combined(m, one, item.line).moved(a.T, -a.T @ r)
