@@ -34,6 +34,12 @@ GIVEN_MASS = ("mass", "inertia_marker", "ixx", "iyy", "izz", "ixy", "izx", "iyz"
 ON, OFF = ("on", "yes", "true", "1"), ("off", "no", "false", "0")
 NUMBERLESS = {"adams_id", "ground_part", "material_type", "planar"}
 """Arguments of parts that hold no numbers with units."""
+ALTERNATIVES = (
+    (("function",), ("user_function", "routine")),
+    (("end_time",), ("duration",)),
+    (("number_of_steps",), ("step_size",)),
+)
+"""Arguments that say the same in two ways: an object has those that it was given last."""
 VALUES = ("real_value", "integer_value", "string_value", "object_value")
 
 
@@ -162,6 +168,10 @@ class Editor:
             # the last command decides: from now on the mass is that of the geometry
             for key in GIVEN_MASS:
                 item.fields.pop(key, None)
+        for one, other in (*ALTERNATIVES, *((b, a) for a, b in ALTERNATIVES)):
+            if set(one) & fields.keys() and not set(other) & fields.keys():
+                for key in other:
+                    item.fields.pop(key, None)
         placed = {key: one for key, one in fields.items() if key in ("location", "orientation", "relative_to")}
         if item.kind in PLACED and item.kind != "model":
             self._place(item, fields)

@@ -182,7 +182,7 @@ def parse_view(
     view = ViewModel(deck, written, variables=values, name=chosen.name, own=tuple(own))
     for name, analysis in (scripts | own).items():
         view.scripts[name] = analysis.script(file)
-        if analysis.model is not chosen or not same(analysis.statements, maker.statements):
+        if analysis.model.path != chosen.path or not same(analysis.statements, maker.statements):
             view.models[name] = _deck(analysis.statements, analysis.problems, analysis.model, run, file)
     return view
 

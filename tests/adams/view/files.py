@@ -104,3 +104,23 @@ WHOLE = EVERYTHING.replace(
     "part create rigid_body mass_properties part_name = .m.A",
     "marker create marker_name = .m.A.M3 location = 60, 40, 0\npart create rigid_body mass_properties part_name = .m.A",
 )
+
+
+RUNS = (
+    PENDULUM
+    + """\
+group create group_name = .swing.GRAVITIES objects_in_group = .swing.gravity* expr_active = (.swing.TILT > 10)
+simulation script create sim_script_name = .swing.TILTED commands =  &
+   "variable modify variable_name=.swing.TILT real_value=5",  &
+   "simulation single_run transient end_time=0.1 number_of_steps=5", "simulation single_run save analysis_name=tilted"
+for variable_name = k start_value = 1 end_value = 2
+simulation single_run transient end_time = 0.1 number_of_steps = 5 model_name = .swing
+variable modify variable_name = .swing.LENGTH real_value = (eval(400 + 50 * k))
+simulation single_run reset
+end
+simulation single_run scripted sim_script_name = .swing.TILTED reset_before_and_after = yes
+constraint attributes constraint_name = .swing.HINGE active = on dependents_active = on
+simulation single_run transient duration = 0.1 step_size = 0.01 type = dynamic
+"""
+)
+"""Simulations between changes of the model."""

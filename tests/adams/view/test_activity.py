@@ -130,3 +130,33 @@ def test_dependents_that_are_off_themselves_are_named():
     assert parse_view(MODEL + JOINTED + both.format("")).deck.of(st.Joint)
     with pytest.raises(DeckError, match=says(".m.J", "off itself")):
         parse_view(MODEL + JOINTED + both.format("constraint attributes constraint_name = .m.J active = off\n"))
+
+
+BALLS = """\
+geometry create shape ellipsoid ellipsoid_name = .m.P.B center_marker = .m.P.cm  &
+   x_scale_factor = 2 y_scale_factor = 2 z_scale_factor = 2
+marker create marker_name = .m.ground.C location = 3, 0, 0
+geometry create shape ellipsoid ellipsoid_name = .m.ground.B center_marker = .m.ground.C  &
+   x_scale_factor = 2 y_scale_factor = 2 z_scale_factor = 2
+contact create contact_name = .m.C i_geometry_name = .m.P.B j_geometry_name = .m.ground.B  &
+   stiffness = 1e6 damping = 1 exponent = 1.5 dmax = 0.01
+"""
+
+
+def test_a_contact_is_off_with_its_solid():
+    off = "geometry attributes geometry_name = .m.ground.B active = off\n"
+    assert parse_view(MODEL + BALLS).deck.of(st.Contact)
+    assert not parse_view(MODEL + BALLS + off).deck.of(st.Contact)
+    # of 1 m between the balls and 5 m in a second without contact
+    assert np.isclose(ends(MODEL + BALLS + off + ONE)[-1], 5.0, rtol=1e-6)
+    assert ends(MODEL + BALLS + ONE)[-1] < 1.1
+
+
+def test_solids_that_are_off_have_no_mass():
+    block = "geometry create shape block block_name = .m.P.{} corner_marker = .m.P.cm diag_corner_coords = 1, 1, {}\n"
+    heavy = "part modify rigid_body mass_properties part_name = .m.P density = 2\n"
+    group = GROUP.format("create", "objects_in_group = .m.P.TWO expr_active = {}")
+    text = MODEL + block.format("ONE", 1) + block.format("TWO", 2) + heavy
+    for active, mass in ((1, 6.0), (0, 2.0)):
+        part = next(one for one in parse_view(text + group.format(active)).deck.of(st.Part).values() if not one.ground)
+        assert part.mass == pytest.approx(mass)

@@ -283,3 +283,47 @@ def test_the_command_runs_each_analysis(tmp_path):
     result = CliRunner().invoke(app, ["adams", str(path), "--simulation", "ZZ"])
     assert result.exit_code == 1
     assert "ZZ" in result.output
+
+
+def test_a_setting_that_comes_later_acts_later():
+    setting = "executive_control set numerical_integration_parameters model_name = m error_tolerance = 1e-3\n"
+    view = parse_view(MODEL + ONE + setting + TWO)
+    result = run_deck(view)
+    assert [one.options["tol"] for one in result.segments] == [1e-8, 1e-3]
+    assert [one.options["tol"] for one in run_deck(parse_view(MODEL + setting + ONE + TWO)).segments] == [1e-3, 1e-3]
+
+
+@pytest.mark.parametrize(
+    ("before", "between"),
+    [
+        ('data_element create variable variable_name = .m.V function = "20"\n',
+         'data_element modify variable variable_name = .m.V function = "40"\n'),
+        ('data_element create variable variable_name = .m.V function = "20"\n',
+         'data_element create variable variable_name = .m.W function = "40"\n'
+         'force modify direct single_component_force single_component_force_name = .m.SF function = "VARVAL(.m.W)"\n'),
+    ],
+)  # fmt: skip
+def test_data_that_a_force_reads_changes_between(before, between):
+    reads = 'force modify direct single_component_force single_component_force_name = .m.SF function = "VARVAL(.m.V)"\n'
+    assert np.allclose(ends(MODEL + before + reads + ONE + between + TWO), [5.0, 25.0], rtol=1e-6)
+
+
+def test_an_axis_changes_between():
+    # the second second: 10 m/s along x from 5 m, and 10 m/s^2 along z
+    turned = "marker modify marker_name = .m.ground.X orientation = 0, 0, 0\n"
+    result = run_deck(parse_view(MODEL + ONE + turned + TWO))
+    assert np.allclose(result.segments[-1].solution.com_position("P")[-1], [15.0, 0.0, 5.0], rtol=1e-6, atol=1e-9)
+
+
+def test_the_last_way_to_say_something_counts():
+    routine = "force modify direct single_component_force single_component_force_name = .m.SF user_function = 1, 2\n"
+    assert np.allclose(ends(MODEL + routine + FORTY + ONE), [10.0], rtol=1e-6)
+    assert parse_view(MODEL + FORTY + routine).deck.of(st.Sforce)[1].function == "USER(1, 2)"
+    modified = "simulation script modify sim_script_name = .m.S {}\n"
+    text = MODEL + SCRIPT.format("end_time = 1 number_of_steps = 2")
+    (command,) = parse_view(text + modified.format("duration = 2 step_size = 0.5")).script
+    assert command.text == "SIMULATE/DYNAMICS, DURATION=2, DTOUT=0.5"
+    (command,) = parse_view(text + modified.format('solver_commands = "simulate/static"')).script
+    assert command.text == "simulate/static"
+    with pytest.raises(DeckError, match=says("exclude", "solver_commands", "end_time")):
+        parse_view(text + modified.format('end_time = 2 solver_commands = "simulate/static"'))

@@ -19,8 +19,8 @@ PASSIVE = frozenset(
     "MARKER REQUEST VARIABLE ARRAY SPLINE CURVE MATRIX STRING PINPUT POUTPUT OUTPUT RESULTS GRAPHICS".split()
 )
 """Statements that change nothing of the motion as long as no other one names them."""
-ANEW = frozenset(("INTEGRATOR", "EQUILIBRIUM", "KINEMATICS", "IC", "OUTPUT", "RESULTS"))
-"""Settings: a command may give those that the deck does not have."""
+ANEW = frozenset(("INTEGRATOR", "EQUILIBRIUM", "KINEMATICS", "IC"))
+"""Settings: a command may give those that the deck does not have, and does not get."""
 DATA_FIRST = ("MARKER", "MATRIX", "ARRAY", "SPLINE", "CURVE", "STRING", "VARIABLE")
 ZERO = {"QP": "0, 0, 0", "REULER": "0, 0, 0"}
 """Of markers: arguments that are not written where they are zero."""
@@ -83,7 +83,7 @@ class Course:
         on, new = [], []
         for head, one in wanted.items():
             keyword = keyword_of(head)
-            if head not in self.statements:
+            if head not in self._arguments:
                 if keyword in SWITCHED and head in self.there:
                     self._off_at_first.append(head)
                     self._off.add(head)
@@ -91,7 +91,8 @@ class Course:
                     new.append(_joined(head, one.arguments))
                 elif keyword not in PASSIVE:
                     raise ChangeError(f"{_label(one)} is made between two simulations; {REMEDY}")
-                self.statements[head] = one
+                if keyword not in ANEW:
+                    self.statements[head] = one
                 self._arguments[head] = one.arguments, one.pair
             if self._arguments[head] != (one.arguments, one.pair):
                 given = self._new_arguments(one, *self._arguments[head])
