@@ -11,10 +11,15 @@ import importlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from gearmbs._lazy import Guessed
 from gearmbs.units import Given
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PLOTS = {
     "GearSpec": "gearmbs.view:wheel_plot",
@@ -109,10 +114,39 @@ def _code(value: Any) -> str:
     return repr(value)
 
 
+class PlotKeywords(TypedDict, total=False):
+    """Keywords of all functions that draw objects, for type checkers; which of them one has follows from its class."""
+
+    title: str | None
+    ax: Axes | None
+    # of pairs of gears; the places and points are theirs
+    driver_angle: float | None
+    torque: float | None
+    place: Any
+    points: Any
+    width: float | None
+    section: float
+    exaggeration: float
+    # of reports and studies
+    signal: xr.DataArray | None
+    channel: str | None
+    component: str | None
+    load: str | None
+    speed: Any
+    phase: xr.DataArray | None
+    tacho: str | None
+    pulses_per_rev: float
+    speed_channel: str | None
+    # of sweeps over speeds, whose figure is a waterfall
+    style: str
+    decibels: float | None
+    maximum: float | str | None
+
+
 class Shown(Guessed):
     """What objects that show themselves share."""
 
-    def plot(self, **options: Any) -> Any:
+    def plot(self, **options: Unpack[PlotKeywords]) -> Figure:
         """Draw the object and return the figure, which shows itself in notebooks.
 
         Parameters

@@ -25,10 +25,11 @@ References
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from numbers import Real
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypedDict, Unpack
 
 import numpy as np
 
@@ -45,7 +46,7 @@ from gearmbs.bearings.laws_kernel import (
 )
 from gearmbs.schema.described import Described, check_keys
 from gearmbs.schema.quantities import Measure
-from gearmbs.units import Quantity, doubt_of_material, to_si
+from gearmbs.units import Quantity, QuantityLike, doubt_of_material, to_si
 from gearmbs.wording import warn
 
 Length = Annotated[Quantity, Measure("length", above=0)]
@@ -55,6 +56,37 @@ GROOVE = Measure(above=0.5, below=1, remedy="a groove is wider than its ball: gi
 ELEMENT_SIZE = Measure("length", above=0, below=1)
 TOUCHING = 1e-9
 """Rounding of the diameters of bearings without a ring, whose needles run on the shaft or in the housing."""
+
+
+class BearingFields(TypedDict, total=False):
+    """Fields of a `Bearing` but for its designation, as they are given, for type checkers."""
+
+    elements: int
+    element_diameter: QuantityLike
+    pitch_diameter: QuantityLike
+    contact_angle: QuantityLike
+    kind: str
+    inner_curvature: QuantityLike
+    outer_curvature: QuantityLike
+    clearance: QuantityLike
+    roller_length: QuantityLike | None
+    row_distance: QuantityLike | None
+    bore: QuantityLike | None
+    outside_diameter: QuantityLike | None
+    width: QuantityLike | None
+    dynamic_rating: QuantityLike | None
+    static_rating: QuantityLike | None
+    youngs_modulus: QuantityLike
+    poisson_ratio: QuantityLike
+    density: QuantityLike
+    rating_source: str
+    estimated: Sequence[str]
+
+
+class ChangedFields(BearingFields, total=False):
+    """All fields of a `Bearing`, as they are given."""
+
+    designation: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +221,7 @@ class Bearing(Described):
                 )
 
     @classmethod
-    def from_designation(cls, designation: str, *, estimate: bool = False, **changes: Any) -> Bearing:
+    def from_designation(cls, designation: str, *, estimate: bool = False, **changes: Unpack[BearingFields]) -> Bearing:
         """Return a bearing by its designation, such as "6205" or "NU206"; see `gearmbs.bearings.catalogue`.
 
         Parameters
@@ -224,16 +256,17 @@ class Bearing(Described):
             return dynamic_rating(cls(**{**own, "dynamic_rating": None}))
 
         names = [item.name for item in fields(cls)]
-        found = look_up(designation, changes, names, rating if estimate else None)
+        found = look_up(designation, {**changes}, names, rating if estimate else None)
         rollers = found.get("kind") in KINDS and KINDS[found["kind"]].rollers
         if rollers and found.get("roller_length") is None and {"designation", "dynamic_rating"} <= found.keys():
             return roller_length_for(cls(**{**found, "roller_length": found["element_diameter"]}))
         return cls(**found)
 
-    def changed(self, **changes: Any) -> Bearing:
+    def changed(self, **changes: Unpack[ChangedFields]) -> Bearing:
         """Return the bearing with other values of some fields."""
         check_keys(changes, [item.name for item in fields(self)], "Bearing", BearingError)
-        return replace(self, **changes)
+        given: dict[str, Any] = {**changes}
+        return replace(self, **given)
 
     @property
     def rollers(self) -> bool:

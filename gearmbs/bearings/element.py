@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from gearmbs.mechanism.parts.quantities import Vector, frame_along
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearmbs.bearings.settings import BearingKeywords
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism import Mechanism
     from gearmbs.mechanism.parts.bodies import Marker
@@ -100,7 +101,7 @@ class RollingBearing(ForceElement):
         Diagnostic("loaded_elements", "1", COUNT),
     )
 
-    def __init__(self, name: str, i: Any, j: Any, bearing: Bearing, **settings: Any) -> None:
+    def __init__(self, name: str, i: Any, j: Any, bearing: Bearing, **settings: Unpack[BearingKeywords]) -> None:
         super().__init__(name, i, j)
         self.settings = bearing_settings(bearing, settings, "RollingBearing")
         self.tables = pack(self.settings)
@@ -112,7 +113,7 @@ class RollingBearing(ForceElement):
     @classmethod
     def between(
         cls, name: str, inner: Body, outer: Body, bearing: Bearing, *, at: Vector, axis: Vector = (0.0, 0.0, 1.0),
-        x: Vector | None = None, **settings: Any,
+        x: Vector | None = None, **settings: Unpack[BearingKeywords],
     ) -> RollingBearing:  # fmt: skip
         """Return a bearing between two bodies, as they stand now.
 
@@ -247,7 +248,7 @@ GROOVE = 0.35
 
 
 def add_bearing(
-    m: Mechanism, name: str, inner: Marker, outer: Marker, bearing: Bearing, **settings: Any
+    m: Mechanism, name: str, inner: Marker, outer: Marker, bearing: Bearing, **settings: Unpack[BearingKeywords]
 ) -> RollingBearing:
     """Add a rolling bearing between two markers; rings with a `LooseFit` become bodies of their own.
 
@@ -281,7 +282,8 @@ def add_bearing(
     >>> sorted(m.bodies)
     ['A.outer ring', 'shaft']
     """
-    defects = as_defects(settings.pop("defects", ()))
+    given: dict[str, Any] = {**settings}
+    defects = as_defects(given.pop("defects", ()))
     fits = {defect.part: defect for defect in defects if isinstance(defect, LooseFit)}
     rest = [defect for defect in defects if not isinstance(defect, LooseFit)]
     require(
@@ -291,7 +293,7 @@ def add_bearing(
         outer = _ring(m, name, OUTER, outer, fits[OUTER], bearing)
     if INNER in fits:
         inner = _ring(m, name, INNER, inner, fits[INNER], bearing)
-    made = RollingBearing(name, inner, outer, bearing=bearing, defects=rest, **settings)
+    made = RollingBearing(name, inner, outer, bearing=bearing, defects=rest, **given)
     m.add(made)
     return made
 

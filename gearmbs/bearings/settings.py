@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypedDict
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gearmbs.bearings.kinds import KINDS, BearingError, require
 from gearmbs.bearings.layout import MARGIN, spline_coefficients
 from gearmbs.schema.described import Described, make
 from gearmbs.schema.quantities import Measure, OneOf
-from gearmbs.units import Quantity
+from gearmbs.units import Quantity, QuantityLike
 
 SHARE = "give a share such as 0.01"
 Share = Annotated[Quantity, Measure(low=0)]
@@ -71,6 +71,27 @@ class BearingSettings(Described):
                 "has two; give it of a ring, or take a bearing with one row",
             )
             defect.check(self.bearing)
+
+
+class BearingKeywords(TypedDict, total=False):
+    """Fields of `BearingSettings` but for the bearing, as they are given, for type checkers."""
+
+    damping: QuantityLike
+    cage_slip: QuantityLike
+    slip_scatter: QuantityLike
+    slip_memory: QuantityLike
+    slip_seed: int
+    cage_angle: QuantityLike
+    preload: QuantityLike
+    sense: int
+    centrifugal: bool
+    smooth: QuantityLike
+    rolling_friction: QuantityLike
+    viscous_friction: QuantityLike
+    slow_speed: QuantityLike
+    slices: int
+    stiffness: QuantityLike | None
+    defects: Any
 
 
 def bearing_settings(bearing: Bearing, options: Mapping[str, Any], label: str) -> BearingSettings:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,8 @@ from scipy.optimize import nnls
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.bearing import Bearing
 from gearmbs.bearings.kinds import KINDS, BearingError, require
-from gearmbs.bearings.settings import BearingTables, bearing_settings, pack
-from gearmbs.units import Quantity, to_si
+from gearmbs.bearings.settings import BearingKeywords, BearingTables, bearing_settings, pack
+from gearmbs.units import QuantityLike, to_si
 from gearmbs.wording import warn
 
 # Where a load puts the inner ring: the minimum of a convex potential, and which loads have none.
@@ -343,6 +343,12 @@ class BearingState:
         )
 
 
+class StaticsKeywords(BearingKeywords, total=False):
+    """Keywords of `BearingStatics`, for type checkers."""
+
+    speed: QuantityLike
+
+
 class BearingStatics:
     """A bearing between two rings at rest or at a constant speed.
 
@@ -362,7 +368,7 @@ class BearingStatics:
     (13.93, 5)
     """
 
-    def __init__(self, bearing: Bearing, *, speed: Quantity = 0.0, **settings: Any) -> None:
+    def __init__(self, bearing: Bearing, *, speed: QuantityLike = 0.0, **settings: Unpack[BearingKeywords]) -> None:
         self.settings = bearing_settings(bearing, settings, "BearingStatics")
         try:
             self.speed = to_si(speed, "angular speed", "speed")
@@ -596,6 +602,6 @@ def _frames(place: np.ndarray, speed: float) -> np.ndarray:
     return frames
 
 
-def stiffness_matrix(bearing: Bearing, load: npt.ArrayLike, **settings: Any) -> np.ndarray:
+def stiffness_matrix(bearing: Bearing, load: npt.ArrayLike, **settings: Unpack[StaticsKeywords]) -> np.ndarray:
     """Return the stiffness of a bearing under a load, shape (5, 5), N/m, N/rad and N m/rad; see `BearingStatics`."""
     return BearingStatics(bearing, **settings).under(load).stiffness

@@ -11,7 +11,7 @@ from contextlib import ExitStack, nullcontext
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
 from gearmbs.campaigns.plans.plan import Plan
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from gearmbs.campaigns.stored.exports import ExportKeywords
     from gearmbs.campaigns.surrogates import ResponseSurface
     from gearmbs.view.figures.style import Picture
 
@@ -317,6 +318,7 @@ class Campaign:
 
         return open_dataset(self.folder)
 
+    # of which kind the answer is follows from the design, which a type does not say
     def sensitivity(self, result: str) -> Any:
         """Return what decides a result, by the design; see `gearmbs.campaigns.sensitivity.sensitivity`."""
         from gearmbs.campaigns.sensitivity import sensitivity
@@ -329,7 +331,7 @@ class Campaign:
 
         return response_surface(self, result, degree)
 
-    def export(self, target: str | Path, format: str = "parquet", **settings: Any) -> list[Path]:
+    def export(self, target: str | Path, format: str = "parquet", **settings: Unpack[ExportKeywords]) -> list[Path]:
         """Write the campaign as CSV, NetCDF, MATLAB or parquet; see `gearmbs.campaigns.stored.exports.export`."""
         from gearmbs.campaigns.stored.exports import export
 
@@ -382,6 +384,7 @@ class Campaign:
 
         return write_report(self, path, results)
 
+    # what it is follows from the subject of the plan, which a campaign that is opened reads from its folder
     def case(self, index: int) -> Any:
         """Return the thing that a case simulates, made again from the plan."""
         unit = self._unit_of(index)

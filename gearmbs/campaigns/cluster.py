@@ -249,6 +249,7 @@ def batch_cluster(system: str, *, walltime: str = "01:00:00", memory: str = "2GB
     return getattr(dask_jobqueue, BATCH[system])(**{**own, **settings})
 
 
+# what a batch system takes beside is known to dask-jobqueue alone
 @contextmanager
 def dask_client(address: str, workers: int | None = None, **settings: Any) -> Iterator[Any]:
     """Yield a client of a scheduler.

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from gearmbs.schema.described import check_keys
 from gearmbs.schema.quantities import Measure
@@ -143,6 +143,9 @@ def limit(value: Any, name: str, example: str) -> float:
 
 DIGITS = 12
 
+Tree: TypeAlias = "bool | int | float | str | list[Tree] | dict[str, Tree] | None"
+"""A canonical form."""
+
 
 def rounded(value: float) -> float:
     """Return a number to twelve significant digits, minus zero as zero."""
@@ -152,7 +155,7 @@ def rounded(value: float) -> float:
     return float(f"{number:.{DIGITS - 1}e}") + 0.0
 
 
-def canonical(value: Any) -> Any:
+def canonical(value: Any) -> Tree:
     """Return a value as a canonical tree.
 
     Raises

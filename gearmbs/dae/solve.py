@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.options import OptionKeywords, Options
 from gearmbs.dae.methods import those_that
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
-from gearmbs.dae.user_problem import as_problem
+from gearmbs.dae.user_problem import EquationKeywords, as_problem
 from gearmbs.progress import time_bar
 from gearmbs.wording import any_of
 
@@ -22,6 +22,10 @@ DEFAULT_RTOL = 1e-6
 """Relative tolerance where none is given: six digits, a local error far below that of most data."""
 OF_EQUATIONS = ("error_mask", "differential", "jac", "jac_sparsity", "p", "scale", "names")
 """Arguments of `as_problem` that `solve_dae` hands on."""
+
+
+class SolveKeywords(OptionKeywords, EquationKeywords, total=False):
+    """What `solve_dae` takes beside its own arguments, for type checkers."""
 
 
 def _event_rules(events: Sequence[Callable]) -> dict[str, Any]:
@@ -60,7 +64,7 @@ def solve_dae(
     events: Callable | Sequence[Callable] | None = None,
     t_eval: npt.ArrayLike | None = None,
     options: Options | None = None,
-    **more: Any,
+    **more: Unpack[SolveKeywords],
 ) -> DAEResult:
     """Solve an implicit system G(t, y, y') = 0 of index one or two, or three with an ``error_mask``.
 
@@ -115,8 +119,9 @@ def solve_dae(
     >>> round(float(result.y[-1, 0]), 6)
     0.367879
     """
-    of_equations = {name: more.pop(name) for name in OF_EQUATIONS if name in more}
-    chosen = Options.gather(method, options, more, "beside what is said of the equations ")
+    settings: dict[str, Any] = {**more}
+    of_equations = {name: settings.pop(name) for name in OF_EQUATIONS if name in settings}
+    chosen = Options.gather(method, options, settings, "beside what is said of the equations ")
     t0, t_end = (float(t) for t in t_span)
     if not (np.isfinite([t0, t_end]).all() and t_end > t0):
         raise ValueError(f"t_span is ({t0:g}, {t_end:g}); it must be two increasing, finite times")

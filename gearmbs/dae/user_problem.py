@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -412,6 +412,18 @@ def _start(y0: npt.ArrayLike, atol: npt.ArrayLike, scale: npt.ArrayLike) -> tupl
     if not (atols > 0).all():
         raise ValueError(f"atol must be positive, is {atols.min():g} for unknown {int(np.argmin(atols))}")
     return y0, atols, _vector(scale, len(y0), "scale")
+
+
+class EquationKeywords(TypedDict, total=False):
+    """What is to be said of equations beside them, for type checkers: arguments of `as_problem`."""
+
+    p: np.ndarray | None
+    scale: float | np.ndarray
+    error_mask: np.ndarray | None
+    differential: np.ndarray | None
+    jac: Callable | None
+    jac_sparsity: Any
+    names: Sequence[str]
 
 
 def as_problem(

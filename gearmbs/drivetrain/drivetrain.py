@@ -61,7 +61,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypedDict, TypeVar, Unpack
 
 from gearmbs._lazy import Guessed
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
@@ -105,6 +105,25 @@ KINDS: dict[str, type[Part]] = {
     "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor, "planetary_stages": PlanetaryStage,
 }  # fmt: skip
 """What each group holds."""
+
+
+class DrivetrainKeywords(TypedDict, total=False):
+    """Fields of a `Drivetrain`, for type checkers."""
+
+    name: str
+    shafts: Sequence[Shaft]
+    wheels: Sequence[Wheel]
+    meshes: Sequence[GearMesh]
+    bearings: Sequence[Bearing]
+    couplings: Sequence[Coupling]
+    housings: Sequence[Housing]
+    drives: Sequence[Drive]
+    loads: Sequence[Load]
+    sensors: Sequence[Sensor]
+    planetary_stages: Sequence[PlanetaryStage]
+    gravity: tuple[float, float, float]
+    run_up: float
+    running: bool
 
 
 @dataclass(frozen=True)
@@ -204,6 +223,7 @@ class Drivetrain(Guessed):
                 groups[group].append(part)
         return replace(self, **groups)
 
+    # of which kind the part is, and so which fields it has, follows from its name
     def changed(self, name: str, **fields: Any) -> Drivetrain:
         """Return a drivetrain with fields of one part changed; of a mesh, ``settings`` are merged."""
         part: Part = self.part(name)
@@ -312,7 +332,7 @@ class Drivetrain(Guessed):
 
         return modal_models(self)
 
-    def of_same_bodies(self, **changes: Any) -> Drivetrain:
+    def of_same_bodies(self, **changes: Unpack[DrivetrainKeywords]) -> Drivetrain:
         """Return a drivetrain with other drives, loads or meshes, whose bodies that deform are not made again."""
         out = replace(self, **changes)
         if "modal_models" in self.__dict__:

@@ -89,6 +89,7 @@ class GearMesh(Part):
     settings: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
     pair: Any = None
 
+    # a pair, an ideal mesh, or what a user's own function makes of the wheels
     def make(self, driver: GearSpec, driven: GearSpec, rotation: Any, torque: float) -> Any:
         """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""
         with errors_named(self.label):

@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Unpack
 
 import numpy as np
 import scipy.linalg
@@ -30,6 +30,7 @@ from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
+    from gearmbs.bearings.settings import BearingKeywords
     from gearmbs.drivetrain.drivetrain import Drivetrain
     from gearmbs.drivetrain.placement import Layout
     from gearmbs.mechanism.mechanism import Mechanism
@@ -154,7 +155,7 @@ def pin_bearing(given: Any) -> Support | PinBearing | None:
     return rolling_pins(table.pop("rolling"), **table)
 
 
-def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
+def rolling_pins(bearing: Any, **settings: Unpack[BearingKeywords]) -> PinBearing:
     """Return what puts rolling bearings between pins and planets, for `planetary_mechanism` and `PlanetaryRun`.
 
     Parameters

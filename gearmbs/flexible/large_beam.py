@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,9 @@ from gearmbs.kernels.jit import njit
 from gearmbs.mechanism import Body, Compiled, Diagnostic, ForceElement, Marker, Mechanism
 from gearmbs.mechanism.parts.quantities import frame_along, quantity, vector
 from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.parts.keywords import MotionKeywords
 
 
 @dataclass(eq=False, repr=False)
@@ -122,7 +125,7 @@ def add_beam(
     *,
     x_axis: npt.ArrayLike | None = None,
     damping_time: Quantity = 0.0,
-    **motion: Any,
+    **motion: Unpack[MotionKeywords],
 ) -> BeamChain:
     """Add a straight beam that may bend, twist and turn as far as it likes.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,9 @@ from gearmbs.flexible.stress import KnownStresses, StressModes, StressRecovery
 from gearmbs.mechanism import Mechanism, ModalBody, Mode, ShapeIntegrals
 from gearmbs.mechanism.parts.modal import COUPLING, ShapedMarker
 from gearmbs.wording import warn
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.parts.keywords import PlaceKeywords
 
 # Named places of a modal body.
 
@@ -381,7 +384,7 @@ class ModalModel:
         damping: Damping = 0.01,
         coupling: str = "full",
         start: Sequence[float] | None = None,
-        **where: Any,
+        **where: Unpack[PlaceKeywords],
     ) -> ModalBody:
         """Add the body to a mechanism.
 

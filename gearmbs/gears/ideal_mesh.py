@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import convert_fields
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, ForceElement, Setting
-from gearmbs.units import Quantity, shown, to_si
+from gearmbs.units import Quantity, QuantityLike, shown, to_si
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:
@@ -29,6 +29,26 @@ SOFTEST = 0.1
 """Deflection under the pair's torque, by the module, that no teeth have: steel yields at some thousandths of it."""
 POINTS = 64
 """Least number of points of the tables over a mesh cycle."""
+
+
+class PartingKeywords(TypedDict, total=False):
+    """Fields of an `IdealMesh` about its backlash, as they are given, for type checkers."""
+
+    backlash: bool
+    depth: QuantityLike
+
+
+class DampedKeywords(PartingKeywords, total=False):
+    """Further fields of an `IdealMesh` whose curves are known."""
+
+    damping: QuantityLike
+
+
+class CurveKeywords(PartingKeywords, total=False):
+    """Further fields of an `IdealMesh` whose damping is known."""
+
+    stiffness_curve: Sequence[float] | None
+    error: Sequence[float] | None
 
 
 @dataclass(frozen=True)
@@ -110,7 +130,7 @@ class IdealMesh(Written):
 
     @classmethod
     def from_contact(
-        cls, pair: GearPair, torque: float | None = None, points: int = POINTS, **others: Any
+        cls, pair: GearPair, torque: float | None = None, points: int = POINTS, **others: Unpack[DampedKeywords]
     ) -> IdealMesh:
         """Mesh with the stiffness curve and the transmission error that a pair's tooth contact has under a torque.
 
@@ -139,7 +159,7 @@ class IdealMesh(Written):
 
     @classmethod
     def with_damping_ratio(
-        cls, pair: GearPair, stiffness: Quantity, ratio: float | None = None, **others: Any
+        cls, pair: GearPair, stiffness: QuantityLike, ratio: float | None = None, **others: Unpack[CurveKeywords]
     ) -> IdealMesh:
         """Mesh whose damping is a ratio of the critical one of the bare wheels on it.
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, Unpack
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from gearmbs.gears.modifications import Fault
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 from gearmbs.gears.tables import fillet_clearance, pack
-from gearmbs.units import Quantity, shown, to_si
+from gearmbs.units import Quantity, QuantityLike, shown, to_si
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:
@@ -39,6 +40,35 @@ _OF_GEOMETRY = {item.name for item in fields(PairGeometry)} | {
     name for name, item in vars(PairGeometry).items() if isinstance(item, cached_property) and name != "_name"
 }
 """Fields of a pair and what follows from them that its geometry has, too."""
+
+
+class PairKeywords(TypedDict, total=False):
+    """Fields of a `GearPair`, as they are given, for type checkers."""
+
+    driver: GearSpec
+    driven: GearSpec
+    centre_distance_error: QuantityLike
+    misalignment: QuantityLike
+    plane: Literal["skew", "inclination"]
+    pivot: QuantityLike
+    axial_shift: QuantityLike
+    backlash: QuantityLike
+    contact: ContactLaw
+    friction: FlankFriction
+    rotation: Literal[1, -1]
+    torque: QuantityLike | None
+    slices: int | None
+    load: Literal["slices", "adams"]
+    root_contact: bool | None
+    stiffness_curve: Literal["constant", "potential-energy"]
+    faults: Sequence[Fault]
+    input_torque: QuantityLike | None
+
+
+class PaperKeywords(PairKeywords, total=False):
+    """What may be changed of the paper's pair: its fields, and the face width of both wheels."""
+
+    face_width: QuantityLike
 
 
 @dataclass(frozen=True)
@@ -211,7 +241,7 @@ class GearPair(PairGeometry, Shown):
         return OperatingPoint(self.torque, self.rotation, "GearPair")  # type: ignore[call-arg]
 
     @classmethod
-    def paper(cls, **changes: Any) -> GearPair:
+    def paper(cls, **changes: Unpack[PaperKeywords]) -> GearPair:
         """The paper's pair: z = 29/29, m = 95/31 mm, alpha = 20 deg, face width 20 mm, IMPACT and ADAMS friction.
 
         The printed module 3.065 mm is 95/31 = 3.064516 mm rounded: with r_a = 47.5 mm = (29/2 + 1) m exactly, the
@@ -223,22 +253,24 @@ class GearPair(PairGeometry, Shown):
         **changes
             Any field of `GearPair`, and ``face_width``.
         """
-        width = changes.pop("face_width", "20 mm")
+        given: dict[str, Any] = {**changes}
+        width = given.pop("face_width", "20 mm")
         module = 95e-3 / 31
         for name in ("driver", "driven"):
-            changes.setdefault(name, GearSpec(29, module, face_width=width, name=name))
-        return cls(**changes)
+            given.setdefault(name, GearSpec(29, module, face_width=width, name=name))
+        return cls(**given)
 
-    def with_changes(self, **changes: Any) -> GearPair:
+    def with_changes(self, **changes: Unpack[PairKeywords]) -> GearPair:
         """A copy with some fields changed, or with another ``input_torque``.
 
         A pair that was given its ``input_torque`` keeps that, whatever its wheels change to.
         """
-        if changes.get("torque") is None:
-            changes.setdefault("input_torque", self._input_torque)
-        if changes.get("input_torque") is not None:
-            changes.setdefault("torque", None)
-        return replace(self, **changes)
+        given: dict[str, Any] = {**changes}
+        if given.get("torque") is None:
+            given.setdefault("input_torque", self._input_torque)
+        if given.get("input_torque") is not None:
+            given.setdefault("torque", None)
+        return replace(self, **given)
 
     def with_faults(self, *faults: Fault) -> GearPair:
         """A copy with these faults added to those it has."""

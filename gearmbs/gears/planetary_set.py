@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from gearmbs.gears.mesh import ContactLaw, FlankFriction, sense_of_rotation
 from gearmbs.gears.modifications import Fault
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, convert_fields
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity, QuantityLike, to_si
 from gearmbs.wording import did_you_mean, warn
 
 MEMBERS = ("sun", "carrier", "ring")
@@ -514,9 +514,31 @@ class PlanetarySet(Written):
         return {"ring": rings[0], "planets": np.array(planets), "steps": np.array(steps)}
 
 
+class PlanetaryKeywords(TypedDict, total=False):
+    """Fields of a `PlanetarySet` but for its wheels and their number, as they are given, for type checkers."""
+
+    angles: Sequence[QuantityLike] | None
+    carrier_radius: QuantityLike | None
+    planet_at_ring: GearSpec | None
+    backlash_sun: QuantityLike
+    backlash_ring: QuantityLike
+    contact: ContactLaw | None
+    friction: FlankFriction
+    slices: int | None
+    pin_errors: Mapping[int, tuple[Any, Any]]
+    faults: Sequence[tuple[str, Fault]]
+    rotation: int
+    ideal: tuple[float, float] | None
+    ideal_damping: float
+    ideal_backlash: bool
+    stiffness: QuantityLike | None
+    damping_ratio: float | None
+    name: str
+
+
 def planetary(
     teeth: tuple[int, int, int],
-    module: Quantity,
+    module: QuantityLike,
     planets: int = 3,
     *,
     helix_angle: Quantity = 0.0,
@@ -525,7 +547,7 @@ def planetary(
     profile_shifts: tuple[float, float, float] = (0.0, 0.0, 0.0),
     pressure_angle: Quantity = "20 deg",
     wheels: Mapping[str, Any] | None = None,
-    **settings: Any,
+    **settings: Unpack[PlanetaryKeywords],
 ) -> PlanetarySet:
     """Make a planetary set from the teeth of sun, planet and ring.
 

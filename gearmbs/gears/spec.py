@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from numbers import Integral, Real
-from typing import Any, Literal
+from typing import Literal, TypedDict, Unpack
 
 from gearmbs._display import Shown, Written
-from gearmbs.units import Given, Quantity, doubt_of_material, shown, to_si, truth
+from gearmbs.units import Given, Quantity, QuantityLike, doubt_of_material, shown, to_si, truth
 from gearmbs.wording import warn
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
@@ -78,6 +78,36 @@ class Material(Written):
         doubt = doubt_of_material(self.youngs_modulus, self.density)
         if doubt:
             warn(f"Material '{self.name}': {doubt}")
+
+
+class WheelKeywords(TypedDict, total=False):
+    """Fields of `GearSpec` that every way to make one hands on, as they are given, for type checkers."""
+
+    pressure_angle: QuantityLike
+    face_width: QuantityLike
+    fillet_radius: QuantityLike | None
+    profile_shift: float
+    thinning: QuantityLike
+    tip_rounding: QuantityLike
+    bore_radius: QuantityLike
+    material: Material
+    helix_angle: QuantityLike
+    hand: Literal["right", "left"]
+    rim_thickness: QuantityLike | None
+
+
+class OfRadiiKeywords(WheelKeywords, total=False):
+    """Further fields of a wheel that is given by its radii."""
+
+    name: str
+    internal: bool
+
+
+class RingKeywords(WheelKeywords, total=False):
+    """Further fields of an internal wheel."""
+
+    addendum: QuantityLike | None
+    dedendum: QuantityLike | None
 
 
 @dataclass(frozen=True)
@@ -244,10 +274,10 @@ class GearSpec(Shown, Written):
     def from_radii(
         cls,
         teeth: int,
-        module: Quantity,
-        tip_radius: Quantity,
-        root_radius: Quantity,
-        **others: Any,
+        module: QuantityLike,
+        tip_radius: QuantityLike,
+        root_radius: QuantityLike,
+        **others: Unpack[OfRadiiKeywords],
     ) -> GearSpec:
         """Wheel from its tip and root radii instead of addendum and dedendum."""
         name = str(others.get("name", "gear"))
@@ -270,7 +300,13 @@ class GearSpec(Shown, Written):
 
     @classmethod
     def ring(
-        cls, teeth: int, module: Quantity, *, outward_shift: float | None = None, name: str = "ring", **others: Any
+        cls,
+        teeth: int,
+        module: QuantityLike,
+        *,
+        outward_shift: float | None = None,
+        name: str = "ring",
+        **others: Unpack[RingKeywords],
     ) -> GearSpec:
         """Internal wheel.
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
-from gearmbs.identify.fit import SIMULATION_STEP, central, fit, noise_of_columns
+from gearmbs.identify.fit import SIMULATION_STEP, FitKeywords, central, fit, noise_of_columns
 from gearmbs.identify.identifiability import LIMIT, Identifiability
 from gearmbs.identify.parameters import Fit, Free, IdentifyError, Scale
 from gearmbs.progress import staged
@@ -45,6 +45,15 @@ EXPERIMENTS: dict[str, dict[str, Any]] = {
 """What most benches can do: by field a factor for speed and torque, else the new value."""
 
 FACTORS = ("operation.speed", "operation.torque")
+
+
+class ProblemKeywords(TypedDict, total=False):
+    """Keywords of `CaseProblem`, for type checkers."""
+
+    gains: Gains
+    channels: Mapping[str, str] | None
+    way: str
+    workers: int
 
 
 class CaseProblem:
@@ -163,7 +172,7 @@ class CaseProblem:
 
     def case(self, name: str, p: Sequence[float]) -> Case:
         """Return a case with the parameters p."""
-        sections: dict[str, dict[str, float]] = {}
+        sections: dict[str, Any] = {}
         for free, value in zip(self.free, p):
             for path, factor in {free.name: 1.0, **free.also}.items():
                 owner, _, place = path.rpartition(":")
@@ -283,12 +292,12 @@ class CaseProblem:
         floor = size * noise_of_columns(many, z, h, matrix / size) if noise else np.zeros(len(self.free))
         return Identifiability(scale.names, matrix, floor, limit)
 
-    def fit(self, **settings: Any) -> Fit:
+    def fit(self, **settings: Unpack[FitKeywords]) -> Fit:
         """Find the parameters; see `gearmbs.identify.fit` for the settings.
 
         The step and the end of the search are those that fit the integrator's noise.
         """
-        settings = {"step": SIMULATION_STEP, "tolerance": 1e-4, **settings}
+        chosen: FitKeywords = {"step": SIMULATION_STEP, "tolerance": 1e-4, **settings}
         return fit(
             lambda p: self.predictions([p])[0],
             self.measured,
@@ -296,7 +305,7 @@ class CaseProblem:
             sigma=self.sigma,
             many=self.predictions,
             lost=self.lost,
-            **settings,
+            **chosen,
         )
 
 
@@ -309,7 +318,7 @@ def identify(
     tell: Callable[[str], None] | None = None,
     starts: int = 1,
     progress: Callable[[float, str], None] | None = None,
-    **settings: Any,
+    **settings: Unpack[ProblemKeywords],
 ) -> Fit:
     """Find parameters of cases from measured mesh harmonics.
 
@@ -353,7 +362,7 @@ def identify(
     return problem.fit(starts=starts, progress=progress)
 
 
-def compare_models(problems: Mapping[str, CaseProblem], **settings: Any) -> pd.DataFrame:
+def compare_models(problems: Mapping[str, CaseProblem], **settings: Unpack[FitKeywords]) -> pd.DataFrame:
     """Fit several models to the same data and compare them: skew or inclination, with or without friction.
 
     Returns
@@ -540,7 +549,7 @@ def _worth(problem: CaseProblem, name: str, changes: Mapping[str, Any], of: str,
 
 def _changed(problem: CaseProblem, changes: Mapping[str, Any], of: str) -> Any:
     case = problem.cases[of]
-    sections: dict[str, dict[str, Any]] = {}
+    sections: dict[str, Any] = {}
     for path, value in changes.items():
         section, _, field = path.partition(".")
         holder = getattr(case, section, None)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,6 +86,19 @@ USUAL_STEPS = 10
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 POLISH = 50
 """Gauss-Newton steps at most after the search."""
+
+
+class FitKeywords(TypedDict, total=False):
+    """How a model is fitted: keywords of `fit` but for the scatter of what is measured, for type checkers."""
+
+    absolute_sigma: bool
+    step: float
+    starts: int
+    loss: str
+    tolerance: float
+    most_runs: int
+    seed: int
+    progress: Progress | None
 
 
 @staged("fitting")

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from gearmbs.signals.analysis.bands import MeshKeywords
     from gearmbs.studies import Case
 
 SECTIONS = ("recording", "case", "free", "measured", "gains", "channels", "starts", "workers", "experiment")
@@ -38,7 +39,7 @@ def harmonic_table(
     sections: int = 8,
     floor: float = 0.02,
     channels: Sequence[str] | None = None,
-    **settings: Any,
+    **settings: Unpack[MeshKeywords],
 ) -> pd.DataFrame:
     """Return the RMS of the mesh harmonics of recordings with their relative standard deviations.
 

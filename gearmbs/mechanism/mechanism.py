@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from gearmbs.dae.analyses.plant import LinearPlant
     from gearmbs.dae.analyses.statics import StaticResult
     from gearmbs.dae.results.solution import Solution
+    from gearmbs.mechanism.parts.keywords import BodyKeywords, FrictionKeywords
     from gearmbs.mechanism.solve.keywords import SimulateOptions
+    from gearmbs.mechanism.solve.measures import Measures
 
 E = TypeVar("E", bound=ForceElement)
 
@@ -222,7 +224,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         shapes: Shapes,
         *,
         integrals: ShapeIntegrals | None = None,
-        **where: Any,
+        **where: Unpack[BodyKeywords],
     ) -> ModalBody:
         """Add a body that deforms by modes; its markers move and turn with their shapes.
 
@@ -406,7 +408,12 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
 
     @keeps_given
     def friction(
-        self, name: str, joint: jt.Joint, mu_static: QuantityLike, mu_dynamic: QuantityLike, **parameters: Any
+        self,
+        name: str,
+        joint: jt.Joint,
+        mu_static: QuantityLike,
+        mu_dynamic: QuantityLike,
+        **parameters: Unpack[FrictionKeywords],
     ) -> list[FrictionForce]:
         """Add dry friction to a revolute, translational, cylindrical, spherical or universal joint.
 
@@ -427,7 +434,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         self._check_name(name)
         if self.joints.get(getattr(joint, "name", "")) is not joint:
             raise ModelError(f"friction '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
-        return add_friction(self, name, joint, friction_of(name, mu_static, mu_dynamic, parameters, self.units))
+        return add_friction(self, name, joint, friction_of(name, mu_static, mu_dynamic, {**parameters}, self.units))
 
     def general_constraint(self, name: str, expression: str) -> None:
         """Demand that an expression of positions and time vanish (ADAMS's GCON)."""
@@ -483,7 +490,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
 
         return linearize(self, inputs, outputs, at=at, t=t)
 
-    def measures(self, solution: Solution) -> Any:
+    def measures(self, solution: Solution) -> Measures:
         """Return what can be measured on a solution of this mechanism; its methods offer it by name."""
         from gearmbs.mechanism.solve.measures import Measures
 

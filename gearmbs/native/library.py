@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import gearmbs
 from gearmbs.dae.problem import ModelError
@@ -26,6 +26,10 @@ from gearmbs.native.kernels import Kernels
 from gearmbs.native.memory import Memory, memory_of
 from gearmbs.native.outputs import Told, chosen_outputs
 from gearmbs.wording import any_of
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.solve.keywords import SimulatorOptions
+    from gearmbs.units import QuantityLike
 
 PORTABLE = {"x86_64": "x86-64-v3", "AMD64": "x86-64-v3"}
 """Processors that libraries are made for, by the kind of machine: those of the last ten years, with fused products."""
@@ -67,13 +71,13 @@ def export(
     folder: str | Path,
     *,
     target: str = "so",
-    t_end: Any = None,
+    t_end: QuantityLike | None = None,
     name: str | None = None,
     outputs: Sequence[Any] | None = None,
     processor: str | None = None,
     compiler: str | None = None,
     report: Callable[[str], None] | None = None,
-    **options: Any,
+    **options: Unpack[SimulatorOptions],
 ) -> Exported:
     """Write a model as a shared library with a C header, which needs neither Python nor a compiler where it is used.
 
@@ -119,7 +123,8 @@ def export(
     if isinstance(model, Mechanism):
         if t_end is None:
             raise ModelError("t_end: an exported model has a latest time that can be asked for; give it, s")
-        model = Simulator(model, t_end, lump=options.pop("lump", False), records=False, **options)
+        settings: SimulatorOptions = {"lump": False, **options}
+        model = Simulator(model, t_end, records=False, **settings)
     elif t_end is not None or options:
         raise ModelError("a simulator has its end and options already; give t_end and options with a mechanism")
     command = c_compiler(compiler)

@@ -171,6 +171,7 @@ class Described(Written):
         if wrong:
             raise self.error("; ".join(wrong))
 
+    # a number, or as many as the measure says
     def read(self, field: str, value: Any, measure: Measure) -> Any:
         """Return what a value of a field is in SI, where its annotation cannot say what it measures."""
         try:

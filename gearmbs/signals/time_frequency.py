@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 import scipy.fft
@@ -13,15 +13,44 @@ import xarray as xr
 
 from gearmbs.progress import waiting
 from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.rotation.keywords import ShaftAndDataKeywords, ShaftKeywords
 from gearmbs.signals.rotation.shaft import REMEDY, shaft_phase
 from gearmbs.signals.signal.arguments import as_given, in_si, takes_data
 from gearmbs.signals.signal.given import STEADY, speed_curve
 from gearmbs.signals.signal.signal import common_unit, rate_of
 from gearmbs.signals.spectra import SCALINGS, spectral_unit, spectrum
 
+if TYPE_CHECKING:
+    from gearmbs.signals.signal.inputs import Given, Units
+
 Scaling = Literal["amplitude", "rms", "power", "density"]
 SLICES = 200
 """So many windows a spectrogram has by default, about."""
+
+
+class SpectrogramKeywords(ShaftAndDataKeywords, total=False):
+    """Keywords of `spectrogram` but for the highest frequency, for type checkers."""
+
+    segment: float | str | None
+    overlap: float
+    scaling: Scaling
+    window: str | tuple
+    speed: Any
+
+
+class WaterfallKeywords(ShaftAndDataKeywords, total=False):
+    """Keywords of `waterfall` but for the highest frequency, for type checkers."""
+
+    speed: Any
+    segment: float | str | None
+    steps: int | None
+    scaling: Scaling
+
+
+class SweepWaterfallKeywords(WaterfallKeywords, total=False):
+    """All keywords of `waterfall`."""
+
+    maximum: float | str | None
 
 
 @takes_data(segment="time", maximum="frequency")
@@ -34,7 +63,7 @@ def spectrogram(
     window: str | tuple = "hann",
     maximum: float | str | None = None,
     speed: Any = None,
-    **shaft: Any,
+    **shaft: Unpack[ShaftAndDataKeywords],
 ) -> xr.DataArray:
     """Short-time Fourier transform: how the spectrum changes over time.
 
@@ -107,7 +136,8 @@ def spectrogram(
         },
     )
     try:
-        phase = shaft_phase(signal, speed, **shaft)
+        known: Mapping[str, Any] = shaft
+        phase = shaft_phase(signal, speed, **known)
     except MissingMetadataError:
         return result
     own = phase["time"].values
@@ -124,11 +154,11 @@ def waterfall(
     steps: int | None = None,
     scaling: Scaling = "amplitude",
     maximum: float | str | None = None,
-    rate: float | str | None = None,
-    units: Any = None,
+    rate: Given | None = None,
+    units: Units | None = None,
     channels: Sequence[str] | None = None,
     gaps: str | None = None,
-    **shaft: Any,
+    **shaft: Unpack[ShaftKeywords],
 ) -> xr.DataArray:
     """Spectra against speed: of one run-up, or of records taken each at its own speed.
 
@@ -173,7 +203,7 @@ def waterfall(
         speed, signals = list(signals), list(signals.values())
     length: float | None = in_si(segment, "time", "segment")
     top: float | None = in_si(maximum, "frequency", "maximum")
-    given = {"rate": rate, "units": units, "channels": channels, "gaps": gaps}
+    given: dict[str, Any] = {"rate": rate, "units": units, "channels": channels, "gaps": gaps}
     samples = isinstance(signals, str) or (isinstance(signals, Sequence) and all(np.isscalar(v) for v in signals[:2]))
     if isinstance(signals, Sequence) and (not samples or not signals):
         return _of_sweep([as_given(record, given) for record in signals], speed, length, scaling, top)

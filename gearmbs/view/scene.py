@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -17,6 +17,9 @@ from gearmbs.view.figures.style import DPI, ENDINGS, VERMILLION, look, new_figur
 from gearmbs.view.mesh import Mesh, corner_normals, feature_edges, feature_ends
 from gearmbs.view.pages import Page, packed, rounded
 from gearmbs.view.render import Camera, render
+
+if TYPE_CHECKING:
+    import plotly.graph_objects
 
 AZIMUTH, ELEVATION = 38.0, 22.0
 UP = (0.0, 1.0, 0.0)
@@ -99,6 +102,18 @@ class Part:
         if self.deflection is not None:
             mesh = Mesh(mesh.vertices + self.deflection.at(instant), mesh.triangles)
         return mesh.placed(self.origins[instant], self.axes[instant])
+
+
+class StillKeywords(TypedDict, total=False):
+    """Keywords of `Scene.still`, for type checkers."""
+
+    instant: int
+    azimuth: float
+    elevation: float
+    width: float
+    height: float | None
+    dpi: float
+    title: str | None
 
 
 @dataclass
@@ -244,7 +259,7 @@ class Scene:
                 image = np.concatenate([colour / np.maximum(opaque, 1e-9), opaque], axis=2)
         return image
 
-    def save(self, path: str | Path, **options: Any) -> Path:
+    def save(self, path: str | Path, **options: Unpack[StillKeywords]) -> Path:
         """Write the scene: ``.html`` to turn and play, ``.png`` of one instant, ``.gif``, ``.mp4`` (by ffmpeg) of all.
 
         Parameters
@@ -255,7 +270,7 @@ class Scene:
         """
         ending = Path(path).suffix.lower()
         if ending in ENDINGS:
-            return write_film(path, self._pictures(110 if ending == ".mp4" else 70, options), len(self))
+            return write_film(path, self._pictures(110 if ending == ".mp4" else 70, {**options}), len(self))
         if ending == ".png":
             with waiting(f"saving {Path(path).name}"), whole_file(path) as part:
                 self.still(**options).savefig(part, dpi=DPI)
@@ -296,7 +311,7 @@ class Scene:
         return self.page().save(path)
 
     @waiting("preparing the figure")
-    def plotly(self, frames: int = 24) -> Any:
+    def plotly(self, frames: int = 24) -> plotly.graph_objects.Figure:
         """Return a plotly figure (needs the extra ``view``), animated over at most so many instants."""
         return plotly_figure(self, frames)
 
@@ -363,7 +378,7 @@ def _part(part: Part) -> dict:
 # A scene as a plotly figure, for notebooks that use plotly (extra ``view``).
 
 
-def plotly_figure(scene: Scene, frames: int = 24) -> Any:
+def plotly_figure(scene: Scene, frames: int = 24) -> plotly.graph_objects.Figure:
     """Return a plotly figure of a scene, animated over at most ``frames`` of its instants.
 
     Raises

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 import numpy as np
 
@@ -323,6 +323,38 @@ def _contact_forces(solution: Solution, chosen: np.ndarray) -> list[np.ndarray]:
 PART_COLOURS = {"sun": BLUE, "planet": ORANGE, "ring": GREEN, "carrier": SHAFT}
 PIN, ARM, GAP = 0.45, 0.25, 0.1
 """Radius of pins by that of the planets' roots, thickness of arms and their distance by the face width."""
+
+
+class SceneKeywords(TypedDict, total=False):
+    """Keywords that `mechanism_scene` and `solution_scene` share, for type checkers."""
+
+    shapes: Mapping[str, Mesh] | None
+    joints: bool
+    factor: float | None
+    title: str | None
+
+
+class MechanismSceneKeywords(SceneKeywords, total=False):
+    """Keywords of `mechanism_scene`."""
+
+    through: Collection[str]
+
+
+class SolutionSceneKeywords(SceneKeywords, total=False):
+    """Keywords of `solution_scene`."""
+
+    start: float | None
+    stop: float | None
+    frames: int
+    forces: bool
+
+
+@overload
+def planetary_scene(gears: PlanetarySet, source: Mechanism, **options: Unpack[MechanismSceneKeywords]) -> Scene: ...
+
+
+@overload
+def planetary_scene(gears: PlanetarySet, source: Solution, **options: Unpack[SolutionSceneKeywords]) -> Scene: ...
 
 
 def planetary_scene(gears: PlanetarySet, source: Mechanism | Solution, **options: Any) -> Scene:

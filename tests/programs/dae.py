@@ -17,6 +17,9 @@ def robertson(t: float, y: np.ndarray, yp: np.ndarray, out: np.ndarray) -> None:
 
 def main(folder: Path) -> float:
     """Return the first species at 40 s."""
-    result = solve_dae(robertson, (0.0, 40.0), [1.0, 0.0, 0.0], rtol=1e-6, atol=np.array([1e-8, 1e-12, 1e-8]))
+    result = solve_dae(
+        robertson, (0.0, 40.0), [1.0, 0.0, 0.0], rtol=1e-6, atol=np.array([1e-8, 1e-12, 1e-8]), max_order=4,
+        names=["a", "b", "c"],
+    )  # fmt: skip
     np.save(folder / "robertson.npy", result.y)
     return float(result.y[-1, 0])

@@ -18,6 +18,7 @@ def main(folder: Path) -> float:
     m.revolute("crank pin", rod, crank, at=(0.1, 0, 0), axis=(0, 1, 0))
     m.spherical("wrist", piston, rod, at=(0.4, 0, 0))
     m.translational("bore", piston, m.ground, at=(0.4, 0, 0), axis=(1, 0, 0))
+    m.friction("dry", main_pin, 0.02, 0.01, pin_radius="10 mm")
     m.rotation("motor", main_pin, "600 rpm", level="velocity")
     m.spring_damper("spring", piston.marker(), m.ground.marker((0.6, 0, 0)), stiffness="2 N/mm", length="200 mm")
     solution = m.simulate("0.1 s", rate="1 kHz", max_step=1e-3, tol=1e-7)

@@ -10,7 +10,8 @@ def main(folder: Path) -> float:
     gears = {"teeth": (21, 34), "module": "2.5 mm", "face_width": "20 mm"}
     healthy = gm.Case(name="healthy", gears=gears, operation={"speed": "1500 rpm", "torque": "60 N m", "duration": 0.2})
     broken = healthy.changed(name="broken tooth", fault={"teeth": "broken tooth"})
-    levels: list[float] = []
+    ideal = gm.IdealMesh.with_damping_ratio(healthy.pair().with_changes(backlash="0.1 mm"), "4e8 N/m", backlash=True)
+    levels: list[float] = [ideal.depth]
     for record in gm.run_cases([healthy, broken]):
         signal = gm.record_signal(record, "line_of_action")
         report = gm.analyse(signal, teeth=21)

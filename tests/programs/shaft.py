@@ -18,7 +18,7 @@ def main(folder: Path) -> float:
     critical: np.ndarray = rotor.critical_speeds(2)
     m = Mechanism("rotor")
     model = shaft.modal_model(4)
-    body = model.add_to(m, "shaft", damping=0.01)
+    body = model.add_to(m, "shaft", damping=0.01, position=(0, 0, 0))
     for seat in ("left", "right"):
         place = model.place(seat)
         m.bushing(seat, body.marker(place), m.ground.marker(place), stiffness=(1e7, 1e7, 1e7))

@@ -37,7 +37,7 @@ def main(folder: Path) -> float:
         running=True,
     )
     frequency = train.kinematics.mesh_frequency("mesh")
-    modes = train.build().linear_modes()
+    modes = train.changed("load", torque="50 N m").build().linear_modes()
     (folder / "modes.txt").write_text(str(modes))
     solution = train.build().simulate(0.005, rate=20_000)
     if not solution.success:

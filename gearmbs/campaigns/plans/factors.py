@@ -435,6 +435,7 @@ def factor_from(table: Mapping[str, Any]) -> AnyFactor:
     return make(cls, settings, f"{kind} {settings.get('path', '')}", CampaignError)
 
 
+# options have names and values of the user's own
 def choose(path: str, *, crossed: bool = False, **options: Any) -> Choice:
     """Return a choice among the options named.
 

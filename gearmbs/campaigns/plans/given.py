@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -20,11 +20,14 @@ from gearmbs.campaigns.plans.factors import (
     factor_from,
     number_in_si,
 )
-from gearmbs.campaigns.plans.plan import ALONG, TAKEN, Plan, crossed
+from gearmbs.campaigns.plans.plan import ALONG, TAKEN, Plan, PlanKeywords, crossed
 from gearmbs.campaigns.settings import CampaignError, check_settings, texts, whole
 from gearmbs.campaigns.subjects.base import Subject, check_keep, make_subject
 from gearmbs.files import python_scalar
 from gearmbs.schema.described import chosen, read_toml
+
+if TYPE_CHECKING:
+    from gearmbs.studies import Case
 
 FILES = ("file", "script", "routines")
 """Settings of subjects that name files."""
@@ -32,13 +35,13 @@ FAILURE_POLICIES = ("record", "tighter", "stop")
 
 
 def make_plan(
-    base: Any = None,
-    factors: Iterable[AnyFactor] = (),
+    base: Case | Subject | None = None,
+    factors: AnyFactor | Iterable[AnyFactor] = (),
     design: str = "sobol",
     n: int = 0,
     *,
     keep: Sequence[str] | None = None,
-    **settings: Any,
+    **settings: Unpack[PlanKeywords],
 ) -> Plan:
     """Return a checked plan.
 
@@ -89,8 +92,8 @@ def make_plan(
         raise CampaignError(f"n = {n!r}: give the number of points of the {design} design")
     keep = subject.keeps[:1] if keep is None else texts(keep, "keep")
     check_keep(subject, keep)
-    settings = check_settings(settings, Plan, design)
-    plan = Plan(subject, own, design, n, keep=keep, **settings)
+    checked = check_settings(settings, Plan, design)
+    plan = Plan(subject, own, design, n, keep=keep, **checked)
     if design == "list":
         plan = replace(plan, options={**plan.options, "rows": _rows_in_si(plan)})
     _consistent(plan)

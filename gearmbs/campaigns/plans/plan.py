@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, make_subject
 from gearmbs.files import python_scalar
 
+if TYPE_CHECKING:
+    from gearmbs.units import QuantityLike
+
 FORMAT = 2
 
 ABOUT = ("index", "unit", "point", "slot", "id", "status", "message", "advice")
@@ -42,6 +46,20 @@ TAKEN = (*ABOUT, "case")
 
 ALL_CORNERS = 6
 """Up to so many coordinates every corner is checked; beyond, both ends of each and some corners."""
+
+
+class PlanKeywords(TypedDict, total=False):
+    """Fields of a `Plan` but for what `gearmbs.campaigns.make_plan` names itself, as they are given to it."""
+
+    seed: int
+    constraints: str | Sequence[str]
+    options: dict[str, Any]
+    unit: int | None
+    time_limit: QuantityLike | None
+    wall_limit: QuantityLike | None
+    memory_limit: QuantityLike | None
+    on_failure: str
+    reuse: str | Sequence[str | Path]
 
 
 @dataclass(frozen=True)

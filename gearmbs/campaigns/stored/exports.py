@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
@@ -27,6 +27,16 @@ FILES = {"csv": ".csv", "netcdf": ".nc", "matlab": ".mat"}
 
 FORMATS = (*FILES, "parquet", "hf")
 ROWS_A_FILE = 2000
+
+
+class ExportKeywords(TypedDict, total=False):
+    """Keywords of `export`, for type checkers."""
+
+    split: Sequence[str] | np.ndarray | None
+    split_by: str | None
+    test: float | None
+    held_out: Mapping[str, Sequence[Any]] | None
+    add: Mapping[str, Any] | None
 
 
 def export(

@@ -12,13 +12,16 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.schema.described import chosen
 from gearmbs.units import DIMENSIONS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 KINDS = {
     "pair": "gearmbs.campaigns.subjects.pair:PairSubject",
@@ -149,6 +152,7 @@ class Subject(ABC):
         """Return the unit of a number that is kept, "" where it has none or the subject does not know it."""
         return ""
 
+    # what is simulated, and what a run of it leaves for `reduce`, are each subject's own
     @abstractmethod
     def check(self, data: dict[str, Any], name: str) -> Any:
         """Return the validated thing that nested data describe.
@@ -160,7 +164,7 @@ class Subject(ABC):
         """
 
     @abstractmethod
-    def canonical(self, thing: Any) -> Any:
+    def canonical(self, thing: Any) -> object:
         """Return its content in SI with defaults filled in and without names; see `gearmbs.campaigns.canonical`."""
 
     @abstractmethod
@@ -191,7 +195,7 @@ class Subject(ABC):
         status = IMPOSSIBLE if isinstance(error, ValueError) else FAILED
         return Outcome(status, f"{type(error).__name__}: {error}"[:2000])
 
-    def partial(self, error: Exception) -> Any:
+    def partial(self, error: Exception) -> xr.Dataset | None:
         """Return the dataset of what was computed before an error, or None."""
         return None
 

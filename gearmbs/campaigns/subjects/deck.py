@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypedDict, Unpack
 
 import numpy as np
 
@@ -17,6 +17,13 @@ from gearmbs.campaigns.settings import CampaignError, by_name
 from gearmbs.campaigns.subjects.base import Kept, Subject, kept_by_functions
 
 PLACE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}")
+
+
+class DeckKeywords(TypedDict, total=False):
+    """Keywords of `DeckSubject` that one of a file takes, too, for type checkers."""
+
+    routines: str | Path | None
+    skip_unsupported: bool
 
 
 class DeckSubject(Subject):
@@ -99,7 +106,7 @@ class DeckSubject(Subject):
         end: float | None = None,
         steps: int = 100,
         script: str | Path | None = None,
-        **more: Any,
+        **more: Unpack[DeckKeywords],
     ) -> DeckSubject:
         """Return the subject of a deck in a file, with a script in another; what else it takes goes on."""
         commands = None if script is None else _text_of(Path(script))
@@ -151,7 +158,7 @@ class DeckSubject(Subject):
             set_variable(deck, number, values[variable])
         return {"deck": deck, "text": text, "script": script, "values": values}
 
-    def canonical(self, thing: dict[str, Any]) -> Any:
+    def canonical(self, thing: dict[str, Any]) -> dict[str, Any]:
         """Return the digest of the template, the values, the span, and digests of the files that it names."""
         digest = hashlib.sha256(self.text.encode()).hexdigest()
         found = {"deck": digest, "values": thing["values"], "end": self.end, "steps": self.steps}
@@ -182,7 +189,9 @@ class DeckSubject(Subject):
             found |= _routine_files(self.routines)
         return found
 
-    def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+    def run(
+        self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]
+    ) -> dict[str, np.ndarray]:
         """Run the deck and return its requests: arrays by name and column."""
         from gearmbs.adams import load_routines, parse_script, run_deck
 

@@ -132,10 +132,11 @@ class FunctionSubject(Subject):
         imported(self.function, "function")
         return self._in_si(data)
 
-    def canonical(self, thing: dict[str, Any]) -> Any:
+    def canonical(self, thing: dict[str, Any]) -> dict[str, Any]:
         """Return the function's name and version and the parameters."""
         return {"function": self.function, "version": self.version, "parameters": thing}
 
+    # a user's own function returns what it returns; `reduce` says what can be kept
     def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Return what the function returns."""
         return imported(self.function, "function")(**thing)

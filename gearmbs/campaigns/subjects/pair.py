@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from gearmbs.signals import COMPONENTS
 from gearmbs.studies.case.case import Case, make_case
 from gearmbs.studies.case.sections import units_of_fields
 from gearmbs.units import to_si
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FIRST_ORDERS = 3
 PERIODIC = {"harmonics", "contact"}
@@ -144,7 +147,7 @@ class PairSubject(Subject):
         """Return the content of a case; see `canonical_case`."""
         return canonical_case(thing)
 
-    def run(self, thing: Case, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+    def run(self, thing: Case, progress: Callable[[float], None], keep: Sequence[str]) -> xr.Dataset:
         """Return the record of a case."""
         from gearmbs.studies.run.simulation import run_case
 
@@ -196,7 +199,7 @@ class PairSubject(Subject):
             return Outcome(FAILED, str(error)[:2000], advice)
         return super().explain(error)
 
-    def partial(self, error: Exception) -> Any:
+    def partial(self, error: Exception) -> xr.Dataset | None:
         """Return the record up to where the integrator stopped."""
         from gearmbs.studies.run.simulation import SimulationFailed
 
@@ -440,11 +443,11 @@ class ClaimsSubject(Subject):
             check_record(case, f"{name}, {case.name}")
         return cases
 
-    def canonical(self, thing: list[Case]) -> Any:
+    def canonical(self, thing: list[Case]) -> list[dict[str, Any]]:
         """Return the contents of the six cases."""
         return [canonical_case(case) for case in thing]
 
-    def run(self, thing: list[Case], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+    def run(self, thing: list[Case], progress: Callable[[float], None], keep: Sequence[str]) -> xr.DataArray:
         """Return the harmonics of the six cases: dims (load, state, harmonic), by component."""
         import xarray as xr
 

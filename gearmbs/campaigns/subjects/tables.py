@@ -8,7 +8,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,12 @@ from gearmbs.campaigns.subjects.base import (
 )
 from gearmbs.schema.described import check_keys, chosen, measures_of, read_toml
 from gearmbs.units import si_unit, to_si
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from gearmbs.drivetrain.drivetrain import Description
+    from gearmbs.studies.planetary import PlanetaryRun
 
 
 class TablesSubject(Subject):
@@ -83,6 +89,7 @@ class TablesSubject(Subject):
         """Return what the tables describe."""
         return self.made({**data, "name": name} if "name" in data else data)
 
+    # a drivetrain, a planetary set, a bearing: each subject's own
     @abstractmethod
     def made(self, tables: dict[str, Any]) -> Any:
         """Return what tables describe.
@@ -185,7 +192,7 @@ class DrivetrainSubject(TablesSubject):
     kind: ClassVar[str] = "drivetrain"
     keeps: ClassVar[tuple[str, ...]] = ("harmonics", "forces", "record")
 
-    def made(self, tables: dict[str, Any]) -> Any:
+    def made(self, tables: dict[str, Any]) -> Description:
         """Return the drivetrain and its run."""
         from gearmbs.drivetrain.drivetrain import make_description
         from gearmbs.studies.case.tooth_faults import tooth_fault
@@ -195,7 +202,7 @@ class DrivetrainSubject(TablesSubject):
         check_record(found.train, found.run)
         return found
 
-    def canonical(self, thing: Any) -> Any:
+    def canonical(self, thing: Description) -> dict[str, Any]:
         """Return the parts and pairs with their defaults and the run in SI, without the name."""
         from gearmbs.studies.trains import described
 
@@ -204,7 +211,7 @@ class DrivetrainSubject(TablesSubject):
             mesh["settings"] = described(thing.train.pairs[mesh["name"]])
         return in_si({"train": train, "run": described(thing.run)})
 
-    def span_and_rate(self, thing: Any) -> tuple[float, float]:
+    def span_and_rate(self, thing: Description) -> tuple[float, float]:
         """Return the length of a record, s, and its sampling rate, Hz."""
         return float(thing.run.duration), float(thing.run.output_rate(thing.train))
 
@@ -217,18 +224,18 @@ class DrivetrainSubject(TablesSubject):
                 return SENSORS[table.get("kind", "speed")].unit
         return super().unit_of_result(name)
 
-    def channels(self, thing: Any) -> dict[str, str]:
+    def channels(self, thing: Description) -> dict[str, str]:
         """Return the sensors and their units."""
         return {sensor.name: sensor.unit for sensor in thing.train.sensors}
 
-    def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+    def run(self, thing: Description, progress: Callable[[float], None], keep: Sequence[str]) -> xr.Dataset:
         """Return the record."""
         from gearmbs.studies.trains import run_train
 
         span = thing.train.run_up + thing.run.settling + thing.run.duration
         return run_train(thing.train, thing.run, progress=progress_by_time(progress, span))
 
-    def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
+    def reduce(self, thing: Description, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
         kept = kept_by_functions(keep, record)
         if "harmonics" in keep:
@@ -249,7 +256,7 @@ class DrivetrainSubject(TablesSubject):
                 kept.signals[name] = np.atleast_2d(record["measured"].sel(sensor=name).values)
         return kept
 
-    def partial(self, error: Exception) -> Any:
+    def partial(self, error: Exception) -> xr.Dataset | None:
         """Return the record up to where the integrator stopped."""
         from gearmbs.studies import SimulationFailed
 
@@ -269,14 +276,14 @@ class PlanetarySubject(TablesSubject):
     kind: ClassVar[str] = "planetary"
     keeps: ClassVar[tuple[str, ...]] = ("forces", "record")
 
-    def made(self, tables: dict[str, Any]) -> Any:
+    def made(self, tables: dict[str, Any]) -> tuple[PlanetaryRun, Any]:
         """Return the set and its run, and the table of the pins as it was given."""
         from gearmbs.studies.planetary import planetary_run
 
         tables.pop("name", None)
         return planetary_run(tables), tables.get("pins")
 
-    def canonical(self, thing: Any) -> Any:
+    def canonical(self, thing: tuple[PlanetaryRun, Any]) -> dict[str, Any]:
         """Return the set with its defaults and the run in SI; the pins, which become a function, as their table."""
         from gearmbs.studies.trains import described
 
@@ -286,22 +293,24 @@ class PlanetarySubject(TablesSubject):
         tree["gears"].pop("name", None)
         return in_si({"run": tree, "pins": pins})
 
-    def span_and_rate(self, thing: Any) -> tuple[float, float]:
+    def span_and_rate(self, thing: tuple[PlanetaryRun, Any]) -> tuple[float, float]:
         """Return the length of a record, s, and its sampling rate, Hz."""
         return float(thing[0].duration), float(thing[0].rate)
 
-    def channels(self, thing: Any) -> dict[str, str]:
+    def channels(self, thing: tuple[PlanetaryRun, Any]) -> dict[str, str]:
         """Return the one signal."""
         return {"ring_sensor": "N"}
 
-    def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+    def run(
+        self, thing: tuple[PlanetaryRun, Any], progress: Callable[[float], None], keep: Sequence[str]
+    ) -> xr.Dataset:
         """Return the record."""
         from gearmbs.studies.planetary import run_planetary
 
         run = thing[0]
         return run_planetary(run, progress_by_time(progress, run.run_up + run.settling + run.duration))
 
-    def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
+    def reduce(self, thing: tuple[PlanetaryRun, Any], record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
         kept = kept_by_functions(keep, record)
         if "forces" in keep:
@@ -379,7 +388,7 @@ class BearingSubject(TablesSubject):
         case.mechanism()
         return case
 
-    def canonical(self, thing: BearingCase) -> Any:
+    def canonical(self, thing: BearingCase) -> dict[str, Any]:
         """Return the bearing's geometry, the defects, and rig and run with their defaults in SI."""
         import inspect
 
@@ -407,7 +416,7 @@ class BearingSubject(TablesSubject):
         """Return the directions of the housing's acceleration."""
         return dict.fromkeys(CHANNELS, "m/s^2")
 
-    def run(self, thing: BearingCase, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+    def run(self, thing: BearingCase, progress: Callable[[float], None], keep: Sequence[str]) -> xr.Dataset:
         """Return the acceleration of the housing."""
         import xarray as xr
 

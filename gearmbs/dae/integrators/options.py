@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -237,6 +237,38 @@ class Options:
         if unknown:
             raise ValueError(f"method={chosen!r} does not know {', '.join(unknown)}; {more}it takes {', '.join(known)}")
         return cls(method=chosen, **settings) if base is None else replace(base, method=chosen, **settings)
+
+
+class StepKeywords(TypedDict, total=False):
+    """Options of any run, for type checkers: those of `Options` about steps, the corrector and the start."""
+
+    corrector: str
+    max_order: int | None
+    max_step: float | None
+    first_step: float | None
+    min_step: float | None
+    max_iterations: int | None
+    max_steps: int | None
+    interpolate: bool
+    breakpoints: Sequence[float]
+    slopes: bool
+    check_start: bool
+    repairs: float
+    pause: Pause | None
+
+
+class OptionKeywords(StepKeywords, total=False):
+    """Options that `gearmbs.dae.solve_dae` takes one by one; it has ``method`` and ``rtol`` among its own arguments."""
+
+    tol: float
+    dense_output: bool
+    event_direction: Sequence[int] | None
+    event_action: Sequence[int] | None
+    event_count: Sequence[int] | None
+    progress: Callable[[float], None] | None
+    consumer: Consumer | None
+    errors: list[BaseException] | None
+    history: History | None
 
 
 def _check_choice(name: str, value: str, choices: Iterable[str]) -> None:

@@ -60,6 +60,7 @@ class Measured:
         """
         return self._measures().expression(expression)
 
+    # a number, a vector or several over time, as the mechanism says of the name
     def output(self, name: str) -> Any:
         """Return an output of the mechanism by its name over time, see `gearmbs.mechanism.Mechanism.output`.
 

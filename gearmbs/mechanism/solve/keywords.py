@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy.typing as npt
 
+from gearmbs.dae.integrators.options import StepKeywords
 from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
@@ -36,43 +37,81 @@ class StopAt:
     direction: int = 0
 
 
-class IntegratorOptions(TypedDict, total=False):
+class IntegratorOptions(StepKeywords, total=False):
     """Options of integrators that simulations hand on; see `gearmbs.dae.Options`."""
 
     rtol: float
-    corrector: str
-    max_order: int | None
-    max_step: float | None
-    first_step: float | None
-    min_step: float | None
-    max_iterations: int | None
-    max_steps: int | None
-    interpolate: bool
-    breakpoints: Sequence[float]
     dense_output: bool
-    slopes: bool
-    check_start: bool
-    repairs: float
-    pause: Callable[[float], float | None] | None
 
 
-class SimulateOptions(IntegratorOptions, total=False):
-    """Keywords of `gearmbs.mechanism.simulate`."""
+class FollowedOptions(TypedDict, total=False):
+    """Those keywords of `gearmbs.mechanism.simulate` that runs to be derived have, too."""
 
     rate: QuantityLike | None
     t_eval: npt.ArrayLike | None
+    integrator: str
+    progress: bool | Callable[[float], None] | None
+    advice: Mapping[Status, str] | None
+
+
+class RunOptions(IntegratorOptions, total=False):
+    """Those keywords of `gearmbs.mechanism.simulate` that are left where outputs and accuracy are a case's."""
+
+    t_start: QuantityLike
+    consumer: Callable[[Solution], None] | None
+    watch: Sequence[tuple[str, str]]
+    stops: Sequence[StopAt]
+    continued: bool
+    initial: State | None
+    inputs: Mapping[str, Any] | None
+
+
+class SimulateOptions(RunOptions, FollowedOptions, total=False):
+    """Keywords of `gearmbs.mechanism.simulate`."""
+
     every_step: bool
+    formulation: str
+    tol: float | None
+    rate_scale: float | None
+    lump: bool | None
+
+
+class SensitivityOptions(StepKeywords, FollowedOptions, total=False):
+    """Keywords of `gearmbs.mechanism.forward_sensitivities` that it hands on to `gearmbs.mechanism.simulate`."""
+
+    rtol: float
+
+
+class SimulatorOptions(IntegratorOptions, total=False):
+    """Keywords of `gearmbs.mechanism.Simulator`, but for whether it keeps records."""
+
     t_start: QuantityLike
     integrator: str
     formulation: str
     tol: float | None
     rate_scale: float | None
-    progress: bool | Callable[[float], None] | None
-    advice: Mapping[Status, str] | None
-    consumer: Callable[[Solution], None] | None
-    watch: Sequence[tuple[str, str]]
     lump: bool | None
-    stops: Sequence[StopAt]
-    continued: bool
     initial: State | None
-    inputs: Mapping[str, Any] | None
+    stops: Sequence[StopAt]
+    advice: Mapping[Status, str] | None
+
+
+class OrbitOptions(TypedDict, total=False):
+    """How a steady motion is looked for: keywords of `gearmbs.mechanism.solve.orbits.steady_motion`."""
+
+    turned: Mapping[str, float] | None
+    settle: int
+    most: int
+    attracting: bool
+    integrator: str
+
+
+class SteadyOptions(OrbitOptions, total=False):
+    """All keywords of `gearmbs.mechanism.solve.orbits.steady_motion`."""
+
+    t_start: QuantityLike
+    initial: State | None
+    formulation: str
+    tol: float | None
+    rate_scale: float | None
+    lump: bool | None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -30,6 +30,10 @@ from gearmbs.mechanism.solve.sensitivities import (
     values_and_scales,
 )
 from gearmbs.mechanism.solve.simulate import prepared, start_time
+from gearmbs.units import QuantityLike
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.solve.keywords import OrbitOptions
 
 
 @dataclass(frozen=True)
@@ -71,15 +75,15 @@ class SteadySensitivities(Sensitivities):
 def steady_sensitivities(
     build: Callable[..., Mechanism],
     parameters: Mapping[str, Any],
-    period: Any,
+    period: QuantityLike,
     *,
-    t_start: Any = 0.0,
+    t_start: QuantityLike = 0.0,
     initial: State | None = None,
     formulation: str = "SI2",
     tol: float | None = None,
     rate_scale: float | None = None,
     lump: bool | None = None,
-    **settings: Any,
+    **settings: Unpack[OrbitOptions],
 ) -> SteadySensitivities:
     """Find the steady motion of a mechanism and differentiate it by parameters.
 

@@ -20,6 +20,7 @@ from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.simulate import just_inside, prepared, start_time
 from gearmbs.mechanism.solve.simulator import Simulator
+from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.members import Members
@@ -260,9 +261,9 @@ def _nearest(choices: list[float], value: float) -> float:
 
 def steady_motion(
     mechanism: Mechanism,
-    period: float,
+    period: QuantityLike,
     *,
-    t_start: float = 0.0,
+    t_start: QuantityLike = 0.0,
     initial: State | None = None,
     turned: Mapping[str, float] | None = None,
     settle: int = 2,

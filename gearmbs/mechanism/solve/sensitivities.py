@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.simulate import prepared, simulate
 from gearmbs.units import QuantityLike
 from gearmbs.wording import any_of, did_you_mean, warn
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.solve.keywords import SensitivityOptions
 
 TIGHTER = 0.1
 """Part of the usual tolerance at which a run is differentiated where none is given. Derivatives bend where the rates of
@@ -115,7 +118,7 @@ def forward_sensitivities(
     tol: float | None = None,
     rate_scale: float | None = None,
     lump: bool | None = None,
-    **options: Any,
+    **options: Unpack[SensitivityOptions],
 ) -> Sensitivities:
     """Simulate a mechanism and differentiate the run by parameters of it.
 

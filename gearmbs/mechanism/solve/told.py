@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from inspect import Signature, signature
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -53,6 +53,22 @@ class Point(NamedTuple):
         return self.rows.yp[self.row]
 
 
+Number = Literal[
+    "joint_displacement", "joint_rate", "state", "kinetic_energy", "constraint_violation", "transmission_error",
+    "joint_angle", "evaluate", "input",
+]  # fmt: skip
+"""Quantities that are one number at an instant,"""
+Array = Literal[
+    "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
+    "reaction_force", "modal_coordinates", "modal_velocities", "marker_position", "marker_velocity", "multipliers",
+]  # fmt: skip
+"""an array,"""
+Pair = Literal["reaction", "load", "deflection"]
+"""two arrays,"""
+Table = Literal["diagnostics", "contact"]
+"""or numbers by name; for type checkers."""
+
+
 class Told(OwnAttributes):
     """The part of a `gearmbs.Simulator` that looks at it."""
 
@@ -73,6 +89,18 @@ class Told(OwnAttributes):
     _failed: str | None
     _origin: State | None
     _given: np.ndarray
+
+    @overload
+    def get(self, what: Number, *names: Any) -> float: ...
+    @overload
+    def get(self, what: Array, *names: Any) -> np.ndarray: ...
+    @overload
+    def get(self, what: Pair, *names: Any) -> tuple[np.ndarray, np.ndarray]: ...
+    @overload
+    def get(self, what: Table, *names: Any) -> dict[str, float]: ...
+    # an output is what its mechanism says
+    @overload
+    def get(self, what: str, *names: Any) -> Any: ...
 
     def get(self, what: str, *names: Any) -> Any:
         """Return a quantity at the present time.

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Unpack, overload
 
 import numpy as np
 import scipy.fft
@@ -31,7 +31,9 @@ from gearmbs.signals.errors import SignalError
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.optical import instrument_faults
 from gearmbs.signals.rotation.angular import angular_resample, samples_per_revolution, time_synchronous_average
+from gearmbs.signals.rotation.keywords import SpeedKeywords
 from gearmbs.signals.rotation.shaft import Known, Shaft, compare_with_mesh, known_shaft, mesh_shaft
+from gearmbs.signals.signal.arguments import DataKeywords
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
 from gearmbs.signals.signal.labels import measured
@@ -72,8 +74,36 @@ class AnalysisOptions:
 SETTINGS = tuple(f.name for f in fields(AnalysisOptions))
 
 
+class AnalysisKeywords(SpeedKeywords, total=False):
+    """Fields of `AnalysisOptions` but for teeth and a planetary set, for type checkers."""
+
+    speed_range: tuple[float, float] | None
+    wheel: int
+    harmonics: int
+    half_width: float
+    lines: int
+    planets: int | Sequence[float]
+    member: str
+
+
+class PlanetaryKeywords(AnalysisKeywords, DataKeywords, total=False):
+    """What `analyse` takes beside a planetary set."""
+
+    progress: Progress | None
+
+
+class FileKeywords(PlanetaryKeywords, total=False):
+    """What `analyse_file` takes: all of `analyse`, and ``format`` of `gearmbs.signals.read_signal`."""
+
+    teeth: int | Sequence[int] | None
+    planetary: Any
+    options: AnalysisOptions | None
+    format: str | None
+
+
+# a planetary set is of gears, which signals do not know, and a speed has many shapes
 @overload
-def analyse(signal: Any, *, planetary: Any, **settings: Any) -> PlanetaryReport: ...
+def analyse(signal: Any, *, planetary: Any, **settings: Unpack[PlanetaryKeywords]) -> PlanetaryReport: ...
 
 
 @overload
@@ -86,7 +116,7 @@ def analyse(
     channels: Sequence[str] | None = None,
     gaps: str | None = None,
     progress: Progress | None = None,
-    **settings: Any,
+    **settings: Unpack[AnalysisKeywords],
 ) -> AnalysisReport: ...
 
 
@@ -101,7 +131,7 @@ def analyse(
     gaps: str | None = None,
     progress: Progress | None = None,
     options: AnalysisOptions | None = None,
-    **settings: Any,
+    **settings: Unpack[AnalysisKeywords],
 ) -> AnalysisReport | VibrationReport: ...
 
 
@@ -209,7 +239,7 @@ def analyse(
     return _report(data, check_teeth(counts), options, _Stages(progress))
 
 
-def analyse_file(path: str | Path, **settings: Any) -> AnalysisReport | VibrationReport:
+def analyse_file(path: str | Path, **settings: Unpack[FileKeywords]) -> AnalysisReport | VibrationReport:
     """Read a file (`read_signal`) and analyse it; `analyse` takes a path as well.
 
     Parameters
@@ -228,11 +258,12 @@ def analyse_file(path: str | Path, **settings: Any) -> AnalysisReport | Vibratio
     SignalFileError, MissingMetadataError, SignalError
         See `read_signal` and `analyse`.
     """
-    if settings.get("format") is None:
-        settings.pop("format", None)
-        return analyse(path, **settings)
-    reading = {name: settings.pop(name) for name in ("rate", "units", "gaps", "format") if name in settings}
-    return analyse(read_any(path, **{**reading, "rate": given_rate(reading.get("rate"))}), **settings)
+    given: dict[str, Any] = {**settings}
+    if given.get("format") is None:
+        given.pop("format", None)
+        return analyse(path, **given)
+    reading = {name: given.pop(name) for name in ("rate", "units", "gaps", "format") if name in given}
+    return analyse(read_any(path, **{**reading, "rate": given_rate(reading.get("rate"))}), **given)
 
 
 def _planetary(signal: xr.DataArray, options: AnalysisOptions) -> PlanetaryReport:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Integral
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -128,6 +128,14 @@ def check_harmonics(harmonics: object) -> None:
     """Refuse a number of harmonics that is not whole and positive."""
     if isinstance(harmonics, bool) or not isinstance(harmonics, Integral) or harmonics < 1:
         raise SignalError(f"harmonics: must be at least 1, a whole number, got {harmonics!r}")
+
+
+class MeshKeywords(TypedDict, total=False):
+    """What is known of a mesh: keywords of `gmf_rms`, for type checkers."""
+
+    gmf: float | None
+    speed: float | None
+    teeth: int | Sequence[int] | None
 
 
 def gmf_rms(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 import xarray as xr
@@ -26,6 +26,23 @@ Progress = Callable[[float, str], None]
 States = Mapping[str, Mapping[str, Any]]
 Scope = Literal["load", "all", "each"]
 FEATURES = ("kurtosis", "fm4", "energy_ratio", "sideband_level")
+
+
+class CompareKeywords(TypedDict, total=False):
+    """Keywords of `compare` but for what is known of the experiment, for type checkers."""
+
+    gaps: str | None
+    reference: str
+    scope: Scope
+    channel: str | None
+    model_channel: str | None
+    way: Literal["band", "orders"]
+    harmonics: int
+    half_width: float
+    wheel: int
+    quantity: Dimension | None
+    band: tuple[Any, Any] | None
+    progress: Progress | None
 
 
 @staged("comparing")
@@ -226,7 +243,7 @@ def compare_files(
     rate: Given | None = None,
     units: Units | None = None,
     speed: Any = None,
-    **settings: Any,
+    **settings: Unpack[CompareKeywords],
 ) -> ComparisonReport:
     """Read the files and `compare` them, which takes files as well.
 

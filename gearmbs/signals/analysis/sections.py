@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import pandas as pd
@@ -24,6 +24,7 @@ from gearmbs.signals.analysis.vibration import VibrationReport
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.formats import checked_format, read_signal
 from gearmbs.signals.files.table import Asked, format_of
+from gearmbs.signals.signal.arguments import DataKeywords
 from gearmbs.signals.signal.given import given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.inputs import to_signal
 from gearmbs.signals.signal.record import Record, checked_gaps, columns_asked, record_of, signal_from
@@ -145,6 +146,12 @@ def _of_file(
         progress(1.0, "reading")
 
 
+class ReadingKeywords(DataKeywords, total=False):
+    """How a record is read: keywords of `gearmbs.signals.read_signal` but for speed and teeth, for type checkers."""
+
+    format: str | None
+
+
 @staged("following")
 def trend(
     path: Any,
@@ -156,7 +163,7 @@ def trend(
     speed_channel: str | None = None,
     harmonics: int = 3,
     progress: Progress | None = None,
-    **reading: Any,
+    **reading: Unpack[ReadingKeywords],
 ) -> xr.Dataset:
     """Features of a long record over time: each section analysed on its own, in memory for one section.
 
@@ -188,8 +195,9 @@ def trend(
     """
     if isinstance(path, (list, tuple)) and path and isinstance(path[0], (str, Path)):
         raise SignalError("path: give one record; series(files, ...) follows many files")
-    if speed_channel is not None and reading.get("channels") is not None:
-        reading["channels"] = [*reading["channels"], speed_channel]
+    kept = reading.get("channels")
+    if speed_channel is not None and kept is not None:
+        reading["channels"] = [*kept, speed_channel]
     rows: list[xr.Dataset | None] = []
     starts, notes = [], []
     done = [0.0]

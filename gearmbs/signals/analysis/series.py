@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import pandas as pd
@@ -18,9 +18,9 @@ import xarray as xr
 
 from gearmbs.files import keep
 from gearmbs.progress import bars
-from gearmbs.signals.analysis.analysis import AnalysisOptions, analyse
+from gearmbs.signals.analysis.analysis import AnalysisKeywords, AnalysisOptions, analyse
 from gearmbs.signals.analysis.report import By, feature_rows, rows_to_frame
-from gearmbs.signals.analysis.sections import sections
+from gearmbs.signals.analysis.sections import ReadingKeywords, sections
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.files.table import known_endings
@@ -29,6 +29,12 @@ from gearmbs.wording import warn
 Progress = Callable[[str, float], None]
 Files = str | Path | Iterable[str | Path] | Mapping[Any, str | Path]
 READING = ("rate", "units", "channels", "gaps", "format")
+
+
+class SeriesKeywords(ReadingKeywords, AnalysisKeywords, total=False):
+    """How the files of a `series` are read and analysed, for type checkers."""
+
+    planetary: Any
 
 
 def series(
@@ -40,7 +46,7 @@ def series(
     by: By = "record",
     errors: Literal["keep", "raise"] = "keep",
     progress: bool | Progress | None = None,
-    **settings: Any,
+    **settings: Unpack[SeriesKeywords],
 ) -> pd.DataFrame:
     """Analyse many files one after the other, and put their features into one table.
 
@@ -82,7 +88,8 @@ def series(
     """
     if errors not in ("keep", "raise"):
         raise SignalError(f"errors: must be 'keep' or 'raise', got {errors!r}")
-    AnalysisOptions(**{k: v for k, v in settings.items() if k not in READING})
+    analysing: dict[str, Any] = {k: v for k, v in settings.items() if k not in READING}
+    AnalysisOptions(**analysing)
     paths, labels = _files(files)
     journal = None
     if store is not None:

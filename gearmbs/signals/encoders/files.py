@@ -6,19 +6,19 @@ Where a column holds neither times nor counts, it is the sampled voltage of an e
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from gearmbs.progress import staged
-from gearmbs.signals.encoders.pulses import PulseTrain, pulse_train, pulses_of_channel
+from gearmbs.signals.encoders.pulses import PulseTrain, TrainKeywords, pulse_train, pulses_of_channel
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
 from gearmbs.signals.files.formats import checked_format, damage_named, format_to_write, read_signal, write_record
 from gearmbs.signals.files.table import Asked, format_of
 from gearmbs.signals.signal.record import SECONDS, Record
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import QuantityLike, to_si
 
 INDEX = " index"
 """End of the name of a column with the pulses once a turn."""
@@ -80,11 +80,11 @@ def read_pulses(
     path: str | Path,
     lines: int | Mapping[str, int] | None = None,
     *,
-    clock: Quantity | None = None,
+    clock: QuantityLike | None = None,
     unit: str | None = None,
-    rate: Any = None,
-    progress: Any = None,
-    **known: Any,
+    rate: float | str | None = None,
+    progress: Callable[[float, str], None] | None = None,
+    **known: Unpack[TrainKeywords],
 ) -> dict[str, PulseTrain]:
     """Read the pulses of encoders and tachos.
 
@@ -138,7 +138,7 @@ def read_pulses(
             raise MissingMetadataError(
                 "lines", f"the pulses in {path.name}", f"pass lines={{{name!r}: ...}}, the marks of a turn"
             )
-        more = {"name": name, "tooth_at_zero": about.get("tooth_at_zero"), **known}
+        more: dict[str, Any] = {"name": name, "tooth_at_zero": about.get("tooth_at_zero"), **known}
         factor = _factor(units[name], clock, unit, path)
         once = name + INDEX if name + INDEX in table else None
         if factor is not None:
@@ -206,7 +206,7 @@ def _present(column: np.ndarray) -> np.ndarray:
     return column[np.isfinite(column)]
 
 
-def _factor(unit: str, clock: Quantity | None, given: str | None, path: Path) -> float | None:
+def _factor(unit: str, clock: QuantityLike | None, given: str | None, path: Path) -> float | None:
     """Return the seconds of a unit of a column, or None of a sampled voltage."""
     key = unit.strip().lower()
     if given is not None and clock is not None:

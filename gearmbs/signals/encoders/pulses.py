@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 import xarray as xr
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.phase import described, mended_count, pulse_edges, pulse_faults
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 
 TURN = 2.0 * math.pi
 FEWEST_TURNS = 2
@@ -78,6 +78,18 @@ class PulseTrain:
         """
         numbers = np.arange(self.numbers[0], self.numbers[-1] + 1)
         return numbers, np.interp(numbers, self.numbers, self.times), np.isin(numbers, self.numbers)
+
+
+class TrainKeywords(TypedDict, total=False):
+    """Keywords of `pulse_train` but for its index pulses, for type checkers."""
+
+    name: str
+    faults: Literal["mend", "refuse", "keep"]
+    tooth_at_zero: Sequence[float] | None
+
+
+class OfChannelKeywords(TrainKeywords, DataKeywords, total=False):
+    """The same of pulses in data of any shape."""
 
 
 def pulse_train(
@@ -208,13 +220,13 @@ def _check_recurrence(missing: np.ndarray, train: PulseTrain) -> None:
 
 @takes_data()
 def pulses_of_channel(
-    signal: xr.DataArray,
+    signal: Any,
     lines: int,
     channel: str | None = None,
     *,
     threshold: float | None = None,
     index: str | None = None,
-    **known: Any,
+    **known: Unpack[OfChannelKeywords],
 ) -> PulseTrain:
     """Take the pulses from a channel that was sampled, as the voltage of an encoder or a tacho.
 
@@ -233,7 +245,8 @@ def pulses_of_channel(
     """
     edges, name, _ = pulse_edges(signal, channel, threshold)
     once = None if index is None else pulse_edges(signal, index, threshold)[0]
-    return pulse_train(edges, lines, index=once, **{"name": name, **known})
+    settings: dict[str, Any] = {"name": name, **known}
+    return pulse_train(edges, lines, index=once, **settings)
 
 
 def angle_of_pulses(train: PulseTrain, marks: Any = None) -> xr.DataArray:

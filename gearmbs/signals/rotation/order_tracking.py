@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import scipy.fft
@@ -15,6 +15,7 @@ import xarray as xr
 from gearmbs.progress import waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.angular import angular_resample
+from gearmbs.signals.rotation.keywords import ShaftAndDataKeywords
 from gearmbs.signals.rotation.shaft import shaft_phase
 from gearmbs.signals.signal.arguments import takes_data
 from gearmbs.signals.signal.signal import common_unit, rate_of
@@ -27,6 +28,26 @@ LEAST_TURNS = 4.0
 """Revolutions of a window at least: a Hann window tells lines two of its own apart, half an order here."""
 
 
+class OrderTrackKeywords(ShaftAndDataKeywords, total=False):
+    """Keywords of `order_track`, for type checkers."""
+
+    speed: Any
+    orders: Sequence[float] | float
+    revolutions: float | None
+    overlap: float
+    scaling: Literal["amplitude", "rms"]
+
+
+class OrderMapKeywords(ShaftAndDataKeywords, total=False):
+    """Keywords of `order_map` but for the highest order, for type checkers."""
+
+    speed: Any
+    revolutions: float | None
+    overlap: float
+    scaling: Literal["amplitude", "rms", "power", "density"]
+    window: str | tuple
+
+
 @takes_data()
 def order_track(
     signal: Any,
@@ -36,7 +57,7 @@ def order_track(
     revolutions: float | None = None,
     overlap: float = 0.75,
     scaling: Literal["amplitude", "rms"] = "amplitude",
-    **shaft: Any,
+    **shaft: Unpack[ShaftAndDataKeywords],
 ) -> xr.DataArray:
     """Amplitudes of orders over time: the record resampled to steps of angle, and transformed in windows of angle.
 
@@ -113,7 +134,7 @@ def order_map(
     maximum: float | None = None,
     scaling: Literal["amplitude", "rms", "power", "density"] = "amplitude",
     window: str | tuple = "hann",
-    **shaft: Any,
+    **shaft: Unpack[ShaftAndDataKeywords],
 ) -> xr.DataArray:
     """Order spectra along a record of changing speed: what turns with the shaft stays in its column.
 
@@ -170,7 +191,7 @@ class _Windows:
         revolutions: float | None,
         overlap: float,
         highest: float | None,
-        shaft: dict[str, Any],
+        shaft: Mapping[str, Any],
         window: str | tuple = "hann",
     ) -> None:
         if not 0.0 <= overlap < 1.0:

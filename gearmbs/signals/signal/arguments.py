@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, cast
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.units import to_si
@@ -13,8 +13,20 @@ from gearmbs.units import to_si
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearmbs.signals.signal.inputs import Given, Units
+
 GIVEN = ("rate", "units", "channels", "gaps")
 """Keywords of `to_signal` that such functions have in addition to their own."""
+
+
+class DataKeywords(TypedDict, total=False):
+    """The same for type checkers."""
+
+    rate: Given | None
+    units: Units | None
+    channels: Sequence[str] | None
+    gaps: str | None
+
 
 F = TypeVar("F", bound=Callable)
 

@@ -15,7 +15,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -279,7 +279,15 @@ def common_unit(signal: xr.DataArray) -> str:
     return _common(units_of(signal))
 
 
-def require(signal: xr.DataArray, name: str, value: Any = None, *, needed_for: str) -> Any:
+@overload
+def require(signal: xr.DataArray, name: Literal["teeth"], value: Any = None, *, needed_for: str) -> tuple[int, ...]: ...
+
+
+@overload
+def require(signal: xr.DataArray, name: Literal["speed", "rate"], value: Any = None, *, needed_for: str) -> float: ...
+
+
+def require(signal: xr.DataArray, name: str, value: Any = None, *, needed_for: str) -> float | tuple[int, ...]:
     """The metadata `name`, from `value` if given, else from the signal, else an error asking for it by name.
 
     Parameters
@@ -333,6 +341,7 @@ def mesh_frequency(signal: xr.DataArray, speed: float | None = None, teeth: int 
     return require(signal, "teeth", teeth, needed_for="the gear mesh frequency")[0] * omega / (2.0 * math.pi)
 
 
+# attributes have names and values of the user's own
 def with_metadata(signal: xr.DataArray, **changes: Any) -> xr.DataArray:
     """A copy that shares the samples, with `speed`, `teeth`, `units` or other attributes set."""
     result = signal.copy(deep=False)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from pydantic import Field, model_validator
 
@@ -55,6 +55,19 @@ of its harmonics, at the usual tolerance to 2 %, which long records average out.
 PRESSED_IN = 20e-6
 """Static penetration of a tooth pair, m, below which that tolerance falls in proportion: at a fifth of the load of the
 paper's pair, whose teeth are pressed in by 24 um, harmonics were 0.9 % off without."""
+
+
+class CaseKeywords(TypedDict, total=False):
+    """Fields of a `Case` as they are given, for type checkers: sections, or some of their fields by name."""
+
+    name: str
+    gears: Gears | dict[str, Any]
+    shafts: Shafts | dict[str, Any]
+    operation: Operation | dict[str, Any]
+    fault: FaultSettings | dict[str, Any]
+    contact: Contact | dict[str, Any]
+    friction: FrictionSettings | dict[str, Any]
+    solver: Solver | dict[str, Any]
 
 
 class Case(Section, Shown):
@@ -228,7 +241,7 @@ class Case(Section, Shown):
             rate *= 2.0
         return rate
 
-    def changed(self, **sections: Any) -> Case:
+    def changed(self, **sections: Unpack[CaseKeywords]) -> Case:
         """Return a copy with fields of its sections changed.
 
         With a new curve of speed or torque the record lasts as long as the curve unless ``duration`` is given, too; of

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from functools import cache
 from numbers import Real
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
 
@@ -99,7 +99,7 @@ class Section(BaseModel, metaclass=_OneError):
         return "case"
 
     @classmethod
-    def checked(cls, data: Any, source: str) -> Any:
+    def checked(cls, data: Any, source: str) -> Self:
         """Return the section made of ``data``, which comes from ``source``.
 
         Raises
@@ -110,14 +110,15 @@ class Section(BaseModel, metaclass=_OneError):
         with readable_errors(cls, source):
             return cls.__pydantic_validator__.validate_python(data)
 
+    # the options are those of pydantic, which has other ones in each version
     @classmethod
-    def model_validate(cls, obj: Any, **options: Any) -> Any:
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
         """Return the section made of a mapping, as pydantic does but with the package's own error."""
         with readable_errors(cls, cls.label(obj)):
             return super().model_validate(obj, **options)
 
     @classmethod
-    def model_validate_json(cls, json_data: Any, **options: Any) -> Any:
+    def model_validate_json(cls, json_data: Any, **options: Any) -> Self:
         """Return the section made of JSON, as pydantic does but with the package's own error."""
         with readable_errors(cls, cls.label({})):
             return super().model_validate_json(json_data, **options)
@@ -171,12 +172,12 @@ class Section(BaseModel, metaclass=_OneError):
             if name in self.model_fields_set and value != field.get_default(call_default_factory=True):
                 yield name, self.written.get(name, value)
 
-    def model_copy(self, **options: Any) -> Any:
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy as pydantic does, without what follows from values that the copy may have others of."""
-        copy = super().model_copy(**options)
+        copy = super().model_copy(update=update, deep=deep)
         for name in copy.__dict__.keys() - type(self).model_fields.keys():
             del copy.__dict__[name]
-        changed = options.get("update") or ()
+        changed = update or ()
         copy.__dict__["given"] = {name: text for name, text in self.written.items() if name not in changed}
         return copy
 

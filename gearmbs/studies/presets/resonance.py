@@ -23,7 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -40,6 +40,9 @@ from gearmbs.studies.presets.files import preset_train, with_values
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.store import save_study
 from gearmbs.units import Quantity, to_si
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Direction = Literal["up", "down"]
 DIRECTIONS: tuple[Direction, ...] = ("up", "down")
@@ -434,7 +437,7 @@ class ResonanceStudy:
         none = f"no load from {LOADS[0]:g} to {LOADS[1]:g} N m at which teeth begin or cease to part"
         return "".join(f"\n{model.capitalize()}: {found or none}.\n" for model, found in self.thresholds.items())
 
-    def figure(self) -> Any:
+    def figure(self) -> Figure:
         """Return amplitude over mesh frequency of both models in both directions, and the lowest lag below it."""
         from gearmbs.view.figures.style import look, new_figure
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from gearmbs.mechanism.solve.orbits import TIGHTER, Posed, SteadyMotion, check_a
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.run.steady import posed_case
 from gearmbs.wording import warn
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,7 +54,7 @@ class SteadyBranch:
         """Return the peak amplitude of a harmonic of a result over the curve, see `SteadyMotion.harmonics`."""
         return np.array([abs(motion.harmonics(result, harmonic)[harmonic]) for motion in self.motions])
 
-    def figure(self, levels: np.ndarray, xlabel: str = "parameter", ylabel: str = "peak amplitude") -> Any:
+    def figure(self, levels: np.ndarray, xlabel: str = "parameter", ylabel: str = "peak amplitude") -> Figure:
         """Return levels over the parameter: stable motions drawn through, others dashed, turning points marked."""
         from gearmbs.view.figures.style import look, new_figure
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Required, TypedDict, Unpack
 
 import numpy as np
 
 from gearmbs.gears import GearPair
 from gearmbs.mechanism import Mechanism, ramp, step
 from gearmbs.studies.case.drive import drive_angle, load_torque
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity, QuantityLike, to_si
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.bearings import Bearing
+    from gearmbs.bearings.settings import BearingKeywords
     from gearmbs.dae.results.solution import Solution
     from gearmbs.flexible import ElasticMaterial
     from gearmbs.flexible.material import Damping
@@ -29,6 +30,18 @@ LOAD = "load"
 DRIVE = "drive"
 
 SUPPORTS = ("support 1", "support 2")
+
+
+class RigKeywords(TypedDict, total=False):
+    """Keywords of `gear_rig`, for type checkers."""
+
+    speed: Required[Any]
+    torque: Any
+    run_up: QuantityLike
+    start: QuantityLike | None
+    shaft_radius: QuantityLike
+    shaft_length: QuantityLike
+    shaft_density: QuantityLike
 
 
 def gear_rig(
@@ -130,7 +143,7 @@ def bearing_rig(
     housing_mass: Quantity = 3.0,
     mount_frequency: Quantity = "150 Hz",
     mount_damping: float = 0.2,
-    **settings: Any,
+    **settings: Unpack[BearingKeywords],
 ) -> Mechanism:
     """Return a test bench: the inner ring on a driven spindle, the outer ring in a housing that stands on mounts.
 
@@ -212,7 +225,7 @@ def rolling_rig(
     bearing_distance: Quantity = None,
     settings: dict[str, Any] | None = None,
     each: Mapping[str, dict[str, Any]] | None = None,
-    **rig: Any,
+    **rig: Unpack[RigKeywords],
 ) -> Mechanism:
     """Return the mechanism of :func:`gear_rig` with two rolling bearings on each shaft instead of its joints.
 

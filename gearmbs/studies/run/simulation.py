@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Collection, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Never, Unpack
 
 import numpy as np
 
@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.bearings import Bearing
+    from gearmbs.bearings.settings import BearingKeywords
     from gearmbs.mechanism import Mechanism
+    from gearmbs.mechanism.solve.keywords import RunOptions
 
 ADVICE = {
     Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
@@ -98,7 +100,7 @@ def simulate_case(
     *,
     mechanism: Mechanism | None = None,
     every_step: bool = False,
-    **options,
+    **options: Unpack[RunOptions],
 ) -> Solution:
     """Integrate the mechanism of a case from rest to the end of its record.
 
@@ -147,7 +149,7 @@ def case_mechanism(
     bearing: Bearing | str | None = None,
     *,
     each: Mapping[str, dict[str, Any]] | None = None,
-    **settings: Any,
+    **settings: Unpack[BearingKeywords],
 ) -> Mechanism:
     """Return the mechanism of a case.
 
@@ -187,7 +189,7 @@ def case_mechanism(
     from gearmbs.studies.run.rig import rolling_rig
 
     one = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
-    return rolling_rig(case.pair(), one, settings=settings, each=each, **rigged)
+    return rolling_rig(case.pair(), one, settings={**settings}, each=each, **rigged)
 
 
 def run_case(
@@ -196,7 +198,7 @@ def run_case(
     *,
     mechanism: Mechanism | None = None,
     variables: Collection[str] | None = None,
-    **settings: Any,
+    **settings: Never,
 ) -> xr.Dataset:
     """Simulate a case and return its record: a pure function of the case.
 
@@ -232,7 +234,8 @@ def run_case(
     SimulationFailed
         If the integrator stops early or teeth slip past each other; the exception carries the solution so far.
     """
-    for name, value in settings.items():
+    misplaced: dict[str, Any] = {**settings}
+    for name, value in misplaced.items():
         raise CaseError(_misplaced(name, value))
     if not isinstance(case, Case):
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")

@@ -11,7 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack, overload
 
 import numpy as np
 
@@ -32,6 +32,9 @@ from gearmbs.wording import any_of, warn
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from gearmbs.mechanism.solve.keywords import SteadyOptions
+    from gearmbs.units import QuantityLike
 
 FURTHEST = 0.5
 """Part of a pitch by which the driven wheel is turned at most to find where its teeth carry the load."""
@@ -60,7 +63,21 @@ class SteadyCase(SteadyMotion):
     record: xr.Dataset
 
 
-def steady(what: Case | Mechanism | Drivetrain, period: Any = None, **settings: Any) -> SteadyMotion:
+@overload
+def steady(
+    what: Case, period: None = None, *, variables: Collection[str] | None = None, most: int = 200
+) -> SteadyCase: ...
+
+
+@overload
+def steady(what: Mechanism, period: QuantityLike, **settings: Unpack[SteadyOptions]) -> SteadyMotion: ...
+
+
+@overload
+def steady(what: Drivetrain, period: QuantityLike | None = None, **settings: Unpack[SteadyOptions]) -> SteadyMotion: ...
+
+
+def steady(what: Case | Mechanism | Drivetrain, period: QuantityLike | None = None, **settings: Any) -> SteadyMotion:
     """Find the motion that repeats itself after a period.
 
     Parameters
@@ -157,7 +174,9 @@ def posed_case(case: Case) -> tuple[Case, Posed, AtValue, float]:
     return case, posed, at_speed(case, posed.problem, geometric_period(case)), tol
 
 
-def steady_train(train: Drivetrain, period: Any = None, **settings: Any) -> SteadyMotion:
+def steady_train(
+    train: Drivetrain, period: QuantityLike | None = None, **settings: Unpack[SteadyOptions]
+) -> SteadyMotion:
     """Find the steady motion of a drivetrain; see `steady`.
 
     Parameters
@@ -191,7 +210,8 @@ def steady_train(train: Drivetrain, period: Any = None, **settings: Any) -> Stea
     if period is None:
         period = mesh_period(train)
         _warn_of_length(train, period)
-    return steady_motion(train.build(), period, **{"t_start": train.run_up, **settings})
+    options: SteadyOptions = {"t_start": train.run_up, **settings}
+    return steady_motion(train.build(), period, **options)
 
 
 def _warn_of_length(train: Drivetrain, period: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,9 @@ from gearmbs.studies.run.levels import told_way
 from gearmbs.studies.run.parallel import run_cases
 from gearmbs.studies.run.store import file_stem, save_study
 from gearmbs.wording import did_you_mean
+
+if TYPE_CHECKING:
+    from gearmbs.signals.time_frequency import SweepWaterfallKeywords
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ class Sweep(Shown):
         index = pd.Index(self.values, name=f"{self.field.rpartition('.')[2]}, {self.unit}")
         return pd.DataFrame(rows, index=index)
 
-    def waterfall(self, component: str | None = None, **settings: Any) -> xr.DataArray:
+    def waterfall(self, component: str | None = None, **settings: Unpack[SweepWaterfallKeywords]) -> xr.DataArray:
         """Return the spectra of the records over speed; ``settings`` are those of `gearmbs.signals.waterfall`."""
         from gearmbs.signals import waterfall
 
@@ -193,8 +196,9 @@ def cases_of_sweep(case: Case, field: str, values: Sequence[Any]) -> list[Case]:
         raise CaseError(f"values: {values!r}; give a sequence of values of {field}")
     cases = []
     for place, value in enumerate(values, 1):
+        change: dict[str, Any] = {section: {name: python_scalar(value)}}
         try:
-            one = case.changed(**{section: {name: python_scalar(value)}})
+            one = case.changed(**change)
         except CaseError as error:
             raise CaseError(f"value {place} of {field}: {str(error).partition(': ')[2] or error}") from None
         cases.append(one)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import xarray as xr
@@ -36,7 +36,7 @@ from gearmbs.view.figures.style import (
 from gearmbs.view.figures.variable_speed import changing_speed_figures
 
 if TYPE_CHECKING:
-    pass
+    from gearmbs.signals.rotation.keywords import SpeedKeywords
 
 ENVELOPE_TOP, ENVELOPE_ORDERS, LEAKED = 1000.0, 20.0, 2
 SEGMENT = 2.0
@@ -45,7 +45,7 @@ SEGMENT = 2.0
 
 @waiting("drawing figures")
 def analysis_figures(
-    report: AnalysisReport | VibrationReport, signal: xr.DataArray | None = None, **shaft: Any
+    report: AnalysisReport | VibrationReport, signal: xr.DataArray | None = None, **shaft: Unpack[SpeedKeywords]
 ) -> dict[str, Figure]:
     """Return the figures of an analysed record.
 
@@ -122,7 +122,7 @@ def report_plot(
     signal: xr.DataArray | None = None,
     *,
     title: str | None = None,
-    **shaft: Any,
+    **shaft: Unpack[SpeedKeywords],
 ) -> Figure:
     """Draw the one figure that says most about a report.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -17,6 +17,11 @@ from gearmbs.progress import waiting
 from gearmbs.signals import order_map, order_track, spectrogram, waterfall
 from gearmbs.signals.signal.arguments import in_si
 from gearmbs.view.figures.style import BLACK, COLOURS, VERMILLION, drawing, label, scaling_name
+
+if TYPE_CHECKING:
+    from gearmbs.signals.rotation.keywords import SpeedKeywords
+    from gearmbs.signals.rotation.order_tracking import OrderMapKeywords, OrderTrackKeywords
+    from gearmbs.signals.time_frequency import SpectrogramKeywords, WaterfallKeywords
 
 # What figures over time, speed, frequency and order share: maps in decibels, stacked lines, marks of orders.
 
@@ -229,7 +234,7 @@ def spectrogram_plot(
     maximum: float | str | None = None,
     title: str | None = None,
     ax: Axes | None = None,
-    **settings: Any,
+    **settings: Unpack[SpectrogramKeywords],
 ) -> Figure:
     """Draw the spectrum over time as a map.
 
@@ -280,7 +285,7 @@ def order_map_plot(
     maximum: float | None = None,
     title: str | None = None,
     ax: Axes | None = None,
-    **settings: Any,
+    **settings: Unpack[OrderMapKeywords],
 ) -> Figure:
     """Draw the order spectrum over time or speed as a map; orders of the shaft stand upright.
 
@@ -326,7 +331,7 @@ def waterfall_plot(
     maximum: float | str | None = None,
     title: str | None = None,
     ax: Axes | None = None,
-    **settings: Any,
+    **settings: Unpack[WaterfallKeywords],
 ) -> Figure:
     """Draw spectra against speed, one above the other, or as a map.
 
@@ -386,7 +391,7 @@ def order_track_plot(
     log: bool = False,
     title: str | None = None,
     ax: Axes | None = None,
-    **settings: Any,
+    **settings: Unpack[OrderTrackKeywords],
 ) -> Figure:
     """Draw the amplitudes of tracked orders over speed or time, a line for each order.
 
@@ -425,7 +430,7 @@ def order_track_plot(
 
 @waiting("drawing figures")
 def changing_speed_figures(
-    signal: Any, *, orders: Sequence[float] | None = None, title: str | None = None, **shaft: Any
+    signal: Any, *, orders: Sequence[float] | None = None, title: str | None = None, **shaft: Unpack[SpeedKeywords]
 ) -> dict[str, Figure]:
     """Return the figures of a record whose speed changes, of its first channel.
 
