@@ -44,6 +44,8 @@ MOST_MISSING = 8
 """Pulses that may be missing in one gap; a longer one may as well be a standstill."""
 SAME_WHEEL = math.log(1.25)
 """Intervals one revolution apart that differ less are the wheel's own pitch error, not a fault of the pulses."""
+RECURRING = 2
+"""Revolutions of the four nearest in which an interval must recur to be the wheel's own."""
 LISTED = 5
 
 
@@ -480,13 +482,19 @@ def _judged(
 
 
 def _own_pitch(deviation: np.ndarray, teeth: int) -> np.ndarray:
-    """Return which intervals recur one revolution before or after, as those of an uneven wheel do."""
-    same = np.zeros(deviation.size, dtype=bool)
-    if deviation.size > teeth:
-        alike = np.abs(deviation[teeth:] - deviation[:-teeth]) < SAME_WHEEL
-        same[teeth:] |= alike
-        same[:-teeth] |= alike
-    return same
+    """Return which intervals recur in the revolutions beside them, as those of an uneven wheel do.
+
+    By chance a lost pulse is one revolution apart from another one, or from a mark that is not there; of a wheel at
+    least two of the four nearest revolutions are alike, even where a fault shifts the count of those beyond it.
+    """
+    alike, beside = np.zeros(deviation.size, dtype=int), np.zeros(deviation.size, dtype=int)
+    for apart in (teeth, 2 * teeth):
+        if deviation.size > apart:
+            same = np.abs(deviation[apart:] - deviation[:-apart]) < SAME_WHEEL
+            for there in (slice(apart, None), slice(None, -apart)):
+                alike[there] += same
+                beside[there] += 1
+    return (beside > 0) & (alike >= np.minimum(beside, RECURRING))
 
 
 def _median(values: np.ndarray, reach: int) -> np.ndarray:

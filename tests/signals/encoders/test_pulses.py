@@ -61,6 +61,17 @@ def test_lost_and_doubled_pulses_are_mended_and_told(lines):
         pulse_train(np.delete(sound.times, lost), lines, faults="refuse")
 
 
+@pytest.mark.parametrize("lost", [98, 99, 100, 101, 198, 199])
+def test_a_pulse_lost_a_turn_after_a_missing_mark_is_no_uneven_mark(lost):
+    """Of a disc that lacks one of 100 marks an interval 100 pulses after the gap is doubled by chance, by no wheel."""
+    angles = steady(turns=8.0)
+    sound, mended = (encoder(angles, 100, lacking=[0], lost=gone) for gone in ([], [lost]))
+    assert mended.referenced
+    # pulses between two gaps are left out
+    assert sound.times.size - mended.times.size in (1, 2, 3)
+    assert np.array_equal(mended.times, sound.times[np.isin(sound.numbers, mended.numbers)])
+
+
 def test_a_mark_that_the_disc_lacks_numbers_the_others():
     whole, lacking = encoder(steady(), 60, index=True), encoder(steady(), 60, lacking=[0])
     assert lacking.referenced
