@@ -72,6 +72,8 @@ from .encoders.files import write_pulses as write_pulses
 from .encoders.instruments import encoder as encoder
 from .encoders.instruments import mark_errors as mark_errors
 from .encoders.instruments import shaft_angles as shaft_angles
+from .encoders.lengths import EncoderPair as EncoderPair
+from .encoders.lengths import RecordLength as RecordLength
 from .encoders.marks import EncoderMarks as EncoderMarks
 from .encoders.marks import encoder_marks as encoder_marks
 from .encoders.marks import torsional_vibration as torsional_vibration

@@ -48,6 +48,9 @@ def transmission_error(
     harmonics: Annotated[
         int | None, typer.Option(help="Highest mesh harmonic, also beyond half the lines where teeth are alike.")
     ] = None,
+    accuracy: Annotated[
+        float, typer.Option(help="Share of themselves that harmonics are wanted to; says how long others take.")
+    ] = 0.02,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures as PNG and SVG.")] = None,
     out: ReportFile = None,
@@ -80,6 +83,7 @@ def transmission_error(
             mark_error=mark_error,
             probability=probability,
             harmonics=harmonics,
+            accuracy=accuracy,
         )
         files = save_tables(found.tables(), tables)
         if figures is not None:

@@ -36,6 +36,8 @@ APART = 0.99
 FLANK = 4.0
 """Turns of the slower shaft in which the window rises and falls, if the record has twice as many: what is half an order
 beside a line and no line itself is let through to 1/15 of what it would be by flanks of no length."""
+MOST_SCATTER = 128
+"""Turns, spread over the record, by which the scatter of a line is told, at most: its square is then known to 6 %."""
 WHOLE = 1e-9
 """Difference from a whole number up to which an order is one: of ratios written as decimals."""
 
@@ -62,7 +64,8 @@ class Window(NamedTuple):
     begin : float
         rad.
     turns, flank : float
-        Turns from the middle of one flank to that of the other, and of each flank.
+        Turns from the middle of one flank to that of the other, and of each flank; without flanks the window is closed,
+        its end followed by its beginning.
     """
 
     begin: float
@@ -91,10 +94,16 @@ class Window(NamedTuple):
 
     def weights(self, phi: np.ndarray, spacing: np.ndarray) -> np.ndarray:
         """Return weights of points, normalised so that the sum with a line's exponential is its amplitude."""
+        weights = spacing * self.fade(phi)
+        return 2.0 / weights.sum() * weights
+
+    def fade(self, phi: np.ndarray) -> np.ndarray:
+        """Return what the window lets through of points, 0 to 1."""
+        if not self.flank:
+            return np.ones(phi.size)
         turned = (phi - self.begin) / TURN
         inside = np.minimum(turned, self.length - turned) / self.flank
-        weights = spacing * (0.5 - 0.5 * np.cos(math.pi * np.clip(inside, 0.0, 1.0)))
-        return 2.0 / weights.sum() * weights
+        return 0.5 - 0.5 * np.cos(math.pi * np.clip(inside, 0.0, 1.0))
 
 
 class Course(NamedTuple):
@@ -193,13 +202,18 @@ def deviations(
     kept = (phi >= begin) & (phi <= end)
     phi, ahead, there, spacing, numbers = (v[kept] for v in (phi, ahead, there, spacing, numbers))
     mean = float(ahead[there].mean())
-    found = Deviations(phi, ahead - mean, mean, spacing, numbers, there)
+    return bridged(Deviations(phi, ahead - mean, mean, spacing, numbers, there), known, window)
+
+
+def bridged(found: Deviations, known: Sequence[float] = (), window: Window | None = None) -> Deviations:
+    """Return deviations with those of missing pulses filled in, as `deviations` says."""
+    phi, there = found.phi, found.there
     if there.all():
         return found
     holes, values = ~there, found.values.copy()
     values[holes] = np.interp(phi[holes], phi[there], values[there])
     if window is not None:
-        weights = window.weights(phi, spacing)
+        weights = window.weights(phi, found.spacing)
         for _ in range(BRIDGINGS):
             model = np.zeros_like(phi)
             for order in known:
@@ -240,10 +254,35 @@ def lines(
     mesh : Fraction, optional
         Order of whose multiples among `orders` the lines are taken out first, as the largest.
     """
-    wanted: dict[Fraction, dict[int, Fraction]] = {step: {} for step in steps}
+    wanted = multiples(orders, steps)
+    values = dict.fromkeys(orders, 0.0j)
+    variances = dict.fromkeys(orders, 0.0)
+    for one, sign in zip(found, signs):
+        own, left = taken_out(one, orders, wanted, window, mesh)
+        for order, variance in scatter(one, left, wanted, window).items():
+            variances[order] += variance
+        for order, value in own.items():
+            values[order] += sign * value
+    return {order: Line(values[order], variances[order]) for order in orders}
+
+
+Multiples = dict[Fraction, dict[int, Fraction]]
+"""Of each step its multiples, and the orders that these are."""
+
+
+def multiples(orders: Sequence[Fraction], steps: Sequence[Fraction]) -> Multiples:
+    """Return which orders are multiples of which step, each of the first that it is one of."""
+    wanted: Multiples = {step: {} for step in steps}
     for order in orders:
         step = next(step for step in steps if (order / step).denominator == 1)
         wanted[step][int(order / step)] = order
+    return wanted
+
+
+def taken_out(
+    one: Deviations, orders: Sequence[Fraction], wanted: Multiples, window: Window, mesh: Fraction | None
+) -> tuple[dict[Fraction, complex], np.ndarray]:
+    """Return the lines of an encoder, and what its deviations are without them."""
     # uneven marks leak a part of each line into all others: the lines of what is left make up for it
     apart = float(min(np.diff([float(o) for o in sorted(orders)]), default=1.0)) * window.turns > APART
     stages = [wanted, wanted] if apart else [wanted]
@@ -251,30 +290,39 @@ def lines(
         large = {mesh: {int(order / mesh): order for order in orders if (order / mesh).denominator == 1}}
         stages = [large, large, *stages]
     values = dict.fromkeys(orders, 0.0j)
-    variances = dict.fromkeys(orders, 0.0)
-    for one, sign in zip(found, signs):
-        weights = window.weights(one.phi, one.spacing)
-        # what is left beside all lines is noise: those of one shaft would scatter over turns of the other
-        left = one.values.copy()
-        for stage in stages:
-            rest = weights * left
-            for step, places in stage.items():
-                for order, rotating in _rotating(one.phi, step, places):
-                    value = complex(rest @ rotating)
-                    values[order] += sign * value
-                    left -= np.real(value * rotating.conj())
-        for step, places in wanted.items():
-            length = TURN / float(step)
-            whole = math.floor(window.length * float(step) + WHOLE)
-            edges = np.searchsorted(one.phi, window.begin + length * np.arange(whole + 1))
-            if whole < 2 or np.any(np.diff(edges) < 1):
-                continue
-            plain = (2.0 / length) * one.spacing * left
-            share = 0.5 * window.noise / (window.turns * float(step))
+    weights = window.weights(one.phi, one.spacing)
+    # what is left beside all lines is noise: those of one shaft would scatter over turns of the other
+    left = one.values.copy()
+    for stage in stages:
+        rest = weights * left
+        for step, places in stage.items():
             for order, rotating in _rotating(one.phi, step, places):
-                by_turn = np.add.reduceat((plain * rotating)[: edges[-1]], edges[:-1])
-                variances[order] += share * float(np.var(by_turn, ddof=1))
-    return {order: Line(values[order], variances[order]) for order in orders}
+                value = complex(rest @ rotating)
+                values[order] += value
+                left -= np.real(value * rotating.conj())
+    return values, left
+
+
+def scatter(one: Deviations, left: np.ndarray, wanted: Multiples, window: Window) -> dict[Fraction, float]:
+    """Return the variances of lines by how they scatter from turn to turn in what is left beside them."""
+    variances = {}
+    for step, places in wanted.items():
+        length = TURN / float(step)
+        whole = math.floor(window.length * float(step) + WHOLE)
+        chosen = np.arange(whole)
+        if whole > MOST_SCATTER:
+            chosen = np.round(np.linspace(0, whole - 1, MOST_SCATTER)).astype(int)
+        first, last = (np.searchsorted(one.phi, window.begin + length * k) for k in (chosen, chosen + 1))
+        if whole < 2 or np.any(first == last):
+            continue
+        picked = np.concatenate([np.arange(a, b) for a, b in zip(first, last)])
+        begins = np.concatenate(([0], np.cumsum(last - first)[:-1]))
+        plain = ((2.0 / length) * one.spacing * left)[picked]
+        share = 0.5 * window.noise / (window.turns * float(step))
+        for order, rotating in _rotating(one.phi[picked], step, places):
+            by_turn = np.add.reduceat(plain * rotating, begins)
+            variances[order] = share * float(np.var(by_turn, ddof=1))
+    return variances
 
 
 def _rotating(phi: np.ndarray, step: Fraction, places: dict[int, Fraction]) -> Iterator[tuple[Fraction, np.ndarray]]:

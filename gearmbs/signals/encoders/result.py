@@ -15,6 +15,7 @@ from scipy import stats
 from gearmbs._display import Shown
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.encoders.estimate import Found, amplitude_interval
+from gearmbs.signals.encoders.lengths import ACCURACY
 from gearmbs.signals.encoders.orders import Gearing, beside
 from gearmbs.signals.encoders.pulses import TURN
 from gearmbs.signals.errors import SignalError
@@ -36,6 +37,8 @@ LEAST_REST = 1e-6
 ENDS = 8
 """Turns of the slower shaft that a record must have beside those of the window: two at either end for the smooth angle,
 four for its flank."""
+LISTED = 4
+"""Harmonics whose lengths a report names."""
 SHAFTS = ("driver", "driven")
 
 
@@ -83,6 +86,12 @@ class MeasuredTransmissionError(Shown):
         Of the driver, in the shortest run's window.
     doubt : str or None
         Why the told teeth or lines seem to be wrong (`gearmbs.signals.encoders.plausible`).
+    accuracy : float
+        Share of themselves that mesh harmonics are wanted to.
+    recorded : dict of str to float
+        Seconds in mesh, by load.
+    freed : dict of str to float
+        Seconds of each shaft running free.
     """
 
     gearing: Gearing
@@ -101,6 +110,9 @@ class MeasuredTransmissionError(Shown):
     turns: float
     doubt: str | None = None
     source: str = field(default="pulses")
+    accuracy: float = ACCURACY
+    recorded: Mapping[str, float] = field(default_factory=dict)
+    freed: Mapping[str, float] = field(default_factory=dict)
 
     def _load(self, load: str | None) -> str:
         if load is None:
@@ -146,6 +158,68 @@ class MeasuredTransmissionError(Shown):
     def shaft_orders(self, load: str | None = None) -> pd.DataFrame:
         """Orders of the shafts that are no mesh orders, as `harmonics`."""
         return self.lines_with_intervals({self._load(load): 1.0}, [o for o in self.lines if not o.harmonic])
+
+    def record_lengths(self, accuracy: float | None = None, load: str | None = None) -> pd.DataFrame:
+        """Which mesh harmonics are known to what was asked, and how long a record the others take.
+
+        What pulses leave open falls as the root of the record's length, what unknown marks leave does not.
+
+        Parameters
+        ----------
+        accuracy : float, optional
+            Half the interval by the amplitude; default: as the result was asked for.
+        load : str, optional
+            Default: the first.
+
+        Returns
+        -------
+        DataFrame
+            ``harmonic``, ``amplitude`` (m), ``reach`` half the interval by it, ``seen`` whether the line is clear of
+            zero, ``known``; ``times`` as long in mesh and free it takes, infinite where marks are unknown, and the
+            ``seconds`` in mesh, ``free_driver`` and ``free_driven`` that these are. Of a line that is not seen, for one
+            of the measured height, which chance has made.
+        """
+        load, share = self._load(load), self.accuracy if accuracy is None else accuracy
+        if not 0.0 < share < 1.0:
+            raise SignalError(
+                f"accuracy: must be a share of the amplitude between 0 and 1, such as 0.02, got {share!r}"
+            )
+        rows = []
+        intervals = self.harmonics(load)
+        for one, seen in zip((o for o in self.lines if o.harmonic), intervals["low"] > 0.0, strict=True):
+            value, variance = self._value(one, load)
+            size = abs(value)
+            half = float(stats.t.ppf(0.5 + 0.5 * self.probability, one.freedom)) * math.sqrt(variance)
+            reach = half / size if size else math.inf
+            known = reach <= share
+            times = 1.0 if known else (reach / share) ** 2 if one.calibrated else math.inf
+            lengths = (self.recorded.get(load, math.nan), *(self.freed.get(shaft, 0.0) for shaft in SHAFTS))
+            needed = [times * length if length else 0.0 for length in lengths]
+            rows.append((one.harmonic, size, reach, bool(seen), known, times, *needed))
+        columns = ["harmonic", "amplitude", "reach", "seen", "known", "times", "seconds", "free_driver", "free_driven"]
+        return pd.DataFrame(rows, columns=columns)
+
+    def _lengths_in_words(self, load: str) -> str:
+        """Return which harmonics are known to what was asked, and what the others take."""
+        table = self.record_lengths(load=load)
+        known, unseen = table[table["known"]], table[~table["seen"]]
+        rest = table[table["seen"] & ~table["known"]]
+        marks, short = rest[np.isinf(rest["times"])], rest[np.isfinite(rest["times"])]
+        words = [f"Known to {100 * self.accuracy:g} %: {_listed(known['harmonic']) if len(known) else 'no harmonic'}."]
+        if len(short):
+            each = [
+                f"{r.harmonic} (to {100 * r.reach:.2g} %) takes {_rounded(r.times)} times the record, "
+                f"{_rounded(r.seconds)} s in mesh"
+                for r in short.itertuples()
+            ]
+            more = f" and {len(each) - LISTED} more, see record_lengths" if len(each) > LISTED else ""
+            free = ", and as many times the free runs" if any(self.freed.values()) else ""
+            words.append(f"Harmonic {'; '.join(each[:LISTED])}{more}{free}.")
+        if len(marks):
+            words.append(f"No length is enough for {_listed(marks['harmonic'])}: the marks are unknown.")
+        if len(unseen):
+            words.append(f"Not clear of the noise: {_listed(unseen['harmonic'])}.")
+        return " ".join(words)
 
     def _value(self, one: OrderLine, load: str) -> tuple[complex, float]:
         value, variance = one.found.of({f"T {load}": 1.0 + 0.0j})
@@ -317,12 +391,15 @@ class MeasuredTransmissionError(Shown):
         )
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """All numbers as tables: mesh_harmonics, shaft_orders, single_flank and, with teeth, driver and driven."""
+        """All numbers as tables.
+
+        mesh_harmonics, shaft_orders, single_flank, record_lengths and, with teeth, driver_teeth and driven_teeth.
+        """
         found = {
             name: pd.concat([make(load).assign(load=load) for load in self.loads], ignore_index=True)
             for name, make in (
                 ("mesh_harmonics", self.harmonics), ("shaft_orders", self.shaft_orders),
-                ("single_flank", self.single_flank),
+                ("single_flank", self.single_flank), ("record_lengths", lambda load: self.record_lengths(load=load)),
             )
         }  # fmt: skip
         for shaft in SHAFTS if self.teeth is not None else ():
@@ -350,8 +427,8 @@ class MeasuredTransmissionError(Shown):
             else ""
         )
         return doubt + (
-            f"Mesh harmonic {int(first['harmonic'])} of the transmission error is {1e6 * first['amplitude']:.3g} um "
-            f"({1e6 * first['low']:.3g} to {1e6 * first['high']:.3g} um){rest}."
+            f"Mesh harmonic {int(first['harmonic'])} of the transmission error is {1e6 * first['amplitude']:.4g} um "
+            f"({1e6 * first['low']:.4g} to {1e6 * first['high']:.4g} um){rest}."
         )
 
     def to_markdown(self) -> str:
@@ -370,6 +447,7 @@ class MeasuredTransmissionError(Shown):
         for load in self.loads:
             title = f" ({load})" if len(self.loads) > 1 else ""
             parts += ["", f"## Mesh harmonics, peak amplitudes in um{title}", "", _micro(self.harmonics(load))]
+            parts += ["", self._lengths_in_words(load)]
             parts += ["", f"## Single-flank values, um{title}", "", _micro(self.single_flank(load))]
             for shaft in SHAFTS if self.teeth is not None else ():
                 teeth = self.tooth_errors(shaft, load)
@@ -403,6 +481,22 @@ def _beside_run_out(error: np.ndarray) -> np.ndarray:
         weight = 1.0 / np.sqrt(np.maximum(np.abs(rest), LEAST_REST * np.abs(rest).max() + np.finfo(float).tiny))
         rest = error - terms @ np.linalg.lstsq(weight[:, None] * terms, weight * error, rcond=None)[0]
     return rest
+
+
+def _listed(harmonics: Iterable[int]) -> str:
+    """Return whole numbers in words, neighbours together."""
+    runs: list[list[int]] = []
+    for h in harmonics:
+        if runs and h == runs[-1][-1] + 1:
+            runs[-1].append(h)
+        else:
+            runs.append([h])
+    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]}{' to ' if len(r) > 2 else ', '}{r[-1]}" for r in runs)
+
+
+def _rounded(value: float) -> str:
+    """Return a number with two digits, without an exponent."""
+    return f"{float(f'{value:.2g}'):g}" if value < 1e6 else f"{value:.1e}"
 
 
 def _shaft(name: str) -> int:

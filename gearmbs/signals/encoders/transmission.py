@@ -12,16 +12,19 @@ import numpy as np
 
 from gearmbs.progress import waiting
 from gearmbs.signals.encoders.estimate import Found, Row, estimate
+from gearmbs.signals.encoders.lengths import ACCURACY
 from gearmbs.signals.encoders.marks import encoder_marks, share_found
+from gearmbs.signals.encoders.meetings import averaged, lines_by_meetings
 from gearmbs.signals.encoders.orders import (
     FEWEST_TURNS,
+    MOST_SCATTER,
     Course,
     Gearing,
     Line,
     Window,
+    bridged,
     deviations,
     folded,
-    lines,
     smooth_angle,
 )
 from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks
@@ -66,14 +69,14 @@ class CoupledRun:
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """Lines of one run by order, in rad of the first shaft, and the place of the second disc."""
+    """Lines of one run by order, in rad of the first shaft, the place of the second disc, turns that scatter is of."""
 
     run: CoupledRun
     values: dict[Fraction, Line]
     mesh: list[Fraction]
     ratio: float
     place: float
-    turns: int
+    scattered: int
     doubt: str | None
     window: Window
 
@@ -95,6 +98,7 @@ def transmission_error_from_pulses(
     mark_error: float | Sequence[float] | None = None,
     probability: float = 0.95,
     harmonics: int | None = None,
+    accuracy: float = ACCURACY,
 ) -> MeasuredTransmissionError:
     """Transmission error of two shafts, its mesh and shaft orders, with the interval that the marks leave.
 
@@ -123,6 +127,9 @@ def transmission_error_from_pulses(
         Highest mesh harmonic. Those from half the lines on are taken, where teeth that are alike pass the marks in many
         phases, at the orders they are folded to; what these orders have of their own, by those beside them, is in the
         interval. Default: those below half the lines.
+    accuracy : float
+        Share of themselves that mesh harmonics are wanted to: the result says which are not, and how long a record they
+        take.
 
     Returns
     -------
@@ -138,6 +145,8 @@ def transmission_error_from_pulses(
         raise SignalError("runs: give at least one CoupledRun")
     if not 0.0 < probability < 1.0:
         raise SignalError(f"probability: must lie between 0 and 1, got {probability!r}")
+    if not 0.0 < accuracy < 1.0:
+        raise SignalError(f"accuracy: must be a share of the amplitude between 0 and 1, such as 0.02, got {accuracy!r}")
     gearing = _gearing(teeth, ratio, mesh_order)
     radius = to_si(base_radius, "length", "base_radius")
     if not 0.0 < radius < LARGEST_RADIUS:
@@ -171,7 +180,7 @@ def transmission_error_from_pulses(
         rows = _rows(order, gearing, measured, shifts, marks, known.get("driven", 0.0), levels.folded(order, trains))
         solved = estimate(rows, known)
         calibrated = all(_is_calibrated(solved, known, name) for name in solved.names if name in known)
-        freedom = 2.0 * sum(m.turns - 1 for m in measured) if calibrated else levels.freedom
+        freedom = 2.0 * sum(m.scattered - 1 for m in measured) if calibrated else levels.freedom
         found.append(OrderLine(*order, solved, freedom, calibrated))
     return MeasuredTransmissionError(
         gearing=gearing, radius=radius, lines=found, loads=tuple(dict.fromkeys(r.load for r in runs)), refused=refused,
@@ -180,7 +189,9 @@ def transmission_error_from_pulses(
         referenced=(trains[0].referenced, trains[1].referenced), speed=trains[0].mean_speed,
         places={m.run.load: m.place for m in reversed(measured)},
         lines_of=(trains[0].lines, trains[1].lines), turns=min(m.window.turns for m in measured),
-        doubt=next(filter(None, (m.doubt for m in measured)), None),
+        doubt=next(filter(None, (m.doubt for m in measured)), None), accuracy=accuracy,
+        recorded={r.load: sum(_seconds(s.driver) for s in runs if s.load == r.load) for r in runs},
+        freed={name: sum(map(_seconds, trains)) for name, trains in freed.items()},
     )  # fmt: skip
 
 
@@ -191,6 +202,10 @@ CALIBRATED = 0.1
 def _is_calibrated(solved: Found, known: Mapping[str, float], name: str) -> bool:
     k = solved.names.index(name)
     return bool(np.real(solved.covariance[k, k]) < CALIBRATED * known[name])
+
+
+def _seconds(train: PulseTrain) -> float:
+    return float(train.times[-1] - train.times[0])
 
 
 def _listed(trains: PulseTrain | Sequence[PulseTrain] | None) -> list[PulseTrain]:
@@ -304,19 +319,28 @@ def _lines_of(
     # the turns after which the wheels meet again, if there are as many
     window = Window.of(begin, end, (float(gearing.ratio.numerator), turn))
     end = begin + TURN * window.length
-    known = [float(o.order) for o in orders if o.harmonic]
     scale = float(gearing.ratio)
-    first = deviations(run.driver, course, begin, end, 1.0, errors["driver"], known, window)
-    second = deviations(run.driven, course, begin, end, scale, errors["driven"], known, window)
+    first = deviations(run.driver, course, begin, end, 1.0, errors["driver"])
+    second = deviations(run.driven, course, begin, end, scale, errors["driven"])
     _check_clocks(run, first.drift - second.drift, float(gearing.mesh), window.length)
+    known = [float(o.order) for o in orders if o.harmonic]
+    period = Fraction(gearing.ratio.numerator)
+    if not averaged(window, period):
+        first, second = (bridged(one, known, window) for one in (first, second))
     steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
-    values = lines((first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh)
+    # after as many turns of the first and second shaft the wheels meet again
+    counts = (gearing.ratio.numerator * run.driver.lines, gearing.ratio.denominator * run.driven.lines)
+    values = lines_by_meetings(
+        (first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh,
+        period=period, counts=counts, known=known,
+    )  # fmt: skip
     mesh = [o.order for o in orders if o.harmonic]
     trains = (run.driver, run.driven)
     doubt = repeating_marks(trains, (float(gearing.mesh), float(gearing.on_second(gearing.mesh))), scale)
     # marks that repeat are told for lines of a mesh otherwise
     doubt = doubt or doubted_numbers(first, second, begin, end, gearing, (run.driver.lines, run.driven.lines))
-    return _Measured(run, values, mesh, scale, second.mean / scale, max(2, math.floor(slower)), doubt, window)
+    scattered = min(max(2, math.floor(slower)), MOST_SCATTER)
+    return _Measured(run, values, mesh, scale, second.mean / scale, scattered, doubt, window)
 
 
 def _check_clocks(run: CoupledRun, drift: float, mesh: float, turns: float) -> None:
@@ -350,7 +374,8 @@ def _free_lines(train: PulseTrain, name: str, orders: Sequence[int], errors: np.
         )
     window = Window.of(begin, end, (1.0,))
     found = deviations(train, course, begin, begin + TURN * window.length, 1.0, errors)
-    return lines((found,), [Fraction(k) for k in orders], (Fraction(1),), window, (1.0,))
+    whole, turn = [Fraction(k) for k in orders], Fraction(1)
+    return lines_by_meetings((found,), whole, (turn,), window, (1.0,), period=turn, counts=(train.lines,))
 
 
 def _shifts(measured: Sequence[_Measured], gearing: Gearing) -> tuple[list[tuple[float, float]], list[str]]:

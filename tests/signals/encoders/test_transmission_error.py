@@ -479,7 +479,9 @@ def test_a_tooth_with_an_error_is_found_by_its_number():
     assert "Teeth of the driver that stand out:" in text
     assert " 8 (-" in text
     assert " 20 (+" in text
-    assert {"mesh_harmonics", "shaft_orders", "single_flank", "driver_teeth", "driven_teeth"} == set(found.tables())
+    assert {
+        "mesh_harmonics", "shaft_orders", "single_flank", "record_lengths", "driver_teeth", "driven_teeth"
+    } == set(found.tables())  # fmt: skip
     figure = measured_error_plot(found, title="two wrong teeth")
     assert len(figure.axes) == len(found.plot().axes) == 5
 
