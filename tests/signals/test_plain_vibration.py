@@ -1,6 +1,7 @@
 """Reports without teeth, and remarks on speeds and rates that cannot be right."""
 
 import math
+import re
 
 import numpy as np
 import pandas as pd
@@ -89,6 +90,26 @@ def test_half_or_double_the_speed_is_remarked():
         said = checks(analyse(pair(), 32, rate=RATE, speed=wrong))
         assert any("CHECK THE SPEED" in note and "1500.0 rpm" in note for note in said), (wrong, said)
         assert said[0] in analyse(pair(), 32, rate=RATE, speed=wrong).to_markdown()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("teeth", "told", "both"), [
+    (15, 16, False), (16, 15, True), (20, 21, False), (32, 30, True), (20, 19, False), (44, 45, False),
+])  # fmt: skip
+def test_teeth_that_are_told_off_by_one_are_told_as_such(teeth, told, both):
+    """Where a usual sampling rate fits as well (12 kHz told as 12.8 is 15 of 16) both are offered."""
+    t = np.arange(round(4 * RATE)) / RATE
+    mesh = 2 * np.pi * teeth * SHAFT * t
+    x = (1 + 0.2 * np.cos(2 * np.pi * SHAFT * t)) * np.cos(mesh) + 0.4 * np.cos(2 * mesh) + 0.2 * np.cos(3 * mesh)
+    x += 0.02 * np.random.default_rng(seed(8)).standard_normal(t.size)
+    said = " ".join(analyse(x, told, rate=RATE, speed="1500 rpm").notes)
+    assert re.search(rf"wheel (of|has) {teeth} teeth, (told as|not) {told}", said), said
+    assert ("sampling rate of" in said) == both
+    assert "wheel" not in " ".join(analyse(x, teeth, rate=RATE, speed="1500 rpm").notes)
+    # a speed that is off by other shares is no matter of teeth
+    other = " ".join(analyse(x, teeth, rate=RATE, speed="1350 rpm").notes)
+    assert "CHECK THE SPEED" in other
+    assert "wheel of" not in other
 
 
 @pytest.mark.slow

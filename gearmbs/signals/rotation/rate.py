@@ -1,4 +1,4 @@
-"""What the lines of a record say against its sampling rate: if it is told wrongly, all are off by one factor."""
+"""What lines of a record say against its sampling rate, or the teeth: told wrongly, these move all by one factor."""
 
 from __future__ import annotations
 
@@ -17,6 +17,26 @@ EXACT = 1e-6
 """Octaves by which a rate may be off these: headers round to so many digits."""
 ALIKE = 0.01
 """Share by which a ratio may be off, as told speeds are; two of these are 2 % apart at least."""
+MISCOUNTED = 2
+"""Teeth by which a wheel is counted wrongly, at most: more, and another wheel is meant."""
+PART_OF_TOOTH = 0.15
+"""How far from a whole number the teeth may come out: of 20 teeth as speeds told off by 0.7 % make them."""
+
+
+def other_teeth(ratio: float, count: int) -> str:
+    """Return which count of teeth, one or two off, would explain that the mesh stands at some times its frequency.
+
+    Parameters
+    ----------
+    ratio : float
+        Mesh frequency in the record by that expected.
+    count : int
+        Told teeth.
+    """
+    teeth = round(ratio * count)
+    if teeth == count or abs(teeth - count) > MISCOUNTED or abs(ratio * count - teeth) > PART_OF_TOOTH:
+        return ""
+    return f" A wheel of {teeth} teeth, told as {count}, would make it so at the given speed: count them (--teeth)."
 
 
 def other_rate(signal: xr.DataArray, ratio: float) -> str:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.phase import phase_from_line, phase_from_speed, phase_from_tacho
-from gearmbs.signals.rotation.rate import other_rate
+from gearmbs.signals.rotation.rate import MISCOUNTED, other_rate, other_teeth
 from gearmbs.signals.rotation.speed import (
     MIN_QUALITY,
     MIN_SCORE_DB,
@@ -413,6 +413,7 @@ def _not_a_sideband(
     whole = round(beside)
     told = f"{nominal * 30 / math.pi:.2f} rpm"
     exact = abs(beside - whole) * nominal / math.tau <= LINES_OFF * found.resolution
+    miscounted = abs(whole) <= MISCOUNTED
     kind = f"{abs(beside):.3g} turns of the shaft {'above' if beside > 0 else 'below'} that of the given {told}"
     if not exact:
         notes.append(
@@ -422,7 +423,8 @@ def _not_a_sideband(
         return found
     notes.append(
         f"The highest line near the mesh frequency is {kind}: a sideband, as planetary sets have (planetary=). The "
-        f"given speed is kept; if {found.speed * 30 / math.pi:.2f} rpm is right, give that."
+        f"given speed is kept; if {found.speed * 30 / math.pi:.2f} rpm is right, give that"
+        + (f"; if the wheel has {counts[0] + whole} teeth, not {counts[0]}, it is the mesh." if miscounted else ".")
     )
     half = SIDEBAND_TURNS / counts[0]
     return _estimate(signal, counts, (nominal * (1.0 - half), nominal * (1.0 + half)))
@@ -508,7 +510,7 @@ def _remark_other(
         f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
         f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
         f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
-        f"{other_rate(signal, ratio) if hint is None else hint}"
+        f"{other_teeth(ratio, counts[0])}{other_rate(signal, ratio) if hint is None else hint}"
     )
     return True
 
