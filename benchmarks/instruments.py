@@ -23,13 +23,10 @@ import gearmbs as gm
 from benchmarks.markdown import table
 from gearmbs import signals
 from gearmbs.gears import GearPair, GearSpec, planetary, planetary_mechanism
-from gearmbs.gears.transmission import loaded_transmission_error
 from gearmbs.mechanism import Mechanism, ramp, step
 
 LINES, MARKS = 1024, 0.01
 COUNTER: dict[str, Any] = {"clock": "50 ns", "jitter": "50 ns"}
-EDGE = math.hypot(50e-9, 50e-9 / math.sqrt(12.0))
-"""RMS error of an edge's time, s: jitter, and a clock that cuts evenly."""
 FREE = 4.0
 """Seconds of the shafts running free."""
 HARMONICS = 4
@@ -58,28 +55,17 @@ class Box(NamedTuple):
         driver, driven = (a.values - a.values[0] for a in self.angles)
         return driver / math.tau, self.radius * (driver - self.ratio * driven)
 
-    def exact(self) -> np.ndarray:
-        """Return the amplitudes of the mesh harmonics, m, over all whole meshes."""
+    def lines(self, count: int) -> np.ndarray:
+        """Return the first mesh harmonics, m, over all whole meshes: peaks, with the phase at the driver's angle 0."""
         turned, lag = self.lag()
         cycles = math.floor(turned[-1] * self.mesh)
         even = np.arange(64 * cycles) / (64 * self.mesh)
-        lines = np.fft.rfft(scipy.interpolate.make_interp_spline(turned, lag, k=5)(even)) / (32 * cycles)
-        return np.abs(lines)[cycles : (HARMONICS + 1) * cycles : cycles]
+        found = np.fft.rfft(scipy.interpolate.make_interp_spline(turned, lag, k=5)(even)) / (32 * cycles)
+        return found[cycles : (count + 1) * cycles : cycles]
 
-    def longer(self, turns: float) -> Box:
-        """Return the same lag, mesh after mesh alike, over more turns at steady speed."""
-        turned, lag = self.lag()
-        even = np.arange(256) / (256 * self.mesh)
-        lines = [np.mean(lag * np.exp(-1j * math.tau * h * self.mesh * turned)) for h in range(1, HARMONICS + 1)]
-        lines = [line / abs(line) * size for line, size in zip(lines, self.exact())]
-        curve = sum(np.real(c * np.exp(1j * math.tau * h * self.mesh * even)) for h, c in enumerate(lines, 1))
-        spline = scipy.interpolate.CubicSpline(
-            np.append(even, 1 / self.mesh), np.append(curve, curve[0]), bc_type="periodic"
-        )
-        t = np.arange(round(math.tau * turns / self.speed * 20e3)) / 20e3
-        driver = self.speed * t
-        driven = (driver - spline(np.mod(driver / math.tau, 1 / self.mesh)) / self.radius) / self.ratio
-        return self._replace(angles=(_angle(driver, t), _angle(driven, t)))
+    def exact(self) -> np.ndarray:
+        """Return the amplitudes of the mesh harmonics, m."""
+        return np.abs(self.lines(HARMONICS))
 
     def measured(self, seed: int, free: float = 0.0, **known: Any) -> Any:
         """Return the transmission error through encoders, one of which lacks a mark; shafts free for some seconds."""
@@ -97,12 +83,6 @@ class Box(NamedTuple):
         run = signals.CoupledRun(*(pulses(k, angle, 0) for k, angle in enumerate(self.angles)))
         alone = {name: pulses(k, down, 2) for k, name in enumerate(("driver", "driven"))} if free else None
         return gm.transmission_error_from_pulses(run, base_radius=self.radius, free=alone, **self.gearing, **known)
-
-    def bound(self, turns: float, free: float) -> float:
-        """Return the standard deviation of an amplitude that no unbiased estimate goes below, m."""
-        alone = self.speed * free / math.tau
-        one = (1.0 + self.ratio) / turns + (1.0 + self.ratio**2) / alone
-        return self.radius * self.speed * EDGE * math.sqrt(2.0 / LINES * one)
 
 
 def _angle(values: np.ndarray, times: np.ndarray) -> xr.DataArray:
@@ -156,9 +136,9 @@ def _turned(name: str, m: Mechanism, seats: list[str], *known: Any) -> Box:
     return Box(name, (next(angles), next(angles)), *known)
 
 
-def encoders(draws: int = 6, longer: float = 4.0) -> str:
-    """Return what encoders make of four gearboxes, and of longer records of those with small harmonics."""
-    rows, long = [], []
+def encoders() -> str:
+    """Return what encoders make of four gearboxes."""
+    rows = []
     micro = "{:.3f}, {:.3f}".format
     for box in boxes():
         exact, found = 1e6 * box.exact(), box.measured(1, FREE).harmonics()[:HARMONICS]
@@ -172,44 +152,9 @@ def encoders(draws: int = 6, longer: float = 4.0) -> str:
             f"{widths.min():.1f} to {widths.max():.1f}; {inside.sum()} of {HARMONICS}",
         ])  # fmt: skip
         print(rows[-1], flush=True)
-        if exact.min() > 0.1:
-            continue
-        for times in (1.0, longer):
-            wide, free = box.longer(times * turns), times * FREE
-            tables = [wide.measured(10 + k, free).harmonics()[:HARMONICS] for k in range(draws)]
-            off = np.array([1e6 * t["amplitude"] - exact for t in tables])
-            reach = float(np.mean([0.5e9 * (t["high"] - t["low"]) for t in tables]))
-            errors = ", ".join(f"{e:.1f}" for e in 100 * np.sqrt(np.mean(off**2, axis=0)) / exact)
-            ideal = 1e9 * wide.bound(times * turns, free)
-            long.append([box.name, f"{times * turns:.0f}", f"{free:g} s", errors + " %",
-                         f"{1e3 * np.sqrt(np.mean(off**2)):.2f}", f"{0.5 * reach:.2f}", f"{ideal:.2f}"])  # fmt: skip
-            print(long[-1], flush=True)
     head = ["", "turns", *(f"harmonic {k}" if k == 1 else str(k) for k in range(1, HARMONICS + 1)), "interval ±",
             "without free runs: width; truth inside"]  # fmt: skip
-    length = ["", "turns in mesh", "free", "errors of harmonics 1 to 4, RMS", "RMS, nm", "told, nm", "bound, nm"]
-    return f"{table(head, rows)}\n<!-- longer -->\n\n{table(length, long)}\n<!-- static -->\n\n{_static()}"
-
-
-def _static(draws: int = 5) -> str:
-    """Return how near the loaded static curve of the paper's pair is to what encoders make of it."""
-    pair = GearPair.paper(backlash="0.1 mm")
-    error = loaded_transmission_error(pair, torque=100.0, points=400).error
-    radius, teeth = pair.geometry.driver.base_radius, pair.geometry.driver.teeth
-    phase = np.arange(401) / 400
-    spline = scipy.interpolate.CubicSpline(phase, np.append(error, error[0]), bc_type="periodic")
-    t = np.arange(round(62 * math.tau / 100.0 * 100e3)) / 100e3
-    driven = 100.0 * t - spline(np.mod(teeth * 100.0 * t / math.tau, 1.0)) / radius
-    box = Box("static", (_angle(100.0 * t, t), _angle(driven, t)), radius, {"teeth": (teeth, teeth)}, 1.0, teeth)
-    lines = np.fft.rfft(error)
-    rows = []
-    for count in (17, 64):
-        told = {"harmonics": count} if count > 17 else {}
-        curves = [box.measured(30 + k, FREE, **told).mesh_cycle(points=400)[1] for k in range(draws)]
-        held = np.fft.irfft(np.where((np.arange(201) > 0) & (np.arange(201) <= count), lines, 0.0), 400)
-        for of, curve in ((f"of {count} harmonics", held), ("whole", error - error.mean())):
-            off = [1e6 * np.abs(c - curve).max() for c in curves]
-            rows.append([str(count), of, f"{min(off):.2f} to {max(off):.2f}"])
-    return table(["harmonics taken", "against the curve", "largest difference, µm"], rows)
+    return table(head, rows)
 
 
 # The paper's comparison.
