@@ -434,7 +434,15 @@ def _given_rate(rate: str | None) -> dict[str, Any]:
     """Return the sampling rate that an option gives, Hz, as a keyword of readers."""
     from gearmbs.units import to_si
 
-    return {} if rate is None else {"rate": to_si(f"{rate} Hz" if rate.isdigit() else rate, "frequency", "--rate")}
+    if rate is None:
+        return {}
+    try:
+        found = float(rate)
+    except ValueError:
+        found = to_si(rate, "frequency", "--rate")
+    if not 0.0 < found < float("inf"):
+        fail(f"--rate is {rate!r}; give a frequency above 0, as 12800 or '12.8 kHz'")
+    return {"rate": found}
 
 
 def _recordings(items: list[str], teeth: int, rate: str | None, window: float) -> tuple[Any, Any, Any]:

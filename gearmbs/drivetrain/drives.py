@@ -16,7 +16,7 @@ from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value, over_time, require, share_of
 from gearmbs.drivetrain.torque_element import OWN, ShaftTorque, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
-from gearmbs.mechanism.parts.functions import as_function, constant, polyline_integral, ramp, step
+from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.parts.joints import Joint, Row, Term
 from gearmbs.schema.quantities import Measure, OverTime
 from gearmbs.units import Quantity
@@ -112,17 +112,30 @@ class SpeedDrive(Drive):
         """Speed at the start of a train that runs already, over the operating speed."""
         return 1.0 if self.curve is None else self.curve[0][1] / self.speed
 
-    def add(self, at: Attached) -> None:
+    def turned(self, speed: float, run_up: float, running: bool) -> TimeFunction:
+        """Return the prescribed rotation, rad from the start, over the time of the simulation.
+
+        Parameters
+        ----------
+        speed : float
+            Operating speed of the shaft about z, rad/s, with its sign.
+        run_up : float
+            Of the drivetrain, s.
+        running : bool
+            Whether its shafts turn at their operating speeds from the start.
+        """
         if self.curve is not None:
             first = self.curve[0][1]
-            later = [(at.run_up + t, w) for t, w in self.curve if t > 0.0]
-            times = [0.0, at.run_up, *(t for t, _ in later)]
-            speeds = [first if at.running else 0.0, first, *(w for _, w in later)]
-            turned = polyline_integral(times, speeds, soft_start=True)
-        elif self.function is not None:
-            turned = as_function(self.function, "rad", self.label)
-        else:
-            turned = ramp(at.speed, over=0.0 if at.running else at.run_up)
+            later = [(run_up + t, w) for t, w in self.curve if t > 0.0]
+            times = [0.0, run_up, *(t for t, _ in later)]
+            speeds = [first if running else 0.0, first, *(w for _, w in later)]
+            return polyline_integral(times, speeds, soft_start=True)
+        if self.function is not None:
+            return as_function(self.function, "rad", self.label)
+        return ramp(speed, over=0.0 if running else run_up)
+
+    def add(self, at: Attached) -> None:
+        turned = self.turned(at.speed, at.run_up, at.running)
         row = Row("angle", (Term(terms.ROTATION, at.i, at.j),), None, turned)
         at.mechanism.joints[self.name] = Joint(self.name, "rotation", at.i, at.j, [row])
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 
-from gearmbs.campaigns import Campaign, Factor, FunctionSubject, make_plan
+from gearmbs.campaigns import Campaign, Choice, Factor, FunctionSubject, Specimens, make_plan
 from gearmbs.campaigns.plans import designs
-from tests.campaigns.models import PI, PLACES
+from tests.campaigns.models import PI, PLACES, Ringing
 
 
 def function(name: str = "ishigami", **settings) -> FunctionSubject:
@@ -33,3 +33,17 @@ def digest(campaign: Campaign) -> str:
     assert [line for line in campaign.check() if not line.startswith("litter")] == []
     entries = [json.loads(campaign.folder.ledger(u).read_text())["digests"] for u in campaign.folder.done()]
     return hashlib.sha256(json.dumps(entries, sort_keys=True).encode()).hexdigest()
+
+
+def ringing(path, torque: float = 20.0, *, varied: bool = True, crossed: bool = True) -> Campaign:
+    """Return a campaign of six specimens in two states that is done at once."""
+    factors = [
+        *([Factor("operation.speed", 90.0, 110.0)] if varied else []),
+        Factor("operation.torque", 5.0, torque),
+        Choice("fault.teeth", {"healthy": [], "faulty": {"size": [0.1, 1.0]}}, crossed=crossed, name="state"),
+        Specimens(6),
+    ]
+    plan = make_plan(Ringing(), factors, n=6, keep=["numbers", "signal:housing"], unit=12)
+    campaign = Campaign(path, plan)
+    campaign.run(workers=0)
+    return campaign

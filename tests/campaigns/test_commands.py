@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import scipy.signal as ss
+import typer
 from typer.testing import CliRunner
 
+from gearmbs.campaigns.commands import _given_rate
 from gearmbs.cli import app
+from tests.says import says
 
 PLAN = """
 design = "sobol"
@@ -72,3 +77,16 @@ def test_data_sets_that_cannot_be_split_are_refused_before_they_are_simulated(tm
     told = call("dataset", tmp_path / "d", "--signals", 96, "--specimens", 2, code=1)
     assert "2 groups are too few" in told
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("text", ["12800", "12800.0", "1.28e4", "12.8 kHz", "12800 Hz"])
+def test_rates_as_they_are_written(text):
+    assert _given_rate(text) == {"rate": 12800.0}
+
+
+@pytest.mark.parametrize("text", ["0", "-5", "nan", "0 Hz", "inf"])
+def test_rates_that_are_none(text, capsys):
+    assert _given_rate(None) == {}
+    with pytest.raises(typer.Exit):
+        _given_rate(text)
+    assert re.search(says("--rate", "12800", "12.8 kHz"), capsys.readouterr().err)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ import pandas as pd
 import pytest
 import scipy.signal as ss
 
-from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, Specimens, make_plan
+from gearmbs.campaigns import Campaign, CampaignError
 from gearmbs.campaigns.codes import code_counts
 from gearmbs.campaigns.datasets import (
     GEARBOXES,
@@ -43,7 +44,7 @@ from gearmbs.campaigns.datasets.baseline import NAMES
 from gearmbs.campaigns.datasets.layers import STOP
 from gearmbs.campaigns.datasets.make import _individuals
 from gearmbs.signals import ModalPath, Mode, accelerometer, make_signal
-from tests.campaigns.models import Ringing
+from tests.campaigns.support import ringing
 from tests.says import says
 
 RATE, DURATION = 12800.0, 0.25
@@ -444,30 +445,17 @@ def test_gearboxes_of_one_file_have_their_own_names_and_the_same_individuals():
     assert _individuals(SimpleNamespace(plan=two)) != one[1]
 
 
-def ringing(path):
-    """Return a campaign of six specimens in two states that is done at once."""
-    factors = [
-        Factor("operation.speed", 90.0, 110.0),
-        Factor("operation.torque", 5.0, 20.0),
-        Choice("fault.teeth", {"healthy": [], "faulty": {"size": [0.1, 1.0]}}, crossed=True, name="state"),
-        Specimens(6),
-    ]
-    plan = make_plan(Ringing(), factors, n=6, keep=["numbers", "signal:housing"], unit=12)
-    campaign = Campaign(path, plan)
-    campaign.run(workers=0)
-    return campaign
-
-
 def test_gearboxes_of_a_data_set_share_no_noise_and_no_drift(tmp_path):
-    """Equal campaigns under one name, whose records of one number are of one state: noise they shared would tell."""
-    both = [ringing(tmp_path / name) for name in ("a", "b")]
+    """Campaigns under one name, whose records of one number are of one state: noise they shared would tell."""
+    both = [ringing(tmp_path / name, torque) for name, torque in (("a", 20.0), ("b", 21.0))]
     paths = write_data_set(both, tmp_path / "data", test=0.5, validation=0.0)
     rows = read_data_set(tmp_path / "data").sort_values(["point", "state"])
     # their individuals are the same ones
     assert rows["specimen"].nunique() == 6
     second = rows.duplicated(["point", "state"])
     first, second = rows[~second], rows[second]
-    assert list(first["id"]) == list(second["id"])
+    assert list(first["state"]) == list(second["state"])
+    assert set(first["id"]).isdisjoint(second["id"])
     noise = [np.stack(part["signal.sensor_1"]) - np.stack(part["clean.sensor_1"]) for part in (first, second)]
     for mine, other in zip(*noise, strict=True):
         assert abs(np.corrcoef(mine, other)[0, 1]) < 0.1
@@ -476,11 +464,15 @@ def test_gearboxes_of_a_data_set_share_no_noise_and_no_drift(tmp_path):
     # the same campaign at the same place has the same
     write_data_set(both, tmp_path / "again", test=0.5, validation=0.0)
     assert read_data_set(tmp_path / "again").equals(read_data_set(tmp_path / "data"))
-    # the sound have no severity, and are not withheld
+    # points are withheld with all their states, by the severity of the faulty one
     write_data_set(both[0], tmp_path / "small", test=0.5, validation=0.0, withheld=(0.0, 0.5))
     small = read_data_set(tmp_path / "small")
-    assert set(small.state[small.split == "withheld"]) == {"faulty"}
-    assert set(small.state[small.split == "train"]) == {"faulty", "healthy"}
+    assert small.groupby("point")["split"].nunique().eq(1).all()
+    for name, inside in (("withheld", True), ("train", False)):
+        part = small[small.split == name]
+        assert part.state.value_counts().nunique() == 1
+        assert ((part.severity <= 0.5) | (part.state == "healthy")).all() == inside
+        assert (part.severity[part.state == "faulty"] <= 0.5).eq(inside).all()
     # what computed it is told, and both plans are there
     names = {path.name for path in paths}
     assert {"plan-pair.json", "plan-pair-2.json"} <= names
@@ -492,12 +484,18 @@ def test_gearboxes_of_a_data_set_share_no_noise_and_no_drift(tmp_path):
 
 
 def test_a_campaign_is_in_a_data_set_once(tmp_path):
-    """By whatever path it is given; two of equal plans are two."""
+    """By whatever path it is given, and not as a copy either."""
     (tmp_path / "link").symlink_to(tmp_path)
     one = ringing(tmp_path / "c")
     for other in (one, Campaign(tmp_path / "c"), Campaign(tmp_path / "link" / "c")):
         with pytest.raises(CampaignError, match=says("data set", str(tmp_path / "c"), "once")):
             write_data_set([one, other], tmp_path / "data")
+    shutil.copytree(tmp_path / "c", tmp_path / "copy")
+    with pytest.raises(CampaignError, match=says(str(tmp_path / "copy"), "case of id", "copy")):
+        write_data_set([one, Campaign(tmp_path / "copy")], tmp_path / "data")
+    for none in ([], [one, None]):
+        with pytest.raises(CampaignError, match=says("campaigns", "give a Campaign")):
+            write_data_set(none, tmp_path / "data")
     assert not (tmp_path / "data").exists()
 
 

@@ -15,10 +15,10 @@ from .gearboxes import Gearbox as Gearbox
 from .gearboxes import data_set_plan as data_set_plan
 from .layers import Noise as Noise
 from .layers import SensorLayers as SensorLayers
-from .make import Measured as Measured
-from .make import measured as measured
 from .make import read_data_set as read_data_set
 from .make import write_data_set as write_data_set
+from .measuring import Measured as Measured
+from .measuring import measured as measured
 from .recordings import identify_noise as identify_noise
 from .recordings import identify_path as identify_path
 from .splits import one_state_a_group as one_state_a_group

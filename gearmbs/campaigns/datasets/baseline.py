@@ -47,9 +47,17 @@ def features(x: np.ndarray, rate: float, shaft: float, teeth: int) -> np.ndarray
     rate : float
         Hz.
     shaft : float
-        Frequency of the shaft that carries the wheel, Hz.
+        Frequency of the shaft that carries the wheel, Hz; of either sign.
     teeth : int
+
+    Raises
+    ------
+    CampaignError
+        If the shaft stands still.
     """
+    shaft = abs(shaft)
+    if not 0.0 < shaft < np.inf:
+        raise CampaignError(f"features: shaft = {shaft!r} Hz; give the frequency of a shaft that turns")
     x = np.asarray(x, dtype=float) - np.mean(x)
     rms = float(np.sqrt(np.mean(x**2))) or 1.0
     x = x / rms
@@ -152,7 +160,7 @@ def feature_table(rows: pd.DataFrame, *, window: float = 0.25) -> tuple[np.ndarr
         for k, x in enumerate(rows[name]):
             if x is None:
                 continue
-            rate, shaft = rows["sampling_rate"][k], float(np.mean(rows["speed"][k])) / (2.0 * np.pi)
+            rate, shaft = rows["sampling_rate"][k], float(np.mean(np.abs(rows["speed"][k]))) / (2.0 * np.pi)
             for part in windows(np.asarray(x, dtype=float), round(window * rate)):
                 found.append(features(part, rate, shaft, rows["teeth"][k][0]))
                 owner.append(k)

@@ -30,12 +30,14 @@ MEANINGS = {
     "state": "label: kind of fault",
     "severity": "label: where in its range the fault's size lies, 0 to 1; 0 if healthy",
     "split": "train, validation, test, or withheld (severities kept from training)",
-    "operation.speed": "speed asked of the drive, rad/s",
-    "operation.torque": "torque of the load, N m",
+    "operation.speed": "speed asked of the drive, rad/s; not a number if it changes",
+    "operation.torque": "torque of the load, N m; not a number if it changes",
     "teeth": "teeth of the pair with the fault, driver and driven",
     "sampling_rate": "of all signals of the row, Hz",
-    "speed": "speed of the shaft of the driver, rad/s",
-    "tacho": "times of the pulses, one a turn of the driver's shaft, s from the first sample",
+    "speed": "speed of the shaft of the driver about its axis, rad/s, negative backwards; of a sensor at another shaft "
+    "by the ratio of the teeth",
+    "tacho": "times of the pulses, one a turn of the driver's shaft either way, s from the first sample; the mark is "
+    "where the specimen has it",
 }
 """Meanings of columns; those of others follow from the beginnings of their names."""
 
@@ -145,9 +147,11 @@ def write_card(
         "",
         "Splits are by specimen: no specimen is in two of them. Windows of one record, or records of one "
         "specimen, in training and "
-        "test make any classifier look better than it is. Severities of the split `withheld` are of "
-        "training specimens and were kept "
-        "out of training.",
+        "test make any classifier look better than it is. Points of the split `withheld` are of training "
+        "specimens, and were kept out of training in all their states for the severity of one.",
+        "",
+        "`croissant.json` holds the SHA-256 of each file, which `read_data_set` of gearmbs compares; pages of the "
+        "parquet files have checksums.",
         "",
         "## Limits",
         "",
@@ -157,6 +161,20 @@ def write_card(
         "",
     ]
     return write_whole(folder / "README.md", "\n".join(lines))
+
+
+def published_on(published: str) -> str:
+    """Return a date of publication, as 2026-01-31.
+
+    Raises
+    ------
+    CampaignError
+        If it is none.
+    """
+    try:
+        return date.fromisoformat(published).isoformat()
+    except (TypeError, ValueError):
+        raise CampaignError(f"published = {published!r}; write year-month-day, as 2026-01-31") from None
 
 
 def write_croissant(
@@ -211,10 +229,7 @@ def write_croissant(
         "recordSet": [{"@type": "cr:RecordSet", "@id": "records", "name": "records", "field": fields}],
     }
     if published is not None:
-        try:
-            tree["datePublished"] = date.fromisoformat(published).isoformat()
-        except ValueError:
-            raise CampaignError(f"published = {published!r}; write year-month-day, as 2026-01-31") from None
+        tree["datePublished"] = published_on(published)
     if url is not None:
         tree["url"] = url
     return write_whole(folder / "croissant.json", json.dumps(tree, indent=1))

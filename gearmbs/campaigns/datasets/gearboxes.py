@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+import copy
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearmbs.bearings.defects import PARTS
-from gearmbs.campaigns.datasets.layers import SensorLayers
+from gearmbs.campaigns.datasets.layers import SensorLayers, checked_layers
+from gearmbs.campaigns.datasets.source import check_states, rotation_of
 from gearmbs.campaigns.plans.factors import AnyFactor, Choice, Factor, Specimens
 from gearmbs.campaigns.plans.given import make_plan
 from gearmbs.campaigns.plans.plan import Plan
-from gearmbs.campaigns.settings import CampaignError
+from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.campaigns.subjects.tables import DrivetrainSubject
+from gearmbs.drivetrain.parts import Accelerometer, SpeedSensor
 from gearmbs.schema.described import chosen
+from gearmbs.schema.quantities import Measure
 from gearmbs.units import to_si
+
+if TYPE_CHECKING:
+    from gearmbs.drivetrain import Drivetrain
+    from gearmbs.drivetrain.parts import Wheel
 
 FOLDER = Path(__file__).parent
 
@@ -53,7 +62,8 @@ class Gearbox:
     name : str
         Of the column ``gearbox``, whatever the file calls it.
     file : Path
-        Drivetrain in TOML, with accelerometers and one speed sensor, at the shaft of the driver.
+        Drivetrain in TOML, with accelerometers and one speed sensor, at the shaft of the driver or at another one that
+        meshes and couplings tie to it, whose speed is brought to the driver's by the teeth.
     mesh : str
         Whose driver has the faults.
     drive, load : str
@@ -84,15 +94,43 @@ class Gearbox:
             chosen(tables.get(table, {}), name, f"gearbox {self.name}: ", CampaignError, table)
         return tables
 
+    @cached_property
+    def train(self) -> Drivetrain:
+        """What the file describes, with all its defaults.
+
+        Raises
+        ------
+        ValueError
+            If the file is wrong.
+        """
+        return DrivetrainSubject(self.tables).check(copy.deepcopy(self.tables), self.name).train
+
     @property
     def accelerometers(self) -> list[str]:
-        """Names of the accelerometers."""
-        return [name for name, table in self.tables["sensors"].items() if table.get("kind") == "accelerometer"]
+        """Names of the accelerometers.
+
+        Raises
+        ------
+        CampaignError
+            If there is none.
+        """
+        found = [sensor.name for sensor in self.train.sensors if isinstance(sensor, Accelerometer)]
+        if not found:
+            raise CampaignError(
+                f"gearbox {self.name}: no accelerometers; give the file [sensors] of the kind 'accelerometer'"
+            )
+        return found
 
     @property
     def speed_sensor(self) -> str:
-        """Name of the speed sensor."""
-        found = [name for name, table in self.tables["sensors"].items() if table.get("kind", "speed") == "speed"]
+        """Name of the speed sensor.
+
+        Raises
+        ------
+        CampaignError
+            If there is none, or several.
+        """
+        found = [sensor.name for sensor in self.train.sensors if isinstance(sensor, SpeedSensor)]
         if len(found) != 1:
             raise CampaignError(f"gearbox {self.name}: {len(found)} speed sensors; give the file one, for the tacho")
         return found[0]
@@ -125,22 +163,22 @@ class Gearbox:
         return [Choice(f"bearings.{name}.settings.defects", where, name=f"{SOURCE}{name}") for name in self.rolling]
 
     @property
-    def driver(self) -> Mapping[str, Any]:
-        """Table of the wheel that has the faults."""
-        return self.tables["wheels"][self.tables["meshes"][self.mesh]["driver"]]
+    def driver(self) -> Wheel:
+        """The wheel that has the faults."""
+        return self.train.wheels_of(self.mesh)[0]
 
     @property
     def teeth(self) -> tuple[int, int]:
         """Teeth of the mesh with the faults, driver and driven."""
-        mesh, wheels = self.tables["meshes"][self.mesh], self.tables["wheels"]
-        return int(wheels[mesh["driver"]]["teeth"]), int(wheels[mesh["driven"]]["teeth"])
+        driver, driven = self.train.wheels_of(self.mesh)
+        return driver.gear.teeth, driven.gear.teeth
 
     def states(self) -> dict[str, Any]:
         """Return the states with the ranges of their sizes in SI, of which the first is the severity.
 
         Heights and depths go by the module, lengths along the face by its width.
         """
-        m, b = to_si(self.driver["module"], "length"), to_si(self.driver["face_width"], "length")
+        m, b = float(self.driver.gear.module), float(self.driver.gear.face_width)
         tooth = [0, self.teeth[0] - 1]
         return {
             "healthy": [],
@@ -201,7 +239,7 @@ def data_set_plan(
     *,
     gearbox: str | Gearbox = "two stages",
     specimens: int = 200,
-    duration: float = 0.25,
+    duration: float | str = 0.25,
     layers: SensorLayers | None = None,
     bearing_defects: bool = False,
     seed: int = 0,
@@ -217,10 +255,13 @@ def data_set_plan(
         One of `GEARBOXES` or one of your own.
     specimens : int
         Individuals, all of which are drawn equally often.
-    duration : float
-        Of a record, s. What the layers need before and after it is simulated in addition.
+    duration : float or str
+        Of a record, s, or text such as "0.25 s". What the layers need before and after it is simulated in addition.
     layers : SensorLayers, optional
         What will be put on the clean signals.
+    seed : int
+        Of individuals, and with the gearbox's name of the points' sequence: of two gearboxes of one seed, points of one
+        number have other speeds, torques and severities.
     bearing_defects : bool
         Give rolling bearings a spall at three of four operating points, on outer ring, inner ring or an element: a
         source of vibration beside the teeth, the same in all their states.
@@ -228,15 +269,21 @@ def data_set_plan(
     Raises
     ------
     CampaignError
-        If no bearing can have a defect, or there are fewer points, each of which is simulated in all states, than
-        specimens.
+        If no bearing can have a defect, there are fewer points, each of which is simulated in all states, than
+        specimens, or the file lacks a sensor.
     """
     box = gearbox if isinstance(gearbox, Gearbox) else chosen(GEARBOXES, gearbox, "", CampaignError, "gearbox")
-    layers = layers or SensorLayers()
+    layers = checked_layers(layers)
     states = box.states()
     each = len(states) * len(box.accelerometers)
-    if not 0.0 < duration < np.inf:
-        raise CampaignError(f"data set: duration = {duration!r}; give the length of a record, s")
+    try:
+        duration = float(Measure("time", above=0, below=np.inf).as_given(duration))
+    except ValueError as error:
+        raise CampaignError(f"data set: duration = {duration!r}; give the length of a record, s: {error}") from None
+    signals, specimens, seed = (
+        whole(value, f"data set: {name}", least)
+        for name, value, least in (("signals", signals, 1), ("specimens", specimens, 1), ("seed", seed, 0))
+    )
     points = -(-signals // each)
     if points < specimens:
         raise CampaignError(
@@ -261,13 +308,21 @@ def data_set_plan(
         *sources,
         box.specimens(specimens, seed),
     ]
-    return make_plan(
+    plan = make_plan(
         DrivetrainSubject(tables),
         factors,
         "sobol",
         n=-(-points // specimens) * specimens,
-        seed=seed,
+        seed=point_seed(box.name, seed),
         keep=["forces", *(f"signal:{name}" for name in (*box.accelerometers, box.speed_sensor))],
         unit=unit,
         time_limit=300.0,
     )
+    check_states(plan, f"gearbox {box.name}")
+    rotation_of(plan, plan.subject.check(plan.subject.base(), box.name), box.mesh, box.speed_sensor, box.name)
+    return plan
+
+
+def point_seed(name: str, seed: int) -> int:
+    """Return the seed of the sequence of a gearbox's points: sequences of one seed have the same points."""
+    return zlib.crc32(f"{seed} {name}".encode())

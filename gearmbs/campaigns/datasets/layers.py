@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.campaigns.settings import CampaignError
+from gearmbs.schema.quantities import Measure
 from gearmbs.signals import ModalPath, Mode, accelerometer, make_signal, quantise
 from gearmbs.signals.filters import apply_zero_phase, kaiser_taps
 from gearmbs.signals.rotation.angular import MARGIN, interpolate
@@ -66,6 +67,20 @@ class Noise:
 
 WHITE = Noise((0.0, 0.5), (1.0, 1.0), 1.0)
 
+FREQUENCY = Measure("frequency", above=0, remedy="give a positive frequency, Hz")
+LIMITS = {
+    "modes": Measure(low=0, whole=True, remedy="give a whole number from 0"),
+    "lowest": FREQUENCY,
+    "highest": FREQUENCY,
+    "damping": Measure(above=0, below=1, several=2, remedy="give two damping ratios above 0 and below 1"),
+    "noise": Measure(low=0, several=2, remedy="give two parts of the level from 0"),
+    "wander": Measure(low=0, below=0.1, remedy="give a part of the speed from 0 to below 0.1"),
+    "bits": Measure(low=2, high=32, whole=True, remedy="give a whole number from 2 to 32"),
+    "headroom": Measure(above=0, remedy="give a positive number"),
+    "seed": Measure(low=0, whole=True, remedy="give a whole number from 0"),
+}
+"""What the settings of layers may be. With a drift of a tenth of the speed the margins are half of the record."""
+
 
 @dataclass(frozen=True)
 class SensorLayers:
@@ -94,6 +109,11 @@ class SensorLayers:
     headroom : float
         Range of the converter over the largest sample of all states; below 1 it clips.
     seed : int
+
+    Raises
+    ------
+    CampaignError
+        Naming the setting, its value and what it may be.
     """
 
     modes: int = 0
@@ -107,6 +127,28 @@ class SensorLayers:
     bits: int = 16
     headroom: float = 1.25
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, limits in LIMITS.items():
+            value = getattr(self, name)
+            try:
+                object.__setattr__(self, name, limits.as_given(value))
+            except ValueError as error:
+                raise CampaignError(f"layers: {name} = {value!r}; {error}") from None
+        for name in ("damping", "noise"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise CampaignError(f"layers: {name} = {(low, high)!r}; give the lower end first")
+        if self.lowest > self.highest:
+            raise CampaignError(
+                f"layers: lowest = {self.lowest:g} Hz is above highest = {self.highest:g} Hz; give the lower "
+                "end of the modes' frequencies as lowest"
+            )
+        for name, kind in (("paths", ModalPath), ("noises", Noise)):
+            given = getattr(self, name)
+            if not (isinstance(given, (tuple, list)) and all(isinstance(one, kind) for one in given)):
+                raise CampaignError(f"layers: {name} = {given!r:.60}; give a tuple of {kind.__name__}")
+            object.__setattr__(self, name, tuple(given))
 
     def path(self, specimen: int, sensor: int = 0) -> ModalPath:
         """Return the transfer path of a specimen to a sensor.
@@ -240,9 +282,33 @@ class SensorLayers:
         found = quantise(signal, bits=self.bits, full_scale=full_scale)
         return found.values[:, 0], int(found.attrs["clipped"])
 
+    def full_scale(self, largest: float) -> float:
+        """Return the range of a converter for a largest sample of either sign, m/s^2.
+
+        Whole numbers of n bits reach from -2^(n-1) to 2^(n-1) - 1: a range of the largest sample would clip a positive
+        one.
+        """
+        top = 2.0 ** (self.bits - 1)
+        return self.headroom * largest * top / (top - 1.0)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the settings for a data card."""
         return asdict(self)
+
+
+def checked_layers(layers: SensorLayers | None, seed: int = 0) -> SensorLayers:
+    """Return layers, the default ones where none are given.
+
+    Raises
+    ------
+    CampaignError
+        If they are something else.
+    """
+    if layers is None:
+        return SensorLayers(seed=seed)
+    if not isinstance(layers, SensorLayers):
+        raise CampaignError(f"layers = {layers!r:.60}; give SensorLayers(...)")
+    return layers
 
 
 def _anti_alias(rate: float) -> np.ndarray:

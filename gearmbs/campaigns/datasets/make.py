@@ -1,207 +1,36 @@
-"""From campaigns to the files of a data set: measured signals, tacho and labels by row, in an order of chance."""
+"""From campaigns to the files of a data set, in an order of chance, and back to rows."""
 
 from __future__ import annotations
 
-import math
+import hashlib
+import json
+import os
 import re
 import shutil
-import zlib
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearmbs.campaigns.campaign import Campaign
 from gearmbs.campaigns.codes import code_counts, known_code
-from gearmbs.campaigns.datasets.card import write_card, write_croissant
-from gearmbs.campaigns.datasets.gearboxes import SOURCE
-from gearmbs.campaigns.datasets.layers import SensorLayers
+from gearmbs.campaigns.datasets.card import published_on, write_card, write_croissant
+from gearmbs.campaigns.datasets.layers import SensorLayers, checked_layers
+from gearmbs.campaigns.datasets.measuring import Measured, measured
+from gearmbs.campaigns.datasets.source import source_of, states
 from gearmbs.campaigns.datasets.splits import shared_groups, split_by_group, withhold
 from gearmbs.campaigns.folder import digest_of
-from gearmbs.campaigns.plans.factors import Choice, Specimens
+from gearmbs.campaigns.plans.factors import Specimens
 from gearmbs.campaigns.settings import CampaignError
-from gearmbs.campaigns.stored.exports import ROWS_A_FILE, check_card, place, remove_former
+from gearmbs.campaigns.stored.exports import ROWS_A_FILE, check_card, place
 from gearmbs.files import whole_file
-from gearmbs.signals.rotation.angular import interpolate
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from gearmbs.campaigns.plans.plan import Plan
-
-MESH_NUMBERS = ("normal_force.max", "normal_force.rms", "transmission_error.rms")
-"""Of the mesh with the fault, what is kept as known."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """The measured part of one campaign.
-
-    Attributes
-    ----------
-    rows : DataFrame
-        Labels, operating points, tacho and signals, a row a record.
-    full_scale : float
-        Of the converter, m/s^2.
-    duration, rate : float
-        Of the records, s and Hz.
-    left_out : int
-        Operating points of which a state failed.
-    """
-
-    rows: pd.DataFrame
-    full_scale: float
-    duration: float
-    rate: float
-    left_out: int
-
-
-def measured(campaign: Campaign, layers: SensorLayers, number: int = 0) -> Measured:
-    """Return the records of a campaign as sensors give them.
-
-    Noise has the level of the operating point in all its states together, and the converter a range for the largest
-    sample of all records, so that neither tells the state. Operating points are left out if one of their states failed:
-    what fails would tell. ``number`` tells the campaigns of a data set apart, which share neither noise nor housings.
-
-    Raises
-    ------
-    CampaignError
-        If the campaign is not done, or has no specimens, states or signals of acceleration.
-    """
-    import pandas as pd
-
-    source, table = _source(campaign), campaign.table
-    done = table[table["status"] == "done"]
-    whole = done.groupby("point")["point"].transform("size") == campaign.plan.variants
-    kept = done[whole].reset_index(drop=True)
-    if kept.empty:
-        raise CampaignError(f"{campaign.path}: no point is done in all its states; see failed()")
-    data = campaign.open().sel(case=kept["index"].to_numpy())
-    first = data[source.places[0][0]].isel(case=0).values[source.places[0][1]]
-    duration = layers.longest(int(np.isfinite(first).sum()), source.rate)
-    # records of equal number in several gearboxes have equal states, and must not have equal noise or drift
-    other = zlib.crc32(f"{source.name} {number}".encode()) << 32
-    owners, records = ([other + int(number) for number in kept[name]] for name in (source.group, "index"))
-    clean = np.empty((len(kept), len(source.places), round(duration * source.rate)), dtype=np.float32)
-    speeds, pulses = [], []
-    for k, (specimen, record) in enumerate(zip(owners, records, strict=True)):
-        here = data.isel(case=k)
-        for j, (name, channel) in enumerate(source.places):
-            x = here[name].values[channel].astype(float)
-            clean[k, j] = layers.heard(x[np.isfinite(x)], source.rate, duration, specimen, record, j)
-        turned = None if source.speed is None else here[source.speed].values[0].astype(float)
-        nominal = float(kept["operation.speed"][k])
-        found = _turning(turned, nominal, source, layers, duration, specimen, record)
-        speeds.append(found[0])
-        pulses.append(found[1])
-    level = _levels(clean, kept["point"].to_numpy())
-    noisy = np.empty_like(clean)
-    for k, j in np.ndindex(level.shape):
-        noisy[k, j] = layers.noisy(clean[k, j], float(level[k, j]), owners[k], records[k], j)
-    full_scale = layers.headroom * float(np.abs(noisy).max())
-    rows = _labels(kept, source)
-    for j in range(len(source.places)):
-        samples, clipped = zip(*(layers.converted(x, full_scale) for x in noisy[:, j]), strict=True)
-        rows[f"signal.sensor_{j + 1}"] = [x.astype(np.float32) for x in samples]
-        rows[f"clipped.sensor_{j + 1}"] = clipped
-        rows[f"clean.sensor_{j + 1}"] = list(clean[:, j])
-    rows = pd.concat([rows, pd.DataFrame({"speed": speeds, "tacho": pulses})], axis=1)
-    return Measured(rows, full_scale, duration, source.rate, table["point"].nunique() - kept["point"].nunique())
-
-
-@dataclass(frozen=True)
-class _Source:
-    """Where a campaign has what a data set takes."""
-
-    name: str
-    group: str
-    places: list[tuple[str, int]]
-    speed: str | None
-    rate: float
-    teeth: tuple[int, int]
-    mesh: str
-    start: float
-
-
-def _states(plan: Plan) -> Choice | None:
-    """Return the choice of the states."""
-    return next((f for f in plan.factors if isinstance(f, Choice) and f.name == "state"), None)
-
-
-def _source(campaign: Campaign) -> _Source:
-    plan, specs, group = campaign.plan, campaign.folder.specs, campaign.plan.group
-    places = [(spec.name, c) for spec in specs if spec.units == "m/s^2" for c in range(len(spec.channels))]
-    choice = _states(plan)
-    if group is None or choice is None or not places:
-        raise CampaignError(
-            f"{campaign.path}: a data set needs Specimens, a choice named state, and signals of accelerations to keep"
-        )
-    if not campaign.status().complete:
-        raise CampaignError(f"data set: {campaign.status()}; run the campaign to its end first")
-    base = plan.subject.base()
-    kind, _, mesh = choice.path.removesuffix(".faults").partition(".")
-    speed = next((spec.name for spec in specs if spec.units == "rad/s"), None)
-    rate = next(spec.rate for spec in specs if spec.name == places[0][0])
-    if kind != "meshes":
-        return _Source(
-            "pair", group, places, speed, rate, (base["gears"]["teeth"][0], base["gears"]["teeth"][1]), "", 0.0
-        )
-    driver, driven = (int(base["wheels"][base["meshes"][mesh][role]]["teeth"]) for role in ("driver", "driven"))
-    found, name = campaign.case(0), str(base.get("name", campaign.path.stem))
-    start = float(found.train.run_up + found.run.settling)
-    return _Source(name, group, places, speed, rate, (driver, driven), mesh, start)
-
-
-def _turning(
-    speed: np.ndarray | None,
-    nominal: float,
-    source: _Source,
-    layers: SensorLayers,
-    duration: float,
-    specimen: int,
-    record: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the speed of a record, rad/s, and the times of its tacho's pulses, s.
-
-    The mark is where the specimen has it; tooth 0 is where the simulation begins, at full speed.
-    """
-    times = layers.times(source.rate, duration, record)
-    before, _ = layers.margins(duration, source.rate)
-    mark = float(np.random.default_rng([layers.seed, 6, specimen]).random())
-    w = np.full(times.size, nominal)
-    if speed is not None:
-        w = interpolate(speed[np.isfinite(speed)], before + times * source.rate)
-    w = w * np.gradient(times) * source.rate
-    turns = mark + nominal * (source.start + before / source.rate) / (2.0 * math.pi)
-    turns = turns + np.r_[0.0, np.cumsum(0.5 * (w[1:] + w[:-1]))] / (2.0 * math.pi * source.rate)
-    whole = np.arange(math.ceil(turns[0]), math.floor(turns[-1]) + 1)
-    return w.astype(np.float32), np.interp(whole, turns, np.arange(turns.size) / source.rate)
-
-
-def _levels(heard: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the RMS of each sensor over all states of a record's operating point, shape (records, sensors)."""
-    power = np.square(heard, dtype=float).mean(axis=-1)
-    _, inverse = np.unique(points, return_inverse=True)
-    count = np.bincount(inverse)
-    return np.sqrt(np.array([np.bincount(inverse, column) / count for column in power.T]).T[inverse])
-
-
-def _labels(kept: pd.DataFrame, source: _Source) -> pd.DataFrame:
-    """Return what is known of each record beside its signals."""
-    import pandas as pd
-
-    sizes = {name: f"size.{name.removeprefix('state.')}" for name in kept.columns if name.startswith("state.")}
-    sizes.pop("state.severity")
-    known = {f"{source.mesh}.{name}": f"known.{name}" for name in MESH_NUMBERS}
-    known = {name: new for name, new in known.items() if name in kept}
-    names = ["id", source.group, "point", "state", "operation.speed", "operation.torque"]
-    sources = [name for name in kept.columns if name.startswith(SOURCE)]
-    rows = kept[[*names, *sizes, *sources, *known]].rename(columns={**sizes, **known, source.group: "specimen"})
-    fixed = {"gearbox": source.name, "severity": kept["state.severity"], "sampling_rate": source.rate}
-    rows = pd.concat([rows, pd.DataFrame(fixed, index=kept.index)], axis=1)
-    return rows.assign(teeth=[list(source.teeth)] * len(rows))
 
 
 def write_data_set(
@@ -229,7 +58,7 @@ def write_data_set(
     test, validation : float
         Parts of the specimens.
     withheld : tuple of float
-        Range of severities that training specimens keep for the split "withheld".
+        Range of severities that training specimens keep for the split "withheld", with all states of these points.
     url, published : str, optional
         Where and when it will be published, for the metadata; the same campaign gives the same files whenever they are
         written.
@@ -237,42 +66,88 @@ def write_data_set(
     Raises
     ------
     CampaignError
-        If a campaign is not done, or has no specimens.
+        If a campaign is not done, has no specimens or no crossed states, or holds a case of another one. Whatever is
+        refused leaves a former data set in the folder as it is.
     """
-    import pandas as pd
-
-    out, layers = place(out, None, title), layers or SensorLayers(seed=seed)
+    out, layers = place(out, None, title), checked_layers(layers, seed)
     check_card(out)
     given = [campaigns] if isinstance(campaigns, Campaign) else list(campaigns)
+    _check_given(given)
+    if published is not None:
+        published_on(published)
+    parts = [measured(campaign, layers, number) for number, campaign in enumerate(given)]
+    rows = _split(given, [part.rows for part in parts], test, validation, withheld, seed)
+    with _written_first(out) as new:
+        files = _parquet(rows, new)
+        facts = _facts(given, parts, rows)
+        boxes = [str(part.rows["gearbox"].iloc[0]) for part in parts]
+        codes = [f"{box}: {told}" for box, campaign in zip(boxes, given, strict=True) for told in _codes(campaign)]
+        card = write_card(new, title, files, facts, layers.as_dict(), codes)
+        beside = [card, *_sources(new, boxes, given), write_croissant(new, title, files, url, published)]
+    return [out / path.relative_to(new) for path in (*files, *dict.fromkeys(beside))]
+
+
+def _check_given(given: Sequence[Campaign]) -> None:
+    """Refuse what is no sequence of campaigns that are done, each once, before anything is measured."""
+    if not given or not all(isinstance(campaign, Campaign) for campaign in given):
+        raise CampaignError(f"data set: campaigns = {given!r:.60}; give a Campaign, or a list of one a gearbox")
     paths = [campaign.path.resolve() for campaign in given]
     if doubled := sorted({str(path) for path in paths if paths.count(path) > 1}):
         raise CampaignError(f"data set: {', '.join(doubled)} is given more than once; give each campaign once")
-    parts = [measured(campaign, layers, number) for number, campaign in enumerate(given)]
+    for campaign in given:
+        source_of(campaign)
+    met: dict[str, Campaign] = {}
+    for campaign in given:
+        for key in campaign.read(["id"], "status == 'done'")["id"]:
+            if key in met:
+                both = dict.fromkeys(str(one.path) for one in (met[key], campaign))
+                raise CampaignError(
+                    f"data set: {' and '.join(both)}: the case of id {key} is in them more than once, whose rows "
+                    "might come into two splits; leave out the copy, or the specimens and points that are alike"
+                )
+            met[key] = campaign
+
+
+def _split(
+    given: Sequence[Campaign],
+    tables: Sequence[pd.DataFrame],
+    test: float,
+    validation: float,
+    withheld: tuple[float, float],
+    seed: int,
+) -> pd.DataFrame:
+    """Return the rows of all campaigns with their splits, in an order of chance."""
+    import pandas as pd
+
     # campaigns whose specimens are drawn alike have the same individuals, each of which is in one split
     alike: dict[str, list[pd.DataFrame]] = {}
-    for campaign, part in zip(given, parts, strict=True):
-        alike.setdefault(_individuals(campaign), []).append(part.rows)
-    sizes = [name for one in given if (choice := _states(one.plan)) is not None for name in choice.sized]
+    for number, (campaign, table) in enumerate(zip(given, tables, strict=True)):
+        alike.setdefault(_individuals(campaign), []).append(table.assign(campaign=number))
+    sizes = [name for one in given if (choice := states(one.plan)) is not None for name in choice.sized]
     groups, individuals = [], 0
-    for tables in alike.values():
-        group = pd.concat(tables, ignore_index=True)
+    for members in alike.values():
+        group = pd.concat(members, ignore_index=True)
         split = split_by_group(group["specimen"].to_numpy(), test=test, validation=validation, seed=seed)
         # states without a size have no severity, which stands as 0 in the rows
-        sized = group["state"].isin(sizes)
-        group["split"] = withhold(split, group["severity"].where(sized).to_numpy(), *withheld)
+        severity = group["severity"].where(group["state"].isin(sizes)).to_numpy()
+        points = group.groupby(["campaign", "point"]).ngroup().to_numpy()
+        group["split"] = withhold(split, severity, *withheld, points)
         group["specimen"] += individuals
         individuals = int(group["specimen"].max()) + 1
-        groups.append(group)
+        groups.append(group.drop(columns="campaign"))
     rows = pd.concat(groups, ignore_index=True)
     # the order of the cases is that of the states
-    rows = rows.iloc[np.random.default_rng(seed).permutation(len(rows))].reset_index(drop=True)
-    files = _parquet(rows, out)
-    signals = rows.filter(like="signal.").notna().to_numpy().sum()
+    return rows.iloc[np.random.default_rng(seed).permutation(len(rows))].reset_index(drop=True)
+
+
+def _facts(given: Sequence[Campaign], parts: Sequence[Measured], rows: pd.DataFrame) -> dict[str, Any]:
+    """Return what the card counts."""
     clipped = rows.filter(like="clipped.").to_numpy() > 0
     counts = rows["split"].value_counts().sort_index().items()
     hours = sum(campaign.status().processor_seconds for campaign in given) / 3600.0
-    facts = {
-        "signals": int(signals),
+    shared = shared_groups(rows["split"].to_numpy(), rows["specimen"].to_numpy()).values()
+    return {
+        "signals": int(rows.filter(like="signal.").notna().to_numpy().sum()),
         "records (simulations)": len(rows),
         "gearboxes": ", ".join(rows["gearbox"].unique()),
         "specimens": rows["specimen"].nunique(),
@@ -282,26 +157,59 @@ def write_data_set(
         "full scale of the converters, m/s^2": ", ".join(f"{part.full_scale:.4g}" for part in parts),
         "signals with clipped samples": int(clipped.sum()),
         "operating points left out, since a state of theirs failed": sum(part.left_out for part in parts),
+        "seeds of the points' sequences": ", ".join(str(campaign.plan.seed) for campaign in given),
         "records by split": ", ".join(f"{name} {count}" for name, count in counts),
-        "specimens in two splits": max(shared_groups(rows["split"].to_numpy(), rows["specimen"].to_numpy()).values()),
+        "specimens in two splits": max(shared, default=0),
         "processor time of the simulations, core hours": f"{hours:.3g}",
     }
-    boxes = [str(part.rows["gearbox"].iloc[0]) for part in parts]
-    codes = [f"{box}: {told}" for box, campaign in zip(boxes, given, strict=True) for told in _codes(campaign)]
-    card = write_card(out, title, files, facts, layers.as_dict(), codes)
-    paths = [card, write_croissant(out, title, files, url, published)]
+
+
+def _sources(out: Path, boxes: Sequence[str], given: Sequence[Campaign]) -> list[Path]:
+    """Copy the plans of the campaigns and the codes that they come from."""
     plans: list[Path] = []
+    codes: list[Path] = []
     for box, campaign in zip(boxes, given, strict=True):
         name = re.sub(r"[^\w.]+", "-", box)
         free = (out / f"plan-{name}{again}.json" for again in ("", *(f"-{k + 2}" for k in range(len(plans)))))
         plans.append(next(path for path in free if path not in plans))
-        paths.append(plans[-1])
-        shutil.copy(campaign.path / "plan.json", paths[-1])
+        shutil.copy(campaign.path / "plan.json", plans[-1])
         for digest in code_counts(campaign.folder):
             if known_code(campaign.folder, digest) is not None:
-                paths.append(out / f"code-{digest}.json")
-                shutil.copy(campaign.path / "codes" / f"{digest}.json", paths[-1])
-    return [*files, *dict.fromkeys(paths)]
+                codes.append(out / f"code-{digest}.json")
+                shutil.copy(campaign.path / "codes" / f"{digest}.json", codes[-1])
+    return [*plans, *codes]
+
+
+OWN = re.compile(r"data/\w+-\d{5}-of-\d{5}\.parquet|README\.md|croissant\.json|plan-.+\.json|code-[0-9a-f]+\.json")
+"""Files of a data set: those of a former one that a new one has not are removed."""
+
+UNDER_WAY = ".writing-"
+"""How the folder begins in which a data set is written before it takes its place."""
+
+
+@contextmanager
+def _written_first(out: Path) -> Iterator[Path]:
+    """Yield a folder for the files of a data set, which take the places of a former one's when all are written.
+
+    Whatever goes wrong before leaves the former one. Between the first and the last renaming files of both stand beside
+    each other, which their digests tell a reader.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    for litter in out.glob(f"{UNDER_WAY}*"):
+        # of a process that was killed
+        shutil.rmtree(litter, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=UNDER_WAY, dir=out) as folder:
+        new = Path(folder)
+        yield new
+        found = [path.relative_to(new) for path in sorted(new.rglob("*")) if path.is_file()]
+        former = [path for path in (*out.glob("data/*.parquet"), *out.glob("*.*")) if path.is_file()]
+        for path in former:
+            name = path.relative_to(out)
+            if name not in found and OWN.fullmatch(name.as_posix()):
+                path.unlink()
+        for name in found:
+            (out / name).parent.mkdir(exist_ok=True)
+            os.replace(new / name, out / name)
 
 
 def _individuals(campaign: Campaign) -> str:
@@ -337,23 +245,67 @@ def _parquet(rows: pd.DataFrame, out: Path) -> list[Path]:
             path = out / "data" / f"{name}-{k:05d}-of-{count:05d}.parquet"
             here = part.iloc[k * ROWS_A_FILE : (k + 1) * ROWS_A_FILE].drop(columns="split")
             with whole_file(path) as file:
-                pq.write_table(pa.Table.from_pandas(here, preserve_index=False), file, compression="zstd")
+                table = pa.Table.from_pandas(here, preserve_index=False)
+                pq.write_table(table, file, compression="zstd", write_page_checksum=True)
             written.append(path)
-    remove_former(out / "data", written)
     return written
 
 
-def read_data_set(folder: str | Path) -> pd.DataFrame:
+def read_data_set(folder: str | Path, *, check: bool = True) -> pd.DataFrame:
     """Return the rows of a data set with the split of each.
+
+    Parameters
+    ----------
+    folder : path-like
+    check : bool
+        Compare the SHA-256 of each file with that in croissant.json; without, files may have been changed or left out.
 
     Raises
     ------
     CampaignError
-        If the folder has none.
+        If the folder has none, or a file is another one than was written, with its name.
     """
     import pandas as pd
 
-    files = sorted(Path(folder).glob("data/*.parquet"))
+    folder = Path(folder)
+    files = sorted(folder.glob("data/*.parquet"))
     if not files:
         raise CampaignError(f"{folder}: no data/*.parquet; give the folder that write_data_set has written")
-    return pd.concat([pd.read_parquet(file).assign(split=file.name.split("-")[0]) for file in files], ignore_index=True)
+    if check:
+        _check_digests(folder, files)
+    tables = []
+    for file in files:
+        try:
+            tables.append(pd.read_parquet(file).assign(split=file.name.split("-")[0]))
+        except (OSError, ValueError) as error:
+            raise CampaignError(f"{file}: cannot be read ({error}); {AGAIN}") from error
+    return pd.concat(tables, ignore_index=True)
+
+
+AGAIN = "fetch it again, or write the data set again from its campaigns"
+
+
+def _check_digests(folder: Path, files: Sequence[Path]) -> None:
+    """Compare files with the digests in croissant.json."""
+    place = folder / "croissant.json"
+    try:
+        listed = json.loads(place.read_bytes())["distribution"]
+        digests = {one["contentUrl"]: one["sha256"] for one in listed if "sha256" in one}
+    except FileNotFoundError:
+        raise CampaignError(
+            f"{place} is not there, which holds the digests of the files; {AGAIN}, or read it unchecked, check=False"
+        ) from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise CampaignError(f"{place} is damaged ({error}); {AGAIN}") from error
+    names = {file.relative_to(folder).as_posix(): file for file in files}
+    if missing := sorted(digests.keys() - names.keys()):
+        raise CampaignError(
+            f"{folder / missing[0]} is not there, which croissant.json lists; {AGAIN}, or read what there is, "
+            "check=False"
+        )
+    for name, file in names.items():
+        with file.open("rb") as content:
+            found = hashlib.file_digest(content, "sha256").hexdigest()
+        if found != digests.get(name):
+            told = "is damaged or of another data set" if name in digests else "is none of the data set"
+            raise CampaignError(f"{file} {told}: its SHA-256 is not in croissant.json; {AGAIN}")

@@ -49,10 +49,26 @@ def split_by_group(
     return np.array([kind.get(g, "train") for g in groups])
 
 
-def withhold(split: np.ndarray, severity: np.ndarray, low: float, high: float) -> np.ndarray:
+def withhold(
+    split: np.ndarray,
+    severity: np.ndarray,
+    low: float,
+    high: float,
+    points: Sequence[int] | np.ndarray | None = None,
+) -> np.ndarray:
     """Return a split in which training rows of a range of severities are "withheld": can a model interpolate?
 
     Rows without a severity, NaN, are in no range.
+
+    Parameters
+    ----------
+    split : ndarray of str, shape (n,)
+    severity : ndarray, shape (n,)
+    low, high : float
+        Range, its ends included.
+    points : array_like of int, shape (n,), optional
+        Operating point of each row: all rows of a point go with those of it that are in the range, so that what is
+        left has the same mixture of states. Default: rows go one by one.
 
     Raises
     ------
@@ -63,6 +79,8 @@ def withhold(split: np.ndarray, severity: np.ndarray, low: float, high: float) -
         raise CampaignError(f"withhold: from {low!r} to {high!r}; give the lower end first")
     split = np.asarray(split)
     inside = (np.asarray(severity) >= low) & (np.asarray(severity) <= high)
+    if points is not None:
+        inside = np.isin(points, np.asarray(points)[inside])
     return np.where((split == "train") & inside, "withheld", split)
 
 

@@ -227,7 +227,7 @@ def _parquet(
                 columns[f"sampling_rate.{spec.name}"] = pa.array(np.full(len(here), spec.rate))
             path = target / "data" / f"{part_name}-{k:05d}-of-{count:05d}.parquet"
             with whole_file(path) as part:
-                pq.write_table(pa.table(columns), part, compression="zstd")
+                pq.write_table(pa.table(columns), part, compression="zstd", write_page_checksum=True)
             written.append(path)
     remove_former(target / "data", written)
     return written
