@@ -48,6 +48,9 @@ def adams(
     to_deck: Annotated[
         Path | None, typer.Option(help="Write the deck of a .cmd here, and its simulations beside; run nothing.")
     ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="With --to-deck: replace files that are not its own, too.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="Prefix of the files written; default: the script's, or the model's name."),
@@ -62,8 +65,7 @@ def adams(
             fail(f"there is no file '{model}'")
         viewed = _viewed(model, variable or [], to_deck is not None or simulation is not None)
         if viewed is not None and to_deck is not None:
-            for path in viewed.save(to_deck):
-                typer.echo(f"wrote {path}")
+            _written(viewed, to_deck, skip_unsupported, overwrite)
             return
         if simulation is not None and (script is not None or end is not None):
             fail(f"--simulation {simulation} has its own commands and end; give it, or a script, or --end")
@@ -136,6 +138,17 @@ def _viewed(model: Path, variable: list[str], needed: bool) -> ViewModel | None:
         if not equals:
             fail(f"--variable {one}: give NAME=VALUE with a number")
     return read_view(model, values)
+
+
+def _written(viewed: ViewModel, path: Path, skip_unsupported: bool, overwrite: bool) -> None:
+    """Write the deck of a command file; say what it lacks, and what else a run would remark."""
+    from gearmbs.adams.errors import folded
+
+    files = viewed.save(path, allow_unsupported=skip_unsupported, overwrite=overwrite)
+    for remark in folded(viewed.deck.diagnostics):
+        typer.echo(str(remark))
+    for file in files:
+        typer.echo(f"wrote {file}")
 
 
 def _held(viewed: ViewModel, name: str | None) -> dict[str, Script]:

@@ -245,7 +245,8 @@ MAKERS: dict[str, Callable[[Deckmaker, Item], None]] = {
     **dict.fromkeys(ARRAYS, make_array),
     **dict.fromkeys(MATRICES, make_matrix),
     "file_matrix": refuse(
-        "a matrix in a file is read in decks; write it into the command file, or into the deck of --to-deck"
+        "a matrix in a file is read in decks; write it into the command file, or into the deck "
+        "(--to-deck, --skip-unsupported)"
     ),
     "curve": make_curve,
     "spline": make_spline,

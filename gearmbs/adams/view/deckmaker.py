@@ -22,6 +22,8 @@ from gearmbs.adams.write.text import listed, number, wrapped
 from gearmbs.solids.bodies import Body
 
 PART_KEYWORDS = {"part": "PART", "point_mass": "POINT_MASS", "flexible_body": "FLEX_BODY"}
+BETWEEN_PLACES = frozenset("spring sforce beam".split())
+"""Forces by parts whose ends may be at two places, I's first."""
 PRIMITIVES = frozenset("atpoint inline inplane orientation parallel_axes perpendicular".split())
 MEASURES = [f"{kind}_measure" for kind in "function object point pt2pt angle orient computed range query".split()]
 KEYWORDS = {
@@ -302,7 +304,12 @@ class Deckmaker:
         placed = [item.fields[key] for key in ("location", *ORIENTATIONS) if key in item.fields]
         relative = self.values.ref(item, "relative_to") or next((one.frame for one in placed), None)
         b, s = self.values.pose(relative)
-        r = b @ np.array(self.values.numbers(item, "location", 3, relative) or [0.0] * 3) + s
+        given_at = self.values.numbers(item, "location", frame=relative) or [0.0] * 3
+        if len(given_at) != 3 and not (len(given_at) == 6 and item.kind in BETWEEN_PLACES):
+            places = "three, or six, three for each end" if item.kind in BETWEEN_PLACES else "three"
+            raise ViewError(f"location of {item.path}: {len(given_at)} numbers; give {places}", item.line)
+        at = [b @ np.array(given_at[k : k + 3]) + s for k in range(0, len(given_at), 3)]
+        r = at[0]
         angles = self.values.numbers(item, "orientation", 3, relative) or [0.0] * 3
         turned = item.fields.get("orientation")
         # functions of orientations give 313 angles whatever the setting is
@@ -320,7 +327,7 @@ class Deckmaker:
             if len(points) != count or len(given) % 3:
                 raise ViewError(f"{key}: these are no points of three coordinates", item.line)
             a = frames.directed(key, points, item.fields[key].sequence)
-        found = [self.new_marker(item, part, a, r) for part in parts if part is not None]
+        found = [self.new_marker(item, part, a, r) for part, r in zip(parts, (at[0], at[-1])) if part is not None]
         return f"I = {found[0]}", f"J = {found[1]}"
 
     def run(self, makers: dict[str, Callable[[Deckmaker, Item], None]], kinds: Iterable[str]) -> None:

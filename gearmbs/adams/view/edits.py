@@ -40,6 +40,8 @@ ALTERNATIVES = (
     (("number_of_steps",), ("step_size",)),
 )
 """Arguments that say the same in two ways: an object has those that it was given last."""
+LIMITS = ("range", "allowed_values", "delta_type", "use_range", "use_allowed_values")
+"""What a variable has for studies of designs."""
 VALUES = ("real_value", "integer_value", "string_value", "object_value")
 
 
@@ -58,6 +60,8 @@ class Editor:
     overrides : dict of str to float
     overridden : dict of str to set of str
         Those of them that there are variables for, with the full names of these.
+    nominal : dict of str to float
+        What the file itself gives these, by full names.
     """
 
     def __init__(self, variables: Mapping[str, float] | None = None) -> None:
@@ -65,6 +69,7 @@ class Editor:
         self.values = Values(self.database)
         self.overrides = {name.lower(): float(value) for name, value in (variables or {}).items()}
         self.overridden: dict[str, set[str]] = {}
+        self.nominal: dict[str, float] = {}
 
     def _arguments(self, command: Command, row: Row) -> dict[str, Stored]:
         """Return the arguments of a command by their full names."""
@@ -159,6 +164,7 @@ class Editor:
         name = self._name(row, given, line)
         item = self._of_name(row, name, line)
         fields = {key: self._meant_now(key, value) for key, value in given.items() if key != row.naming}
+        self._take_back(row, item, fields, line)
         new = fields.pop(f"new_{row.naming}", None)
         if new is not None:
             rename(self.database, item, text_of((self._now(new) or [""])[0]), line)
@@ -194,6 +200,16 @@ class Editor:
         self.database.version += 1
         if "expr_active" in fields:
             item.active, item.told = True, self.database.version
+
+    def _take_back(self, row: Row, item: Item, fields: dict[str, Stored], line: int) -> None:
+        """Take what ``no_X = yes`` says out of an object: it has no X from then on, as if none had been given."""
+        for key in [one for one in fields if one.startswith("no_") and one[3:] in row.arguments]:
+            word = text_of((self._now(fields.pop(key)) or [""])[0]).lower()
+            if word not in ON:
+                continue
+            if key[3:] in fields:
+                raise ViewError(f"{' '.join(row.words)}: {key[3:]} and {key} exclude each other; give one", line)
+            item.fields.pop(key[3:], None)
 
     def _meant_now(self, key: str, stored: Stored) -> Stored:
         """Return what names markers or parts with their full names: short ones mean those of the current part."""
@@ -278,7 +294,7 @@ class Editor:
     def _ground(self, item: Item, fields: dict[str, Stored], line: int) -> None:
         """See to it that a model has one ground."""
         word = text_of((self._now(fields["ground_part"]) or [""])[0]).lower()
-        if word not in ("yes", "on", "true"):
+        if word not in ON:
             del fields["ground_part"]
             return
         for other in self.database.of("part"):
@@ -312,7 +328,7 @@ class Editor:
         if "location" in fields:
             stored = fields["location"]
             if stored.live:
-                fields["location"] = Stored(stored.values, stored.line, frame, before=_fixed_before(item, "location"))
+                fields["location"] = Stored(stored.values, stored.line, frame)
             else:
                 given = self._triple(stored, f"the location of {item.path}")
                 point = frames.COORDINATES[self.database.coordinates](given, self.database.units.radian)
@@ -325,7 +341,7 @@ class Editor:
             if key != "orientation":
                 fields["orientation"] = self._directed(item, key, stored, frame, fields)
             elif stored.live:
-                fields[key] = Stored(stored.values, stored.line, frame, sequence, _fixed_before(item, key))
+                fields[key] = Stored(stored.values, stored.line, frame, sequence)
             else:
                 radian = self.database.units.radian
                 angles = self._triple(stored, f"the orientation of {item.path}")
@@ -402,6 +418,8 @@ class Editor:
             if len(now) > 1 or any(isinstance(one, (str, Item)) for one in now):
                 what = f"{len(now)} values" if len(now) > 1 else text_of(now[0])[:40]
                 raise ViewError(f"variables: {item.path} holds {what}; a number takes the place of one number", line)
+            if now:
+                self.nominal[item.path] = float(now[0])
             item.fields["real_value"] = fixed(self.overrides[override], line=line)
         elif held and "index" in given:
             self._member(item, given["index"], next(iter(held.items())), line)
@@ -409,7 +427,7 @@ class Editor:
             for key in VALUES:
                 item.fields.pop(key, None)
             item.fields.update(held)
-        item.fields |= {"units": given["units"]} if "units" in given else {}
+        item.fields.update((key, given[key]) for key in ("units", *LIMITS) if key in given)
         db.version += 1
 
     def _member(self, item: Item, index: Stored, held: tuple[str, Stored], line: int) -> None:
@@ -482,12 +500,6 @@ class Editor:
         return value
 
     # One command.
-
-
-def _fixed_before(item: Item, key: str) -> Stored | None:
-    """Return the numbers that an argument held before it holds an expression."""
-    before = item.fields.get(key)
-    return before.before if before is not None and before.live else before
 
 
 def _meant(item: Item, key: str) -> bool:

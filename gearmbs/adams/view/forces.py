@@ -370,6 +370,8 @@ MAKERS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "friction": make_friction,
     "contact": make_contact,
     "nforce": refuse("a force on many points is not modelled; give beams or fields between neighbouring parts"),
-    "fe_load": refuse("a load on an FE part is read in decks only; write FE_LOAD into the deck of --to-deck"),
-    "modal_force": refuse("a modal force is read in decks only; write MFORCE into the deck of --to-deck"),
+    "fe_load": refuse(
+        "loads on FE parts are read in decks; write FE_LOAD into the deck (--to-deck, --skip-unsupported)"
+    ),
+    "modal_force": refuse("a modal force is read in decks; write MFORCE into the deck (--to-deck, --skip-unsupported)"),
 }

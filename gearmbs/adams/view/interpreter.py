@@ -17,7 +17,7 @@ from gearmbs.adams.parse.reader import read_text
 from gearmbs.adams.view.edits import Editor
 from gearmbs.adams.view.expressions import text_of
 from gearmbs.adams.view.lexer import BARE, EXPRESSION, TEXT, Command, Value, ViewError, commands
-from gearmbs.adams.view.model import PARTS, Item
+from gearmbs.adams.view.model import PARTS, UNREAD, Item
 from gearmbs.adams.view.values import Stored, fixed, is_ground
 from gearmbs.adams.view.vocabulary import Row, kinds_of, resolve
 
@@ -297,6 +297,8 @@ class Interpreter(Editor):
             self._defaults(row, given, command.line)
         elif row.words == ("file", "command", "read"):
             self._file(given, command.line)
+        elif row.words == ("file", "geometry", "read"):
+            self._geometry(given, command.line)
         elif row.words == ("file", "parasolid", "read"):
             name = text_of((self._now(given["file_name"]) or [""])[0]) if "file_name" in given else ""
             self.parasolids.append((name, command.line))
@@ -330,6 +332,29 @@ class Interpreter(Editor):
     def _file(self, given: dict[str, Stored], line: int) -> None:
         name = text_of((self._now(given["file_name"]) or [""])[0]) if "file_name" in given else ""
         self._nested(self._text_of_file(name, line), line)
+
+    def _geometry(self, given: dict[str, Stored], line: int) -> None:
+        """Note that a part has geometry of a file, which is not read.
+
+        Raises
+        ------
+        ViewError
+            If no part is named: parts of unknown mass would be made.
+        """
+        name = text_of((self._now(given["file_name"]) or [""])[0]) if "file_name" in given else ""
+        if "part_name" not in given:
+            raise ViewError(
+                f"file geometry read: {name[:80]} makes parts of a file that is not read; create them with their mass, "
+                "and give part_name",
+                line,
+            )
+        for one in self._now(given["part_name"]):
+            part = one if isinstance(one, Item) else self.database.find(text_of(one), PARTS)
+            if part is None or part.kind not in PARTS:
+                raise ViewError(f"file geometry read: there is no part {text_of(one)[:80]}", line)
+            k = sum(child.kind == UNREAD for child in part.children.values())
+            solid = self.database.add(UNREAD, f"{part.path}.geometry_of_file_{k + 1}", line)
+            solid.fields["file_name"] = fixed(name, line=line)
 
     def _nested(self, text: str, line: int) -> None:
         """Carry out a text within this one; its errors are at the command that asked for it."""
@@ -379,7 +404,7 @@ class Interpreter(Editor):
             names = [one for one in values if one == word] or [one for one in values if one.startswith(word)]
             if len(names) != 1:
                 raise ViewError(f"{' '.join(command.words)}: it has no argument {word[:40]}", command.line)
-            values[names[0]] = ", ".join(_written(one) for one in found)
+            values[names[0]] = ", ".join(self._handed(one) for one in found)
 
         def filled(match: re.Match[str]) -> str:
             return values.get((match["quoted"] or match["plain"]).lower(), match.group())
@@ -387,6 +412,12 @@ class Interpreter(Editor):
         body = "\n".join(line for line in macro.text.splitlines() if not line.lstrip().startswith("!"))
         self._nested(_PARAMETER.sub(filled, body), command.line)
         return True
+
+    def _handed(self, value: Value) -> str:
+        """Return a value as a macro gets it: as it stood in the command, with what is in EVAL evaluated."""
+        if value.kind == EXPRESSION and "eval" in value.text.lower():
+            return self.values.called_with(value.text, value.line)
+        return _written(value)
 
 
 def _written(value: Value) -> str:

@@ -140,6 +140,20 @@ def commands(text: str) -> Iterator[Command | ViewError]:
             yield error
 
 
+def closed(text: str, at: int) -> int:
+    """Return the place behind the bracket that closes the one at a place.
+
+    Raises
+    ------
+    ViewError
+        If none does.
+    """
+    reader = _Reader(text, (0,), (0,))
+    reader.at = at
+    reader.balanced()
+    return reader.at
+
+
 class _Reader:
     """Takes one command apart."""
 
@@ -194,13 +208,13 @@ class _Reader:
         if c in "\"'":
             return Value(TEXT, self._quoted(c), line)
         if c == "(":
-            self._balanced()
+            self.balanced()
             return Value(EXPRESSION, self.text[start : self.at], line)
         while self.at < len(self.text) and self.text[self.at] not in " \t,":
             if self.text[self.at] in "\"'":
                 self._quoted(self.text[self.at])
             elif self.text[self.at] in _CLOSING:
-                self._balanced()
+                self.balanced()
             else:
                 self.at += 1
         if self.at == start:
@@ -220,7 +234,7 @@ class _Reader:
         self.at = k + 1
         return "".join(out)
 
-    def _balanced(self) -> None:
+    def balanced(self) -> None:
         """Go behind a bracket and what it closes."""
         open_: list[str] = []
         while self.at < len(self.text):

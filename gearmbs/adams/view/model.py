@@ -121,6 +121,8 @@ class Item:
 
 
 PARTS = ("part", "point_mass", "flexible_body")
+UNREAD = "geometry_of_file"
+"""What parts have of files that are not read."""
 JOINTS = frozenset(
     "revolute translational cylindrical spherical fixed universal hooke convel planar screw rackpin".split()
 )

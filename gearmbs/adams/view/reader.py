@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,13 +10,13 @@ from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError
 from gearmbs.adams.parse.commands import Script
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import COMMANDS_OF_VIEW, deck_of, is_deck, is_script, read_file
-from gearmbs.adams.view import data, forces, instances, machinery, measures, statements, tires
+from gearmbs.adams.view import data, factors, forces, instances, machinery, measures, statements, tires
 from gearmbs.adams.view.deckmaker import PART_KEYWORDS, Deckmaker, Made
 from gearmbs.adams.view.interpreter import Interpreter
 from gearmbs.adams.view.model import PARTS, Item
 from gearmbs.adams.view.simulations.changes import same
 from gearmbs.adams.view.simulations.runs import Analysis, Simulator, named
-from gearmbs.files import write_whole
+from gearmbs.adams.write.view_files import texts_of, write_new
 
 
 @dataclass
@@ -42,6 +41,9 @@ class ViewModel:
     models : dict of str to tuple of (Deck, str)
         Deck and text of those simulations whose model is another than that of ``deck``, which is the one that the file
         leaves.
+    left_out : dict of str to tuple of Diagnostic
+        What the command file holds and the deck of such a simulation lacks, as no statement could be made of it; under
+        "" what ``deck`` lacks.
     """
 
     deck: Deck
@@ -51,13 +53,14 @@ class ViewModel:
     name: str = ""
     own: tuple[str, ...] = ()
     models: dict[str, tuple[Deck, str]] = field(default_factory=dict)
+    left_out: dict[str, tuple[Diagnostic, ...]] = field(default_factory=dict)
 
     def deck_for(self, script: Script | None) -> Deck:
         """Return the deck of one of the simulations: the model as it was then; that of ``deck`` of other scripts."""
         name = next((name for name, one in self.scripts.items() if one is script), "")
         return self.models[name][0] if name in self.models else self.deck
 
-    def save(self, path: str | Path) -> list[Path]:
+    def save(self, path: str | Path, *, allow_unsupported: bool = False, overwrite: bool = False) -> list[Path]:
         """Write the deck, and its simulations beside it as NAME.acf; return the files.
 
         A simulation whose model is another, since commands between changed it, has its own deck beside its script.
@@ -66,21 +69,24 @@ class ViewModel:
         ----------
         path : str or Path
             Of the deck (.adm).
+        allow_unsupported : bool
+            Write it without what could not be made a statement, which comments at its top then name, instead of
+            refusing.
+        overwrite : bool
+            Replace files that were not written by this method, or have been changed since. The command file itself is
+            never replaced.
+
+        Raises
+        ------
+        DeckError
+            Naming what the deck would lack, or the files that would be lost; nothing is written then.
         """
-        path = Path(path)
-        written = [path]
-        write_whole(path, self.text)
-        for name, script in self.scripts.items():
-            stem = re.sub(r"\W+", "_", name)
-            model = path.stem
-            if name in self.models:
-                model = f"{path.stem}_{stem}"
-                written.append(path.with_name(f"{model}.adm"))
-                write_whole(written[-1], self.models[name][1])
-            written.append(path.with_name(f"{path.stem}_{stem}.acf"))
-            lines = [model, f"{path.stem}_{stem}", *(command.text for command in script), "STOP"]
-            write_whole(written[-1], "\n".join(lines) + "\n")
-        return written
+        lacking = tuple(dict.fromkeys(one for decks in self.left_out.values() for one in decks))
+        if lacking and not allow_unsupported:
+            raise DeckError(lacking)
+        models = {name: text for name, (_, text) in self.models.items()}
+        texts = texts_of(Path(path), self.text, self.scripts, models, self.left_out)
+        return write_new(texts, self.deck.file, overwrite)
 
     @property
     def script(self) -> Script | None:
@@ -139,6 +145,7 @@ def parse_view(
         raise DeckError(
             [Diagnostic(ERROR, f"this is of the solver, not of View: {kind}, `run_deck` runs them", file, 1)]
         )
+    given = factors.checked(variables, file)
 
     def asked_for(one: Item) -> bool:
         return model is None or one.name.lower() == model.lower().lstrip(".")
@@ -146,7 +153,7 @@ def parse_view(
     def made(run: Interpreter, one: Item) -> Deckmaker:
         return _made(run, one, file)
 
-    run = Simulator(made, file, folder, variables, asked_for)
+    run = Simulator(made, file, folder, given, asked_for)
     run.run(text)
     _raise(run, file)
     missing = [name for name in run.overrides if name not in run.overridden]
@@ -168,22 +175,22 @@ def parse_view(
 
     # scripts that change the model start from it as the file leaves it, each for itself
     def again(path: str) -> list[Analysis]:
-        return _read_again(text, Simulator(made, file, folder, variables, asked_for, quiet=True), path)
+        return _read_again(text, Simulator(made, file, folder, given, asked_for, quiet=True), path)
 
     scripts = _of_scripts(run, chosen, again)
     own = named(run.analyses, list(scripts))
     maker = run.made(chosen)
     deck, written = _deck(maker.statements, maker.problems, chosen, run, file)
-    values = {}
-    for item in run.database.of("variable"):
-        value = run.values.variable(item) if item.line and "real_value" in item.fields else None
-        if isinstance(value, (int, float)):
-            values[item.path] = float(value)
-    view = ViewModel(deck, written, variables=values, name=chosen.name, own=tuple(own))
+    deck.diagnostics += factors.outside(run, file)
+    values = factors.listed(run)
+    view = ViewModel(
+        deck, written, variables=values, name=chosen.name, own=tuple(own), left_out={"": _lacking(maker.problems)}
+    )
     for name, analysis in (scripts | own).items():
         view.scripts[name] = analysis.script(file)
         if analysis.model.path != chosen.path or not same(analysis.statements, maker.statements):
             view.models[name] = _deck(analysis.statements, analysis.problems, analysis.model, run, file)
+            view.left_out[name] = _lacking(analysis.problems)
     return view
 
 
@@ -230,6 +237,10 @@ def _deck(
         deck.diagnostics.append(Diagnostic(IGNORED, f"commands without effect on the motion: {what}", file, first))
     lines = [title, "!", *(line for one in made for line in one.lines()), "END"]
     return deck, "\n".join(lines) + "\n"
+
+
+def _lacking(problems: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
+    return tuple(one for one in problems if one.severity == UNSUPPORTED)
 
 
 def _made(run: Interpreter, model: Item, file: str) -> Deckmaker:

@@ -60,8 +60,7 @@ def rename(db: Database, item: Item, name: str, line: int) -> None:
 def _changed(held: Stored, renamed: Callable[[str], str]) -> Stored:
     """Return what an argument holds with other names."""
     values = tuple((kind, _value(kind, value, renamed)) for kind, value in held.values)
-    before = None if held.before is None else _changed(held.before, renamed)
-    return held if values == held.values and before is held.before else replace(held, values=values, before=before)
+    return held if values == held.values else replace(held, values=values)
 
 
 def _value(kind: str, value: Any, renamed: Callable[[str], str]) -> Any:

@@ -10,7 +10,7 @@ from gearmbs.adams.view import frames
 from gearmbs.adams.view.deckmaker import JOINTS, PART_KEYWORDS, PRIMITIVES, Deckmaker, place, translated
 from gearmbs.adams.view.geometry.masses import mass_of_geometry
 from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.model import Item
+from gearmbs.adams.view.model import UNREAD, Item
 from gearmbs.adams.view.values import is_ground
 from gearmbs.adams.write.text import listed, number
 
@@ -50,6 +50,10 @@ def _mass(m: Deckmaker, item: Item) -> list[str | None]:
     item.used |= {"density", "material_type"}
     if given is None:
         return mass_of_geometry(m, item, marker)
+    unread = [one for one in item.children.values() if one.kind == UNREAD]
+    if unread:
+        files = ", ".join(m.values.text(one, "file_name") or "" for one in unread)[:200]
+        m.remark(item, f"geometry of files is not read, and does not count for the given mass: {files}")
     inertia = [m.values.number(item, key, 0.0) or 0.0 for key in ("ixx", "iyy", "izz", "ixy", "izx", "iyz")]
     at = m.values.ref(item, "inertia_marker", ("marker",))
     arguments: list[str | None] = [f"MASS = {number(given)}"]
@@ -223,6 +227,6 @@ MAKERS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "gear": make_gear,
     "gcon": make_gcon,
     "ptcv": make_point_curve,
-    "cvcv": refuse("a curve on a curve is read in decks; write the statement CVCV into the deck of --to-deck"),
+    "cvcv": refuse("a curve on a curve is read in decks; write CVCV into the deck (--to-deck, --skip-unsupported)"),
     "user_constraint": refuse("a constraint of a routine is not modelled; give a general_constraint"),
 }

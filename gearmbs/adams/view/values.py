@@ -17,10 +17,13 @@ import numpy as np
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import Evaluator, Tree, parse, text_of
 from gearmbs.adams.view.functions import FUNCTIONS
-from gearmbs.adams.view.lexer import BARE, EXPRESSION, Value, ViewError
+from gearmbs.adams.view.lexer import BARE, EXPRESSION, Value, ViewError, closed
 from gearmbs.adams.view.model import PARTS, PLACED, Database, Item
+from gearmbs.adams.write.text import number
 
 _NUMERIC = re.compile(r"[+-]?(?:\d|\.\d)")
+_EVAL = re.compile(r"(?<![\w.$])eval\s*\(", re.IGNORECASE)
+_PLAIN = re.compile(r"[\w.$]+")
 _SPECIAL = {"none": "", "true": 1, "false": 0, "pi": math.pi}
 Pose = tuple[np.ndarray, np.ndarray]
 """Rotation and position of a frame in the global one."""
@@ -44,15 +47,12 @@ class Stored:
         Of a place: what its numbers are relative to.
     sequence : str
         Of an orientation: how its angles are meant, such as body313; of one by points which axis and plane they give.
-    before : Stored or None
-        What was held before: it counts where expressions depend on each other in a circle.
     """
 
     values: tuple[tuple[str, Any], ...]
     line: int = 0
     frame: Item | None = None
     sequence: str = "body313"
-    before: Stored | None = None
 
     @property
     def live(self) -> bool:
@@ -65,6 +65,16 @@ def fixed(*values: Any, line: int = 0) -> Stored:
     return Stored(tuple(("value", one) for one in values), line)
 
 
+def _literal(value: Any, name: bool = False) -> str:
+    """Return a value as an expression has it; a text without quotation marks where it may be a name."""
+    if isinstance(value, str):
+        if name and _PLAIN.fullmatch(value):
+            return value
+        quoted = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{quoted}"'
+    return value.path if isinstance(value, Item) else number(value)
+
+
 class _DeepError(Exception):
     """An argument is to be evaluated before what asks for it."""
 
@@ -72,15 +82,29 @@ class _DeepError(Exception):
         self.wanted: tuple[Item, str, Item | None] = wanted
 
 
+SHOWN = 4
+"""Arguments of a circle that a message names."""
+
+
+def _circle(rows: list[tuple[Item, str]]) -> ViewError:
+    """Return the error of arguments each of which depends on the next one, and the last on the first."""
+    first, key = rows[0]
+    shown = [f"the {name} of {item.path}" for item, name in rows[1 : SHOWN + 1]]
+    through = f", through {', '.join(shown)}{' and others' if len(rows) > SHOWN + 1 else ''}" if shown else ""
+    line = max(item.fields[name].line for item, name in rows)
+    return ViewError(f"{key} of {first.path} depends on itself{through}; give one of them numbers", line)
+
+
 class Values:
     """Reads arguments of objects in a database."""
 
     def __init__(self, database: Database) -> None:
         self.db = database
-        self.busy: set[tuple[int, str]] = set()
+        self.busy: dict[tuple[int, str], Item] = {}
         self._deep: dict[tuple[int, str, int], list[Any]] = {}
         self.loops: dict[str, Item] = {}
         self._poses: dict[int, Pose] = {}
+        self._rotations: dict[int, np.ndarray] = {}
         self._version = self._deep_version = -1
         self.constant = 0
 
@@ -111,8 +135,11 @@ class Values:
         if kind in ("number", "text", "value"):
             return ("value", tree[1])
         if kind == "name":
-            loop = self.loops.get(tree[1].lower())
-            return ("value", self.variable(loop)) if loop is not None else tree
+            loop, rest = self._of_loop(tree[1])
+            if loop is None:
+                return tree
+            held = self.variable(loop)
+            return ("name", f"{held.path}.{rest}") if rest and isinstance(held, Item) else ("value", held)
         made: list[Any] = [kind]
         inner: list[Tree] = []
         for one in tree[1:]:
@@ -153,7 +180,13 @@ class Values:
         ------
         ViewError
         """
-        item = self.loops.get(name.lower()) or self.db.find(name)
+        loop, rest = self._of_loop(name)
+        if loop is not None and rest:
+            held = self.variable(loop)
+            if not isinstance(held, Item):
+                raise ViewError(f"{name[:80]}: {loop.path} is {text_of(held)[:40]}, no object")
+            return self.lookup(f"{held.path}.{rest}")
+        item = loop or self.db.find(name)
         if item is not None:
             return self.variable(item) if item.kind == "variable" else item
         if name.lower() in _SPECIAL:
@@ -163,6 +196,16 @@ class Values:
         if owner is not None:
             return self.attribute(owner, attribute)
         raise ViewError(f"there is no object {name[:80]}")
+
+    def _of_loop(self, name: str) -> tuple[Item | None, str]:
+        """Return the variable of a loop that a name begins with, and what follows: an attribute of its object."""
+        head, rest = name, ""
+        while self.loops and head:
+            if (loop := self.loops.get(head.lower())) is not None:
+                return loop, rest
+            head, _, last = head.rpartition(".")
+            rest = f"{last}.{rest}" if rest else last
+        return None, ""
 
     def attribute(self, item: Item, name: str) -> Any:
         """Return an attribute of an object."""
@@ -178,6 +221,8 @@ class Values:
         if word == "adams_id" and word not in item.fields:
             raise ViewError(f"{item.path} has no adams_id before the deck is made")
         fields = [key for key in item.fields if key == word] or [key for key in item.fields if key.startswith(word)]
+        if not fields and item.kind == "variable" and isinstance(held := self.variable(item), Item):
+            return self.attribute(held, name)
         if not fields:
             raise ViewError(f"{item.path} has no {name[:40]}")
         values = self.values(item, fields[0])
@@ -192,6 +237,26 @@ class Values:
                     values = [one if isinstance(one, Item) else self.db.find(one) or one for one in values if one != ""]
                 return values[0] if len(values) == 1 else values
         return 0
+
+    def called_with(self, text: str, line: int) -> str:
+        """Return an expression as a macro gets it: what stands in EVAL is evaluated at the call, and written as it is.
+
+        Where EVAL is all of it, the bare value is written, of which a macro may make names.
+        """
+        tree = self.frozen(parse(text, self.db.units, line), line)
+        if tree[0] == "value":
+            return ", ".join(_literal(one, name=True) for one in (tree[1] if isinstance(tree[1], list) else [tree[1]]))
+        pieces, at = [], 0
+        for match in _EVAL.finditer(text):
+            end = closed(text, match.end() - 1)
+            if match.start() < at:
+                continue
+            value = self.evaluate(parse(text[match.end() : end - 1], self.db.units, line), line)
+            members = value if isinstance(value, list) else [value]
+            written = ", ".join(_literal(one) for one in members)
+            pieces += [text[at : match.start()], f"{{{written}}}" if isinstance(value, list) else written]
+            at = end
+        return "".join(pieces) + text[at:]
 
     # What arguments come to.
 
@@ -212,8 +277,9 @@ class Values:
             try:
                 found = self._evaluated(*waiting[-1])
             except _DeepError as deep:
-                if any(all(a is b for a, b in zip(deep.wanted, one)) for one in waiting):
-                    raise ViewError(f"{key} of {item.path} depends on itself", item.fields[key].line) from None
+                same = (all(a is b for a, b in zip(deep.wanted, one)) for one in waiting)
+                if (first := next((k for k, one in enumerate(same) if one), None)) is not None:
+                    raise _circle([(one, name) for one, name, _ in waiting[first:]]) from None
                 waiting.append(deep.wanted)
             except RecursionError:
                 message = f"{key} of {item.path}: its expressions are nested too deeply; give parts of them names"
@@ -229,13 +295,14 @@ class Values:
         item.used.add(key)
         mark = (id(item), key)
         if mark in self.busy:
-            raise ViewError(f"{key} of {item.path} depends on itself", stored.line)
+            rows = [(one, name) for (_, name), one in self.busy.items()]
+            raise _circle(rows[list(self.busy).index(mark) :])
         known = self._deep.get((id(item), key, id(frame)))
         if known is not None:
             return known
         if len(self.busy) >= AT_ONCE:
             raise _DeepError(item, key, frame)
-        self.busy.add(mark)
+        self.busy[mark] = item
         try:
             found: list[Any] = []
             for kind, value in stored.values:
@@ -247,7 +314,7 @@ class Values:
                 error.line = stored.line
             raise
         finally:
-            self.busy.discard(mark)
+            self.busy.pop(mark, None)
 
     def numbers(self, item: Item, key: str, count: int | None = None, frame: Item | None = None) -> list[float] | None:
         """Return an argument as numbers, places among them in a frame, None where it was not given.
@@ -332,8 +399,6 @@ class Values:
     def location(self, item: Item) -> np.ndarray:
         """Return an object's position in the frame of its home."""
         stored = item.fields.get("location")
-        if stored is not None and (id(item), "location") in self.busy and stored.before is not None:
-            stored = stored.before
         if stored is None:
             return frames.ORIGIN
         if not stored.live:
@@ -361,8 +426,6 @@ class Values:
     def orientation(self, item: Item) -> np.ndarray:
         """Return an object's rotation in the frame of its home."""
         stored = item.fields.get("orientation")
-        if stored is not None and (id(item), "orientation") in self.busy and stored.before is not None:
-            stored = stored.before
         if stored is None:
             return frames.IDENTITY
         if not stored.live and len(stored.values) == 1 and isinstance(stored.values[0][1], np.ndarray):
@@ -377,29 +440,45 @@ class Values:
         home = self.home(item)
         if stored.frame is home or self.same(stored.frame, home):
             return a
-        return self.pose(home)[0].T @ self.pose(stored.frame)[0] @ a
+        return self.rotation(home).T @ self.rotation(stored.frame) @ a
+
+    def rotation(self, item: Item | None) -> np.ndarray:
+        """Return the rotation of an object's frame in the global one, whatever its place depends on."""
+        if item is None or item.kind == "model" or is_ground(item):
+            return frames.IDENTITY
+        self._see_placed(item)
+        known = self._rotations.get(id(item))
+        if known is None:
+            known = self._rotations[id(item)] = self.rotation(self.home(item)) @ self.orientation(item)
+        return known
 
     def pose(self, item: Item | None) -> Pose:
         """Return the rotation and the position of an object's frame in the global one."""
         if item is None or item.kind == "model" or is_ground(item):
             return GLOBAL
+        self._see_placed(item)
+        known = self._poses.get(id(item))
+        if known is None:
+            known = self._poses[id(item)] = self.rotation(item), self.point(item)
+        return known
+
+    def _see_placed(self, item: Item) -> None:
+        """See that an object has a place, and forget places from before a change.
+
+        Raises
+        ------
+        ViewError
+        """
         if item.kind not in PLACED:
             raise ViewError(f"{item.path} is a {item.kind.replace('_', ' ')}, which has no place")
         if self._version != self.db.version:
-            self._poses, self._version = {}, self.db.version
-        known = self._poses.get(id(item))
-        if known is None:
-            a, r = self.pose(self.home(item))
-            known = a @ self.orientation(item), a @ self.location(item) + r
-            self._poses[id(item)] = known
-        return known
+            self._poses, self._rotations, self._version = {}, {}, self.db.version
 
     def point(self, item: Item) -> np.ndarray:
         """Return an object's position in the global frame, whatever its orientation depends on."""
         if item.kind == "model" or is_ground(item):
             return frames.ORIGIN
-        if item.kind not in PLACED:
-            raise ViewError(f"{item.path} is a {item.kind.replace('_', ' ')}, which has no place")
+        self._see_placed(item)
         a, r = self.pose(self.home(item))
         return a @ self.location(item) + r
 

@@ -21,11 +21,25 @@ defaults units length = mm angle = deg force = newton mass = kg time = sec
 part create rigid_body name_and_position part_name = .m.P location = 10, 20, 30 orientation = 90, 0, 0
 marker create marker_name = .m.P.A location = 11, 20, 30 orientation = 0, 90, 0
 marker create marker_name = .m.P.B location = 10, 25, 30
+marker create marker_name = .m.P.D location = 0, 0, 0 orientation = 30, 40, 50
+marker create marker_name = .m.P.E location = 0, 0, 0 orientation = 0, 10, 0
 point create point_name = .m.P.C location = 10, 20, 37
 variable create variable_name = .m.v real_value = 4
 variable create variable_name = .m.list real_value = 1, 2, 3
 variable create variable_name = .m.text string_value = "hello"
 """
+
+
+D, E = (Rotation.from_euler("ZXZ", angles, degrees=True).as_matrix() for angles in ((30, 40, 50), (0, 10, 0)))
+IN_E = E.T @ D
+TURNED = np.degrees(
+    [
+        np.arctan2(-IN_E[1, 2], IN_E[2, 2]),
+        np.arctan2(IN_E[0, 2], IN_E[2, 2]),
+        np.arctan2(IN_E[1, 0], IN_E[0, 0]),
+    ]
+)
+TURNED_IN_ALL = np.degrees(np.arctan2(D[0, 2], D[2, 2]))
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +105,11 @@ def evaluated(values, text, frame=None):
         ("ORI_PLANE_MIRROR({0, 0, 0}, {{18, 6, 0}, {18, 12, 0}, {21, 6, 0}}, 'xy')", [0.0, 0.0, 0.0]),
         ("ORI_PLANE_MIRROR({0, 0, 0}, {{18, 6, 0}, {18, 12, 0}, {21, 6, 0}}, 'xz')", [0.0, 180.0, 0.0]),
         ("LOC_PLANE_MIRROR({2, 4, 5}, {{10, 12, 1}, {14, 12, 1}, {12, 10, 1}})", [2.0, 4.0, -3.0]),
+        # of z axes about x and y, of the x axis about z, as the solver's
+        ("AX(.m.P.D, .m.P.E)", TURNED[0]),
+        ("AY(.m.P.D, .m.P.E)", TURNED[1]),
+        ("AZ(.m.P.D, .m.P.E)", TURNED[2]),
+        ("AY(.m.P.D)", TURNED_IN_ALL),
         (".m.P.C.loc_x + 10 * .m.P.A.loc_y", -10.0),
         ("LOC_SPHERICAL(10, 8d, 90d)", [10 * np.cos(np.radians(8)), 10 * np.sin(np.radians(8)), 0.0]),
     ],
@@ -175,16 +194,39 @@ def test_what_has_no_value_is_named(values, text, words):
         evaluated(values, text)
 
 
-def test_circles_are_ended_by_what_was_there_before():
-    circle = MODEL + (
-        "marker create marker_name = .m.P.D location = 1, 2, 3\n"
-        "marker modify marker_name = .m.P.D location = (LOC_RELATIVE_TO({0, 0, 1}, .m.P.E)) relative_to = .m.P\n"
-    )
+def with_places(*places):
+    """Return places of markers that are modified one after the other: where the first of them is then."""
     run = Interpreter()
-    run.run(circle.replace("marker modify", "marker create marker_name = .m.P.E location = 0, 0, 0\nmarker modify"))
-    run.run("marker modify marker_name = .m.P.E location = (LOC_RELATIVE_TO({0, 0, 0}, .m.P.D)) relative_to = .m.P\n")
+    run.run(MODEL + "".join(f"marker create marker_name = .m.P.{name} location = 0, 0, 0\n" for name in "FGH"))
+    for name, place in zip("FGH", places):
+        run.run(f"marker modify marker_name = .m.P.{name} relative_to = .m.P {place}\n")
     assert not run.errors
-    assert np.all(np.isfinite(run.values.location(run.database.find(".m.P.D"))))
+    return run.values.location(run.database.find(".m.P.F"))
+
+
+AT = "location = (LOC_RELATIVE_TO({{{}, 0, 0}}, .m.P.{}))"
+
+
+@pytest.mark.parametrize(
+    ("places", "words"),
+    [
+        ((AT.format(1, "G"), AT.format(1, "F")), (".m.P.F", ".m.P.G")),
+        ((AT.format(0, "G"), AT.format(1, "H"), AT.format(1, "F")), (".m.P.F", ".m.P.G", ".m.P.H")),
+        (("orientation = (ORI_RELATIVE_TO({0, 0, 0}, .m.P.G))  &\n " + AT.format(1, "F"),), (".m.P.F",)),
+    ],
+)
+def test_places_in_a_circle_are_refused_by_all_names(places, words):
+    with pytest.raises(ViewError, match=says("itself", "numbers", *words)):
+        with_places(*places)
+
+
+def test_places_and_axes_of_two_markers_are_no_circle():
+    """F is where G is, and G has the axes of F: neither asks for itself."""
+    found = with_places(AT.format(0, "G"), "location = 1, 2, 3 orientation = (ORI_RELATIVE_TO({0, 0, 0}, .m.P.F))")
+    assert np.allclose(found, (1, 2, 3))
+    found = with_places(AT.format(2, "G"), "location = 1, 2, 3 orientation = (ORI_RELATIVE_TO({90, 0, 0}, .m.P.F))")
+    assert np.allclose(found, (1, 4, 3))
+    assert np.allclose(with_places(AT.format(1, "G"), "location = 1, 2, 3"), (2, 2, 3))
 
 
 def test_variables_in_a_row_are_no_deep_recursion():

@@ -107,6 +107,47 @@ def test_a_factor_may_be_any_number(held):
     assert part(text, variables={"A": 5.5}).mass == 5.5
 
 
+@pytest.mark.parametrize("value", ["3cm", "", None, float("nan"), "inf", [1, 2]])
+def test_a_factor_that_is_no_number_is_refused(value):
+    text = VARIABLE.format("A", "real_value = 2") + BODY.format("create", "(.m.A)")
+    with pytest.raises(DeckError, match=says("A", "number", "unit")):
+        parse_view(MODEL + text, variables={"A": value})
+    assert part(text, variables={"A": "3"}).mass == 3.0
+
+
+LIMITED = {
+    "range = 1, 3": (2.5, 5, "1 to 3"),
+    "range = -1, 3 delta_type = relative": (4.5, 0.5, "1 to 5"),
+    "range = -50, 10 delta_type = percent_relative": (1.5, 3, "1 to 2.2"),
+    "allowed_values = 1, 2, 5": (5, 3, "1, 2, 5"),
+}
+
+
+@pytest.mark.parametrize("limits", LIMITED)
+def test_a_factor_outside_its_limits_is_remarked(limits):
+    inside, beyond, told = LIMITED[limits]
+    of = MODEL + VARIABLE.format("A", "real_value = 2 " + limits) + BODY.format("create", "(.m.A)")
+
+    def remarks(text, value):
+        return [d.message for d in parse_view(text, variables={"A": value}).deck.diagnostics if ".m.A" in d.message]
+
+    (remark,) = remarks(of, beyond)
+    assert told in remark
+    assert not remarks(of, inside)
+    unused = "use_range = no" if "range" in limits.split() else "use_allowed_values = no"
+    assert not remarks(of.replace(limits, f"{limits} {unused}"), beyond)
+
+
+@pytest.mark.parametrize("held", ["real_value = 2", "integer_value = 2", "real_value = (2 * 1)"])
+def test_variables_of_one_number_are_listed(held):
+    text = (
+        VARIABLE.format("A", held)
+        + VARIABLE.format("B", "real_value = 1, 2")
+        + VARIABLE.format("C", "string_value = x")
+    )
+    assert parse_view(MODEL + text + BODY.format("create", 1)).variables == {".m.A": 2.0}
+
+
 @pytest.mark.parametrize("written", ["$mass:t=real:d=5", "$'mass:t=real:d=5'", "$mass:d=5 $'mass'"])
 def test_defaults_of_macros(written):
     """In quotation marks or without."""

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from gearmbs.adams import parse_script, parse_view, read_view, run_deck
+from gearmbs.adams import DeckError, parse_script, parse_view, read_view, run_deck
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.view.geometry import masses, solids
 from tests.says import says
@@ -255,6 +255,27 @@ def test_what_has_no_formula_is_refused_and_with_a_mass_runs():
     assert "center_of_mass_marker" in refused.unsupported[0].message
     given = parse_view(PART + MASSES % ("mass = 2 ixx = 1 iyy = 1 izz = 1 center_of_mass_marker = .m.P.A", csg)).deck
     assert not given.unsupported
+
+
+READ = 'file geometry read type_of_geometry = step file_name = "a.stp"'
+
+
+def test_geometry_of_a_file_counts_for_the_mass_unless_that_is_given():
+    read = f"{READ} part_name = .m.P"
+    refused = parse_view(PART + MASSES % ("density = 1", read)).deck.unsupported
+    assert len(refused) == 1
+    assert re.search(says("a.stp", ".m.P", "mass", "center_of_mass_marker"), refused[0].message)
+    given = parse_view(PART + MASSES % ("mass = 2 ixx = 1 iyy = 1 izz = 1 center_of_mass_marker = .m.P.A", read)).deck
+    assert not given.unsupported
+    assert any("a.stp" in d.message for d in given.diagnostics)
+    of_ground = parse_view(PART + MASSES % ("density = 1", f"{READ} part_name = .m.ground")).deck
+    assert not of_ground.unsupported
+
+
+@pytest.mark.parametrize("to", ["", " model_name = .m", " part_name = .m.Q"])
+def test_geometry_of_a_file_that_would_make_parts_is_refused(to):
+    with pytest.raises(DeckError, match=says("file geometry read", "there" if "Q" in to else "part_name")):
+        parse_view(PART + MASSES % ("density = 1", READ + to))
 
 
 def unwelded_box(gap=0.0):

@@ -11,7 +11,7 @@ from gearmbs.adams.view.deckmaker import Deckmaker
 from gearmbs.adams.view.geometry.combined import combined, taken_off
 from gearmbs.adams.view.geometry.solids import REMEDY, SHAPES, Moments, need, polyhedron
 from gearmbs.adams.view.lexer import ViewError
-from gearmbs.adams.view.model import Item
+from gearmbs.adams.view.model import UNREAD, Item
 from gearmbs.adams.write.text import listed, number
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.contacts.meshes import read_triangles
@@ -164,6 +164,9 @@ def moments_of(m: Deckmaker, item: Item, marker: Item | None) -> Moments | None:
             continue
         if one.kind == "csg":
             total += combined(m, one, item.line).moved(a.T, -a.T @ r)
+        if one.kind == UNREAD:
+            what = f"{(m.values.text(one, 'file_name') or '')[:80]} with geometry of {item.path} is not read"
+            raise ViewError(f"file geometry read: {what}; {REMEDY}", one.line)
         if one.kind in UNKNOWN:
             raise ViewError(f"{one.path} is a {one.kind}, whose mass is not computed; {REMEDY}", item.line)
         if one.kind == "shell":
