@@ -21,7 +21,15 @@ from gearmbs.adams.results.remarks import Doubt, assembly_of, doubt, faceted_tou
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.sensors import Watch, act, after, equilibria_to_passage, in_unit, parts, renew, take_samples, up_to
-from gearmbs.adams.session import Session, active_sensors, check_linear, is_sequence, output_times, remark
+from gearmbs.adams.session import (
+    Session,
+    active_sensors,
+    check_linear,
+    is_sequence,
+    output_times,
+    plant_variables,
+    remark,
+)
 from gearmbs.dae.analyses import plant as _plant
 from gearmbs.dae.analyses.kinematics import kinematic
 from gearmbs.dae.analyses.modes import Modes
@@ -41,6 +49,11 @@ from gearmbs.mechanism.solve.simulate import StopAt
 
 DEFAULT_TOLERANCE = 1e-8
 """Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""
+
+COARSER = 100.0
+"""Times as large an error where a deck gives none and its positions have no digits left for it, as often as needed."""
+COARSEST = 1e-4
+"""The largest error that is taken so, a tenth of ADAMS's default."""
 
 FIRST_STEP = 0.05
 """ADAMS's default HINIT, in output steps."""
@@ -156,6 +169,13 @@ def _part(session: Session, command: Simulate, watch: Watch, times: np.ndarray) 
         if watch.first_step is not None:
             options["first_step"] = watch.first_step * session.deck.units.time
         solution, equilibrium = _solve(session, command, kind, model, times, options, session.progress, watch.stops())
+        while solution.status is Status.BELOW_ROUNDING and _goes_coarser(session, options):
+            options["tol"] *= COARSER
+            note = (
+                f"the deck gives no ERROR, and in double precision what moves so far has no digits left for "
+                f"{DEFAULT_TOLERANCE:g}; ERROR = {options['tol']:g} is used"
+            )
+            solution, equilibrium = _solve(session, command, kind, model, times, options, False, watch.stops())
         if watch.turned_round(RequestEvaluator(model, solution)):
             solution, equilibrium = _solve(session, command, kind, model, times, options, False, watch.stops())
         if watch.sensors:
@@ -176,6 +196,13 @@ def _part(session: Session, command: Simulate, watch: Watch, times: np.ndarray) 
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         take_samples(session, evaluator, float(times[0]))
     return segment, fired
+
+
+def _goes_coarser(session: Session, options: dict[str, Any]) -> bool:
+    """Return whether a larger error may be taken: where nobody has asked for one."""
+    integrator = session.deck.only(st.Integrator)
+    asked = session.tol is not None or (integrator is not None and integrator.error is not None)
+    return not asked and options["tol"] * COARSER <= COARSEST * 1.001
 
 
 def _doubt(session: Session, segment: Segment) -> Doubt | None:
@@ -379,8 +406,8 @@ def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: 
 def plant_of(session: Session, command: Linear, build: Callable[[Session], tuple[AdamsModel, System]]) -> LinearPlant:
     """Carry out LINEAR/STATEMAT at the session's present state; ``build`` makes a session's model and system."""
     deck = session.deck
-    inputs = _variables(deck, st.PlantInput, command.pinput, command)
-    outputs = _variables(deck, st.PlantOutput, command.poutput, command)
+    inputs = plant_variables(deck, st.PlantInput, command.pinput, command)
+    outputs = plant_variables(deck, st.PlantOutput, command.poutput, command)
     model, system = build(session)
     evaluator = RequestEvaluator(model, initial_conditions(system))
     values = [float(evaluator.expression(f"VARVAL({v.id})")[-1]) for v in inputs]
@@ -403,22 +430,6 @@ def plant_of(session: Session, command: Linear, build: Callable[[Session], tuple
     count = len(inputs)
     joints = joint_coordinates(model.mechanism)
     return _plant.linear_plant(system, places[:count], places[count:], shown, deck.units.time, joints)
-
-
-def _variables(deck: Deck, kind: type[st.Plant], number: int | None, command: Command) -> list[st.Variable]:
-    """Return the VARIABLEs of a PINPUT or POUTPUT."""
-    there, keyword = deck.of(kind), kind.keyword
-    message = ""
-    if not there:
-        message = f"the deck has no {keyword}; add {keyword}/1, VARIABLES=..."
-    elif number is None and len(there) > 1:
-        message = f"the deck has several; give {keyword} = {', '.join(map(str, there))}"
-    elif number is not None and number not in there:
-        message = f"there is no {keyword}/{number}; the deck has {keyword} {', '.join(map(str, there))}"
-    if message:
-        raise DeckError([Diagnostic(ERROR, f"LINEAR/STATEMAT: {message}", command.file, command.line)])
-    plant = there[number if number is not None else next(iter(there))]
-    return [deck.of(st.Variable)[v] for v in plant.variables]
 
 
 # From the solution of an analysis to what its results show: ``segment_of``, ``kept_until``.

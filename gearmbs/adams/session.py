@@ -21,7 +21,7 @@ from gearmbs.adams.builders.scopes import IN_DYNAMICS, BodyState, deck_scope, ma
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, refused_arguments
-from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch, apply_change
+from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, apply_change
 from gearmbs.adams.parse.deck import (
     READ_IN_DECKS,
     Deck,
@@ -428,6 +428,9 @@ def _gone_through(
             elif isinstance(command, (Linear, Simulate)):
                 if isinstance(command, Linear):
                     check_linear(command)
+                    if command.statemat:
+                        plant_variables(session.deck, st.PlantInput, command.pinput, command)
+                        plant_variables(session.deck, st.PlantOutput, command.poutput, command)
                 else:
                     _advance(session, command)
                 if not checked:
@@ -448,6 +451,28 @@ def check_linear(command: Linear) -> None:
     """
     if command.eigensol == command.statemat:
         raise unsupported(command, "LINEAR takes one of EIGENSOL and STATEMAT; more is not supported")
+
+
+def plant_variables(deck: Deck, kind: type[st.Plant], number: int | None, command: Command) -> list[st.Variable]:
+    """Return the VARIABLEs of a PINPUT or POUTPUT that LINEAR/STATEMAT asks for.
+
+    Raises
+    ------
+    DeckError
+        If there is no such one, or several.
+    """
+    there, keyword = deck.of(kind), kind.keyword
+    message = ""
+    if not there:
+        message = f"the deck has no {keyword}; add {keyword}/1, VARIABLES=..."
+    elif number is None and len(there) > 1:
+        message = f"the deck has several; give {keyword} = {', '.join(map(str, there))}"
+    elif number is not None and number not in there:
+        message = f"there is no {keyword}/{number}; the deck has {keyword} {', '.join(map(str, there))}"
+    if message:
+        raise DeckError([Diagnostic(ERROR, f"LINEAR/STATEMAT: {message}", command.file, command.line)])
+    plant = there[number if number is not None else next(iter(there))]
+    return [deck.of(st.Variable)[v] for v in plant.variables]
 
 
 def is_sequence(command: Simulate) -> bool:

@@ -513,7 +513,9 @@ def convert(spec: Spec, raw: str) -> Any:
         words = tuple(w for p in parts for w in re.split(r"\s*:\s*", p) if w)
         return tuple(_word(spec, w) for w in words)
     if len(parts) != 1:
-        raise StatementError(f"one value is expected, got {len(parts)}")
+        stray = next((p for p in parts[1:] if re.match(r"[A-Za-z]", p)), None)
+        what = f"got {len(parts)}" if stray is None else f"and {stray[:40]} behind it is no argument of this statement"
+        raise StatementError(f"one value is expected, {what}")
     if kind == REAL:
         return real(parts[0])
     if kind in (INT, ID):

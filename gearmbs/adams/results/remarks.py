@@ -360,7 +360,9 @@ def doubt(
         second = again({**options, "tol": tol, "max_steps": steps})
     except (ModelError, ArithmeticError) as error:
         return Doubt(float(solution.t[0]), options["tol"], stopped=f"{error}.")
-    if second.status in (Status.TOO_MANY_STEPS, Status.INTERRUPTED) or (not second.success and tol < TELLING):
+    if second.status in (Status.TOO_MANY_STEPS, Status.INTERRUPTED, Status.BELOW_ROUNDING) or (
+        not second.success and tol < TELLING
+    ):
         return None
     if not second.success:
         return Doubt(float(second.t[-1]), options["tol"], stopped=second.message.partition(". ")[0].rstrip(".") + ".")

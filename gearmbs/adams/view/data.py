@@ -245,8 +245,7 @@ MAKERS: dict[str, Callable[[Deckmaker, Item], None]] = {
     **dict.fromkeys(ARRAYS, make_array),
     **dict.fromkeys(MATRICES, make_matrix),
     "file_matrix": refuse(
-        "a matrix in a file is read in decks; write it into the command file, or into the deck "
-        "(--to-deck, --skip-unsupported)"
+        "a matrix in a file is read in decks; write it into the command file, or into the deck of --to-deck"
     ),
     "curve": make_curve,
     "spline": make_spline,

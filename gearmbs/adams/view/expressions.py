@@ -67,6 +67,10 @@ def _parsed(text: str, units: tuple[tuple[str, str], ...]) -> tuple[Tree, frozen
     return tree, frozenset(parser.units.converted)
 
 
+ALL: Tree = ("text", "*")
+"""An index that stands for every member."""
+
+
 class _Parser:
     def __init__(self, text: str, units: Units) -> None:
         self.text, self.units = text, units
@@ -145,7 +149,12 @@ class _Parser:
     def listed(self, closing: str) -> tuple[Tree, ...]:
         trees = []
         while not (self.kind == "operator" and self.token == closing):
-            trees.append(self.level(0))
+            if closing == "]" and self.kind == "operator" and self.token == "*":
+                # all of a row or a column
+                trees.append(ALL)
+                self.next()
+            else:
+                trees.append(self.level(0))
             if len(trees) > LARGEST_ARRAY:
                 raise self.error(f"a list of more than {LARGEST_ARRAY} members")
             if self.kind == "operator" and self.token == ",":
@@ -186,9 +195,9 @@ class _Parser:
             tree = self.level(0)
             self.take(")")
             return tree
-        if kind == "operator" and token == "{":
+        if kind == "operator" and token in ("{", "["):
             self.next()
-            return ("array", self.listed("}"))
+            return ("array", self.listed("}" if token == "{" else "]"))
         raise self.error(f"{token!r} is not expected" if kind else "it ends too early")
 
     def unit_behind(self) -> float | None:
@@ -349,8 +358,13 @@ class Evaluator:
         return [self.each(function, *((v[k % len(v)] if isinstance(v, list) else v) for v in values)) for k in range(n)]
 
     def member(self, value: Any, index: list[Any]) -> Any:
-        """Return a member of a list, counted from 1."""
-        for one in index:
+        """Return a member of a list, counted from 1; ``*`` stands for all of a row or a column."""
+        for place, one in enumerate(index):
+            if one == "*":
+                rest = index[place + 1 :]
+                if not isinstance(value, list):
+                    raise self.error(f"{_shown(value)} is no list")
+                return [self.member(row, rest) for row in value] if rest else value
             k = round(self.number(one))
             if not isinstance(value, list) or not 1 <= k <= len(value):
                 raise self.error(f"there is no member {k} of {_shown(value)}")

@@ -59,8 +59,19 @@ def make_load(m: Deckmaker, item: Item) -> None:
     )
 
 
+TRANSLATIONAL = (0, 1, 2, 6, 7, 11)
+"""Of the 21 numbers of a symmetric matrix, by columns from the diagonal on, those of forces and velocities alone."""
+
+
 def make_beam(m: Deckmaker, item: Item) -> None:
     """BEAM."""
+    damping = m.values.numbers(item, "matrix_of_damping_terms", 21) or []
+    if m.radian != 1.0 and any(x for k, x in enumerate(damping) if k not in TRANSLATIONAL):
+        raise ViewError(
+            "matrix_of_damping_terms: whether those of rotations are of degrees or radians is not known; give "
+            "damping_ratio, or choose radians",
+            item.line,
+        )
     m.add(
         item,
         f"BEAM/{m.id(item)}",
@@ -370,8 +381,6 @@ MAKERS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "friction": make_friction,
     "contact": make_contact,
     "nforce": refuse("a force on many points is not modelled; give beams or fields between neighbouring parts"),
-    "fe_load": refuse(
-        "loads on FE parts are read in decks; write FE_LOAD into the deck (--to-deck, --skip-unsupported)"
-    ),
-    "modal_force": refuse("a modal force is read in decks; write MFORCE into the deck (--to-deck, --skip-unsupported)"),
+    "fe_load": refuse("loads on FE parts are read in decks; write FE_LOAD into the deck of --to-deck"),
+    "modal_force": refuse("a modal force is read in decks; write MFORCE into the deck of --to-deck"),
 }

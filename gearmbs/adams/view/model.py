@@ -219,6 +219,10 @@ class Database:
         owner = self.items.get(item.parent.lower())
         if owner is not None:
             owner.children.pop(item.path.lower(), None)
+        for name in ("model", "part", "frame"):
+            held = getattr(self, name)
+            if held is not None and self.items.get(held.path.lower()) is not held:
+                setattr(self, name, None)
         self.version += 1
 
     def move(self, item: Item, path: str, line: int) -> None:

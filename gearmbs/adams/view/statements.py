@@ -227,6 +227,6 @@ MAKERS: dict[str, Callable[[Deckmaker, Item], None]] = {
     "gear": make_gear,
     "gcon": make_gcon,
     "ptcv": make_point_curve,
-    "cvcv": refuse("a curve on a curve is read in decks; write CVCV into the deck (--to-deck, --skip-unsupported)"),
+    "cvcv": refuse("a curve on a curve is read in decks; write CVCV into the deck of --to-deck"),
     "user_constraint": refuse("a constraint of a routine is not modelled; give a general_constraint"),
 }

@@ -104,8 +104,14 @@ class Relaxation:
         high = max(float(net.max(initial=0.0)) / 0.1, 1e-6 * 9.81 / arm)
         return high, 1e-12 * max(high, ratio)
 
-    def run(self, max_iterations: int) -> tuple[int, float]:
+    def run(self, max_iterations: int, first: float = 1.0) -> tuple[int, float]:
         """Iterate; return the number of iterations and the residual.
+
+        Parameters
+        ----------
+        max_iterations : int
+        first : float
+            The longest first step, in lengths of the mechanism; each that is taken doubles what the next may be.
 
         Raises
         ------
@@ -116,7 +122,7 @@ class Relaxation:
         start = instant.y[instant.block("R", "theta")].copy()
         rest, stiffness, mass = self.parts(instant.y)
         sigma, lowest = self.first_sigma(rest, stiffness, mass)
-        limit, polished = self.length, False
+        limit, polished = first * self.length, False
         for iteration in range(1, max_iterations + 1):
             size = float(np.abs(rest / self.sizes).max(initial=0.0))
             if not np.isfinite(size):

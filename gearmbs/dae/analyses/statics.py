@@ -46,6 +46,9 @@ from gearmbs.dae.results.solution import Solution
 # it stands these are steps of its load.
 
 
+SHORTER = (1e-2, 1e-4)
+"""First steps, in lengths of the mechanism, of those who fell through what bears them: a solid is thinner than the
+ground it stands on is wide, and a body that touches it without any depth is not borne until it has some."""
 FIRST_SHARES = (1.0, 1.0 / 16.0)
 """Shares of the forces first released: again with the smaller one where the larger led to an unstable position."""
 SMALLEST_SHARE = 1.0 / 1024.0
@@ -76,6 +79,13 @@ def equilibrium(relaxation: Relaxation, max_iterations: int) -> tuple[int, float
     try:
         return relaxation.run(max_iterations)
     except SingularModelError:
+        # who fell past what would have borne him finds it by shorter steps
+        for first in SHORTER:
+            _put_back(relaxation.instant, before)
+            try:
+                return relaxation.run(max_iterations, first)
+            except ModelError:
+                pass
         raise
     except ModelError as failure:
         _put_back(relaxation.instant, before)

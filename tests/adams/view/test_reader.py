@@ -458,3 +458,26 @@ part create rigid_body mass_properties part_name = .swing.B mass = 1 center_of_m
     owners = {one.id: one.part for one in deck.of(st.Marker).values()}
     parts = [one for one in deck.of(st.Part).values() if one.name in ("A", "B")]
     assert [owners[one.cm] for one in parts] == [one.id for one in parts]
+
+
+DAMPED = [0.1 * k for k in range(21)]
+SLIDING = [x if k in (0, 1, 2, 6, 7, 11) else 0.0 for k, x in enumerate(DAMPED)]
+
+
+@pytest.mark.parametrize(
+    ("angle", "terms", "refused"), [("deg", DAMPED, True), ("deg", SLIDING, False), ("rad", DAMPED, False)]
+)
+def test_damping_of_a_beam_is_of_radians(angle, terms, refused):
+    """No public model shows whether View's terms of rotations are of degrees, and a symmetric matrix cannot say."""
+    text = PENDULUM.replace("angle = deg", f"angle = {angle}").replace("0d, 0d, 0d", "0, 0, 0") + (
+        "force create element_like beam beam_name = .swing.BEAM i_marker_name = .swing.ROD.TOP  &\n"
+        "   j_marker_name = .swing.ground.PIVOT ixx = 1 iyy = 1 izz = 1 area_of_cross_section = 1 length = 10  &\n"
+        "   youngs_modulus = 1 shear_modulus = 1 y_shear_area_ratio = 1 z_shear_area_ratio = 1  &\n"
+        f"   matrix_of_damping_terms = {', '.join(map(str, terms))}\n"
+    )
+    deck = parse_view(text).deck
+    if refused:
+        assert re.search(says(".swing.BEAM", "matrix_of_damping_terms", "damping_ratio"), deck.unsupported[0].message)
+    else:
+        assert not deck.unsupported
+        assert np.allclose(by_name(parse_view(text), st.Beam, "BEAM").cmatrix, terms)

@@ -3,7 +3,7 @@
 Nothing here reads a file, starts a program or asks the system.
 """
 
-from gearmbs.adams.view.functions import numeric, objects, places, texts
+from gearmbs.adams.view.functions import matrices, numeric, objects, places, texts
 from gearmbs.adams.view.functions.table import FUNCTIONS
 
-__all__ = ["FUNCTIONS", "numeric", "objects", "places", "texts"]
+__all__ = ["FUNCTIONS", "matrices", "numeric", "objects", "places", "texts"]

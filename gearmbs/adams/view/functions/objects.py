@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gearmbs.adams.view.expressions import Evaluator, text_of
+from gearmbs.adams.view.expressions import Evaluator, parse, text_of
 from gearmbs.adams.view.functions.table import FUNCTIONS, Function, Values, item_of
 from gearmbs.adams.view.model import Item
 from gearmbs.adams.view.vocabulary import kinds_of
@@ -50,7 +50,22 @@ def _unique(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) 
     return f"{stem}_{k}"
 
 
+def _unique_id(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> int:
+    """Return an id that no object of a type has been given."""
+    kinds, taken = kinds_of(text_of(args[0]), ev.line), [0]
+    for item in values.db.of(*kinds):
+        held = item.fields.get("adams_id")
+        taken += [int(one) for _, one in (held.values if held is not None else ()) if isinstance(one, (int, float))]
+    return max(taken) + 1
+
+
+def _conversion(values: Values, ev: Evaluator, args: list[Any], frame: Item | None) -> Any:
+    return ev(parse(f"1({text_of(args[0])})", values.db.units, ev.line))
+
+
 FUNCTIONS |= {
+    "UNIQUE_ID": Function(1, 1, _unique_id),
+    "UNITS_CONVERSION_FACTOR": Function(1, 1, _conversion),
     "DB_EXISTS": Function(1, 1, _exists),
     "DB_TYPE": Function(1, 1, _type),
     "DB_DEFAULT": Function(2, 2, _default),

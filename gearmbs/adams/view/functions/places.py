@@ -266,7 +266,18 @@ def _euler(k: int, c: np.ndarray) -> float:
     return frames.angles_313(c)[k]
 
 
-for _names, _angle in (("AX AY AZ", _angle_about), ("PSI THETA PHI", _euler)):
+def _tait_bryan(k: int, c: np.ndarray) -> float:
+    """Yaw, pitch and roll: body-fixed 321 angles, of which the pitch is the negative second one."""
+    if k == 1:
+        return math.atan2(c[2, 0], math.hypot(c[0, 0], c[1, 0]))
+    return math.atan2(c[1, 0], c[0, 0]) if k == 0 else math.atan2(c[2, 1], c[2, 2])
+
+
+for _names, _angle in (
+    ("AX AY AZ", _angle_about),
+    ("PSI THETA PHI", _euler),
+    ("YAW PITCH ROLL", _tait_bryan),
+):
     for _k, _name in enumerate(_names.split()):
         FUNCTIONS[_name] = Function(1, 2, _turn(partial(_angle, _k)), placing=True)
 
