@@ -16,7 +16,7 @@ import numpy as np
 
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import Evaluator, Tree, parse, text_of
-from gearmbs.adams.view.functions import FUNCTIONS
+from gearmbs.adams.view.functions.known import FUNCTIONS
 from gearmbs.adams.view.lexer import BARE, EXPRESSION, Value, ViewError, closed
 from gearmbs.adams.view.model import PARTS, PLACED, Database, Item
 from gearmbs.adams.write.text import number
