@@ -30,8 +30,8 @@ from gearmbs.mechanism import Mechanism, Simulator, forward_sensitivities, stead
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.native import export
 from gearmbs.signals import (
-    analyse, analyse_file, compare_files, order_map, order_track, read_pulses, require, series, spectrogram, trend,
-    waterfall,
+    analyse, analyse_file, compare_files, envelope_spectrum, kurtogram, order_map, order_track, read_pulses, require,
+    series, spectrogram, spectrum, trend, waterfall,
 )
 from gearmbs.studies import Case, bearing_rig, case_mechanism, run_case, simulate_case, steady
 from gearmbs.view import (
@@ -69,6 +69,9 @@ analyse_file(path, teeth=24, channels=["a"], format="csv")
 compare_files(files, teeth=24, reference="healthy", quantity="acceleration", band=("100 Hz", "5 kHz"))
 trend(path, "10 s", teeth=24, units="g", format="csv")
 series([path], teeth=24, speed="1200 rpm", gaps="longest")
+spectrum(np.zeros(4096), rate="10 kHz", units="g")
+envelope_spectrum(path, channels=["a"], gaps="longest")
+kurtogram(signal, levels=5)
 spectrogram(signal, segment="50 ms", tacho="tacho", rate="10 kHz")
 waterfall(signal, steps=20, speed_channel="speed")
 order_map(signal, "1200 rpm", revolutions=8.0, units="g")
@@ -132,6 +135,9 @@ analyse_file(path, teeths=24)
 compare_files(files, scope="loads")
 trend(path, "10 s", rates="10 kHz")
 series([path], teeth=24, half_with=0.2)
+spectrum(np.zeros(4096), rates="10 kHz")
+envelope_spectrum(path, channels=1)
+kurtogram(signal, level=5)
 spectrogram(signal, tako="tacho")
 waterfall(signal, pulses_per_rev="two")
 order_map(signal, revs=8.0)

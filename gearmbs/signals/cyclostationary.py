@@ -13,7 +13,7 @@ References
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import scipy.fft
@@ -21,7 +21,7 @@ import scipy.signal as ss
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import rate_of
 
 OVERSAMPLED = 2.0
@@ -30,7 +30,9 @@ FEWEST_BLOCKS = 16
 
 
 @takes_data(highest="frequency")
-def spectral_correlation(signal: Any, highest: float, *, segment: int = 256, channel: str | None = None) -> xr.Dataset:
+def spectral_correlation(
+    signal: Any, highest: float, *, segment: int = 256, channel: str | None = None, **_data: Unpack[DataKeywords]
+) -> xr.Dataset:
     """Return the spectral correlation and coherence of one channel by the fast algorithm of Antoni et al.
 
     Parameters

@@ -14,7 +14,7 @@ References
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import scipy.linalg
@@ -22,7 +22,7 @@ import scipy.signal as ss
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of
 
 LENGTH, ROUNDS = 64, 30
@@ -33,7 +33,9 @@ LOADING = 1e-9
 
 
 @takes_data()
-def minimum_entropy(signal: Any, *, length: int = LENGTH, rounds: int = ROUNDS) -> xr.DataArray:
+def minimum_entropy(
+    signal: Any, *, length: int = LENGTH, rounds: int = ROUNDS, **_data: Unpack[DataKeywords]
+) -> xr.DataArray:
     """Return each channel through the filter that makes its kurtosis highest (Endo and Randall).
 
     Parameters
@@ -67,7 +69,13 @@ def minimum_entropy(signal: Any, *, length: int = LENGTH, rounds: int = ROUNDS) 
 
 @takes_data(period="time")
 def maximum_correlated_kurtosis(
-    signal: Any, period: float, *, shifts: int = 1, length: int = LENGTH, rounds: int = ROUNDS
+    signal: Any,
+    period: float,
+    *,
+    shifts: int = 1,
+    length: int = LENGTH,
+    rounds: int = ROUNDS,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Return each channel through the filter that makes its correlated kurtosis at a period highest (McDonald et al.).
 

@@ -11,12 +11,12 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import check_rate, like, rate_of
 
 if TYPE_CHECKING:
@@ -250,13 +250,14 @@ def _valid(source: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
 
 @takes_data(low="frequency", high="frequency", transition="frequency")
 def bandpass(
-    signal: xr.DataArray,
+    signal: Any,
     low: float,
     high: float,
     *,
     transition: float,
     edges: Edges = "trim",
     attenuation: float = ATTENUATION_DB,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Zero-phase band-pass, flat from `low` to `high` and down by `attenuation` beyond the transition bands.
 

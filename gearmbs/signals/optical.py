@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any, Unpack
 
 import numpy as np
 import scipy.linalg
@@ -20,7 +21,7 @@ import xarray as xr
 from gearmbs.progress import waiting
 from gearmbs.signals.encoders.estimate import amplitude_interval
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import DIMENSIONS, like, rate_of, unit_dimension, units_of
 from gearmbs.units import Quantity, to_si
 
@@ -72,12 +73,13 @@ FEWEST_ORDERS = 8
 @takes_data()
 @waiting("bridging drop-outs")
 def repair_vibrometer(
-    signal: xr.DataArray,
+    signal: Any,
     *,
     full_scale: Quantity | None = None,
     level: str | None = None,
     least_level: float | None = None,
     spikes: float | None = SPIKE,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Bridge the drop-outs of a laser vibrometer, and say how many there were.
 
@@ -409,7 +411,12 @@ PIXELS = ("px", "pix", "pixel", "pixels")
 
 @takes_data()
 def point_track(
-    signal: xr.DataArray, scale: Quantity, *, direction: Sequence[float] | None = None, name: str = "camera"
+    signal: Any,
+    scale: Quantity,
+    *,
+    direction: Sequence[float] | None = None,
+    name: str = "camera",
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Displacement of a point that a camera has followed.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import scipy.fft
@@ -15,7 +15,7 @@ from gearmbs.progress import staged, waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import bandpass
 from gearmbs.signals.rotation.phase import analytic
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of, units_of
 
 Scaling = Literal["amplitude", "rms", "power", "density"]
@@ -25,7 +25,7 @@ SCALINGS = ("amplitude", "rms", "power", "density")
 
 @takes_data(segment="time")
 def spectrum(
-    signal: xr.DataArray,
+    signal: Any,
     *,
     scaling: Scaling = "amplitude",
     window: str | tuple = "hann",
@@ -33,6 +33,7 @@ def spectrum(
     overlap: float = 0.5,
     detrend: bool = True,
     progress: Progress | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """One-sided spectrum by averaged periodograms (Welch), segment by segment.
 
@@ -171,7 +172,12 @@ FLOOR = 1e-12
 @takes_data(segment="time")
 @waiting("cepstrum")
 def power_cepstrum(
-    signal: xr.DataArray, *, segment: int | float | None = None, window: str | tuple = "boxcar", overlap: float = 0.5
+    signal: Any,
+    *,
+    segment: int | float | None = None,
+    window: str | tuple = "boxcar",
+    overlap: float = 0.5,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Power cepstrum, the inverse Fourier transform of ln |X|^2, averaged over segments.
 
@@ -249,7 +255,11 @@ BLOCK = 1 << 17
 @takes_data(band="frequency", transition="frequency")
 @waiting("envelope")
 def envelope(
-    signal: xr.DataArray, band: tuple[float, float] | None = None, *, transition: float | None = None
+    signal: Any,
+    band: tuple[float, float] | None = None,
+    *,
+    transition: float | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Magnitude of the analytic signal, after a zero-phase band-pass if a band is given.
 
@@ -282,11 +292,12 @@ def envelope(
 @takes_data(band="frequency", segment="time")
 @waiting("envelope spectrum")
 def envelope_spectrum(
-    signal: xr.DataArray,
+    signal: Any,
     band: tuple[float, float] | None = None,
     *,
     scaling: Scaling = "amplitude",
     segment: int | float | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Spectrum of the envelope, mean removed: modulation frequencies with their amplitudes (see `spectrum`)."""
     return spectrum(envelope(signal, band), scaling=scaling, segment=segment)
@@ -294,7 +305,9 @@ def envelope_spectrum(
 
 @takes_data()
 @waiting("spectral kurtosis")
-def spectral_kurtosis(signal: xr.DataArray, *, segment: int = 256, overlap: float = 0.75) -> xr.DataArray:
+def spectral_kurtosis(
+    signal: Any, *, segment: int = 256, overlap: float = 0.75, **_data: Unpack[DataKeywords]
+) -> xr.DataArray:
     """Spectral kurtosis from the short-time Fourier transform X(t, f).
 
     SK(f) = <|X|^4> / <|X|^2>^2 - 2: zero for stationary Gaussian noise, -1 for a steady tone, large where the energy
@@ -350,7 +363,9 @@ def spectral_kurtosis(signal: xr.DataArray, *, segment: int = 256, overlap: floa
 
 @takes_data()
 @staged("kurtogram")
-def kurtogram(signal: xr.DataArray, *, levels: int = 7, progress: Progress | None = None) -> xr.Dataset:
+def kurtogram(
+    signal: Any, *, levels: int = 7, progress: Progress | None = None, **_data: Unpack[DataKeywords]
+) -> xr.Dataset:
     """Kurtosis of the complex envelope in bands that halve, and are split in three, level by level.
 
     Level 0 is the whole band; the next ones have 2, 3, 4, 6, 8, 12, ... bands. Each band's complex envelope is cut out

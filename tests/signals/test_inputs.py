@@ -84,3 +84,35 @@ def test_what_is_missing_or_wrong_is_told_in_one_line():
 def test_signatures_show_the_keywords():
     for function in CALLS:
         assert {"rate", "units", "channels", "gaps"} <= set(inspect.signature(function).parameters)
+
+
+@pytest.mark.parametrize("function", CALLS, ids=lambda f: f.__name__)
+def test_keywords_there_are_not_are_refused(function):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'rates'"):
+        function(SIGNAL, rates="5 kHz", **CALLS[function])
+
+
+def test_type_checkers_are_told_of_the_keywords():
+    """Each function that takes data has a table of keywords with those of data in it, which signatures do not show."""
+    taking = {name: f for name in of_signals.__all__ if holds_given(f := getattr(of_signals, name))}
+    assert {"spectrum", "order_map", "diagnose_bearing", "phase_from_tacho"} <= taking.keys()
+    for name, function in taking.items():
+        own = list(parameters_of(inspect.unwrap(function)))
+        # some have these keywords among their own parameters
+        tables = [str(p.annotation) for p in own if p.kind is p.VAR_KEYWORD]
+        assert "rate" in {p.name for p in own} or tables[0] in {f"Unpack[{kind}]" for kind in TABLES}, name
+        assert "_data" not in inspect.signature(function).parameters
+
+
+TABLES = ("DataKeywords", "ShaftAndDataKeywords", "OfChannelKeywords")
+"""Those with the keywords of data."""
+
+
+def parameters_of(function):
+    return inspect.signature(function).parameters.values()
+
+
+def holds_given(function):
+    return inspect.isfunction(function) and {"rate", "units", "channels", "gaps"} <= set(
+        inspect.signature(function).parameters
+    )

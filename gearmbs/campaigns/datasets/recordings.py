@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
@@ -10,7 +10,7 @@ from scipy.linalg import solve_toeplitz
 from gearmbs.campaigns.datasets.layers import STOP, Noise
 from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.signals import ModalPath, Mode, discrete_random, rate_of, sample
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 
 LINES = 64
 """Bands of the identified density: wider than lines and their sidebands, narrower than resonances of a housing."""
@@ -34,7 +34,7 @@ FEWEST = 4096
 
 
 @takes_data(data_rate="frequency")
-def identify_noise(signal: Any, data_rate: float | None = None) -> tuple[Noise, ...]:
+def identify_noise(signal: Any, data_rate: float | None = None, **_data: Unpack[DataKeywords]) -> tuple[Noise, ...]:
     """Return the noise of each channel of a recording.
 
     The recording is parted into what can be predicted and what cannot, see `gearmbs.signals.discrete_random`; the
@@ -78,7 +78,7 @@ def identify_noise(signal: Any, data_rate: float | None = None) -> tuple[Noise, 
 
 
 @takes_data()
-def identify_path(signal: Any, modes: int = 6) -> tuple[ModalPath, ...]:
+def identify_path(signal: Any, modes: int = 6, **_data: Unpack[DataKeywords]) -> tuple[ModalPath, ...]:
     """Return the transfer path to each channel of a recording, by the resonances of what does not repeat.
 
     Random vibration of a machine, of rolling and sliding, is taken for white where it arises: then linear prediction of

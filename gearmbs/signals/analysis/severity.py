@@ -9,14 +9,14 @@ has the standard gives them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import pandas as pd
 
 from gearmbs.signals.conversion import convert
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import given_speed
 from gearmbs.signals.signal.signal import rate_of
 from gearmbs.units import Quantity, to_si
@@ -57,6 +57,7 @@ def vibration_zones(
     group: Literal[1, 2] = 2,
     support: Literal["rigid", "flexible"] = "rigid",
     displacement: Sequence[Quantity] | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> pd.DataFrame:
     """Return the zone of ISO 20816-3 of each channel.
 

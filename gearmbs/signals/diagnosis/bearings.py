@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import pandas as pd
@@ -42,7 +42,7 @@ from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.separation import level_lines, prewhiten
 from gearmbs.signals.rotation.shaft import shaft_phase
 from gearmbs.signals.rotation.sweep import remark_sweep
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, unit_dimension, units_of
 from gearmbs.signals.spectra import kurtogram
 from gearmbs.units import to_si
@@ -184,6 +184,7 @@ def diagnose_bearing(
     tolerance: float = TOLERANCE,
     level: float = LEAST_LEVEL,
     progress: Callable[[float, str], None] | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> BearingReport:
     """Look for the lines of one or several bearings in a record and say what they mean.
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import pandas as pd
@@ -36,7 +36,7 @@ from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.sweep import remark_sweep
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import given_speed
 from gearmbs.signals.signal.signal import rate_of
 
@@ -232,6 +232,7 @@ def diagnose_planetary(
     member: str = "carrier",
     phase: xr.DataArray | None = None,
     sensor_angle: float | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> PlanetaryReport:
     """Look for faulty teeth of a planetary set in a record and say what was found. The ring is at rest.
 

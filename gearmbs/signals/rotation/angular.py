@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import scipy.fft
@@ -15,7 +15,7 @@ import xarray as xr
 from gearmbs.progress import staged, waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import apply_zero_phase, decimation_taps, kaiser_taps
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import check_teeth, common_unit, rate_of, require, units_of
 from gearmbs.signals.spectra import periodograms, spectral_unit
 
@@ -76,7 +76,9 @@ TURN = 2.0 * math.pi
 
 @takes_data()
 @waiting("resampling in angle")
-def angular_resample(signal: xr.DataArray, phase: xr.DataArray, *, samples_per_rev: int | None = None) -> xr.DataArray:
+def angular_resample(
+    signal: Any, phase: xr.DataArray, *, samples_per_rev: int | None = None, **_data: Unpack[DataKeywords]
+) -> xr.DataArray:
     """Order tracking: resample to equal steps of the shaft's angle.
 
     Parameters
@@ -112,12 +114,13 @@ def angular_resample(signal: xr.DataArray, phase: xr.DataArray, *, samples_per_r
 @takes_data()
 @staged("averaging")
 def time_synchronous_average(
-    signal: xr.DataArray,
+    signal: Any,
     phase: xr.DataArray,
     *,
     samples_per_rev: int | None = None,
     revolutions: int = 1,
     progress: Progress | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Average over shaft revolutions: what does not turn with the shaft fades as 1 / sqrt(averages).
 

@@ -6,7 +6,7 @@ Pulses that are missing or too many are told from the intervals beside them.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Unpack
 
 import numpy as np
 import scipy.fft
@@ -16,7 +16,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import speed_curve
 from gearmbs.signals.signal.signal import rate_of
 from gearmbs.wording import warn
@@ -50,7 +50,7 @@ LISTED = 5
 
 
 @takes_data()
-def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
+def phase_from_speed(signal: Any, speed: Any, **_data: Unpack[DataKeywords]) -> xr.DataArray:
     """Angle of a shaft whose speed is known, zero at the first sample.
 
     Parameters
@@ -88,12 +88,13 @@ def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
 
 @takes_data()
 def phase_from_tacho(
-    signal: xr.DataArray,
+    signal: Any,
     channel: str | None = None,
     *,
     pulses_per_rev: float = 1.0,
     threshold: float | None = None,
     faults: Literal["mend", "refuse", "keep"] = "mend",
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Angle (rad) of the shaft from a tacho channel's rising pulse edges.
 
@@ -204,7 +205,12 @@ def pulse_edges(
 
 @takes_data(frequency="frequency", half_bandwidth="frequency")
 def phase_from_line(
-    signal: xr.DataArray, frequency: float, order: float, *, half_bandwidth: float | None = None
+    signal: Any,
+    frequency: float,
+    order: float,
+    *,
+    half_bandwidth: float | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Angle (rad) of the shaft from the phase of one line, such as a gear mesh harmonic.
 

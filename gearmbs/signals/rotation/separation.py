@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any, Unpack
 
 import numpy as np
 import scipy.fft
@@ -30,7 +31,7 @@ import xarray as xr
 from gearmbs.progress import waiting
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.angular import time_synchronous_average
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of
 
 FLOOR = 1e-12
@@ -39,7 +40,9 @@ FLOOR = 1e-12
 
 @takes_data()
 @waiting("parting lines and noise")
-def remove_average(signal: xr.DataArray, phase: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+def remove_average(
+    signal: Any, phase: xr.DataArray, **_data: Unpack[DataKeywords]
+) -> tuple[xr.DataArray, xr.DataArray]:
     """Part a record into what repeats with every turn of a shaft and the rest.
 
     Parameters
@@ -81,7 +84,11 @@ def _periodic(values: np.ndarray, at: np.ndarray) -> np.ndarray:
 @takes_data(delay="time")
 @waiting("parting lines and noise")
 def discrete_random(
-    signal: xr.DataArray, *, delay: float | None = None, segment: int | None = None
+    signal: Any,
+    *,
+    delay: float | None = None,
+    segment: int | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> tuple[xr.DataArray, xr.DataArray]:
     """Part a record into what can be predicted from its past and what cannot.
 
@@ -132,7 +139,7 @@ def discrete_random(
 
 @takes_data()
 @waiting("parting lines and noise")
-def prewhiten(signal: xr.DataArray) -> xr.DataArray:
+def prewhiten(signal: Any, **_data: Unpack[DataKeywords]) -> xr.DataArray:
     """Give all lines of the spectrum the same magnitude and keep their phases.
 
     This is editing of the cepstrum to zero everywhere: lines of shafts and gears and every resonance are levelled, and
@@ -151,7 +158,7 @@ def prewhiten(signal: xr.DataArray) -> xr.DataArray:
 
 @takes_data(width="frequency")
 @waiting("parting lines and noise")
-def level_lines(signal: xr.DataArray, width: float, most: float = 10.0) -> xr.DataArray:
+def level_lines(signal: Any, width: float, most: float = 10.0, **_data: Unpack[DataKeywords]) -> xr.DataArray:
     """Flatten a spectrum over neighbourhoods, and cut its lines to a multiple of what is round them.
 
     Parameters
@@ -188,7 +195,12 @@ def level_lines(signal: xr.DataArray, width: float, most: float = 10.0) -> xr.Da
 @takes_data(frequencies="frequency", keep_below="time")
 @waiting("parting lines and noise")
 def edit_cepstrum(
-    signal: xr.DataArray, frequencies: Sequence[float] | float, *, width: float = 0.02, keep_below: float | None = None
+    signal: Any,
+    frequencies: Sequence[float] | float,
+    *,
+    width: float = 0.02,
+    keep_below: float | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Level families of equally spaced lines: notches in the real cepstrum at multiples of 1/f.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 import scipy.ndimage
@@ -13,7 +13,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.phase import phase_from_line
-from gearmbs.signals.signal.arguments import takes_data
+from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import rate_of, require
 from gearmbs.signals.spectra import periodograms
 from gearmbs.wording import warn
@@ -280,10 +280,11 @@ class SpeedEstimate:
 
 @takes_data(speed_range="angular speed")
 def estimate_speed(
-    signal: xr.DataArray,
+    signal: Any,
     teeth: int | Sequence[int] | None = None,
     *,
     speed_range: tuple[float, float] | None = None,
+    **_data: Unpack[DataKeywords],
 ) -> SpeedEstimate:
     """Find the gear mesh frequency, and with the tooth count the speed, from the record alone.
 

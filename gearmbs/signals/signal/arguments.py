@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 GIVEN = ("rate", "units", "channels", "gaps")
 """Keywords of `to_signal` that such functions have in addition to their own."""
+FOR_CHECKERS = "_data"
+"""How a function calls these where it has no other keywords that it hands on; it never gets any."""
 
 
 class DataKeywords(TypedDict, total=False):
@@ -47,7 +49,10 @@ def takes_data(**dimensions: str) -> Callable[[F], F]:
         places = list(own.parameters)
         extra = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in GIVEN]
         shown = [p for p in own.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
-        rest = [p for p in own.parameters.values() if p.kind is inspect.Parameter.VAR_KEYWORD]
+        rest = [
+            p for p in own.parameters.values() if p.kind is inspect.Parameter.VAR_KEYWORD and p.name != FOR_CHECKERS
+        ]
+        known = None if FOR_CHECKERS not in own.parameters else {*places, *GIVEN} - {FOR_CHECKERS}
 
         @functools.wraps(function)
         def called(*args: Any, **settings: Any) -> Any:
@@ -62,6 +67,9 @@ def takes_data(**dimensions: str) -> Callable[[F], F]:
                 found[0] = as_given(found[0], given)
             elif places[0] in settings:
                 settings[places[0]] = as_given(settings[places[0]], given)
+            if known is not None and not settings.keys() <= known:
+                other = next(name for name in settings if name not in known)
+                raise TypeError(f"{function.__name__}() got an unexpected keyword argument {other!r}")
             return function(*found, **settings)
 
         # what help and documentation show
