@@ -177,14 +177,15 @@ def test_free_flight_conserves_momentum_angular_momentum_and_energy(formulation,
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "tolerances", "factor"),
-    [("WSTIFF", (1e-9, 1e-10), 100), pytest.param("IDA", (1e-7, 1e-8), 4000, marks=pytest.mark.slow)],
+    [("WSTIFF", (1e-9, 1e-10), 100), pytest.param("IDA", (1e-6, 1e-8), 4000, marks=pytest.mark.slow)],
 )
 def test_tumbling_for_a_hundred_seconds(integrator, tolerances, factor):
     """No damping: energy and angular momentum about the centre of mass, summed over the mass points.
 
     What they stray is error of the integrator alone, so it falls with the tolerance: 15 times the tolerance are
-    measured of WSTIFF, 1000 times of IDA. The tolerances are far above where rounding collapses the steps (IDA: 1e-12,
-    with some libraries).
+    measured of WSTIFF, 1000 times of IDA, whose momentum at one tolerance strays five times more on one processor than
+    on another: it is judged over two decades. The tolerances are far above where rounding collapses the steps (IDA:
+    1e-12, with some libraries).
     """
     m, body = with_cloud(velocity=(0.3, -0.2, 0.5), angular_velocity=(2.0, -3.0, 1.5))
     points = [body.marker(point, name=f"P{k}") for k, point in enumerate(POINTS)]
