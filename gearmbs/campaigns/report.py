@@ -181,7 +181,7 @@ def _at_hand(campaign: Campaign, result: str) -> str:
 
 
 def _surface(campaign: Campaign, result: str) -> str:
-    from gearmbs.campaigns.surrogates import response_surface
+    from gearmbs.campaigns.surrogates import response_surface, untold
 
     for degree in (2, 1):
         try:
@@ -190,10 +190,10 @@ def _surface(campaign: Campaign, result: str) -> str:
             continue
         table = surface.table()
         table = table.reindex(table["coefficient"].abs().sort_values(ascending=False).index).head(12)
-        note = (
-            f"<p>R<sup>2</sup> = {surface.r_squared:.3f}, of points left out {surface.q_squared:.3f}, RMS error there "
-            f"{surface.error:.3g}.</p>"
-        )
+        left_out = f"of points left out {surface.q_squared:.3f}, RMS error there {surface.error:.3g}"
+        if surface.alone:
+            left_out = html.escape(untold(surface))
+        note = f"<p>R<sup>2</sup> = {surface.r_squared:.3f}, {left_out}.</p>"
         return f"<h3>Response surface of degree {degree}, factors from -1 to 1</h3>{note}" + _table(table)
     return ""
 

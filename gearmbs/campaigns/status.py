@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from gearmbs.campaigns.codes import one_code
 from gearmbs.campaigns.folder import Folder, read_ledger
 from gearmbs.studies.run.claims import BEAT, owner, told
 
@@ -179,7 +180,7 @@ def read_status(folder: Folder) -> CampaignStatus:
         simulation_seconds=sum(row.simulation_seconds for row in rows),
         eta=0.0 if left == 0 else left / rate if rate else None,
         not_numbers=sum(row.not_numbers for row in rows),
-        codes=max(1, len({row.code for row in rows})),
+        codes=max(1, len(one_code(folder, {row.code for row in rows}))),
         late=tuple(words[u] for u in late),
         at_work=tuple(words.values()),
         rate=rate,

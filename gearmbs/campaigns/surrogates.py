@@ -391,11 +391,14 @@ class ResponseSurface:
     r_squared : float
         Part of the variance it explains of the points it was fitted to.
     q_squared : float
-        The same for each point by the surface fitted to all others: what it is worth elsewhere.
+        The same for each point by the surface fitted to all others: what it is worth elsewhere. NaN where a point
+        alone decides a coefficient, so that the others tell nothing of it (``alone``).
     error : float
-        RMS of those left-out errors, in the unit of the result.
+        RMS of those left-out errors, in the unit of the result; NaN as above.
     count : int
         Points.
+    alone : int
+        Points without which the others do not determine the coefficients: their leverage is 1.
     """
 
     names: list[str]
@@ -406,6 +409,7 @@ class ResponseSurface:
     q_squared: float
     error: float
     count: int
+    alone: int = 0
 
     def terms(self) -> list[str]:
         """Return the names of the terms."""
@@ -473,8 +477,9 @@ def fit_surface(
     coefficients = inverse @ (x.T @ y)
     rest = y - x @ coefficients
     leverage = np.einsum("ij,jk,ik->i", x, inverse, x)
+    single = leverage >= 1.0 - 1e-9
     with np.errstate(all="ignore"):
-        out = np.where(leverage < 1.0 - 1e-9, rest / (1.0 - leverage), np.nan)
+        out = np.where(single, np.nan, rest / (1.0 - leverage))
     spread = float(np.sum((y - y.mean()) ** 2))
     noise = float(rest @ rest) / (n - t) if n > t else np.nan
     return ResponseSurface(
@@ -486,6 +491,7 @@ def fit_surface(
         1.0 - float(np.sum(out**2)) / spread if spread else 1.0,
         float(out_of_scale(np.sqrt(np.mean(out**2)), power, "error")),
         n,
+        int(single.sum()),
     )
 
 
@@ -510,7 +516,7 @@ def response_surface(campaign: Campaign, result: str, degree: int = 2) -> Respon
     Warns
     -----
     CampaignWarning
-        If results are missing, of cases that failed or are not done.
+        If results are missing, of cases that failed or are not done, or nothing is known of points left out.
     """
     if campaign.plan.variants > 1:
         raise CampaignError("response surface: not of crossed choices; fit each option's cases by fit_surface")
@@ -538,4 +544,16 @@ def response_surface(campaign: Campaign, result: str, degree: int = 2) -> Respon
                 )
             found[:, at] = [value == alternatives[-1] for value in factor.columns(mine)[factor.name]]
         at += factor.width
-    return fit_surface(found, values, names, degree)
+    surface = fit_surface(found, values, names, degree)
+    if surface.alone:
+        warnings.warn(f"{result}: {untold(surface)}", CampaignWarning, stacklevel=3)
+    return surface
+
+
+def untold(surface: ResponseSurface) -> str:
+    """Return why nothing is known of points left out."""
+    return (
+        f"{surface.alone} of {surface.count} points decide a coefficient alone, as the one run at the centre of a box "
+        "behnken design does (leverage 1): the others tell nothing of them, and there is no error at points left out; "
+        "give options={'centre': 3}, more points, or degree=1"
+    )

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import gearmbs
-from gearmbs.campaigns.codes import admit, folder_code
+from gearmbs.campaigns.codes import admit, folder_code, has_grown, known_code, loaded_since, note
 from gearmbs.campaigns.folder import Folder, sealed
 from gearmbs.campaigns.limits import TimeLimitReached, last, limited
 from gearmbs.campaigns.reuse import Reuse
@@ -58,7 +58,8 @@ _folders: dict[str, Folder] = {}
 
 @dataclass
 class CaseResult:
-    """What came of a case: how it ended, what is kept, its key, processor seconds inside the simulation, files."""
+    """What came of a case: how it ended, what is kept, its key, processor seconds inside the simulation, files, and the
+    modules that it has loaded, with their files."""
 
     outcome: Outcome
     kept: Kept = field(default_factory=Kept)
@@ -66,6 +67,7 @@ class CaseResult:
     seconds: float = 0.0
     reused: bool = False
     files: list[str] = field(default_factory=list)
+    loaded: dict[str, str] = field(default_factory=dict)
 
 
 class CaseRunner:
@@ -111,13 +113,15 @@ class CaseRunner:
         thing, result = self.prepare(row)
         if thing is None:
             return result
-        start = time.thread_time()
+        start, before = time.thread_time(), set(sys.modules)
         self._attempt(thing, result, row)
         if result.outcome.status == FAILED and self.plan.on_failure == "tighter":
             tighter = self.subject.tightened(thing)
             if tighter is not None:
                 self._attempt(tighter, result, row)
         result.seconds = time.thread_time() - start
+        if len(sys.modules) > len(before):
+            result.loaded = loaded_since(before)
         return result
 
     def _attempt(self, thing: Any, result: CaseResult, row: dict[str, Any]) -> None:
@@ -390,9 +394,18 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
     finally:
         if runner not in _guards:
             runner.close()
+    if loaded := {name: file for result in results for name, file in result.loaded.items()}:
+        note(folder, loaded, getattr(known_code(folder, code), "sources", {}))
     digests = store(folder, unit, rows, results)
-    if _code(folder, mix) != code:
-        raise CodeChanged("the code, or a file that cases read, was edited while the unit was done")
+    while (now := _code(folder, mix)) != code:
+        if not _has_grown(folder, now, code):
+            raise CodeChanged("the code, or a file that cases read, was edited while the unit was done")
+        # modules that cases load are known now, and with them the code and the keys of the cases are others
+        code = now
+        keys = CaseRunner(folder, code)
+        for row, result in zip(rows, results, strict=True):
+            result.key = keys.prepare(row)[1].key
+        digests = store(folder, unit, rows, results)
     about = {
         "processor_seconds": round(time.process_time() - cpu + runner.elsewhere - before, 4),
         "wall_seconds": round(time.monotonic() - clock, 4),
@@ -403,6 +416,12 @@ def _work(folder: Folder, mix: bool, unit: int, claim: Claim) -> bool:
     }
     enter(folder, unit, rows, results, digests, about)
     return True
+
+
+def _has_grown(folder: Folder, now: str, before: str) -> bool:
+    """Return whether the code with a digest is that of another with modules more that cases have loaded."""
+    code = known_code(folder, now)
+    return code is not None and has_grown(folder, code, known_code(folder, before))
 
 
 def _look(

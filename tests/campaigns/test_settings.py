@@ -294,3 +294,22 @@ def test_a_report_of_a_part_says_so_once(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert "of 40 cases;" not in whole.report(tmp_path / "s.html", "y").read_text()
+
+
+def test_one_run_at_the_centre_has_no_error_left_out(tmp_path):
+    """It alone decides the constant; of three each is told by the others."""
+    for centre, options in ((1, {}), (3, {"options": {"centre": 3}})):
+        campaign = Campaign(tmp_path / str(centre), make_plan(function(), ranges(), "box behnken", **options))
+        campaign.run(workers=0)
+        assert len(campaign.table) == 12 + centre
+        if centre == 3:
+            assert np.isfinite(campaign.response_surface("y").q_squared)
+            continue
+        with pytest.warns(CampaignWarning, match=says("y", "leverage 1", "1 of 13 points", "'centre': 3")):
+            surface = campaign.response_surface("y")
+        assert np.isnan(surface.q_squared)
+        assert surface.alone == 1
+        with pytest.warns(CampaignWarning, match="leverage"):
+            text = campaign.report(tmp_path / "r.html", "y").read_text()
+        assert "nan" not in text.partition("Response surface")[2].partition("<table")[0]
+        assert np.isfinite(campaign.response_surface("y", degree=1).q_squared)

@@ -3,17 +3,18 @@
 Results are only put beside each other if they come from equal code. What counts of a source is its syntax tree without
 what cannot change a number:
 
-* docstrings, comments, layout;
+* docstrings, unless the module asks for one (``__doc__``, ``getdoc``), comments, layout;
 * messages: texts with a blank, and texts put together, in the arguments of exceptions, of warnings and of ``assert``.
   A text without a blank may be a name that a handler looks for, and counts; so do numbers.
 
 Of the package count all modules but `OUTSIDE`, and its tables; a test runs simulations in a process that cannot import
 those. Beyond it count the modules that a plan names, with all they import that belongs to them, wherever in the file
-that is written; of other packages their version and the digests that their installer noted. Kernels are made
-of these sources by numba and LLVM for a target processor: their versions, options and the processor count, too.
+that is written, as ``import_module("name")`` too; of other packages their version and the digests that their installer
+noted. Kernels are made of these sources by numba and LLVM for a target processor: their versions, options and the
+processor count, too.
 
-What a module reads while it runs, such as a table beside it, is not known here; who knows of files puts them into
-`Code.files`.
+What a module reads while it runs, such as a table beside it, is not known here, nor a module that it loads under a
+name that it puts together; who knows of files puts them into `Code.files`.
 """
 
 from __future__ import annotations
@@ -226,7 +227,7 @@ def _read(names: Iterable[str]) -> tuple[Code, list[_Source]]:
                 continue
             top = name.partition(".")[0]
             if top not in own and top != "gearmbs":
-                if not {"site-packages", "dist-packages"}.isdisjoint(path.parts):
+                if is_installed(path):
                     packages.add(top)
                     continue
                 if path.is_relative_to(sysconfig.get_path("stdlib")):
@@ -239,6 +240,11 @@ def _read(names: Iterable[str]) -> tuple[Code, list[_Source]]:
             further += imports
     memory.keep()
     return Code(digests, setting(packages)), files
+
+
+def is_installed(path: Path) -> bool:
+    """Return whether a file is of a package that an installer has put there."""
+    return not {"site-packages", "dist-packages"}.isdisjoint(path.parts)
 
 
 def _package_files() -> Iterator[tuple[str, Path]]:
@@ -276,8 +282,24 @@ def _file_of(module: str, required: bool) -> Path | None:
 # What counts of a source.
 
 
+DOCUMENTS = ("__doc__", "getdoc")
+"""Names by which a source asks for docstrings, which then count."""
+
+IMPORTERS = ("import_module", "__import__")
+"""Functions that import a module by its name."""
+
+
 class _Messages(ast.NodeTransformer):
-    """Takes out of a syntax tree what cannot change a number."""
+    """Takes out of a syntax tree what cannot change a number.
+
+    Parameters
+    ----------
+    asked : bool
+        Whether the source asks for docstrings, which then stay.
+    """
+
+    def __init__(self, asked: bool = False) -> None:
+        self.asked = asked
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         _mute_named(node)
@@ -299,7 +321,7 @@ class _Messages(ast.NodeTransformer):
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
         # a text that stands for itself describes what is beside it
-        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str) and not self.asked:
             return None
         return self.generic_visit(node)
 
@@ -317,8 +339,13 @@ def _mute(call: ast.Call) -> None:
         keyword.value = _Muted().visit(keyword.value)
 
 
+def _name_called(node: ast.Call) -> str | None:
+    """Return the name of the function of a call, without what it belongs to."""
+    return getattr(node.func, "attr", getattr(node.func, "id", None))
+
+
 def _warns(node: ast.AST) -> bool:
-    return isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", None)) in MESSAGES_FROM
+    return isinstance(node, ast.Call) and _name_called(node) in MESSAGES_FROM
 
 
 def _mute_named(function: ast.FunctionDef) -> None:
@@ -344,7 +371,11 @@ def _mute_named(function: ast.FunctionDef) -> None:
 
 def what_counts(source: bytes) -> str:
     """Return a digest of a source in Python without what cannot change a number."""
-    return hashlib.sha256(ast.dump(_Messages().visit(ast.parse(source))).encode()).hexdigest()[:32]
+    tree = ast.parse(source)
+    asked = any(
+        getattr(node, name, None) in DOCUMENTS for node in ast.walk(tree) for name in ("id", "attr", "value", "name")
+    )
+    return hashlib.sha256(ast.dump(_Messages(asked).visit(tree)).encode()).hexdigest()[:32]
 
 
 def _imports(name: str, path: Path, source: bytes) -> list[str]:
@@ -358,6 +389,12 @@ def _imports(name: str, path: Path, source: bytes) -> list[str]:
             above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             base = ".".join([*above, *([node.module] if node.module else [])])
             found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+        elif isinstance(node, ast.Call) and _name_called(node) in IMPORTERS:
+            given = node.args[0] if node.args else None
+            if isinstance(given, ast.Constant) and isinstance(given.value, str):
+                near = given.value.lstrip(".")
+                above = package.split(".")[: len(package.split(".")) - (len(given.value) - len(near)) + 1]
+                found.append(".".join([*above, near]) if near != given.value else near)
     # packages run their own code before that of what they hold
     return sorted({".".join(n.split(".")[: k + 1]) for n in found if n for k in range(n.count(".") + 1)})
 
