@@ -90,8 +90,10 @@ from gearmbs.units import Quantity
 from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
-    from gearmbs.drivetrain.kinematics import KinematicTable, PowerFlow
+    from gearmbs.drivetrain.kinematics import KinematicTable
     from gearmbs.drivetrain.placement import Layout
+    from gearmbs.drivetrain.static.flow import PowerFlow
+    from gearmbs.drivetrain.static.rest import Rest
     from gearmbs.drivetrain.torsional import MeshDynamics, TorsionalModel, TorsionalSpring
     from gearmbs.flexible import ModalModel
     from gearmbs.gears.spec import GearSpec
@@ -299,11 +301,33 @@ class Drivetrain(Guessed):
         return operating_speeds(self)
 
     @cached_property
-    def power(self) -> PowerFlow:
-        """Torques that the meshes and couplings transmit at the operating point, and who pushes."""
-        from gearmbs.drivetrain.kinematics import power_flow
+    def nominal_power(self) -> PowerFlow:
+        """Torques at the operating point, branches of closed chains sharing as equal teeth do; picks drive flanks."""
+        from gearmbs.drivetrain.static.flow import power_flow
 
         return power_flow(self)
+
+    @cached_property
+    def at_rest(self) -> Rest:
+        """Torques of meshes, forces of bearings and tilts of wheels in the loaded position of rest."""
+        from gearmbs.drivetrain.static.rest import position_of_rest
+
+        return position_of_rest(self)
+
+    @cached_property
+    def power(self) -> PowerFlow:
+        """Torques that the meshes and couplings transmit at the operating point, and who pushes.
+
+        Branches of closed chains share as in the loaded position of rest.
+
+        Warns
+        -----
+        UserWarning
+            Where a closed chain has none, so that its branches share as equal teeth do.
+        """
+        from gearmbs.drivetrain.static.flow import loaded_flow
+
+        return loaded_flow(self)
 
     @cached_property
     def pairs(self) -> dict[str, Any]:
@@ -311,8 +335,8 @@ class Drivetrain(Guessed):
         out = {}
         for mesh in self.meshes:
             driver, driven = self.wheels_of(mesh)
-            sense = self.power.rotation(mesh.name)
-            out[mesh.name] = mesh.make(driver.gear, driven.gear, sense, self.power.on_driven(mesh.name))
+            sense = self.nominal_power.rotation(mesh.name)
+            out[mesh.name] = mesh.make(driver.gear, driven.gear, sense, self.nominal_power.on_driven(mesh.name))
         return out | stage_pairs(self)
 
     @cached_property
@@ -359,11 +383,13 @@ class Drivetrain(Guessed):
         Warns
         -----
         UserWarning
-            Of meshes that are damped above critical, and of misaligned ones without load.
+            Of meshes that are damped above critical, of misaligned ones without load, and of those that carry nothing
+            by a law that has no stiffness then.
         """
-        from gearmbs.drivetrain.torsional import torsional_model, warn_of_overdamped_meshes
+        from gearmbs.drivetrain.torsional import torsional_model, warn_of_idle_meshes, warn_of_overdamped_meshes
 
         warn_of_overdamped_meshes(self)
+        warn_of_idle_meshes(self)
         return torsional_model(self)
 
     @cached_property

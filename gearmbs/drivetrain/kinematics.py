@@ -6,7 +6,6 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,10 +16,7 @@ from gearmbs.drivetrain.parts import GearMesh
 from gearmbs.drivetrain.planetary import (
     Meshing,
     PlanetaryStage,
-    balanced_torques,
-    differentials,
     held_ratio,
-    member_torques,
     with_differentials,
 )
 from gearmbs.drivetrain.shaft import Shaft
@@ -310,7 +306,7 @@ def table_at(train: Drivetrain, speeds: Mapping[str, float]) -> KinematicTable:
     return turned.kinematics
 
 
-# Speeds of all shafts from the drives, torques of meshes and couplings from the loads, who pushes, and weak drives.
+# Speeds of all shafts from the drives, and drives that are too weak for the loads.
 
 
 SAME_SPEED = 1e-9
@@ -432,95 +428,10 @@ def _agree(
     )
 
 
-@dataclass(frozen=True)
-class PowerFlow:
-    """Torques at the operating point, from the loads to the drives, without losses.
-
-    Attributes
-    ----------
-    torques : dict of str to (float, float)
-        On the first and on the second shaft of each mesh (the driver's and the driven's) and coupling, about their z
-        axes, N m.
-    pushing : dict of str to str
-        Of each mesh, the shaft whose wheel pushes.
-    senses : dict of str to int
-        Of each mesh, the sense in which the driver turns about z.
-    drivers : dict of str to str
-        Of each mesh, the driver's shaft.
-    drive : dict of str to float
-        Torque of the drive of each train about its shaft, N m, by the drive's name.
-    members : dict of str to dict of str to float
-        Of each planetary stage, the torques of its planets on sun, carrier and ring about the axis, N m.
-    """
-
-    torques: dict[str, tuple[float, float]]
-    pushing: dict[str, str]
-    senses: dict[str, int]
-    drivers: dict[str, str]
-    drive: dict[str, float]
-    members: dict[str, dict[str, float]] = field(default_factory=dict)
-
-    def rotation(self, mesh: str) -> int:
-        """Return the ``rotation`` of a mesh's pair: the driver's sense, or its opposite if the driven wheel pushes."""
-        return self.senses[mesh] * (1 if self.pushing[mesh] == self.drivers[mesh] else -1)
-
-    def on_driven(self, mesh: str) -> float:
-        """Return the size of the torque on the driven wheel of a mesh, N m."""
-        return abs(self.torques[mesh][1])
-
-
-def power_flow(train: Drivetrain) -> PowerFlow:
-    """Return the torques of a drivetrain at its operating point.
-
-    Trees are exact. Of a closed chain the last link found carries nothing here.
-    """
-    speeds = train.speeds
-    first_of = {link.name: link.first for link in links(train)}
-    applied = dict.fromkeys(speeds, 0.0)
-    for load in train.loads:
-        sense = -1.0 if speeds[load.shaft] < 0.0 else 1.0
-        resisting = sense * load.nominal(abs(speeds[load.shaft]))
-        applied[load.shaft] -= resisting
-        if load.on in applied:
-            applied[load.on] += resisting
-    torques: dict[str, tuple[float, float]] = {}
-    pushing: dict[str, str] = {}
-    driven_by: dict[str, float] = {}
-    done: set[str] = set()
-    roots = [drive.shaft for drive in train.drives] + [shaft.name for shaft in train.shafts]
-    for root in roots:
-        if root in done:
-            continue
-        done.add(root)
-        found = list(walk(train, root))
-        rest = dict(applied)
-        for link, new in reversed(found):
-            done.add(link.second)
-            on_second = -rest[link.second] if new else 0.0
-            on_first = -on_second * link.ratio
-            rest[link.first] += on_first
-            forward = first_of[link.name] == link.first
-            torques[link.name] = (on_first, on_second) if forward else (on_second, on_first)
-            pushing[link.name] = link.first if on_second * speeds[link.second] >= 0.0 else link.second
-        for drive in train.drives:
-            if drive.shaft == root:
-                driven_by.setdefault(drive.name, -rest[root])
-    members: dict[str, dict[str, float]] = {}
-    if differentials(train):
-        torques, members, driven_by = balanced_torques(train, links(train), applied)
-        for link in links(train):
-            drives = torques[link.name][1] * speeds[link.second] >= 0.0
-            pushing[link.name] = link.first if drives else link.second
-    members |= member_torques(train, torques)
-    drivers = {mesh.name: train.wheels_of(mesh)[0].shaft for mesh in train.meshes}
-    senses = {name: -1 if speeds[shaft] < 0.0 else 1 for name, shaft in drivers.items()}
-    return PowerFlow(torques, pushing, senses, drivers, driven_by, members)
-
-
 def warn_of_weak_drives(train: Drivetrain) -> None:
     """Warn of drives whose largest torque is less than that of the loads on their shaft, at speed or from rest.
 
-    Torques are those of the operating point without losses, see `PowerFlow`. Nothing is said
+    Torques are those of the operating point without losses, see `gearmbs.drivetrain.static.flow`. Nothing is said
     where a drive prescribes the speed, or a torque is a function of time.
 
     Warns
@@ -538,7 +449,7 @@ def warn_of_weak_drives(train: Drivetrain) -> None:
         done |= reached
         drives = [drive for drive in train.drives if drive.shaft in reached]
         sense = -1.0 if first.speed < 0.0 else 1.0
-        needed = sense * train.power.drive.get(first.name, 0.0)
+        needed = sense * train.nominal_power.drive.get(first.name, 0.0)
         message = _too_weak(train, drives, needed) or _never_starts(train, drives, reached)
         if message is not None:
             warn(message)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gearmbs.drivetrain.part import DrivetrainError, require
-from gearmbs.drivetrain.parts import GearMesh
+from gearmbs.drivetrain.parts import GearMesh, Wheel
 from gearmbs.drivetrain.planetary import PlanetaryStage, assemble_stage
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 CLOSED = 1e-6
 """Largest distance between what two ways round a closed chain give, m, and angle, rad."""
+ROUNDED = 1e-9
+"""Overlap of teeth, m, that is rounding: a thousandth of the smallest deflection of teeth under load."""
+LARGE_BACKLASH = 0.1
+"""Largest backlash that a message proposes, by the base pitch: half of that is a tooth."""
 ANGLE_STEPS = 30
 
 
@@ -94,9 +98,12 @@ def ties(train: Drivetrain) -> list[Tie]:
     return out
 
 
-def order(train: Drivetrain) -> Iterator[tuple[Tie, bool, bool]]:
-    """Yield ties from placed shafts outwards: the tie, whether it leads from its first shaft, and to a new one."""
-    waiting = ties(train)
+def order(train: Drivetrain, last: frozenset[str] = frozenset()) -> Iterator[tuple[Tie, bool, bool]]:
+    """Yield ties from placed shafts outwards: the tie, whether it leads from its first shaft, and to a new one.
+
+    Those of the names in ``last`` come behind all others that can be reached.
+    """
+    waiting = sorted(ties(train), key=lambda tie: tie.name in last)
     placed: set[str] = set()
     drives = [drive.shaft for drive in train.drives]
     positioned = [shaft.name for shaft in train.shafts if shaft.position is not None]
@@ -218,6 +225,10 @@ def _check_closed(train: Drivetrain, tie: Tie, known: Seat, found: Seat, geometr
     )
 
 
+class Misfit(DrivetrainError):
+    """Teeth that overlap where a chain closes."""
+
+
 def assembled(train: Drivetrain) -> Layout:
     """Return the places and the starting angles at which all drive flanks just touch.
 
@@ -226,11 +237,27 @@ def assembled(train: Drivetrain) -> Layout:
     DrivetrainError
         If wheels whose angles are given overlap, or a phase cannot be reached.
     """
+    try:
+        return _assembled(train, frozenset())
+    except Misfit:
+        last = frozenset(mesh.name for mesh in train.meshes if any(_turnable(train, w) for w in train.wheels_of(mesh)))
+        return _assembled(train, last)
+
+
+def _turnable(train: Drivetrain, wheel: Wheel) -> bool:
+    """Return whether turning a wheel on its shaft moves that against its mate, and nothing else."""
+    meshes = sum(wheel.name in (mesh.driver, mesh.driven) for mesh in train.meshes)
+    joined = sum(wheel.shaft in (tie.first, tie.second) for tie in ties(train))
+    return wheel.angle is None and meshes == 1 and joined > 1
+
+
+def _assembled(train: Drivetrain, last: frozenset[str]) -> Layout:
+    """Return the layout with the meshes of some names assembled behind all others."""
     pairs = train.pairs
     places, directions = seats(train, pairs)
     wheels = {wheel.name: wheel.angle for wheel in train.wheels}
     angles: dict[str, float] = {}
-    steps = list(order(train))
+    steps = list(order(train, last))
     followers = {(tie.second if forward else tie.first) for tie, forward, new in steps if new}
     for shaft in train.shafts:
         if shaft.name not in followers:
@@ -263,7 +290,7 @@ def _turn(
             "one of them",
         )
         wheels[driver.name] = _near_zero(direction + mesh.phase * pitch - angles[driver.shaft], pitch)
-    mine = wheels[here.name]
+    mine, was_open = wheels[here.name], wheels[here.name] is None
     if mine is None:
         mine = wheels[here.name] = 0.0
     known = angles[here.shaft] + mine - direction
@@ -280,13 +307,26 @@ def _turn(
         return
     own = wheels[there.name]
     assert own is not None
+    if was_open:
+        # the wheel at this end is in no other mesh yet
+        known = angles[there.shaft] + own - direction
+        turned = direction + (_driver_angle(pair, known) if forward else pair.driven_angle(known))
+        wheels[here.name] = _near_zero(turned - angles[here.shaft], 2.0 * math.pi / here.gear.teeth)
+        return
     off = _near_zero(angles[there.shaft] + own - wanted, mate_pitch)
-    free = pair.geometry.normal_backlash / there.gear.base_radius
-    require(
-        abs(off) <= free,
-        f"{mesh.label}: at the start its teeth overlap by {MM * (abs(off) - free) * there.gear.base_radius:.4g} mm: "
-        f"the chain is closed and the angles of its wheels are given; leave out the angle of wheel '{there.name}'",
-    )
+    excess = (abs(off) - pair.geometry.normal_backlash / there.gear.base_radius) * there.gear.base_radius
+    if excess > ROUNDED:
+        overlap = f"{mesh.label}: at the start its teeth overlap by {MM * excess:.4g} mm: the chain is closed and "
+        given = [w.name for w in (there, here) if train.part(w.name, Wheel).angle is not None]
+        if given:
+            raise Misfit(f"{overlap}the angles of its wheels are given; leave out the angle of wheel '{given[0]}'")
+        needed = excess + pair.geometry.normal_backlash
+        more = needed <= LARGE_BACKLASH * abs(pair.geometry.driver.base_pitch)
+        raise Misfit(
+            f"{overlap}none of its wheels can be turned on its shaft, because each is the only one there, meshes with "
+            "two others, or has its angle or phase given; change a number of teeth or the direction of a mesh"
+            + (f", or give a normal backlash of {MM * needed:.4g} mm or more" if more else "")
+        )
 
 
 def _near_zero(angle: float, pitch: float) -> float:

@@ -138,7 +138,7 @@ class PlanetaryStage(Part):
 
     def with_rotation(self, train: Drivetrain) -> PlanetarySet:
         """Return the set with the drive flanks of the operating point: the sun drives if its planets hold it back."""
-        on_sun, known = train.power.members[self.name]["sun"], self.speeds(train)
+        on_sun, known = train.nominal_power.members[self.name]["sun"], self.speeds(train)
         turns = -on_sun if on_sun else known["sun"] - known["carrier"]
         return replace(self.gears, rotation=-1 if turns < 0.0 else 1)
 
@@ -451,6 +451,21 @@ def with_differentials(train: Drivetrain, links: list[Any], speeds: dict[str, fl
     return {name: float(turned[k]) for name, k in place.items()}
 
 
+def columns_of(train: Drivetrain, links: list[Any]) -> list[np.ndarray]:
+    """Return the torques on all shafts that go with one on the second shaft of each link, and with one of each stage.
+
+    Of stages without a held member, with a unit torque on the sun; each shape (shafts,).
+    """
+    place = {shaft.name: k for k, shaft in enumerate(train.shafts)}
+    columns: list[np.ndarray] = []
+    for link in links:
+        column = np.zeros(len(place))
+        column[place[link.second]] += 1.0
+        column[place[link.first]] -= link.ratio
+        columns.append(column)
+    return columns + [_willis(train, stage, place) for stage in differentials(train)]
+
+
 def balanced_torques(
     train: Drivetrain, links: list[Any], applied: Mapping[str, float]
 ) -> tuple[dict[str, tuple[float, float]], dict[str, dict[str, float]], dict[str, float]]:
@@ -467,14 +482,8 @@ def balanced_torques(
     drives : dict of str to float
     """
     place = {shaft.name: k for k, shaft in enumerate(train.shafts)}
-    columns: list[np.ndarray] = []
-    for link in links:
-        column = np.zeros(len(place))
-        column[place[link.second]] += 1.0
-        column[place[link.first]] -= link.ratio
-        columns.append(column)
     stages = differentials(train)
-    columns += [_willis(train, stage, place) for stage in stages]
+    columns = columns_of(train, links)
     for drive in train.drives:
         columns.append(np.eye(len(place))[place[drive.shaft]])
     # a column that follows from those before it is left out

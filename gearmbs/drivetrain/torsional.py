@@ -293,7 +293,8 @@ class MeshDynamics(NamedTuple):
     law : str
         The contact law of a tooth pair.
     stiffness, damping : float
-        Means over a mesh cycle, in the transverse plane along the line of action, N/m and N s/m.
+        Means over a mesh cycle, in the transverse plane along the line of action, N/m and N s/m; zero without load by
+        laws of another exponent than 1.
     mass : float
         Of both shafts with their wheels there, 1 / (r_b1^2 / J_1 + r_b2^2 / J_2), kg; a shaft of prescribed speed
         counts as held.
@@ -358,6 +359,22 @@ def warn_of_overdamped_meshes(train: Drivetrain) -> None:
             )
 
 
+def warn_of_idle_meshes(train: Drivetrain) -> None:
+    """Warn of meshes that carry nothing by laws that have no stiffness then.
+
+    Warns
+    -----
+    UserWarning
+        With the mesh, its law and the remedy.
+    """
+    for name, found in train.mesh_dynamics.items():
+        if found.stiffness == 0.0:
+            warn(
+                f"mesh '{name}' carries nothing, and its law ({found.law}) has no stiffness without load: the "
+                "torsional chain has no spring there; give a load, or a law of exponent 1"
+            )
+
+
 def _inertias(train: Drivetrain, names: tuple[str, ...]) -> np.ndarray:
     """Return the moments of inertia of all shafts with their wheels, and of planets, about their axes, kg m^2."""
     inertias = np.zeros(len(names))
@@ -398,11 +415,13 @@ def _mesh_spring(train: Drivetrain, mesh: Meshing, names: tuple[str, ...]) -> To
     share = max(1.0, geometry.contact_ratio)
     # a helical flank has its normal out of the transverse plane, in gap and in force, and a longer line of contact
     transverse = math.cos(geometry.driver.base_helix_angle)
-    # at no load laws with an exponent have no stiffness; a linear one has it always
     face = law.face_share(geometry)
-    one = law.tangent_stiffness(force / share, 1, face) if force > 0.0 else face * law.law.stiffness
-    if law.law.exponent == 1.0:
+    linear = law.law.exponent == 1.0
+    if linear:
         one = face * law.law.stiffness
+    else:
+        # F = K d^n has the slope n K d^(n - 1): none without load
+        one = law.tangent_stiffness(force / share, 1, face) if force > 0.0 else 0.0
     if law.stiffness_curve == "potential-energy":
         # the law's stiffness is the largest along the path
         path = np.linspace(geometry.first_roll_lengths[0], geometry.driver.tip_roll_length, CURVE_POINTS)
@@ -410,8 +429,11 @@ def _mesh_spring(train: Drivetrain, mesh: Meshing, names: tuple[str, ...]) -> To
         one *= float(curve.mean() / curve.max())
     stiffness = float(transverse * one * geometry.contact_ratio)
     damping = float(transverse * law.tangent_damping(force / share, face) * geometry.contact_ratio)
+    if stiffness == 0.0:
+        # flanks that do not press on each other do not damp each other
+        damping = 0.0
     # an ideal mesh is one spring, however its wheels stand
-    if geometry.misalignment and not isinstance(pair, IdealMesh):
+    if geometry.misalignment and stiffness > 0.0 and not isinstance(pair, IdealMesh):
         tilted = _tilted_stiffness(train, mesh.name, stiffness, force)
         stiffness, damping = tilted, damping * tilted / stiffness
     one, two = geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius

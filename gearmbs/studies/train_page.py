@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,16 +14,15 @@ import xarray as xr
 
 from gearmbs._display import readable, settings_of
 from gearmbs.bearings import mean_load, rating_life
-from gearmbs.drivetrain import Drivetrain, DrivetrainError
+from gearmbs.drivetrain import Drivetrain
 from gearmbs.drivetrain.kinematics import RPM
-from gearmbs.drivetrain.plants import resting
 from gearmbs.files import write_whole
 from gearmbs.gears import GearPair
 from gearmbs.gears.pattern import ContactPattern, contact_pattern
-from gearmbs.mechanism.solve.analyses import static_equilibrium
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
 from gearmbs.studies.mode_names import mode_table, named_modes, ranked_crossings
+from gearmbs.studies.same_train import check_record_of
 from gearmbs.studies.train_views import one_a_group, train_campbell, train_report, train_scene, train_spectrum
 
 if TYPE_CHECKING:
@@ -31,17 +30,26 @@ if TYPE_CHECKING:
 
 MODES, CROSSINGS = 20, 10
 """Rows of the tables of modes and of crossings: those of which a decision may be made come first."""
+SHARES = {
+    "rest": "the means of loaded positions of rest over the mesh cycle",
+    "equal teeth": "those of equally stiff teeth without backlash, as no position of rest was found",
+}
+"""What the report says of torques in closed chains, by `gearmbs.drivetrain.static.flow.PowerFlow.shared_by`."""
+STRAIGHT = 1e-9
+"""Opening of flanks over their face under load, m, up to which axes count as parallel: far below any flank's form."""
 ANGLE = (35.0, 25.0)
 """Azimuth and elevation from which the drivetrain is seen, degrees."""
 
 SOURCES = (
     ("speeds, mesh and fault frequencies", "teeth and ratios; planets by Willis' equation", "docs/theory/planetary.md"),
-    ("torques and power flow", "equilibrium of every shaft under the nominal loads, without losses",
+    ("torques and power flow", "equilibrium of every shaft under the nominal loads, without losses; of branches of "
+     "closed chains the mean of positions of rest",
      "docs/theory/drivetrains.md"),
     ("stiffness of teeth, where a law of the wheels is named", "mean over a mesh cycle, c_gamma b", "ISO 6336-1"),
     ("damping of teeth, where nothing else is given", "0.07 of critical of the bare wheels: a convention",
      "docs/theory/drivetrains.md"),
-    ("contact patterns", "at rest under the nominal load; sections of the face are springs of their own",
+    ("contact patterns", "at rest under the nominal load, wheels tilted as shafts and bearings give; sections of the "
+     "face are springs of their own",
      "docs/theory/gears.md"),
     ("bearing lives", "L10 = (C/P)^p, p = 3 of balls and 10/3 of rollers; a_1 = a_ISO = 1", "ISO 281"),
     ("modes, Campbell diagram", "linearised at rest under the nominal loads; no whirl", "docs/howto/gearboxes.md"),
@@ -70,13 +78,25 @@ class TrainPage:
 
     @cached_property
     def patterns(self) -> dict[str, ContactPattern]:
-        """Contact pattern of each mesh under its share of the operating torque; planets of a stage are alike."""
+        """Contact pattern of each mesh under its share of the operating torque; planets of a stage are alike.
+
+        The axes stand to each other as in the loaded position of rest; where there is none, as without load.
+        """
         out = {}
         for mesh in one_a_group(self.train):
             pair, spring = self.train.pairs[mesh.name], self.train.mesh_springs[mesh.name]
             if isinstance(pair, GearPair) and spring.preload > 0.0:
-                out[mesh.group] = contact_pattern(pair, spring.preload * pair.geometry.driven.base_radius)
+                standing = self._standing(mesh.name, pair)
+                out[mesh.group] = contact_pattern(standing, spring.preload * pair.geometry.driven.base_radius)
         return out
+
+    def _standing(self, mesh: str, pair: GearPair) -> GearPair:
+        """Return a pair with its axes as they stand at rest under load."""
+        rest = self.train.at_rest
+        if abs(rest.openings.get(mesh, 0.0)) * pair.geometry.common_face_width < STRAIGHT:
+            return pair
+        apart = float(pair.centre_distance_error) + rest.apart[mesh]
+        return replace(pair, misalignment=rest.skews[mesh], plane="skew", centre_distance_error=apart)
 
     @cached_property
     def campbell(self) -> xr.Dataset | None:
@@ -198,23 +218,24 @@ class TrainPage:
             speed = train.speeds[load.shaft]
             row("load", load.name, load.shaft, -np.copysign(load.nominal(abs(speed)), speed))
         header = ["", "name", "on", "torque about its axis, N m", "speed, rpm", "power into it, kW"]
-        return ["## Power flow", "", markdown_table(header, rows), ""]
+        told = ["## Power flow", "", markdown_table(header, rows), ""]
+        if flow.shared:
+            told += [f"Equilibrium alone does not tell the torques of {', '.join(flow.shared)}, which close a chain: "
+                     f"they are {SHARES[flow.shared_by]}.", ""]  # fmt: skip
+        return told
 
     def _static(self) -> list[str]:
-        train = resting(self.train)
-        mechanism = train.build()
-        rest = static_equilibrium(mechanism, t=2.0 * train.run_up).solution
+        rest, lines = self.train.at_rest, ["## Loads at rest", ""]
+        if rest.trouble:
+            return [*lines, f"No position of rest was found: {rest.trouble}.", ""]
         rows = []
-        for bearing in train.bearings:
-            # of joints reactions, of elements loads
-            is_joint = bearing.name in mechanism.joints
-            force = (rest.reaction(bearing.name) if is_joint else rest.load(bearing.name))[0][-1]
-            along = force @ train.layout.seats[bearing.shaft].axes
+        for bearing in self.train.bearings:
+            along = rest.bearings[bearing.name]
             told = (np.hypot(along[0], along[1]), along[2], np.linalg.norm(along))
             rows.append([bearing.name, bearing.shaft, *(f"{value:.5g}" for value in told)])
         header = ["bearing", "shaft", "across its axis, N", "along it, N", "whole, N"]
-        meshes = [[m.name, f"{rest.diagnostics(m.name)['normal_force'][-1]:.5g}"] for m in train.meshings]
-        lines = ["## Loads at rest", "", markdown_table(header, rows), ""]
+        meshes = [[name, f"{force:.5g}"] for name, force in rest.forces.items()]
+        lines += [markdown_table(header, rows), ""]
         return [*lines, markdown_table(["mesh", "normal force, N"], meshes), ""] if meshes else lines
 
     def _life(self) -> list[str]:
@@ -227,18 +248,27 @@ class TrainPage:
         return ["## Bearing lives", "", told, ""]
 
     def _pattern(self) -> list[str]:
-        rows = [
-            [
+        rest, lines = self.train.at_rest, ["## Contact patterns", ""]
+        first = {mesh.group: mesh.name for mesh in one_a_group(self.train)}
+        rows = []
+        for name, pattern in self.patterns.items():
+            width = self.train.pairs[first[name]].geometry.common_face_width
+            opening = rest.openings.get(first[name])
+            rows.append([
                 name,
                 f"{1e-3 * pattern.pressure.max():.4g}",
                 f"{pattern.face_load_factor:.3f}",
                 f"{pattern.share.max():.3f}",
-            ]
-            for name, pattern in self.patterns.items()
-        ]
-        header = ["mesh", "largest load along the face, N/mm", "face load factor", "largest share of one tooth"]
-        told = markdown_table(header, rows) if rows else "No teeth carry load that have a contact of their own."
-        return ["## Contact patterns", "", told, ""]
+                "-" if opening is None else f"{1e6 * abs(opening) * width:.2f}",
+            ])  # fmt: skip
+        if not rows:
+            return [*lines, "No teeth carry load that have a contact of their own.", ""]
+        header = ["mesh", "largest load along the face, N/mm", "face load factor", "largest share of one tooth",
+                  "flanks open over the face by tilts under load, um"]  # fmt: skip
+        lines += [markdown_table(header, rows), ""]
+        if rest.trouble:
+            lines += [f"The patterns are of axes as without load: no position of rest was found ({rest.trouble}).", ""]
+        return lines
 
     def _modes(self) -> list[str]:
         table = mode_table(named_modes(self.train)).head(MODES)
@@ -288,10 +318,5 @@ def train_page(train: Drivetrain, record: xr.Dataset, *, maximum: float = 2000.0
     DrivetrainError
         For the record of another drivetrain.
     """
-    shafts = [str(name) for name in record["shaft"].values]
-    if shafts != list(train.turning):
-        raise DrivetrainError(
-            f"{train.name}: the record has the shafts {', '.join(shafts)}, which are not those of the drivetrain, "
-            f"{', '.join(train.turning)}; give the record of this drivetrain"
-        )
+    check_record_of(train, record)
     return TrainPage(train, record, maximum)

@@ -18,6 +18,7 @@ from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
 from gearmbs.studies.mode_names import train_modes, with_gains
 from gearmbs.studies.run.record import flank_shares
+from gearmbs.studies.same_train import check_record_of
 from gearmbs.studies.train_record import STRAY, recorded_table
 from gearmbs.studies.trains import train_signal
 
@@ -35,7 +36,13 @@ def train_report(train: Drivetrain, record: xr.Dataset) -> str:
     """Return the report of a record: frequencies, torques, meshes, bearings, sensors, harmonics, cost.
 
     What the drivetrain has none of has no section.
+
+    Raises
+    ------
+    DrivetrainError
+        For the record of another drivetrain.
     """
+    check_record_of(train, record)
     sections = [_frequencies, _bearings, _sensors, _cost]
     if train.meshings:
         sections = [_frequencies, _meshes, _bearings, _sensors, _levels, _cost]
@@ -96,6 +103,10 @@ def _laws(train: Drivetrain) -> str:
               "of critical damping"]  # fmt: skip
     rows = []
     for name, m in train.mesh_dynamics.items():
+        if m.stiffness == 0.0:
+            # by a law that has no stiffness without load
+            rows.append([name, m.law, "0, carries nothing", "0", "-", "-"])
+            continue
         over = ", **over-damped**" if m.damping_ratio > 1.0 else ""
         rows.append([name, m.law, f"{1e-6 * m.stiffness:.4g}", f"{1e-3 * m.damping:.4g}", f"{m.frequency:.5g}",
                      f"{m.damping_ratio:.3g}{over}"])  # fmt: skip

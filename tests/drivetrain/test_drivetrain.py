@@ -218,10 +218,13 @@ def test_closed_chain_of_four_wheels_turns_its_last_wheel():
     )
     found = train.build().simulate(1e-6, rate=2e6).contact("m2")
     assert found["penetration_drive"].max() < 1e-9
-    # an angle that makes them overlap is refused
-    wrong = train.changed("b2", angle=train.layout.wheels["b2"] + 0.05)
+    # an angle that makes them overlap is refused where those of all others are given, too
+    turned = train.changed("b2", angle=train.layout.wheels["b2"] + 0.05)
+    wrong = turned.changed("a1", angle=0.0).changed("b1", angle=0.0)
     with pytest.raises(DrivetrainError, match=says("angle", "wheel 'b2'", "leave out")):
         _ = wrong.layout
+    # otherwise another wheel is turned
+    assert turned.layout.wheels["b1"] == pytest.approx(0.05, abs=1e-12)
     # other teeth between the same shafts: two speeds, or another centre distance
     with pytest.raises(DrivetrainError, match=says("shaft 'b'")):
         Drivetrain("x", wheels=[*wheels[:3], wheel("b2", "b", 31, "3 mm", station=0.15)], meshes=meshes, **given)

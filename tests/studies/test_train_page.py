@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import gearmbs as gm
 from gearmbs.bearings import Bearing, mean_load, rating_life
@@ -12,6 +13,7 @@ from gearmbs.drivetrain import (
     Drivetrain,
     DrivetrainError,
     ElasticBearing,
+    GearMesh,
     IdealBearing,
     PlanetaryStage,
     RunSettings,
@@ -19,8 +21,11 @@ from gearmbs.drivetrain import (
     SpeedDrive,
     TorqueLoad,
 )
-from gearmbs.gears import planetary
+from gearmbs.drivetrain.static.rest import Rest
+from gearmbs.gears import GearSpec, planetary
 from gearmbs.studies import run_train, train_page
+from gearmbs.studies.train_page import TrainPage
+from tests.drivetrain.test_closed_chains import split
 from tests.says import says
 
 pytestmark = pytest.mark.slow
@@ -116,3 +121,70 @@ def test_a_record_of_another_drivetrain_is_refused(page):
     with pytest.raises(DrivetrainError, match=says("spare", "record")):
         train_page(other, page.record)
     assert train_page(page.train, page.record).maximum == 2000.0
+
+
+def one_stage(station, diameter="30 mm", modes=None):
+    """A spur stage 21/52 in ball bearings, 400 N m; its wheels at a station, the left bearing of the input behind."""
+    wheels = [GearSpec(z, "3 mm", face_width="25 mm", bore_radius=bore) for z, bore in ((21, "15 mm"), (52, "20 mm"))]
+    first = "80 mm" if station == "20 mm" else "26 mm"
+    return Drivetrain(
+        "stage",
+        shafts=[
+            Shaft(name="i", length="240 mm", diameter="30 mm", modes=modes, wheels={"z1": (station, wheels[0])},
+                  bearings={"ia": (first, "6206"), "ib": ("214 mm", "6206")}),
+            Shaft(name="o", length="240 mm", diameter="40 mm", modes=modes, wheels={"z2": (station, wheels[1])},
+                  bearings={"oa": ("26 mm", "6208"), "ob": ("214 mm", "6208")}),
+        ],
+        meshes=[GearMesh(name="m", driver="z1", driven="z2")],
+        drives=[SpeedDrive(name="d", shaft="i", speed=157.0)],
+        loads=[TorqueLoad(name="l", shaft="o", torque=400.0)],
+        running=True,
+    )  # fmt: skip
+
+
+def page_of(train):
+    """Return the page with a record that has names and frequencies only."""
+    return TrainPage(train, xr.Dataset())
+
+
+def test_patterns_are_of_wheels_as_they_stand_under_load():
+    """Overhung: rigid shafts give 19.5 um over the face, bent ones 95; c_gamma of 19.7 N/(mm um) says K = 1.88, 4.2."""
+    rigid, bent, straight = (
+        page_of(one_stage("20 mm")), page_of(one_stage("20 mm", modes=6)), page_of(one_stage("120 mm"))
+    )  # fmt: skip
+    width = 0.025
+    assert abs(rigid.train.at_rest.openings["m"]) * width == pytest.approx(19.5e-6, rel=2e-3)
+    assert abs(bent.train.at_rest.openings["m"]) * width == pytest.approx(95.1e-6, rel=2e-3)
+    assert rigid.patterns["m"].face_load_factor == pytest.approx(1.516, abs=2e-3)
+    assert rigid.patterns["m"].pressure.max() == pytest.approx(330.9e3, rel=1e-3)
+    assert bent.patterns["m"].face_load_factor == pytest.approx(3.15, abs=0.01)
+    # the input gives way to the left: the right ends of the teeth carry
+    assert rigid.patterns["m"].section[rigid.patterns["m"].pressure.max(axis=0).argmax()] > 0.0
+    assert straight.patterns["m"].face_load_factor == pytest.approx(1.0, abs=1e-9)
+    assert table("\n".join(rigid._pattern()), "Contact patterns")[0][-1] == "19.54"
+
+
+def test_a_page_without_a_position_of_rest_says_so():
+    page = page_of(one_stage("20 mm"))
+    page.train.__dict__["at_rest"] = Rest(trouble="shaft 'i' is free")
+    assert "No position of rest was found: shaft 'i' is free." in page._static()
+    text = "\n".join(page._pattern())
+    assert "no position of rest was found (shaft 'i' is free)" in text
+    assert table(text, "Contact patterns")[0][2] == "1.000"
+    assert "no position of rest" not in "\n".join(page_of(one_stage("20 mm"))._pattern())
+
+
+def test_power_that_splits_is_told_as_it_splits():
+    train = split(backlash="0.1 mm")
+    page = page_of(train)
+    text = "\n".join(page._power())
+    powers = {row[1]: float(row[5]) for row in table(text, "Power flow")}
+    assert powers["m3 on d"] == powers["m4 on d"] == 5.0
+    assert "m1, m2, m3, m4, which close a chain: they are the means of loaded positions of rest" in text
+    rows = {row[0]: float(row[1]) for row in table("\n".join(page._pattern()), "Contact patterns")}
+    assert rows == {"m1": 70.95, "m2": 70.95, "m3": 141.9, "m4": 141.9}
+    train = split(backlash="0.1 mm")
+    train.__dict__["at_rest"] = Rest(trouble="it slips")
+    with pytest.warns(UserWarning, match=says("closed chain", "it slips", "equally stiff teeth")):
+        text = "\n".join(page_of(train)._power())
+    assert "those of equally stiff teeth without backlash, as no position of rest was found" in text
