@@ -420,11 +420,14 @@ def bearing_lives(
         turning = _spin(solution, element.i.body) - _spin(solution, element.j.body)
         speed = np.abs(np.einsum("tc,tc->t", turning[counts], axis))
         bearing = element.bearing
-        largest = max(equivalent_load(bearing, r, a) for r, a in zip(radial, axial))
         mean, turns = 0.0, np.inf
-        if largest > 0.0 and np.any(speed > 0.0):
-            mean = mean_load(bearing, radial, axial, lasting * speed)
-            turns = rating_life(bearing, mean, reliability=reliability, life_factor=life_factor)
+        try:
+            largest = max(equivalent_load(bearing, r, a) for r, a in zip(radial, axial))
+            if largest > 0.0 and np.any(speed > 0.0):
+                mean = mean_load(bearing, radial, axial, lasting * speed)
+                turns = rating_life(bearing, mean, reliability=reliability, life_factor=life_factor)
+        except BearingError as error:
+            raise BearingError(f"'{element.name}': {error}") from None
         average = float(np.average(speed, weights=lasting))
         hours = turns * 2.0 * np.pi / average / 3600.0 if average > 0.0 else np.inf
         rows.append((mean, largest, bearing.rating, average, turns, hours))

@@ -145,6 +145,13 @@ class Kind:
     classes: str = "balls"
     usual: Usual
 
+    @property
+    def thrust(self) -> Literal["both ways", "one way", "none"]:
+        """How it carries axial loads: one way if moving a ring along the axis preloads it; rollers need an angle."""
+        if self.preloaded:
+            return "one way"
+        return "none" if self.rollers and self.angle == "none" else "both ways"
+
 
 # Factors of the equivalent load by ISO 281.
 
@@ -154,46 +161,62 @@ DEEP_GROOVE = (
     (2.07, 0.34, 1.31), (3.45, 0.38, 1.15), (5.17, 0.42, 1.04), (6.89, 0.44, 1.00),
 )  # fmt: skip
 """f_0 F_a/C_0, e, Y of single-row deep groove bearings; X = 0.56."""
-ANGULAR = (
-    (20.0, 0.57, 0.43, 1.00), (25.0, 0.68, 0.41, 0.87), (30.0, 0.80, 0.39, 0.76), (35.0, 0.95, 0.37, 0.66),
-    (40.0, 1.14, 0.35, 0.57), (45.0, 1.34, 0.33, 0.50),
-)  # fmt: skip
-"""Contact angle in degrees, e, X, Y of single-row angular contact bearings."""
+# By contact angle in degrees, at the same nine levels of F_a/(i Z d^2): e, X, Y. f_0 F_a/C_0 of the standard's table
+# are these levels over cos(a), as C_0 = f_0 i Z d^2 cos(a). Single rows up to 5 degrees are those of deep groove
+# bearings. At F_a = e F_r X + e Y is 1, but for rounding, which tables of makers have alike.
+_LEVELS = tuple(level for level, _, _ in DEEP_GROOVE)
+_RADIAL = tuple((e, 0.56, y) for _, e, y in DEEP_GROOVE)
+_TEN = tuple(zip((0.29, 0.32, 0.36, 0.38, 0.40, 0.44, 0.49, 0.54, 0.54), (0.46,) * 9,
+                 (1.88, 1.71, 1.52, 1.41, 1.34, 1.23, 1.10, 1.01, 1.00)))  # fmt: skip
+_FIFTEEN = tuple(zip((0.38, 0.40, 0.43, 0.46, 0.47, 0.50, 0.55, 0.56, 0.56), (0.44,) * 9,
+                     (1.47, 1.40, 1.30, 1.23, 1.19, 1.12, 1.02, 1.00, 1.00)))  # fmt: skip
+ANGULAR: dict[float, tuple[tuple[float, ...], ...]] = {
+    0.0: _RADIAL, 5.0: _RADIAL, 10.0: _TEN, 15.0: _FIFTEEN, 20.0: ((0.57, 0.43, 1.00),) * 9,
+    25.0: ((0.68, 0.41, 0.87),) * 9, 30.0: ((0.80, 0.39, 0.76),) * 9, 35.0: ((0.95, 0.37, 0.66),) * 9,
+    40.0: ((1.14, 0.35, 0.57),) * 9, 45.0: ((1.34, 0.33, 0.50),) * 9,
+}  # fmt: skip
+"""e, X, Y of single rows by contact angle in degrees and level."""
 
-DOUBLE_ANGULAR = (
-    (20.0, 0.57, 1.09, 0.70, 1.63), (25.0, 0.68, 0.92, 0.67, 1.41), (30.0, 0.80, 0.78, 0.63, 1.24),
-    (35.0, 0.95, 0.66, 0.60, 1.07), (40.0, 1.14, 0.55, 0.57, 0.93), (45.0, 1.34, 0.47, 0.54, 0.81),
-)  # fmt: skip
-"""Contact angle in degrees, e, Y below e, X and Y above it of double row angular contact bearings, and of four-point
-bearings, whose ratings count two rows."""
+_BELOW_FIVE = (2.78, 2.40, 2.07, 1.87, 1.75, 1.58, 1.39, 1.26, 1.21)
+_BELOW_TEN = (2.18, 1.98, 1.76, 1.63, 1.55, 1.42, 1.27, 1.17, 1.16)
+_BELOW_FIFTEEN = (1.65, 1.57, 1.46, 1.38, 1.34, 1.26, 1.14, 1.12, 1.12)
+DOUBLE_ANGULAR: dict[float, tuple[tuple[float, ...], ...]] = {
+    5.0: tuple(zip((0.23, 0.26, 0.30, 0.34, 0.36, 0.40, 0.45, 0.50, 0.52), (0.78,) * 9,
+                   (3.74, 3.23, 2.78, 2.52, 2.36, 2.13, 1.87, 1.69, 1.63), _BELOW_FIVE)),
+    10.0: tuple(zip((e for e, _, _ in _TEN), (0.75,) * 9,
+                    (3.06, 2.78, 2.47, 2.29, 2.18, 2.00, 1.79, 1.64, 1.63), _BELOW_TEN)),
+    15.0: tuple(zip((e for e, _, _ in _FIFTEEN), (0.72,) * 9,
+                    (2.39, 2.28, 2.11, 2.00, 1.93, 1.82, 1.66, 1.63, 1.63), _BELOW_FIFTEEN)),
+    20.0: ((0.57, 0.70, 1.63, 1.09),) * 9, 25.0: ((0.68, 0.67, 1.41, 0.92),) * 9,
+    30.0: ((0.80, 0.63, 1.24, 0.78),) * 9, 35.0: ((0.95, 0.60, 1.07, 0.66),) * 9,
+    40.0: ((1.14, 0.57, 0.93, 0.55),) * 9, 45.0: ((1.34, 0.54, 0.81, 0.47),) * 9,
+}  # fmt: skip
+"""e, X, Y above it, Y below it of double row angular contact bearings, and of four-point bearings, whose ratings count
+two rows, by contact angle in degrees and level."""
 
 
-def _deep_groove_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
-    table = np.array(DEEP_GROOVE)
-    # f_0 F_a/C_0, with C_0 = f_0 i Z d^2
+def _by_angle(bearing: Bearing, axial: float, table: dict[float, tuple[tuple[float, ...], ...]]) -> tuple[float, ...]:
+    """Return the row of a table for a bearing's contact angle and axial load, between its rows on straight lines."""
+    degrees, angles = math.degrees(bearing.contact_angle), list(table)
+    require(
+        angles[0] <= degrees <= angles[-1],
+        f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors of the equivalent load are for "
+        f"{angles[0]:g} to {angles[-1]:g} deg; give the angle of the catalogue",
+    )
     count = KINDS[bearing.kind].rated_rows * bearing.elements
     level = axial / (count * (1e3 * bearing.element_diameter) ** 2)
-    e, y = (float(np.interp(level, table[:, 0], table[:, k])) for k in (1, 2))
-    return e, 0.56, y
+    k = min(int(np.searchsorted(angles, degrees, side="right")) - 1, len(angles) - 2)
+    share = (degrees - angles[k]) / (angles[k + 1] - angles[k])
+    ends = [[float(np.interp(level, _LEVELS, column)) for column in zip(*table[angles[j]])] for j in (k, k + 1)]
+    return tuple((1.0 - share) * low + share * high for low, high in zip(*ends))
 
 
-def _angular_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
-    degrees, table = math.degrees(bearing.contact_angle), np.array(ANGULAR)
-    require(
-        20.0 <= degrees <= 45.0,
-        f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors are for 20 to 45 deg",
-    )
-    e, x, y = (float(np.interp(degrees, table[:, 0], table[:, k])) for k in (1, 2, 3))
-    return e, x, y
+def _single_row_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+    return _by_angle(bearing, axial, ANGULAR)
 
 
 def _double_angular_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
-    degrees, table = math.degrees(bearing.contact_angle), np.array(DOUBLE_ANGULAR)
-    require(
-        20.0 <= degrees <= 45.0,
-        f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors are for 20 to 45 deg",
-    )
-    return tuple(float(np.interp(degrees, table[:, 0], table[:, k])) for k in (1, 3, 4, 2))
+    return _by_angle(bearing, axial, DOUBLE_ANGULAR)
 
 
 def _self_aligning_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
@@ -206,10 +229,16 @@ def _spherical_factors(bearing: Bearing, radial: float, axial: float) -> tuple[f
     return 1.5 * slope, 0.67, 0.67 / slope, 0.45 / slope
 
 
+TILTED = math.radians(4.0 / 60.0)
+"""Axial load by the radial one that is a tilt of the axis along which it is measured: the 4 minutes that makers let
+cylindrical roller bearings lean."""
+
+
 def _cylindrical_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
     require(
-        axial <= 1e-9 * max(radial, 1.0),
-        f"F_a is {axial:.4g} N; cylindrical rollers carry no axial load: their life counts F_r alone",
+        axial <= TILTED * max(radial, 1.0),
+        f"F_a is {axial:.4g} N beside F_r of {radial:.4g} N, and a {bearing.kind} bearing carries no axial load: let "
+        "another bearing locate the shaft, with axial stiffness 0 here, or take a kind that does",
     )
     return math.inf, 1.0, 0.0
 
@@ -339,14 +368,14 @@ SET_WHEN_MOUNTED = "their clearance is set when they are mounted"
 
 KINDS: dict[str, Kind] = {
     "deep groove": Kind(
-        angle="free", reduction=0.95, load_factors=_deep_groove_factors, usual=Usual(size=0.300, fill=0.595)
+        angle="free", reduction=0.95, load_factors=_single_row_factors, usual=Usual(size=0.300, fill=0.595)
     ),
     "angular contact": Kind(
         angle="needed",
         one_shoulder=True,
         preloaded=True,
         reduction=0.95,
-        load_factors=_angular_factors,
+        load_factors=_single_row_factors,
         usual=Usual(size=0.300, fill=0.82),
         designation=re.compile(r"^7([023])(\d\d)\s*-?\s*(AC|[ABC])(?:EC?[ABC]?)?(?:G[ABC]?)?(?:JP|[DFJMPY])?(?![A-Z])"),
         series={"0": "70", "2": "72", "3": "73"},
@@ -416,7 +445,7 @@ KINDS: dict[str, Kind] = {
         rows="parallel",
         reduction=0.90,
         rated_rows=2,
-        load_factors=_deep_groove_factors,
+        load_factors=_single_row_factors,
         usual=Usual(size=0.250, fill=0.78, apart=0.5),
         designation=re.compile(r"^(4[23])(\d\d)(?!\d)"),
         series={"42": "42", "43": "43"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +15,7 @@ from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.housing import Housing
 from gearmbs.drivetrain.kinematics import joined
 from gearmbs.drivetrain.loads import Load
+from gearmbs.drivetrain.on_shafts import check_thrust
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
@@ -162,6 +164,7 @@ def _held(train: Drivetrain, shaft: Shaft) -> None:
     for coupling in train.couplings:
         if coupling.kind == "rigid" and group & {coupling.first, coupling.second}:
             group |= {coupling.first, coupling.second}
+    check_thrust(train, group)
     if len(group) > 1:
         return
     mine = [b for b in train.bearings if b.shaft == shaft.name]
@@ -515,6 +518,10 @@ class _Builder:
         role = "revolute"
         if len(ideal) == 2 and bearing.name in ideal:
             role = ("spherical", "inline")[ideal.index(bearing.name)]
+        sense = train.senses.get(bearing.name)
+        if sense != bearing.told_sense:
+            # that of its pair
+            bearing = replace(bearing, sense=sense)
         bearing.add(self.m, i, j, role)
 
     def attached(self, part: Any, end: Any) -> Attached:

@@ -15,7 +15,7 @@ from gearmbs.drivetrain.part import Attached, Part, errors_named, require
 from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import ForceElement
-from gearmbs.schema.quantities import Measure
+from gearmbs.schema.quantities import Measure, OneOf
 from gearmbs.units import Quantity
 from gearmbs.wording import warn
 
@@ -56,7 +56,10 @@ class Bearing(Part, ABC):
     on_station : float or str, optional
         Of a bearing on a shaft, where on that, m; default: its middle.
     rolling : gearmbs.bearings.Bearing, str or mapping, optional
-        What rolls in it, for the table of frequencies: a bearing, its designation, or its fields.
+        What rolls in it, for the tables of frequencies and lives: a bearing, its designation, or its fields.
+    sense : {1, -1}, optional
+        Direction along z in which the inner ring of a one-sided bearing, tapered roller or angular contact, presses;
+        default: two of a shaft stand face to face, see `gearmbs.drivetrain.on_shafts.senses`.
     """
 
     title: ClassVar[str] = "bearing"
@@ -67,12 +70,36 @@ class Bearing(Part, ABC):
     on: str | None = None
     on_station: Annotated[Quantity, Measure("length")] = None
     rolling: Any = None
+    sense: Annotated[int, OneOf((1, -1))] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rolling is not None:
             with errors_named(f"{self.label}: rolling"):
                 object.__setattr__(self, "rolling", rolling_bearing(self.rolling))
+        what = "nothing that rolls is given" if self.rolling is None else f"a {self.rolling.kind} bearing has none"
+        require(
+            self.sense is None or self.is_one_sided,
+            f"{self.label}: sense is {self.sense}, but {what}; leave it out, or give a tapered roller or angular "
+            "contact bearing",
+        )
+
+    @property
+    def thrust(self) -> str:
+        """How what rolls in it carries axial loads: "both ways", "one way" or "none"; empty if nothing is told."""
+        from gearmbs.bearings.kinds import KINDS as ROLLING
+
+        return "" if self.rolling is None else ROLLING[self.rolling.kind].thrust
+
+    @property
+    def is_one_sided(self) -> bool:
+        """Whether it is a tapered roller or angular contact bearing, which carries axial loads one way."""
+        return self.thrust == "one way"
+
+    @property
+    def told_sense(self) -> int | None:
+        """The sense of a one-sided bearing that is given; None if it is left to the shaft."""
+        return self.sense if self.is_one_sided else None
 
     def holds(self, count: int) -> np.ndarray:
         """Return what it holds of its point and the shaft's tilts, rows over (x, y, z, tilt x, tilt y).
@@ -262,11 +289,33 @@ class RollingContactBearing(Bearing):
             on_rings = [d for d in as_defects(self.settings.get("defects", ())) if not isinstance(d, LooseFit)]
             checked = {**self.settings, "defects": on_rings}
             bearing_settings(self.rolling, checked, "RollingBearing")
+        other = self.settings.get("sense")
+        require(
+            None in (self.sense, other) or self.sense == other,
+            f"{self.label}: sense is {self.sense} and in its settings {other}; give one of them",
+        )
+
+    @property
+    def told_sense(self) -> int | None:
+        if not self.is_one_sided:
+            return None
+        return self.settings.get("sense") if self.sense is None else self.sense
+
+    def holds(self, count: int) -> np.ndarray:
+        from gearmbs.bearings.kinds import KINDS as ROLLING
+
+        if ROLLING[self.rolling.kind].rows == "back to back":
+            # their lines of contact meet the axis at two places, so that they hold tilts, too
+            return np.eye(5)
+        return np.eye(5)[: 2 if self.thrust == "none" else 3]
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
         from gearmbs.bearings.element import add_bearing
 
-        add_bearing(m, self.name, shaft, seat, self.rolling, **self.settings)
+        settings = dict(self.settings)
+        if self.told_sense is not None:
+            settings["sense"] = self.told_sense
+        add_bearing(m, self.name, shaft, seat, self.rolling, **settings)
 
 
 BEARINGS: dict[str, type[Bearing]] = {

@@ -350,6 +350,13 @@ class Drivetrain(Guessed):
         return self.turning.get(meshing.bodies[end], 0.0) - self.turning.get(meshing.carrier, 0.0)
 
     @cached_property
+    def senses(self) -> dict[str, int]:
+        """Sense of each tapered roller and angular contact bearing, by name; see `gearmbs.drivetrain.on_shafts`."""
+        from gearmbs.drivetrain.on_shafts import senses
+
+        return senses(self)
+
+    @cached_property
     def modal_models(self) -> dict[str, ModalModel]:
         """Bodies with modes of the shafts and housings that deform, by name; see `gearmbs.drivetrain.bodies`."""
         from gearmbs.drivetrain.bodies import modal_models

@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from gearmbs._display import readable, settings_of
-from gearmbs.bearings import mean_load, rating_life
 from gearmbs.drivetrain import Drivetrain
 from gearmbs.drivetrain.kinematics import RPM
+from gearmbs.drivetrain.on_shafts import arrangement
 from gearmbs.files import write_whole
 from gearmbs.gears import GearPair
 from gearmbs.gears.pattern import ContactPattern, contact_pattern
@@ -23,6 +23,7 @@ from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
 from gearmbs.studies.mode_names import mode_table, named_modes, ranked_crossings
 from gearmbs.studies.same_train import check_record_of
+from gearmbs.studies.train_bearings import BearingLife, bearing_lives
 from gearmbs.studies.train_views import one_a_group, train_campbell, train_report, train_scene, train_spectrum
 
 if TYPE_CHECKING:
@@ -52,6 +53,9 @@ SOURCES = (
      "face are springs of their own",
      "docs/theory/gears.md"),
     ("bearing lives", "L10 = (C/P)^p, p = 3 of balls and 10/3 of rollers; a_1 = a_ISO = 1", "ISO 281"),
+    ("axial load of a pair of tapered roller or angular contact bearings that are springs or joints",
+     "the thrust that its radial load induces, F_r/2Y or e F_r, or its neighbour's with what pushes the shaft",
+     "docs/theory/bearings.md"),
     ("modes, Campbell diagram", "linearised at rest under the nominal loads; no whirl", "docs/howto/gearboxes.md"),
 )  # fmt: skip
 """What the report tells, the law behind it, and where that is stated."""
@@ -109,36 +113,9 @@ class TrainPage:
             return None
 
     @cached_property
-    def lives(self) -> list[tuple[str, str, float, float, float, float]]:
-        """Name, designation, C (N), equivalent load (N), life (revolutions) and (h) of bearings in which parts roll."""
-        rows = []
-        for name, rolling, force, speed in self._rolling():
-            load = mean_load(rolling, np.hypot(force[:, 0], force[:, 1]), force[:, 2], speed) if speed.any() else 0.0
-            turns = rating_life(rolling, load) if load > 0.0 else np.inf
-            mean = float(speed.mean())
-            hours = turns * 2.0 * np.pi / mean / 3600.0 if mean > 0.0 else np.inf
-            rows.append((name, rolling.designation or "-", rolling.rating, load, turns, hours))
-        return rows
-
-    def _rolling(self) -> Iterator[tuple[str, Any, np.ndarray, np.ndarray]]:
-        """Yield name, bearing, force across and along its axis (m, 3) and speed of its rings (m,)."""
-        train, forces = self.train, self.record["bearing_force"]
-        turning, rest = set(map(str, self.record.shaft.values)), np.zeros(self.record.sizes["time"])
-
-        def speed(one: str, two: str) -> np.ndarray:
-            found = [self.record["speed"].sel(shaft=b).values if b in turning else rest for b in (one, two)]
-            return np.abs(found[0] - found[1])
-
-        for bearing in train.bearings:
-            if bearing.rolling is not None:
-                axes = train.layout.seats[bearing.shaft].axes
-                force = forces.sel(bearing=bearing.name).values @ axes
-                yield bearing.name, bearing.rolling, force, speed(bearing.shaft, train.carrier(bearing))
-        for pin, (stage, _) in train.pins.items():
-            rolling = getattr(stage.on_pins, "rolling", None)
-            if rolling is not None:
-                force = forces.sel(bearing=pin).values
-                yield pin, rolling, force, speed(pin.removesuffix(" pin"), stage.carrier)
+    def lives(self) -> list[BearingLife]:
+        """Lives of the bearings in which parts roll, those of planets' pins behind the others."""
+        return bearing_lives(self.train, self.record)
 
     def figures(self) -> Iterator[tuple[str, Figure]]:
         """Yield the figures with what they show, those first of which most is decided."""
@@ -239,13 +216,20 @@ class TrainPage:
         return [*lines, markdown_table(["mesh", "normal force, N"], meshes), ""] if meshes else lines
 
     def _life(self) -> list[str]:
-        header = ["bearing", "designation", "C, kN", "equivalent load of the record, N", "L10, 10^6 turns", "L10, h"]
+        header = ["bearing", "designation", "C, kN", "C of", "equivalent load of the record, N", "L10, 10^6 turns",
+                  "L10, h", "note"]  # fmt: skip
         rows = [
-            [name, kind, f"{1e-3 * rating:.4g}", f"{load:.4g}", f"{1e-6 * turns:.4g}", f"{hours:.4g}"]
-            for name, kind, rating, load, turns, hours in self.lives
-        ]
+            [one.name, one.designation, f"{1e-3 * one.rating:.4g}", one.source,
+             *("-" if np.isnan(x) else f"{x:.4g}" for x in (one.load, 1e-6 * one.turns, one.hours)), one.note]
+            for one in self.lives
+        ]  # fmt: skip
         told = markdown_table(header, rows) if rows else "No bearing says what rolls in it: give it `rolling`."
-        return ["## Bearing lives", "", told, ""]
+        pairs = [
+            f"The one-sided bearings of shaft '{shaft.name}' stand {stand}."
+            for shaft in self.train.shafts
+            if (stand := arrangement(self.train, shaft.name))
+        ]
+        return ["## Bearing lives", "", told, "", *(line for pair in pairs for line in (pair, ""))]
 
     def _pattern(self) -> list[str]:
         rest, lines = self.train.at_rest, ["## Contact patterns", ""]

@@ -31,6 +31,7 @@ from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
+from gearmbs.studies.train_bearings import bearing_remarks
 from gearmbs.studies.train_record import (
     CONTACT,
     TURN,
@@ -50,6 +51,7 @@ from gearmbs.studies.train_record import (
     unresolved,
     warn_of_speeds,
 )
+from gearmbs.wording import warn
 
 COUNTED = ("pairs_drive", "pairs_back")
 TRACK_MOMENTS = 60
@@ -109,8 +111,8 @@ def run_train(
         speed, and NaN where the speed is not steady, see `gearmbs.studies.train_record`. What planets do to bearings,
         lasers and accelerometers has their sidebands by turns of the carrier in it, and is NaN without a whole turn.
         Of a run-up or coast-down (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the same at
-        60 moments, without sidebands. The attribute ``remarks`` names speeds that are not the nominal ones, and
-        carriers that make no whole turn.
+        60 moments, without sidebands. The attribute ``remarks`` names speeds that are not the nominal ones,
+        carriers that make no whole turn, and what else is warned of.
 
     Raises
     ------
@@ -123,7 +125,9 @@ def run_train(
     -----
     UserWarning
         Of meshes that are damped above critical by their contact law, of drives that cannot carry the loads, and of
-        speeds that are not steady or far from the nominal ones.
+        speeds that are not steady or far from the nominal ones, of meshes without force though a torque acts, as of a
+        shaft that has left its bearings, and of tapered roller and angular contact bearings that carry against their
+        sense.
     """
     run = run or RunSettings()
     warn_of_overdamped_meshes(train)
@@ -277,13 +281,18 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
     speed = _interpolated(known.t, known.speed, t)
     bearing = values[:, meshes : meshes + 3 * bearings].reshape(t.size, bearings, 3)
     out = _dataset(train, t, contact, bearing, values[:, meshes + 3 * bearings :], speed, error)
+    of_bearings = bearing_remarks(train, out)
+    for remark in of_bearings:
+        warn(f"drivetrain '{train.name}': {remark}")
     if train.changes_speed:
         out["mesh_track"] = mesh_tracks(train, run, out, known)
         out.attrs = attributes(train, run, solution)
         return out
     held = held_speeds(train, out)
     out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop, held)
-    out.attrs = attributes(train, run, solution) | speed_attributes(held, unresolved(train, known, start, stop))
+    out.attrs = attributes(train, run, solution) | speed_attributes(
+        held, [*unresolved(train, known, start, stop), *of_bearings]
+    )
     if differentials(train):
         table, factor = recorded_table(train, out)
         out.attrs["placed_lines"] = json.dumps({name: factor * at for name, at in table.known_lines().items()})
