@@ -153,6 +153,11 @@ def _written(viewed: ViewModel, path: Path, skip_unsupported: bool, overwrite: b
 
 def _held(viewed: ViewModel, name: str | None) -> dict[str, Script]:
     """Return a simulation of a command file by its name, or those that the file runs itself, or its last script."""
+    from gearmbs.adams import DeckError
+
+    wanted = name if name is not None else next(reversed(viewed.refused), None) if not viewed.scripts else None
+    if wanted in viewed.refused and wanted not in viewed.scripts:
+        raise DeckError(viewed.refused[wanted])
     if name is None:
         names = viewed.own or tuple(viewed.scripts)[-1:]
         return {one: viewed.scripts[one] for one in names}

@@ -38,6 +38,8 @@ class ViewModel:
     name : str
     own : tuple of str
         Names of what the file runs itself, in order: each starts from the design.
+    refused : dict of str to list of Diagnostic
+        Scripts that cannot be carried out and that the file does not run itself, and why.
     models : dict of str to tuple of (Deck, str)
         Deck and text of those simulations whose model is another than that of ``deck``, which is the one that the file
         leaves.
@@ -52,6 +54,7 @@ class ViewModel:
     variables: dict[str, float] = field(default_factory=dict)
     name: str = ""
     own: tuple[str, ...] = ()
+    refused: dict[str, list[Diagnostic]] = field(default_factory=dict)
     models: dict[str, tuple[Deck, str]] = field(default_factory=dict)
     left_out: dict[str, tuple[Diagnostic, ...]] = field(default_factory=dict)
 
@@ -90,7 +93,15 @@ class ViewModel:
 
     @property
     def script(self) -> Script | None:
-        """The simulation to run when none is named: the last that the file runs itself, else the last that it holds."""
+        """The simulation to run when none is named: the last that the file runs itself, else the last that it holds.
+
+        Raises
+        ------
+        DeckError
+            If it holds only what cannot be carried out.
+        """
+        if not self.scripts and self.refused:
+            raise DeckError(next(reversed(self.refused.values())))
         return next(reversed(self.scripts.values()), None)
 
 
@@ -174,18 +185,20 @@ def parse_view(
         raise DeckError([Diagnostic(ERROR, message, file, 0) for message in wrong])
 
     # scripts that change the model start from it as the file leaves it, each for itself
-    def again(path: str) -> list[Analysis]:
+    def again(path: str) -> tuple[list[Analysis], list[Diagnostic]]:
         return _read_again(text, Simulator(made, file, folder, given, asked_for, quiet=True), path)
 
-    scripts = _of_scripts(run, chosen, again)
-    own = named(run.analyses, list(scripts))
+    scripts, refused = _of_scripts(run, chosen, again)
+    own = named(run.analyses, [*scripts, *refused])
     maker = run.made(chosen)
     deck, written = _deck(maker.statements, maker.problems, chosen, run, file)
     deck.diagnostics += factors.outside(run, file)
+    for name, wrong_there in refused.items():
+        said = f"{wrong_there[0].message}; it is left out of what can be run ({name})"
+        deck.diagnostics.append(Diagnostic(WARNING, said, file, wrong_there[0].line))
     values = factors.listed(run)
-    view = ViewModel(
-        deck, written, variables=values, name=chosen.name, own=tuple(own), left_out={"": _lacking(maker.problems)}
-    )
+    view = ViewModel(deck, written, variables=values, name=chosen.name, own=tuple(own), refused=refused)
+    view.left_out[""] = _lacking(maker.problems)
     for name, analysis in (scripts | own).items():
         view.scripts[name] = analysis.script(file)
         if analysis.model.path != chosen.path or not same(analysis.statements, maker.statements):
@@ -200,28 +213,32 @@ def _raise(run: Interpreter, file: str) -> None:
         raise DeckError([Diagnostic(ERROR, str(error), file, max(error.line, 0)) for error in run.errors])
 
 
-def _read_again(text: str, run: Simulator, path: str) -> list[Analysis]:
-    """Return the analyses of a script that changes the model, which the file is read again for."""
+def _read_again(text: str, run: Simulator, path: str) -> tuple[list[Analysis], list[Diagnostic]]:
+    """Return the analyses of a script that changes the model, which the file is read again for, and what is wrong."""
     run.run(text)
     run.quiet = False
     item = run.database.items.get(path.lower())
-    found = run.aside(item) if item is not None else []
-    _raise(run, run.file)
-    return found
+    return run.aside(item) if item is not None else ([], [])
 
 
-def _of_scripts(run: Simulator, model: Item, again: Callable[[str], list[Analysis]]) -> dict[str, Analysis]:
-    """Return what the scripts of a model do, by their names, each from the design on."""
+def _of_scripts(
+    run: Simulator, model: Item, again: Callable[[str], tuple[list[Analysis], list[Diagnostic]]]
+) -> tuple[dict[str, Analysis], dict[str, list[Diagnostic]]]:
+    """Return what the scripts of a model do, by their names, each from the design on; and why some do not."""
     found: dict[str, Analysis] = {}
+    refused: dict[str, list[Diagnostic]] = {}
     for item in run.database.of("script"):
         if run.database.model_of(item) is not model:
             continue
-        analyses = run.aside(item) if run.only_simulates(item) else again(item.path)
-        _raise(run, run.file)
+        analyses, wrong = run.aside(item) if run.only_simulates(item) else again(item.path)
+        refused.pop(item.name, None)
+        if wrong:
+            refused[item.name] = wrong
+            continue
         for k, one in enumerate(analyses, 1):
             if one.commands:
                 found[item.name if k == len(analyses) else f"{item.name}_{k}"] = one
-    return found
+    return found, refused
 
 
 def _deck(

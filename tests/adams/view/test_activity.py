@@ -13,6 +13,8 @@ from .test_runs import MODEL, OFF, ON, ONE, RESET, RUN, ends
 
 GROUP = "group {} group_name = .m.G {}\n"
 CREATED = GROUP.format("create", "objects_in_group = .m.SF")
+OTHER_GROUP = "group create group_name = .m.H objects_in_group = .m.SF\n"
+OTHER_ON = "group attributes group_name = .m.H active = on\n"
 SWITCHED = GROUP.format("attributes", "active = {}")
 
 
@@ -38,6 +40,9 @@ SWITCHED = GROUP.format("attributes", "active = {}")
         # by an expression, which stays alive
         (GROUP.format("create", "objects_in_group = .m.SF expr_active = (.m.PULL > 30)"), 0.0),
         (OFF + CREATED, 0.0),
+        (CREATED + OTHER_GROUP + SWITCHED.format("off"), 0.0),
+        (CREATED + OTHER_GROUP + OTHER_ON + SWITCHED.format("off"), 0.0),
+        (GROUP.format("create", "objects_in_group = .m.NONE"), 5.0),
     ],
 )  # fmt: skip
 def test_groups_switch_their_objects(text, place):
@@ -57,6 +62,8 @@ def test_a_group_by_an_expression_follows_its_variable():
     [
         (CREATED + SWITCHED.format("off") + ON, ("switched on after", ".m.SF", "G")),
         (CREATED + OFF + SWITCHED.format("on"), ("after .m.SF", "G")),
+        (CREATED + OTHER_GROUP + SWITCHED.format("off") + OTHER_ON, (".m.SF", ".m.H", "one of them")),
+        (GROUP.format("create", "objects_in_group = .m.NONE") + SWITCHED.format("off"), ("no .m.NONE",)),
         (CREATED + SWITCHED.format("perhaps"), ("active", "perhaps", "no_opinion")),
     ],
 )

@@ -162,7 +162,28 @@ def test_scripts_run_in_order():
 def test_a_script_that_runs_itself_ends():
     own = 'commands = "simulation single_run scripted sim_script_name=.m.S"'
     with pytest.raises(DeckError, match=says("within each other")):
-        parse_view(MODEL + SCRIPT.format(own))
+        run_deck(parse_view(MODEL + SCRIPT.format(own)))
+
+
+def test_a_script_that_cannot_be_carried_out_is_refused_when_it_is_run(tmp_path):
+    stale = SCRIPT.format('commands = "simulation single_run transient end_time=1 number_of_steps=2 model_name=.old"')
+    for text in (stale, SCRIPT.format('solver_commands = "simulate/nonsense"')):
+        view = parse_view(MODEL + text)
+        assert list(view.refused) == ["S"]
+        assert any("left out" in one.message and one.line for one in view.deck.diagnostics)
+        with pytest.raises(DeckError, match=says("in the simulation")):
+            run_deck(view)
+        assert run_deck(view, end=1.0).success
+        # nor does it stand in the way of others
+        assert np.allclose(ends(MODEL + text + ONE), [5.0], rtol=1e-6)
+    path = tmp_path / "x.cmd"
+    path.write_text(MODEL + stale)
+    for more in ([], ["--simulation", "S"]):
+        result = CliRunner().invoke(app, ["adams", str(path), *more])
+        assert result.exit_code == 1
+        assert ".old" in result.output
+    with pytest.raises(DeckError, match=says("no model", ".old")):
+        parse_view(MODEL + stale + "simulation single_run scripted sim_script_name = .m.S\n")
 
 
 OTHER = """\

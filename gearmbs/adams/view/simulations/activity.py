@@ -57,8 +57,17 @@ class Activity:
         self.doubts: list[tuple[Item, str]] = []
         self._groups: dict[int, Item] = {}
         self._known: dict[int, Item | None] = {}
+        self._on: dict[int, Item] = {}
+        off: list[Item] = []
+        on: list[Item] = []
         for group in self.db.of("group"):
-            self._read(group)
+            switched_off = self._is_off(group)
+            if switched_off is not None:
+                (off if switched_off else on).append(group)
+        for group in on:
+            self._read_on(group)
+        for group in off:
+            self._read_off(group)
 
     def cause(self, item: Item) -> Item | None:
         """Return what an object is off by, itself perhaps; None if it is active."""
@@ -83,32 +92,46 @@ class Activity:
                     return causes[0]
         return None
 
-    def _read(self, group: Item) -> None:
-        """Note what a group switches off.
+    def _is_off(self, group: Item) -> bool | None:
+        """Return whether a group is off, None if that cannot be evaluated."""
+        if "expr_active" not in group.fields:
+            return not group.active
+        try:
+            return not self.values.number(group, "expr_active")
+        except ViewError as error:
+            self.doubts.append((group, str(error)))
+            return None
 
-        A group that is on leaves each of its objects as it is. Where an object was switched after its group to the
-        opposite, or before it to the opposite of "on", it is not known which of the two View goes by.
-        """
-        off = not group.active
-        if "expr_active" in group.fields:
-            try:
-                off = not self.values.number(group, "expr_active")
-            except ViewError as error:
-                self.doubts.append((group, str(error)))
-                return
+    # A group that is on leaves each of its objects as it is. Where an object, or another group of it, was switched to
+    # the opposite, and the later of the two commands switched on, it is not known which of them View goes by.
+
+    def _read_on(self, group: Item) -> None:
         for member in self._members(group, set()):
-            after = member.told > group.told
-            if off and member.active and after:
-                why = f"{member.path} was switched on after its group was switched off"
-                self.doubts.append((group, f"{why}; take it out of the group, or switch the group on"))
-            elif not off and group.told and not member.active and member.told and not after:
+            if not isinstance(member, Item) or not group.told:
+                continue
+            if not member.active and 0 < member.told < group.told:
                 why = f"it was switched on after {member.path} was switched off"
                 self.doubts.append((group, f"{why}; switch {member.name} itself by its attributes, after the group"))
-            if off:
-                self._groups[id(member)] = group
+            before = self._on.get(id(member))
+            if before is None or before.told < group.told:
+                self._on[id(member)] = group
 
-    def _members(self, group: Item, seen: set[int]) -> Iterator[Item]:
-        """Yield the objects of a group, and of groups within it."""
+    def _read_off(self, group: Item) -> None:
+        for member in self._members(group, set()):
+            if not isinstance(member, Item):
+                self.doubts.append((group, f"objects_in_group: there is no {member[:80]} to switch off"))
+                continue
+            if member.active and member.told > group.told:
+                why = f"{member.path} was switched on after its group was switched off"
+                self.doubts.append((group, f"{why}; take it out of the group, or switch the group on"))
+            other = self._on.get(id(member))
+            if other is not None and other.told > group.told:
+                why = f"{member.path} is in {other.path}, too, which was switched on after this group was switched off"
+                self.doubts.append((group, f"{why}; take it out of one of them"))
+            self._groups[id(member)] = group
+
+    def _members(self, group: Item, seen: set[int]) -> Iterator[Item | str]:
+        """Yield the objects of a group, and of groups within it; of what is not there the name."""
         if id(group) in seen or "objects_in_group" not in group.fields:
             return
         seen.add(id(group))
@@ -116,5 +139,5 @@ class Activity:
             one = value if isinstance(value, Item) else self.db.find(str(value))
             if one is not None and one.kind == "group":
                 yield from self._members(one, seen)
-            elif one is not None:
-                yield one
+            elif one is not None or value != "":
+                yield one or str(value)

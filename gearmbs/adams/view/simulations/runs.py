@@ -151,22 +151,25 @@ class Simulator(Interpreter):
         inside = model.path.lower() + "."
         return any(part.path.lower().startswith(inside) for part in self.parts())
 
-    def aside(self, item: Item) -> list[Analysis]:
-        """Return the analyses of a script from the design on, those of the file itself left as they are."""
+    def aside(self, item: Item) -> tuple[list[Analysis], list[Diagnostic]]:
+        """Return the analyses of a script from the design on, and what is wrong with it; those of the file stay."""
         before, self._open, self._last = (self.analyses, self._open, self._last), {}, None
         self.analyses = []
         errors = len(self.errors)
         self.at = item.line
+        wrong: list[Diagnostic] = []
         try:
             self._script(item, item.line)
         except ViewError as error:
             self.errors.append(error)
+        except DeckError as error:
+            wrong += error.diagnostics
         found = self.analyses
         self.analyses, self._open, self._last = before
         for one in self.errors[errors:]:
-            one.args = (f"in the simulation {item.path}: {one}",)
-            one.line = item.line
-        return found
+            wrong.append(Diagnostic(ERROR, f"in the simulation {item.path}: {one}", self.file, item.line))
+        del self.errors[errors:]
+        return found, list(dict.fromkeys(wrong))
 
     def only_simulates(self, item: Item) -> bool:
         """Return whether a script changes nothing of the model, and so is carried out without another reading."""
