@@ -76,7 +76,8 @@ def _by_parts(own: dict[str, Any], there: dict[str, Any]) -> Iterator[str]:
 def _differences(own: Any, there: Any, where: str) -> Iterator[tuple[str, Any, Any]]:
     """Yield place and both values of what differs in two descriptions, of tables only the keys that both have."""
     if isinstance(own, dict) and isinstance(there, dict):
-        keys = dict.fromkeys([*own, *there])
+        # the curve of a run-up is how a drivetrain ran, not what it is; its nominal speed is compared
+        keys = dict.fromkeys(key for key in (*own, *there) if key != "curve")
         for key in [k for k in keys if k in own and k in there] if "kind" in own else keys:
             yield from _differences(own.get(key), there.get(key), f"{where}.{key}" if where else key)
     elif isinstance(own, list) and isinstance(there, list) and len(own) == len(there):
