@@ -180,11 +180,13 @@ class ForeignFMU:
 
         if self._fmu is not None:
             raise ModelError(f"{self.name}: it runs in a simulation already; make another ForeignFMU for this one")
-        token = self._told.guid if self._second else self._told.instantiationToken
         kind = FMU2Slave if self._second else FMU3Slave
         try:
             made = kind(
-                guid=token, unzipDirectory=self._folder, modelIdentifier=self._able.modelIdentifier, instanceName="fmu"
+                guid=self._told.guid,
+                unzipDirectory=self._folder,
+                modelIdentifier=self._able.modelIdentifier,
+                instanceName="fmu",
             )
             made.instantiate()
             self._initialise(made, t)

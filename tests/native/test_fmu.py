@@ -32,7 +32,9 @@ def mechanism():
 
 @pytest.fixture(scope="module", params=VERSIONS)
 def made(request, tmp_path_factory):
-    return export(mechanism(), tmp_path_factory.mktemp(request.param), t_end=END, target=request.param)
+    return export(
+        mechanism(), tmp_path_factory.mktemp(request.param), t_end=END, target=request.param, processor="native"
+    )
 
 
 class Driven:
@@ -48,7 +50,7 @@ class Driven:
         where = fmpy.extract(path, unzipdir=folder)
         slave = FMU2Slave if self.second else FMU3Slave
         self.fmu = slave(
-            guid=told.guid if self.second else told.instantiationToken, unzipDirectory=where, instanceName="pair",
+            guid=told.guid, unzipDirectory=where, instanceName="pair",
             modelIdentifier=told.coSimulation.modelIdentifier,
         )  # fmt: skip
         self.fmu.instantiate()
