@@ -305,6 +305,12 @@ def test_samples_of_uff_are_in_the_units_of_its_system(tmp_path, system, unit):
 def test_the_abscissa_of_uff_has_a_unit_and_is_time(tmp_path):
     path = universal(tmp_path / "a.uff", step=1e3 / RATE, abscissa_axis_units_lab="ms")
     assert read_signal(path).attrs["sampling_rate"] == pytest.approx(RATE)
-    over = {"func_type": 0, "abscissa_spec_data_type": 18, "abscissa_axis_units_lab": "Hz"}
+    other = universal(tmp_path / "b.uff", abscissa_spec_data_type=18, abscissa_axis_units_lab="Hz")
+    # a function of the general type, which older writers do not know: the first number of the sixth record behind 58
+    lines = other.read_bytes().split(b"\n")
+    place = 6 + next(k for k, line in enumerate(lines) if line.startswith(b"    58"))
+    assert lines[place].startswith(b"    1 ")
+    lines[place] = b"    0" + lines[place][5:]
+    other.write_bytes(b"\n".join(lines))
     with pytest.raises(SignalFileError, match=says("no time history")):
-        read_signal(universal(tmp_path / "b.uff", **over))
+        read_signal(other)

@@ -65,7 +65,10 @@ def test_harmonics_are_those_of_a_long_precise_record_or_it_is_told_that_they_ar
 
 @pytest.mark.slow
 def test_harmonics_that_scatter_by_the_tolerance_are_told_and_a_tighter_one_settles_them():
-    """Number 184 of the random cases: the small second harmonic of a horizontal force is 0.4 % low at 9e-9."""
+    """Number 184 of the random cases: the small second harmonic of a horizontal force is 0.4 % low at 9e-9.
+
+    Its means settle, or do not within a second: what scatters by the last digits decides, and either is told.
+    """
     case = Case(
         gears={"teeth": (20, 31)},
         operation={"speed": 141.4296, "torque": 68.8414, **AUTO},
@@ -75,8 +78,11 @@ def test_harmonics_that_scatter_by_the_tolerance_are_told_and_a_tighter_one_sett
     loose, tight = (
         run_case(one, variables=["gmf_rms"]).attrs for one in (case, case.changed(solver={"tolerance": 1e-10}))
     )
-    assert "scatter" in loose["record_length"]
-    assert f"{0.1 * case.tolerance:.1g}" in loose["record_length"]
+    if loose["record_status"] == "at the limit":
+        assert "does not repeat itself" in loose["record_length"]
+    else:
+        assert "scatter" in loose["record_length"]
+        assert f"{0.1 * case.tolerance:.1g}" in loose["record_length"]
     assert tight["record_scatter"] < 0.5 * loose["record_scatter"]
     assert "scatter" not in tight["record_length"]
 
