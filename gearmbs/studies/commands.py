@@ -238,9 +238,20 @@ def run(
         bool,
         typer.Option("--lump", help="Integrate gear and shaft as one body, as [solver] lump = true does."),
     ] = False,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a case: how well its mesh harmonics are to be known, such as '1 %'; their errors are told."
+        ),
+    ] = None,
 ) -> None:
     """Simulate a case, a planetary set or a whole drivetrain, and write its record as NetCDF."""
     kind = kind_of(case_file)
+    if accuracy is not None and kind != "case":
+        raise typer.BadParameter(
+            f"{case_file} is a {kind}, whose errors are not estimated; leave it out and compare two tolerances",
+            param_hint="--accuracy",
+        )
     if kind == "planetary set":
         run_planetary_set(case_file, out)
         return
@@ -261,10 +272,13 @@ def run(
 
         target, operation = out or case_file.with_suffix(".nc"), case.operation
         span = operation.run_up + operation.settling + operation.longest
-        data = simulated(case.name, span, target, partial(run_case, case), record_size(case))
+        data = simulated(case.name, span, target, partial(run_case, case, accuracy=accuracy), record_size(case))
         typer.echo(_level_table(data))
         told = data.attrs.get("record_length")
-        for remark in [*([f"record: {told}"] if told else []), *remarks(case)]:
+        known = data.attrs.get("accuracy_by")
+        about = [f"record: {told}"] if told else []
+        about += [f"accuracy: {known}"] if known else []
+        for remark in [*about, *remarks(case)]:
             typer.echo(f"note: {remark}", err=True)
         speed, cycle = data.attrs["solver_real_time_factor"], 1e3 * data.attrs["solver_time_per_mesh_cycle"]
         typer.echo(f"solver: {speed:.3g} times real time, {cycle:.3g} ms a mesh cycle", err=True)
@@ -343,6 +357,9 @@ def _level_table(data: Any) -> str:
         for component in levels.component.values:
             row = levels.sel(component=component).values
             lines.append(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
+            if "gmf_rms_error" in data:
+                errors = data["gmf_rms_error"].sel(way=way, component=component).values
+                lines.append(f"{'  +/- numerically':<18}" + "".join(f"{v:10.2g}" for v in errors))
         return "\n".join(lines)
     speed = data["speed"] * 30.0 / 3.141592653589793
     lines = [f"driver from {float(speed[0]):.4g} to {float(speed[-1]):.4g} rpm, at most {float(speed.max()):.4g} rpm"]

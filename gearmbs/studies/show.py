@@ -118,7 +118,10 @@ def sweep_plot(sweep: Sweep, component: str | None = None, **options: Any) -> Fi
         figure = new_figure(7.2, 4.2)
         ax = figure.subplots()
         for k, colour in zip((1, 2, 3), (BLUE, ORANGE, VERMILLION), strict=True):
-            ax.plot(table.index.to_numpy(), table[f"{k} x GMF"].to_numpy(), "o-", color=colour, label=f"{k} × GMF")
+            x, levels = table.index.to_numpy(), table[f"{k} x GMF"].to_numpy()
+            ax.plot(x, levels, "o-", color=colour, label=f"{k} × GMF")
+            if f"{k} x GMF +/-" in table:
+                ax.errorbar(x, levels, table[f"{k} x GMF +/-"].to_numpy(), fmt="none", ecolor=colour, capsize=3.0)
         ax.set_xlabel(f"{sweep.field.rpartition('.')[2].replace('_', ' ')}, {sweep.unit}")
         ax.set_ylabel(f"RMS by {table['way'].iloc[0]}, m/s²")
         ax.set_title(options.get("title") or f"{sweep.case.name}: mesh harmonics, {sweep.component(component)}")

@@ -14,10 +14,12 @@ from gearmbs.files import check_place
 from gearmbs.progress import bars
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
+from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.claims import Claim, claimed
 from gearmbs.studies.run.engine import available_cores, processes, run_jobs, threads
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
 from gearmbs.studies.run.store import RecordFolder, file_stem, record_size
+from gearmbs.units import QuantityLike
 from gearmbs.wording import warn
 
 
@@ -47,6 +49,7 @@ def run_cases(
     done: Callable[[Case, xr.Dataset], None] | None = None,
     folder: str | Path | None = None,
     errors: Literal["raise", "keep"] = "raise",
+    accuracy: QuantityLike | None = None,
 ) -> list[Any]:
     """Run cases in parallel and return their records in order.
 
@@ -66,6 +69,8 @@ def run_cases(
         Calls at the same time share the cases.
     errors : {"raise", "keep"}
         What becomes of a case that fails: "raise" stops the others, "keep" puts the error in the place of its record.
+    accuracy : float or str, optional
+        Of the mesh harmonics of each record, see `gearmbs.studies.run_case`.
 
     Returns
     -------
@@ -90,6 +95,7 @@ def run_cases(
         raise ValueError(
             f"cases: of the names {names} two make the same file; name them apart, as by more than / and _"
         )
+    wanted = None if accuracy is None else asked_accuracy(accuracy)
     found: dict[str, Any] = {}
     for case in cases:
         try:
@@ -98,7 +104,7 @@ def run_cases(
             if errors == "raise":
                 raise
             found[case.name] = error
-    ledger = None if folder is None else RecordFolder(Path(folder))
+    ledger = None if folder is None else RecordFolder(Path(folder), wanted)
     if ledger is not None:
         stored = {case.name: ledger.result(case) for case in cases if case.name not in found}
         found |= {name: known[0] for name, known in stored.items() if known is not None}
@@ -127,7 +133,7 @@ def run_cases(
                 done(case, result)
 
         run_jobs(
-            partial(_carried_out, ledger, errors == "keep"),
+            partial(_carried_out, ledger, errors == "keep", wanted),
             left,
             workers,
             where=threads if workers == 1 or compiled else processes,
@@ -153,17 +159,18 @@ def _cost(case: Case) -> float:
 
 
 def _carried_out(
-    ledger: RecordFolder | None, keep: bool, case: Case, report: Callable[[float], None]
+    ledger: RecordFolder | None, keep: bool, accuracy: float | None, case: Case, report: Callable[[float], None]
 ) -> tuple[Any, str]:
     """Return the record of a case, or the failure if it is to be kept, and why it is not where it should be."""
 
+    run = run_case if accuracy is None else partial(run_case, accuracy=accuracy)
     begun = False
 
     def work(_claim: Claim | None = None) -> tuple[Any, str]:
         nonlocal begun
         begun = True
         try:
-            record = run_case(case, lambda t: report(min(t / _span(case), 1.0)))
+            record = run(case, lambda t: report(min(t / _span(case), 1.0)))
         except SimulationFailed as failure:
             if not keep or isinstance(failure, SimulationInterrupted):
                 raise

@@ -82,6 +82,21 @@ class Found(NamedTuple):
     periods: int
 
 
+class Precision(NamedTuple):
+    """What is asked of a record besides its case.
+
+    Attributes
+    ----------
+    holds : float
+        Deviation up to which a motion is said to repeat itself.
+    like : Found or None
+        The record is to be this one of another run of the motion, whether the motion repeats itself or not.
+    """
+
+    holds: float = HOLDS
+    like: Found | None = None
+
+
 class PeriodicRecorder:
     """Collects what the record of a case needs, and ends the run when its motion repeats itself.
 
@@ -94,10 +109,15 @@ class PeriodicRecorder:
         longest length.
     begin : float, optional
         Time from which its mesh periods are counted, s; default the end of the run-up.
+    precision : Precision, optional
+        How well the motion must repeat itself, or that the record is to be that of another run.
     """
 
-    def __init__(self, case: Case, known_period: bool = True, begin: float | None = None) -> None:
+    def __init__(
+        self, case: Case, known_period: bool = True, begin: float | None = None, precision: Precision | None = None
+    ) -> None:
         self.case = case
+        self._precision = precision or Precision()
         operation = case.operation
         self.period = geometric_period(case) if known_period else 0
         self._gmf, self._begin = case.mesh_frequency, operation.run_up if begin is None else begin
@@ -117,6 +137,13 @@ class PeriodicRecorder:
     def pause(self, t: float) -> float | None:
         """Return when to look at the motion again, or None if it repeats itself; see `gearmbs.dae.Options`."""
         self._watched = True
+        like = self._precision.like
+        if like is not None:
+            end = self._begin + (like.start + like.periods + BEYOND) / self._gmf if like.periods else math.inf
+            if t < end:
+                return end
+            self.found = like
+            return None
         whole = math.floor((t - self._begin) * self._gmf - 0.5 * BEYOND)
         if whole > 0:
             self._add(whole)
@@ -182,7 +209,7 @@ class PeriodicRecorder:
             weight = 1.0 if p == 1 else len(late) / span
             shift, noise = weight * shift, noise / math.sqrt(span)
             self.deviation = float((np.maximum(shift, noise) / levels).max())
-            if self.deviation <= HOLDS:
+            if self.deviation <= self._precision.holds:
                 return Found(n - span, span)
         return None
 

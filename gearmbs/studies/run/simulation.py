@@ -19,7 +19,8 @@ from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record, edge, slip
 from gearmbs.studies.case.sections import Operation, Solver
 from gearmbs.studies.run import rig
-from gearmbs.studies.run.periodic import PeriodicRecorder, reach, signal_stop
+from gearmbs.studies.run.accuracy import Recorded, accurate_record
+from gearmbs.studies.run.periodic import Found, PeriodicRecorder, Precision, reach, signal_stop
 from gearmbs.studies.run.record import (
     VARIABLES,
     attributes_of,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from gearmbs.bearings.settings import BearingKeywords
     from gearmbs.mechanism import Mechanism
     from gearmbs.mechanism.solve.keywords import RunOptions
+    from gearmbs.units import QuantityLike
 
 ADVICE = {
     Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
@@ -198,6 +200,7 @@ def run_case(
     *,
     mechanism: Mechanism | None = None,
     variables: Collection[str] | None = None,
+    accuracy: QuantityLike | None = None,
     **settings: Never,
 ) -> xr.Dataset:
     """Simulate a case and return its record: a pure function of the case.
@@ -212,6 +215,10 @@ def run_case(
         seats and mesh by their names. Default: the case's own.
     variables : collection of str, optional
         Evaluate only these of the variables below, with the same values; default all.
+    accuracy : float or str, optional
+        How well the mesh harmonics are to be known, such as "1 %" or 0.01, as a part of the largest of their component.
+        Tolerance, length of a record whose duration is "auto" and slices of the face are chosen for it, as far as the
+        case does not give them, and the record tells its numerical error; see `gearmbs.studies.run.accuracy`.
     **settings
         None: what else there is to set, such as ``lump``, belongs to the case, and is refused here by its place there.
 
@@ -222,7 +229,8 @@ def run_case(
         ``acceleration``: force on the driven gear over its mass, decimated to the signal rate, by component;
         ``gmf_rms``: RMS of the first three mesh harmonics by component, by band-pass and by orders; of a run-up instead
         ``order_rms``, the same followed by order tracking over ``track_time`` and ``track_speed``, and ``speed`` and
-        ``angle`` of the driver over ``signal_time``; transmission error, contact forces and penetrations; parameters,
+        ``angle`` of the driver over ``signal_time``; transmission error, contact forces and penetrations; with an
+        accuracy, ``gmf_rms_error`` or ``order_rms_error``; parameters,
         versions and solver statistics in the attributes, with ``bearings``, ``bearing_defects`` and ``bearings_json``
         where the mechanism has rolling bearings.
 
@@ -241,8 +249,25 @@ def run_case(
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
+
+    def run(case: Case, variables: Collection[str] | None, precision: Precision | None = None) -> Recorded:
+        return _recorded(case, progress, mechanism, variables, precision)
+
+    if accuracy is not None:
+        return accurate_record(run, case, accuracy, variables, own_mechanism=mechanism is not None)
+    return run(case, variables).record
+
+
+def _recorded(
+    case: Case,
+    progress: bool | Callable[[float], None] | None,
+    mechanism: Mechanism | None,
+    variables: Collection[str] | None,
+    precision: Precision | None,
+) -> Recorded:
+    """Simulate a case that has been checked, and return its record; see `run_case`."""
     load_kernels(case.solver.integrator, case.lump)
-    periodic = PeriodicRecorder(case, mechanism is None) if case.is_auto else None
+    periodic = PeriodicRecorder(case, mechanism is None, precision=precision) if case.is_auto else None
     recorder = Recorder(case) if periodic is None else periodic.recorder
     options: dict[str, Any] = {"every_step": True, "consumer": recorder.take, "watch": WATCHED}
     if periodic is not None and INTEGRATORS[case.solver.integrator].can("pause"):
@@ -264,7 +289,7 @@ def run_case(
     dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
     if periodic is not None:
         dataset.attrs |= periodic.attributes()
-    return dataset
+    return Recorded(dataset, None if periodic is None else periodic.found or Found(0, 0))
 
 
 def _misplaced(name: str, value: Any) -> str:

@@ -78,17 +78,21 @@ def file_stem(name: str) -> str:
     return name.replace(", ", "_").replace("/", "_")
 
 
-def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
-    """Return the record of exactly this case on joints from a folder, None if there is none made by this code."""
+def stored_record(folder: str | Path, case: Case, accuracy: float | None = None) -> xr.Dataset | None:
+    """Return the record of exactly this case on joints from a folder, None if there is none made by this code.
+
+    It is one to the accuracy that is asked for, and of no accuracy if none is.
+    """
     path = Path(folder) / f"{file_stem(case.name)}.nc"
     if not path.is_file():
         return None
     try:
         with xr.open_dataset(path, engine="h5netcdf") as found:
-            known = found.attrs.get("case_json"), found.attrs.get("code")
+            known = found.attrs.get("case_json"), found.attrs.get("code"), found.attrs.get("accuracy_asked")
+            wanted = case.model_dump_json(), code_of().digest, accuracy
             # the case says nothing of rolling bearings, so a record on them is not that of the case alone
             on_joints = "bearings" not in found.attrs
-            return found.load() if on_joints and known == (case.model_dump_json(), code_of().digest) else None
+            return found.load() if on_joints and known == wanted else None
     except (OSError, ValueError, KeyError):
         # damaged, or not one of ours: the case is computed again
         return None
@@ -96,13 +100,21 @@ def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
 
 @dataclass(frozen=True)
 class RecordFolder:
-    """Records of cases in a folder, as the ledger of a run: a case is done if its record is there."""
+    """Records of cases in a folder, as the ledger of a run: a case is done if its record is there.
+
+    Attributes
+    ----------
+    path : Path
+    accuracy : float or None
+        Of the records' mesh harmonics, if one is asked for.
+    """
 
     path: Path
+    accuracy: float | None = None
 
     def result(self, case: Case) -> tuple[xr.Dataset, str] | None:
-        """Return the record of a case that is done, as `enter` left it."""
-        record = stored_record(self.path, case)
+        """Return the record of a case that is done to the accuracy asked for, as `enter` left it."""
+        record = stored_record(self.path, case, self.accuracy)
         return None if record is None else (record, "")
 
     def claim(self, case: Case) -> Path:

@@ -26,6 +26,7 @@ from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.signals.time_frequency import SweepWaterfallKeywords
+    from gearmbs.units import QuantityLike
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,7 @@ class Sweep(Shown):
         """Return RMS of the mesh harmonics (m/s^2), the mesh frequency (Hz) and the solver's cost, a row a value.
 
         All rows have their levels by ``way``: by bands, or by orders if one of the records is too short for bands.
+        Of records to an accuracy each level has its numerical error beside it, as ``1 x GMF +/-``.
         ``record`` says whether a record has the length that was given, or one after which the motion repeats itself, or
         the longest one.
         """
@@ -102,6 +104,9 @@ class Sweep(Shown):
             if "gmf_rms" in record:
                 levels = record["gmf_rms"].sel(component=name, way=way)
                 row |= {f"{int(h)} x GMF": float(level) for h, level in zip(levels.harmonic, levels, strict=True)}
+                if "gmf_rms_error" in record:
+                    off = record["gmf_rms_error"].sel(component=name, way=way)
+                    row |= {f"{int(h)} x GMF +/-": float(error) for h, error in zip(off.harmonic, off, strict=True)}
                 row["way"] = way
             row["record"] = record.attrs.get("record_status", "given")
             row["ms a mesh cycle"] = 1e3 * record.attrs["solver_time_per_mesh_cycle"]
@@ -144,6 +149,7 @@ def sweep(
     workers: int | None = None,
     progress: bool | Callable[[str, float], None] | None = None,
     errors: Literal["raise", "keep"] = "raise",
+    accuracy: QuantityLike | None = None,
 ) -> Sweep:
     """Run a case for many values of one of its settings.
 
@@ -162,6 +168,8 @@ def sweep(
         Records are written there as they come; a call that was interrupted goes on where it stopped.
     workers, progress, errors
         See `run_cases`.
+    accuracy : float or str, optional
+        Of the mesh harmonics of each record, such as "1 %", see `run_case`; the table and the figure tell their errors.
 
     Returns
     -------
@@ -182,7 +190,7 @@ def sweep(
     >>> study.plot()  # doctest: +SKIP
     """
     cases = cases_of_sweep(case, field, values)
-    results = run_cases(cases, workers=workers, progress=progress, errors=errors, folder=folder)
+    results = run_cases(cases, workers=workers, progress=progress, errors=errors, folder=folder, accuracy=accuracy)
     return Sweep(case, field, cases, results)
 
 

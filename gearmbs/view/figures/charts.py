@@ -35,6 +35,7 @@ def gmf_bars(
     unit: str | None = None,
     values: bool = True,
     log: bool = False,
+    errors: xr.DataArray | None = None,
 ) -> Figure:
     """Draw the RMS of the gear mesh harmonics of several states, as the paper's Figures 5 and 7 do.
 
@@ -52,6 +53,9 @@ def gmf_bars(
         Write the number over each bar.
     log : bool
         Logarithmic RMS axis.
+    errors : xarray.DataArray, dims (state, harmonic), optional
+        Numerical errors of the RMS, such as ``gmf_rms_error`` of records that were simulated to an accuracy; drawn as
+        bars about each height.
 
     Returns
     -------
@@ -63,9 +67,13 @@ def gmf_bars(
         If dimensions are missing or a value is negative or not finite.
     """
     table = checked_table(table, "table", ("state", "harmonic"))
+    errors = None if errors is None else checked_table(errors, "errors", ("state", "harmonic"))
+    if errors is not None and errors.shape != table.shape:
+        raise ValueError(f"errors: has shape {errors.shape}, the table {table.shape}; give one for each level")
     with drawing(ax, 6.4, 4.2, title=title, legend=3) as (figure, ax):
         states = [str(s) for s in table.state.values]
-        bars(ax, table, "state", [state_colour(s, k) for k, s in enumerate(states)], state_labels(table), values, log)
+        colours = [state_colour(s, k) for k, s in enumerate(states)]
+        bars(ax, table, "state", colours, state_labels(table), values, log, errors)
         harmonic_axis(ax, table)
         ax.set_ylabel(label(rms_name(table), unit or table.attrs.get("units", "")))
     return figure
@@ -142,7 +150,14 @@ def checked_table(table: xr.DataArray, name: str, dims: tuple[str, ...]) -> xr.D
 
 
 def bars(
-    ax: Axes, table: xr.DataArray, dim: str, colours: list[str], labels: list[str], values: bool, log: bool
+    ax: Axes,
+    table: xr.DataArray,
+    dim: str,
+    colours: list[str],
+    labels: list[str],
+    values: bool,
+    log: bool,
+    errors: xr.DataArray | None = None,
 ) -> None:
     """Draw one bar for each ``dim`` in each group along the other dimension; missing values are left out."""
     data = np.asarray(table.transpose(dim, ...).values, dtype=float)
@@ -152,6 +167,9 @@ def bars(
     for k in range(count):
         at = np.arange(groups) + (k - 0.5 * (count - 1)) * width
         drawn = ax.bar(at, data[k], width, label=labels[k], color=colours[k], edgecolor="white", linewidth=0.8)
+        if errors is not None:
+            size = np.asarray(errors.transpose(dim, ...).values, dtype=float)[k]
+            ax.errorbar(at, data[k], size, fmt="none", ecolor="black", elinewidth=1.0, capsize=3.0)
         for patch in drawn:
             patch.set_hatch(HATCHES[k % len(HATCHES)])
         if values:

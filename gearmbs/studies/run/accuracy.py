@@ -1,0 +1,236 @@
+"""Records whose mesh harmonics are as accurate as asked, and tell how accurate they are.
+
+A run has three numerical errors: of its steps, which the tolerance bounds; of its length, where the motion has not yet
+come back to itself; of the sum over slices that stands for the integral along the face. Each run has a *twin* over the
+same stretch of the motion, whose tolerance is `COARSER` times as large and which has half as many slices of the face.
+What the two differ by is mostly the error of the twin. That of the run itself is smaller, by
+
+    tolerance   ten times with a method of order one in the tolerance; the harmonics of meshing wheels, whose steps are
+                cut by kinks, were found to follow its power of 0.6 to 1: four times at least
+    slices      four times, as the sum is a trapezoidal rule of pieces with kinks: order two
+
+With `SHARE` = 1/2 of the difference as the error of the run there is room for both in one. Single harmonics of the two
+may agree by chance: the largest difference among those of a component counts for all of them. To this comes the part by
+which the motion does not repeat itself.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from gearmbs.dae.methods import INTEGRATORS
+from gearmbs.studies.case.case import Case, CaseError, CaseWarning
+from gearmbs.studies.case.sections import LEAST_TOLERANCE
+from gearmbs.studies.run.levels import LEVELS
+from gearmbs.studies.run.periodic import HOLDS, LEAST_LEVEL, Found, Precision
+from gearmbs.studies.run.record import SERIES, VARIABLES
+from gearmbs.units import QuantityLike, to_si
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+COARSER = 10.0
+"""Tolerance of the twin over that of the run: a decade. The twin costs 0.7 of the run, with half the slices 0.65."""
+
+SHARE = 0.5
+"""Part of the difference from the twin that is taken as the error; see the module's text."""
+
+DECAYED = 0.5
+"""Part of a record's deviation that its mean is off by where an oscillation decays fast; see `periodic`."""
+
+USUAL = {True: 2e-3, False: 1e-2}
+"""Accuracy for which the usual tolerance does: of records that are as long as needed, whose tolerance is a tenth of the
+others', and of those with a duration. Of random cases it was 1.4e-4 in the median, 7e-4 at most; of others, five times
+that. What is asked below takes a smaller tolerance in proportion."""
+
+APART = 1e-2
+"""Difference, as a part of the largest harmonic of the component, beyond which the two runs are no longer a good one
+and a less good one of the same motion: then the whole of it is the error."""
+
+FLOOR = 1e-4
+"""Error that is told at least, as a part of the largest harmonic: below it errors of steps that kinks cut fall with a
+small power of the tolerance, and by chance."""
+
+SMALLEST, LARGEST = 2.0 * FLOOR, 0.5
+"""Accuracies that can be asked for; beyond the second there is no digit left."""
+
+ATTEMPTS = 3
+"""Runs at most, each at a tolerance of a tenth or less of the one before, which is its twin."""
+
+NOTED = 0.3
+"""Part of the asked accuracy that a motion may miss to be said to repeat itself, if that is less than usual."""
+
+
+class Recorded(NamedTuple):
+    """A record, and which mesh periods of its run it is of, if its duration is "auto"."""
+
+    record: xr.Dataset
+    found: Found | None
+
+
+class Run(Protocol):
+    """Simulates a case, for some variables, to a precision."""
+
+    def __call__(
+        self, case: Case, variables: Collection[str] | None, precision: Precision | None = None
+    ) -> Recorded: ...
+
+
+def asked_accuracy(accuracy: QuantityLike) -> float:
+    """Return an accuracy as a part, from a number or a text such as "1 %".
+
+    Raises
+    ------
+    CaseError
+        If it is none, or beyond what can be asked for.
+    """
+    try:
+        wanted = float(to_si(accuracy, "dimensionless", "accuracy"))
+    except (TypeError, ValueError):
+        wanted = 0.0
+    if not SMALLEST <= wanted <= LARGEST:
+        raise CaseError(
+            f"accuracy = {accuracy!r}: is a part of the largest mesh harmonic of a component; give {SMALLEST:g} to "
+            f'{LARGEST:g}, such as 0.01 or "1 %"'
+        )
+    return wanted
+
+
+def accurate_record(
+    run: Run, case: Case, accuracy: QuantityLike, variables: Collection[str] | None, *, own_mechanism: bool
+) -> xr.Dataset:
+    """Return the record of a case whose mesh harmonics are as accurate as asked, and what they are known to.
+
+    Parameters
+    ----------
+    run : callable
+        Simulates a case; see `Run`.
+    case : Case
+        Without a tolerance.
+    accuracy : float or str
+        Of the mesh harmonics, as a part of the largest of their component; see `asked_accuracy`.
+    variables : collection of str or None
+        As of `gearmbs.studies.run_case`.
+    own_mechanism : bool
+        Whether another mechanism is simulated than that of the case, whose slices stay.
+
+    Returns
+    -------
+    Dataset
+        As of `gearmbs.studies.run_case`. ``gmf_rms_error``, or ``order_rms_error``: the numerical error of each level,
+        with the level's dimensions and unit. Other variables over time have the errors of their mean and of their
+        standard deviation as the attributes ``error_of_mean`` and ``error_of_std``. Attributes ``accuracy_asked``,
+        ``accuracy_found`` and ``accuracy_by``, in words.
+
+    Raises
+    ------
+    CaseError
+        If the case has a tolerance of its own, or a mechanism of one's own has slices.
+
+    Warns
+    -----
+    CaseWarning
+        If the accuracy was not reached.
+    """
+    wanted = asked_accuracy(accuracy)
+    slices = case.pair().face_slices
+    if case.solver.tolerance is not None:
+        raise CaseError(
+            f"accuracy = {accuracy!r}: the tolerance is chosen for it, but the case has solver.tolerance = "
+            f"{case.solver.tolerance:g}; leave one of the two out"
+        )
+    if own_mechanism and slices > 1:
+        raise CaseError(
+            f"accuracy = {accuracy!r}: what the {slices} slices of the face of a mechanism of one's own are good for "
+            "is not known; run the case without the mechanism, or leave accuracy out"
+        )
+    level = LEVELS[0 if case.operation.speed_curve is None else 1]
+    kept = set(VARIABLES if variables is None else variables)
+    both = kept - {"acceleration"} | {level}
+    precision = Precision(min(HOLDS, NOTED * wanted))
+    usual = min(case.tolerance, INTEGRATORS[case.solver.integrator].largest_tolerance / COARSER)
+    fine = _at(case, max(LEAST_TOLERANCE, usual * min(1.0, wanted / USUAL[case.is_auto])), slices)
+    found = run(fine, kept | {level}, precision)
+    coarse = _at(case, min(COARSER * fine.tolerance, usual * COARSER), slices // 2 | 1 if slices > 1 else 1)
+    twin = run(coarse, both, Precision(like=found.found)).record
+    for attempt in range(ATTEMPTS):
+        record = found.record
+        error = _errors(record, twin, level)
+        worst = _worst(record[level], error)
+        if worst <= wanted or attempt == ATTEMPTS - 1 or fine.tolerance <= LEAST_TOLERANCE:
+            break
+        twin, coarse = record, fine
+        slices = slices if slices == 1 or case.contact.slices is not None else 2 * slices - 1
+        fine = _at(
+            case,
+            max(LEAST_TOLERANCE, fine.tolerance * float(np.clip(0.5 * wanted / worst, 1e-3, 1.0 / COARSER))),
+            slices,
+        )
+        found = run(fine, kept | {level}, precision)
+    if level in kept:
+        record[f"{level}_error"] = error
+    for name in kept & {*SERIES} & {*record.data_vars} & {*twin.data_vars}:
+        for what in ("mean", "std"):
+            one, other = (getattr(r[name].astype(float), what)("time").values for r in (record, twin))
+            record[name].attrs[f"error_of_{what}"] = (SHARE * np.abs(one - other)).tolist()
+    record = _told(record.drop_vars(level) if level not in kept else record, wanted, worst, fine, coarse)
+    # the case as it was asked for: its tolerance is that of its accuracy, and is told beside it
+    record.attrs["case_json"] = case.model_dump_json()
+    return record
+
+
+def _at(case: Case, tolerance: float, slices: int) -> Case:
+    """Return a case at a tolerance and with so many slices of the face, one as lumped as the given one."""
+    contact = {} if slices == case.pair().face_slices else {"slices": slices}
+    return case.changed(solver={"tolerance": tolerance, "lump": case.lump}, contact=contact)
+
+
+def _errors(record: xr.Dataset, twin: xr.Dataset, level: str) -> xr.DataArray:
+    """Return the numerical errors of the levels of a record from those of its twin."""
+    import xarray as xr
+
+    values = record[level]
+    apart, largest = abs(values - twin[level]).max("harmonic"), values.max("harmonic")
+    error = xr.where(apart > APART * largest, 1.0, SHARE) * apart
+    error = np.maximum(error, FLOOR * largest) + 0.0 * values
+    if record.attrs.get("record_status") == "periodic":
+        returned = record.attrs["record_deviation"] * np.maximum(values, LEAST_LEVEL * largest)
+        error = np.hypot(error, DECAYED * returned)
+    elif "record_status" in record.attrs:
+        # of what does not repeat itself two stretches are two samples, of which neither is the better one
+        error = np.maximum(error, apart)
+    error = error.transpose(*values.dims)
+    error.attrs = {"units": values.attrs["units"], "long_name": f"numerical error of the {values.attrs['long_name']}"}
+    return error
+
+
+def _worst(levels: xr.DataArray, error: xr.DataArray) -> float:
+    """Return the largest error as a part of the largest level of its component, or a hundredth of that of all."""
+    largest = levels.max([dim for dim in levels.dims if dim not in ("way", "component")])
+    return float((error / np.maximum(largest, LEAST_LEVEL * largest.max("component"))).max())
+
+
+def _told(record: xr.Dataset, wanted: float, worst: float, fine: Case, coarse: Case) -> xr.Dataset:
+    """Return a record that says what its mesh harmonics are known to."""
+    slices = [one.pair().face_slices for one in (fine, coarse)]
+    sliced = f" and {slices[0]} slices of the face" if slices[0] > 1 else ""
+    against = f" and {slices[1]}" if slices[0] > 1 else ""
+    said = (
+        f"mesh harmonics are known to {_per_cent(worst)} of the largest of their component, by runs at tolerances of "
+        f"{fine.tolerance:.2g}{sliced}, and of {coarse.tolerance:.2g}{against}"
+    )
+    if worst > wanted:
+        said += f"; {_per_cent(wanted)} was asked for"
+        if record.attrs.get("record_status", "periodic") != "periodic":
+            said += ", but the motion does not repeat itself: a longer duration averages more of it"
+        warnings.warn(CaseWarning(f"case '{fine.name}': {said}"), stacklevel=4)
+    record.attrs |= {"accuracy_asked": wanted, "accuracy_found": worst, "accuracy_by": said}
+    return record
+
+
+def _per_cent(part: float) -> str:
+    return f"{100.0 * part:.2g} %"
