@@ -87,9 +87,13 @@ def test_lean_and_general_form_agree(name):
     wrench, slopes, told = (np.array(part) for part in zip(*(lean for lean, _ in found)))
     force, along, said = (np.array(part) for part in zip(*(general for _, general in found)))
     assert (np.abs(told - said) <= 1e-10 * np.abs(said).max(axis=0)).all()
+    # an indentation is a difference of places as far as this from the origin, and is known to their rounding
+    place = 4.0 * np.finfo(float).eps * max(np.abs(both.start[0]).max(), np.abs(both.start[4]).max())
+    angle = place / min(wheel.base_radius for wheel in pair.wheels)
     for part in (slice(0, 3), slice(3, 6)):
         largest = np.abs(force[:, part]).max(axis=1, keepdims=True)
-        assert (np.abs(wrench[:, part] - force[:, part]) <= 1e-10 * largest).all()
+        rounding = angle * np.abs(along[:, part]).max(axis=(1, 2))[:, None]
+        assert (np.abs(wrench[:, part] - force[:, part]) <= 1e-10 * largest + rounding).all()
         # elastic and damping parts of a slope may cancel: as parts of the largest one
         largest = np.abs(along[:, part]).max(axis=(0, 1))
         assert (np.abs(slopes[:, part] - along[:, part]) <= 1e-10 * largest).all()
