@@ -256,20 +256,31 @@ def score(model: Any, x: np.ndarray, labels: np.ndarray, groups: np.ndarray, see
     return scored(model.predict_proba(x), model.classes_, labels, groups, seed)
 
 
-def scored(p: np.ndarray, classes: np.ndarray, labels: np.ndarray, groups: np.ndarray, seed: int = 0) -> Score:
-    """Return how good probabilities of classes are, shape (n, classes), with an interval by resampling groups."""
+def scored(
+    p: np.ndarray,
+    classes: np.ndarray,
+    labels: np.ndarray,
+    groups: np.ndarray,
+    seed: int = 0,
+    fold: np.ndarray | None = None,
+) -> Score:
+    """Return how good probabilities of classes are, shape (n, classes), with an interval by resampling groups.
+
+    With the number of the fold of each row rows are ranked within their fold, and the mean over the folds is taken.
+    """
+    parts = np.zeros(len(labels), dtype=int) if fold is None else np.asarray(fold)
     guess = np.asarray(classes)[p.argmax(axis=1)]
     names = np.unique(groups)
     generator = np.random.default_rng(seed)
     drawn = []
     for _ in range(RESAMPLES):
         rows = np.concatenate([np.flatnonzero(groups == g) for g in generator.choice(names, names.size)])
-        drawn.append(macro_auroc(labels[rows], p[rows], classes))
+        drawn.append(_mean_auroc(labels[rows], p[rows], classes, parts[rows]))
     drawn = [value for value in drawn if np.isfinite(value)]
     low, high = np.quantile(drawn, [0.025, 0.975]) if names.size > 1 and drawn else (np.nan, np.nan)
     counts = np.unique(labels, return_counts=True)[1]
     return Score(
-        macro_auroc(labels, p, classes),
+        _mean_auroc(labels, p, classes, parts),
         float(low),
         float(high),
         float(np.mean(guess == labels)),
@@ -277,6 +288,13 @@ def scored(p: np.ndarray, classes: np.ndarray, labels: np.ndarray, groups: np.nd
         len(labels),
         names.size,
     )
+
+
+def _mean_auroc(labels: np.ndarray, p: np.ndarray, classes: np.ndarray, parts: np.ndarray) -> float:
+    """Return the macro AUROC of each part of the rows, in the mean by their numbers of rows."""
+    found = [(np.sum(parts == k), macro_auroc(labels[parts == k], p[parts == k], classes)) for k in np.unique(parts)]
+    known = [(count, value) for count, value in found if np.isfinite(value)]
+    return float(sum(n * v for n, v in known) / sum(n for n, _ in known)) if known else float("nan")
 
 
 def macro_auroc(labels: np.ndarray, scores: np.ndarray, classes: np.ndarray) -> float:
@@ -346,14 +364,19 @@ def from_recordings_to_recordings(real: np.ndarray, labels: np.ndarray, groups: 
     return held_out(real, labels, fold, groups, seed)
 
 
-def held_out(x: np.ndarray, labels: np.ndarray, fold: np.ndarray, groups: np.ndarray, seed: int = 0) -> Score:
-    """Return how well the baseline does on the rows of each fold, trained on those of all others."""
+def held_out(
+    x: np.ndarray, labels: np.ndarray, fold: np.ndarray, groups: np.ndarray, seed: int = 0, *, pooled: bool = True
+) -> Score:
+    """Return how well the baseline does on the rows of each fold, trained on those of all others.
+
+    Rows of all folds are ranked together, or, not pooled, those of each by themselves.
+    """
     classes = np.unique(labels)
     p = np.zeros((len(labels), classes.size))
     for k in np.unique(fold):
         model = classifier(seed).fit(x[fold != k], labels[fold != k])
         p[np.ix_(fold == k, np.searchsorted(classes, model.classes_))] = model.predict_proba(x[fold == k])
-    return scored(p, classes, labels, groups, seed)
+    return scored(p, classes, labels, groups, seed, None if pooled else fold)
 
 
 def from_simulation_to_recordings(

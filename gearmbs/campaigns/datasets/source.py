@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.plans.plan import Plan
     from gearmbs.drivetrain import Drivetrain
 
-NEEDED = "a data set needs Specimens, a choice named state, and signals of accelerations to keep"
+NEEDED = (
+    "a data set needs Specimens, a choice named state, choose(..., crossed=True, name='state'), and signals of "
+    "accelerations to keep"
+)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ table into changes of the nested data of a case. Columns hold numbers in SI or t
 
 from __future__ import annotations
 
+import copy
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -175,23 +176,42 @@ class Choice:
     Parameters
     ----------
     path : str
-        Field, as "fault.teeth".
+        Field, as "fault.teeth", or a section, as "fault", of which each option sets some fields and leaves the others.
     options : dict
-        Value or table by name. Two numbers or texts with units as an entry of a table are its range, drawn
-        uniformly, whole numbers as such: ``{"kind": "broken tooth", "lost": (0.1, 0.9), "tooth": (0, 28)}``.
+        Value or table by name. Two numbers or texts with units as an entry of a table, or of a table within, are its
+        range, drawn uniformly, whole numbers as such:
+        ``{"kind": "broken tooth", "lost": (0.1, 0.9), "tooth": (0, 28)}``; of a section
+        ``{"misalignment": ("0.2 deg", "1 deg")}``.
     crossed : bool
         Take every point of the plan with each of the options, instead of choosing one: the same specimen and the same
         operating point in all states.
     name : str, optional
         Of the column with the option's name; default the path. Its ranges are in ``NAME.ENTRY``; ``severity`` is
-        where in
-        its range the first of an option lies, between 0 and 1.
+        where in its range the first of an option lies, between 0 and 1.
+    section : bool
+        Whether the path is that of a section; a plan finds out.
+
+    Examples
+    --------
+    >>> states = Choice(
+    ...     "fault",
+    ...     {
+    ...         "healthy": {},
+    ...         "broken": {"teeth": {"kind": "broken tooth", "lost": (0.2, 0.8)}},
+    ...         "misaligned": {"misalignment": ("0.2 deg", "1 deg")},
+    ...     },
+    ...     crossed=True,
+    ...     name="state",
+    ... )
+    >>> states.ranges
+    {'healthy': [], 'broken': ['teeth.lost'], 'misaligned': ['misalignment']}
     """
 
     path: str
     options: dict[str, Any]
     crossed: bool = False
     name: str = ""
+    section: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", self.name or self.path)
@@ -202,11 +222,18 @@ class Choice:
     def ranges(self) -> dict[str, list[str]]:
         """Names of the entries of each option that are ranges."""
         return {
-            name: [k for k, v in table.items() if _is_range(v) and not _are_words(v)]
+            name: [k for k, v in _entries(table) if _is_range(v) and not _are_words(v)]
             if isinstance(table, Mapping)
             else []
             for name, table in self.options.items()
         }
+
+    @property
+    def sets(self) -> list[str]:
+        """Paths of the fields that it sets."""
+        if not self.section:
+            return [self.path]
+        return [f"{self.path}.{key}" for key in dict.fromkeys(key for table in self.options.values() for key in table)]
 
     @property
     def width(self) -> int:
@@ -230,21 +257,40 @@ class Choice:
 
     def in_si(self, subject: Subject) -> Choice:
         """Return the choice with the ranges of its tables in SI."""
-        subject.unit_of(self.path)
+        section = subject.is_section(self.path)
+        if not section:
+            subject.unit_of(self.path)
         options = {}
         for name, table in self.options.items():
+            if section and not isinstance(table, Mapping):
+                raise CampaignError(
+                    f"choice {self.path!r}: {name} = {table!r:.60}; give a table of fields of {self.path}"
+                )
             if isinstance(table, Mapping):
-                table = dict(table)
-                for key, value in table.items():
+                table = copy.deepcopy(dict(table))
+                for key, value in _entries(table):
+                    if section:
+                        subject.unit_of(f"{self.path}.{key.partition('.')[0]}")
                     if _is_range(value):
-                        unit = subject.table_unit(self.path, table, key)
+                        unit = self.unit_of_entry(subject, table, key)
                         if unit == "1" and any(isinstance(v, str) for v in value) and not _are_words(value):
                             raise CampaignError(
                                 f"{self.path}.{name}.{key} = {value!r}: it has no unit here; give two numbers"
                             )
-                        table[key] = _range_in_si(value, unit, f"{self.path}.{name}.{key}")
+                        _set_entry(table, key, _range_in_si(value, unit, f"{self.path}.{name}.{key}"))
             options[name] = list(table) if isinstance(table, tuple) else table
-        return Choice(self.path, options, self.crossed, self.name)
+        return Choice(self.path, options, self.crossed, self.name, section)
+
+    def unit_of_entry(self, subject: Subject, table: Mapping[str, Any], key: str) -> str:
+        """Return the SI unit of an entry of an option's table, by its key, or by the path to it in tables within."""
+        outer, dot, inner = key.rpartition(".")
+        if dot:
+            return subject.table_unit(f"{self.path}.{outer}", get_path(table, outer), inner)
+        return (
+            subject.unit_of(f"{self.path}.{key}")
+            if subject.is_section(self.path)
+            else subject.table_unit(self.path, table, key)
+        )
 
     def columns(self, u: np.ndarray, variant: np.ndarray | None = None) -> Columns:
         """Return the columns for coordinates u, shape (n, width), and the options' numbers if they are crossed."""
@@ -262,7 +308,7 @@ class Choice:
         for k, name in enumerate(names):
             here = which == k
             for place, key in enumerate(ranges[name]):
-                low, high = self.options[name][key]
+                low, high = get_path(self.options[name], key)
                 x = rest[here, place]
                 if isinstance(low, int) and isinstance(high, int):
                     found[f"{self.name}.{key}"][here] = np.minimum(np.floor(low + x * (high - low + 1)), high)
@@ -281,7 +327,7 @@ class Choice:
         for name, keys in self.ranges.items():
             here = columns[self.name] == name
             for place, key in enumerate(keys, 1):
-                low, high = self.options[name][key]
+                low, high = get_path(self.options[name], key)
                 found[here, place] = (columns[f"{self.name}.{key}"][here] - low) / (high - low or 1.0)
         return found
 
@@ -291,8 +337,8 @@ class Choice:
         for k, (name, keys) in enumerate(self.ranges.items()):
             places = [0.5] * (self.width - 1)
             for place, key in enumerate(keys):
-                low, high = self.options[name][key]
-                given = table.get(key) if isinstance(table, Mapping) else None
+                low, high = get_path(self.options[name], key)
+                given = _entry(table, key)
                 if not (all(isinstance(v, (int, float)) for v in (given, low, high)) and low <= given <= high):
                     break
                 whole = isinstance(low, int) and isinstance(high, int)
@@ -306,12 +352,16 @@ class Choice:
         name = str(row[self.name])
         table = self.options[name]
         if isinstance(table, Mapping):
-            chosen = dict(table)
+            chosen = copy.deepcopy(dict(table))
             for key in self.ranges[name]:
                 value = float(row[f"{self.name}.{key}"])
-                low, high = table[key]
-                chosen[key] = int(value) if isinstance(low, int) and isinstance(high, int) else value
-            set_path(data, self.path, [chosen] if _holds_several(data, self.path) else chosen)
+                low, high = get_path(table, key)
+                _set_entry(chosen, key, int(value) if isinstance(low, int) and isinstance(high, int) else value)
+            for path, found in {f"{self.path}.{k}": v for k, v in chosen.items()}.items() if self.section else ():
+                several = isinstance(found, Mapping) and _holds_several(data, path)
+                set_path(data, path, [found] if several else found)
+            if not self.section:
+                set_path(data, self.path, [chosen] if _holds_several(data, self.path) else chosen)
         else:
             set_path(data, self.path, table)
 
@@ -417,7 +467,11 @@ FACTORS = {"factor": Factor, "choice": Choice, "specimens": Specimens}
 def factor_table(factor: AnyFactor) -> dict[str, Any]:
     """Return a factor as a table of numbers and texts, from which `factor_from` makes it again."""
     kind = next(name for name, cls in FACTORS.items() if isinstance(factor, cls))
-    return {"type": kind, **asdict(factor)}
+    table = {"type": kind, **asdict(factor)}
+    if not table.get("section", True):
+        # as plans have it whose choices are of fields
+        del table["section"]
+    return table
 
 
 def factor_from(table: Mapping[str, Any]) -> AnyFactor:
@@ -436,15 +490,15 @@ def factor_from(table: Mapping[str, Any]) -> AnyFactor:
 
 
 # options have names and values of the user's own
-def choose(path: str, *, crossed: bool = False, **options: Any) -> Choice:
-    """Return a choice among the options named.
+def choose(path: str, *, crossed: bool = False, name: str = "", **options: Any) -> Choice:
+    """Return a choice among the options named; ``name`` is that of its column, the path by default. See `Choice`.
 
     Examples
     --------
     >>> choose("fault.teeth", none=(), broken={"kind": "broken tooth", "lost": (0.1, 0.9)}).width
     2
     """
-    return Choice(path, options, crossed)
+    return Choice(path, options, crossed, name)
 
 
 def get_path(data: Mapping[str, Any], path: str) -> Any:
@@ -453,6 +507,33 @@ def get_path(data: Mapping[str, Any], path: str) -> Any:
     for section in sections:
         data = data.get(section, {})
     return data.get(name)
+
+
+def _entries(table: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Return the entries of a table and of tables within it, these by paths."""
+    found = []
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            found += [(f"{key}.{inner}", entry) for inner, entry in _entries(value)]
+        else:
+            found.append((key, value))
+    return found
+
+
+def _entry(table: Any, key: str) -> Any:
+    """Return an entry of a table, or of one within, alone in a list or not, by its path; None where there is none."""
+    for name in key.split("."):
+        table = table[0] if isinstance(table, list | tuple) and len(table) == 1 else table
+        table = table.get(name) if isinstance(table, Mapping) else None
+    return table
+
+
+def _set_entry(table: dict[str, Any], key: str, value: Any) -> None:
+    """Set an entry of a table, or of a table within, by its path."""
+    *outer, last = key.split(".")
+    for name in outer:
+        table = table[name]
+    table[last] = value
 
 
 def _holds_several(data: Mapping[str, Any], path: str) -> bool:

@@ -102,7 +102,13 @@ def make_plan(
 
 def _set_by(factors: Iterable[AnyFactor]) -> list[str]:
     """Return the paths of the fields that factors set."""
-    return [path for f in factors for path in (f.errors if isinstance(f, Specimens) else (f.path,))]
+    return [path for f in factors for path in _paths(f)]
+
+
+def _paths(factor: AnyFactor) -> Iterable[str]:
+    if isinstance(factor, Specimens):
+        return factor.errors
+    return factor.sets if isinstance(factor, Choice) else (factor.path,)
 
 
 def _check_units(subject: Subject, values: Mapping[str, Iterable[Any]], varied: Sequence[str]) -> None:

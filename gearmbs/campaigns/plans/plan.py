@@ -338,7 +338,7 @@ class Plan:
                 for option, keys in factor.ranges.items():
                     for key in keys:
                         if name == f"{factor.name}.{key}":
-                            return self.subject.table_unit(factor.path, factor.options[option], key)
+                            return factor.unit_of_entry(self.subject, factor.options[option], key)
         return self.subject.unit_of_result(name.removeprefix("result."))
 
     def data(self, row: dict[str, Any]) -> dict[str, Any]:

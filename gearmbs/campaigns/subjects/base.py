@@ -140,6 +140,10 @@ class Subject(ABC):
             If there is no such field.
         """
 
+    def is_section(self, path: str) -> bool:
+        """Return whether a path is that of a section, some of whose fields a choice may set together."""
+        return False
+
     def unit_follows(self, path: str) -> str:
         """Return the path of the field by which the unit of another one goes, "" where it is the same always."""
         return ""

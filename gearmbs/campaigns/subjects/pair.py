@@ -122,6 +122,10 @@ class PairSubject(Subject):
             raise CampaignError(f"{path}: unknown; fields of {section} are {', '.join(known)}")
         return units_of_fields(holder).get(name, "1")
 
+    def is_section(self, path: str) -> bool:
+        """Return whether a path is that of a section of a case."""
+        return path in type(self.case).model_fields and path not in PLAIN
+
     def unit_follows(self, path: str) -> str:
         """Return the exponent, by which the unit of the stiffness goes."""
         return "contact.exponent" if path == "contact.stiffness" else ""
