@@ -356,7 +356,8 @@ def made_rows(count=40, each=6, clean=lambda state, x: x):
         }
     )
     rows["signal.sensor_1"], rows["tacho"] = signals, [np.arange(3)] * len(rows)
-    rows["teeth"] = [[20, 40]] * len(rows)
+    rows["teeth"], rows["sampling_rate"] = [[20, 40]] * len(rows), RATE
+    rows["speed"] = [np.full(len(x), speed) for x, speed in zip(signals, rows["operation.speed"])]
     return rows.iloc[generator.permutation(len(rows))].reset_index(drop=True)
 
 
@@ -388,10 +389,11 @@ def spoilt(state, x):
 
 @pytest.mark.slow
 def test_artefacts_tell_nothing_where_there_are_none():
-    found = artefact_leaks(made_rows(), folds=3)
+    found = artefact_leaks(made_rows(), folds=3, permutations=5)
     assert list(found) == ["clipping", "above the band", "metadata", "edges"]
     # of 240 rows the AUROC scatters by 0.04
     assert all(abs(one.auroc - 0.5) < 0.1 for one in found.values()), found
+    assert all(one.chance_low <= 0.5 <= one.chance_high < 0.65 for one in found.values()), found
 
 
 @pytest.mark.slow
@@ -399,8 +401,24 @@ def test_artefacts_are_found():
     rows = made_rows(clean=spoilt)
     rows = rows.assign(point=rows["point"] + 1000 * (rows["state"] == "b"))
     # rows of a data set in another order are the same rows
-    found = artefact_leaks(rows.sample(frac=1.0, random_state=1), folds=3)
+    found = artefact_leaks(rows.sample(frac=1.0, random_state=1), folds=3, permutations=5)
     assert all(one.low > 0.6 for one in found.values()), found
+    assert all(one.auroc > one.chance_high for one in found.values()), found
+
+
+@pytest.mark.slow
+def test_records_that_begin_at_one_phase_have_edges_as_within():
+    """One speed, one phase: a tone of the mesh with noise, whose record holds 40.37 of its periods."""
+    rows = made_rows(20, 4)
+    generator = np.random.default_rng(3)
+    n = len(rows["signal.sensor_1"][0])
+    tone = np.sin(2.0 * np.pi * 40.37 * np.arange(n) / n)
+    rows["signal.sensor_1"] = [tone + 0.05 * generator.standard_normal(n) for _ in range(len(rows))]
+    turns = 40.37 / (n / RATE) / 20.0
+    rows["speed"] = [np.full(n, 2.0 * np.pi * turns)] * len(rows)
+    found = artefact_leaks(rows, folds=3, permutations=5)["edges"]
+    # where the end meets the beginning the phase jumps: within, two stretches are as far apart
+    assert found.auroc <= max(found.chance_high, 0.65), found
 
 
 @pytest.mark.slow

@@ -210,5 +210,6 @@ def test_bars_have_errors_of_their_own_shape():
     table = xr.DataArray([[1.0, 2.0, 3.0]], dims=("state", "harmonic"), coords={"state": ["a"], "harmonic": [1, 2, 3]})
     figure = gmf_bars(table, errors=0.1 * table)
     assert sum(len(c.get_children()) > 1 for c in figure.axes[0].containers) >= 2
+    assert len(gmf_bars(table[0].drop_vars("state"), errors=0.1 * table[0].drop_vars("state")).axes[0].containers) >= 2
     with pytest.raises(ValueError, match=says("errors", "(1, 2)", "(1, 3)")):
         gmf_bars(table, errors=table.isel(harmonic=[0, 1]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -15,6 +17,9 @@ if TYPE_CHECKING:
 
 EDGE = 24
 """Samples at either end that are looked at: filters that begin at a record's edge show in fewer."""
+
+PERMUTATIONS, FEWER = 20, 50
+"""Permutations of the labels, and trees of their classifiers; the range of twenty is one of 90 %."""
 
 CANDIDATES = 8
 """Shifts by whole mesh periods that are nearest to whole samples, of which one is taken by chance."""
@@ -38,8 +43,14 @@ METADATA = (
 """Columns that are neither signal nor label, and the row's number, its numbers of pulses and of samples."""
 
 
-def artefact_leaks(rows: pd.DataFrame, *, folds: int = 5, seed: int = 0) -> dict[str, Score]:
-    """Return how well classifiers do that see artefacts alone, split by specimen; 0.5 is chance.
+def artefact_leaks(
+    rows: pd.DataFrame, *, folds: int = 5, seed: int = 0, permutations: int = PERMUTATIONS
+) -> dict[str, Score]:
+    """Return how well classifiers do that see artefacts alone, split by specimen, and what chance makes of them.
+
+    Of few specimens, whose records are alike, chance alone takes scores far from 0.5: the same is done again with the
+    labels of each operating point permuted, and `Score.chance_low` and `Score.chance_high` are the least and the
+    largest of these. A score above them tells that something leaks.
 
     ``clipping``, ``above the band`` and ``metadata`` try to tell the states, by numbers of clipped samples, by the
     levels above the pass band, and by the columns that are neither signal nor label, with the row's number. ``edges``
@@ -53,6 +64,12 @@ def artefact_leaks(rows: pd.DataFrame, *, folds: int = 5, seed: int = 0) -> dict
         Of `read_data_set`.
     folds : int
         Parts of the specimens, each of which is tested by classifiers trained on the others.
+    permutations : int
+        How often labels are permuted.
+
+    Returns
+    -------
+    dict of Score
     """
     # a part of the rows, or rows in another order, keep their former numbers
     rows = rows.reset_index(drop=True)
@@ -65,18 +82,52 @@ def artefact_leaks(rows: pd.DataFrame, *, folds: int = 5, seed: int = 0) -> dict
     generator = np.random.default_rng(seed)
     joined = np.array([piece for values, k in zip(x, owner) for piece in _joined(values, _period(rows, k), generator)])
     edge = np.tile(["edge", "inside"], len(x))
+    box = rows["gearbox"].to_numpy() if "gearbox" in rows else np.zeros(len(rows), dtype=int)
+    # records of one operating point have one phase, whatever their states and sensors
+    point = np.unique(list(zip(box.astype(str), rows["point"].astype(str))), axis=0, return_inverse=True)[1].ravel()
+    levels = np.array([above_the_band(values) for values in x])
     tests = {
-        "clipping": (clipped[:, None], states[owner], groups[owner]),
-        "above the band": (np.array([above_the_band(values) for values in x]), states[owner], groups[owner]),
-        "metadata": (_metadata(rows), states, groups),
-        "edges": (joined, edge, np.repeat(groups[owner], 2)),
+        "clipping": (clipped[:, None], states[owner], owner, False),
+        "above the band": (levels, states[owner], owner, False),
+        "metadata": (_metadata(rows), states, np.arange(len(rows)), False),
+        "edges": (joined, edge, np.repeat(owner, 2), True),
     }
+    # where a point has one state only, states are dealt out among all points of its specimen
+    crossed = rows.groupby(point)["state"].nunique().min() > 1
+    blocks = point if crossed else np.unique(groups, return_inverse=True)[1]
     individuals = np.unique(groups)
     fold = np.random.default_rng(seed).permutation(individuals.size) % folds
-    return {
-        name: held_out(features, labels, fold[np.searchsorted(individuals, owners)], owners, seed, pooled=False)
-        for name, (features, labels, owners) in tests.items()
-    }
+    found = {}
+    for name, (features, labels, row, swapped) in tests.items():
+        owners = groups[row]
+        parts = fold[np.searchsorted(individuals, owners)]
+        own = held_out(features, labels, parts, owners, seed, pooled=False)
+        chance = [
+            held_out(features, other, parts, owners, seed, pooled=False, trees=FEWER).auroc
+            for other in _permuted(labels, (point if swapped else blocks)[row], row, swapped, generator, permutations)
+        ]
+        found[name] = replace(own, chance_low=min(chance), chance_high=max(chance))
+    return found
+
+
+def _permuted(
+    labels: np.ndarray, block: np.ndarray, row: np.ndarray, swapped: bool, generator: np.random.Generator, count: int
+) -> Iterator[np.ndarray]:
+    """Yield labels as chance might have dealt them: the states of each block among its rows, or all pairs swapped."""
+    for _ in range(count):
+        other = labels.copy()
+        for k in np.unique(block):
+            here = np.flatnonzero(block == k)
+            if swapped:
+                # an edge and what is inside take turns, in all records of a point alike
+                if generator.random() < 0.5:
+                    other[here] = labels[here].reshape(-1, 2)[:, ::-1].ravel()
+                continue
+            numbers = np.unique(row[here])
+            given = dict(zip(row[here].tolist(), labels[here].tolist()))
+            dealt = dict(zip(numbers.tolist(), (given[n] for n in generator.permutation(numbers).tolist())))
+            other[here] = [dealt[n] for n in row[here].tolist()]
+        yield other
 
 
 def above_the_band(x: np.ndarray) -> np.ndarray:

@@ -219,6 +219,8 @@ class Score:
         Accuracy of always naming the commonest class.
     count, groups : int
         Test rows and the groups they come from.
+    chance_low, chance_high : float
+        Least and largest area with labels dealt out by chance, where that was tried, else NaN.
     """
 
     auroc: float
@@ -228,15 +230,18 @@ class Score:
     chance: float
     count: int
     groups: int
+    chance_low: float = float("nan")
+    chance_high: float = float("nan")
 
     def __str__(self) -> str:
+        by_chance = f", {self.chance_low:.3f} to {self.chance_high:.3f} by chance" if self.chance_low > 0.0 else ""
         return (
-            f"macro AUROC {self.auroc:.3f} ({self.low:.3f} to {self.high:.3f}), accuracy {self.accuracy:.3f} (chance "
-            f"{self.chance:.3f}), {self.count} windows of {self.groups} groups"
+            f"macro AUROC {self.auroc:.3f} ({self.low:.3f} to {self.high:.3f}){by_chance}, accuracy "
+            f"{self.accuracy:.3f} (chance {self.chance:.3f}), {self.count} windows of {self.groups} groups"
         )
 
 
-def classifier(seed: int = 0) -> Any:
+def classifier(seed: int = 0, trees: int = TREES) -> Any:
     """Return the baseline's classifier: a random forest, the same for the same seed.
 
     Raises
@@ -248,7 +253,7 @@ def classifier(seed: int = 0) -> Any:
         from sklearn.ensemble import RandomForestClassifier
     except ImportError:
         raise CampaignError("the baseline needs scikit-learn: pip install 'gearmbs[datasets]'") from None
-    return RandomForestClassifier(TREES, min_samples_leaf=2, class_weight="balanced", random_state=seed)
+    return RandomForestClassifier(trees, min_samples_leaf=2, class_weight="balanced", random_state=seed)
 
 
 def score(model: Any, x: np.ndarray, labels: np.ndarray, groups: np.ndarray, seed: int = 0) -> Score:
@@ -365,7 +370,14 @@ def from_recordings_to_recordings(real: np.ndarray, labels: np.ndarray, groups: 
 
 
 def held_out(
-    x: np.ndarray, labels: np.ndarray, fold: np.ndarray, groups: np.ndarray, seed: int = 0, *, pooled: bool = True
+    x: np.ndarray,
+    labels: np.ndarray,
+    fold: np.ndarray,
+    groups: np.ndarray,
+    seed: int = 0,
+    *,
+    pooled: bool = True,
+    trees: int = TREES,
 ) -> Score:
     """Return how well the baseline does on the rows of each fold, trained on those of all others.
 
@@ -374,7 +386,7 @@ def held_out(
     classes = np.unique(labels)
     p = np.zeros((len(labels), classes.size))
     for k in np.unique(fold):
-        model = classifier(seed).fit(x[fold != k], labels[fold != k])
+        model = classifier(seed, trees).fit(x[fold != k], labels[fold != k])
         p[np.ix_(fold == k, np.searchsorted(classes, model.classes_))] = model.predict_proba(x[fold == k])
     return scored(p, classes, labels, groups, seed, None if pooled else fold)
 

@@ -41,7 +41,7 @@ def gmf_bars(
 
     Parameters
     ----------
-    table : xarray.DataArray, dims (state, harmonic)
+    table : xarray.DataArray, dims (state, harmonic) or (harmonic,)
         RMS; the unit is taken from ``attrs["units"]``. Coordinates ``fault_misalignment`` (rad) and
         ``fault_centre_distance_error`` (m) along ``state``, if there, are written into the legend.
     title : str, optional
@@ -53,7 +53,7 @@ def gmf_bars(
         Write the number over each bar.
     log : bool
         Logarithmic RMS axis.
-    errors : xarray.DataArray, dims (state, harmonic), optional
+    errors : xarray.DataArray, with the table's dims, optional
         Numerical errors of the RMS, such as ``gmf_rms_error`` of records that were simulated to an accuracy; drawn as
         bars about each height.
 
@@ -66,6 +66,8 @@ def gmf_bars(
     ValueError
         If dimensions are missing or a value is negative or not finite.
     """
+    if getattr(table, "dims", None) == ("harmonic",):
+        table, errors = (one if one is None else one.expand_dims(state=["record"]) for one in (table, errors))
     table = checked_table(table, "table", ("state", "harmonic"))
     errors = None if errors is None else checked_table(errors, "errors", ("state", "harmonic"))
     if errors is not None and errors.shape != table.shape:
