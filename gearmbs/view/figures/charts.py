@@ -67,7 +67,8 @@ def gmf_bars(
         If dimensions are missing or a value is negative or not finite.
     """
     if getattr(table, "dims", None) == ("harmonic",):
-        table, errors = (one if one is None else one.expand_dims(state=["record"]) for one in (table, errors))
+        table = table.expand_dims(state=["record"])
+        errors = None if errors is None else errors.expand_dims(state=["record"])
     table = checked_table(table, "table", ("state", "harmonic"))
     errors = None if errors is None else checked_table(errors, "errors", ("state", "harmonic"))
     if errors is not None and errors.shape != table.shape:
