@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -133,7 +133,7 @@ def _main_effects(table: pd.DataFrame, results: list[str], factors: list[str], u
 
 
 def _tornado(table: pd.DataFrame, results: list[str], factors: list[str], units: dict[str, str]) -> Picture:
-    """Mean of each result at either end of each factor, the factor that moves it most on top."""
+    """Mean of each result at either end of each factor with its 95 % interval, what moves it most on top."""
     from gearmbs.view.figures.style import BLACK, BLUE, ORANGE, label, new_figure
 
     picture = new_figure(7.5, (0.9 + 0.42 * len(factors)) * len(results))
@@ -142,14 +142,16 @@ def _tornado(table: pd.DataFrame, results: list[str], factors: list[str], units:
         y = table[result].to_numpy(dtype=float)
         middle = float(np.nanmean(y))
         ends = {factor: _ends(table[factor], y) for factor in factors}
-        order = sorted(factors, key=lambda factor: np.nan_to_num(abs(ends[factor][1] - ends[factor][0])))
+        order = sorted(factors, key=lambda factor: np.nan_to_num(abs(ends[factor][1].mean - ends[factor][0].mean)))
         for k, factor in enumerate(order):
-            low, high, text_low, text_high = ends[factor]
-            for value, text, colour, place in ((low, text_low, BLUE, k + 0.19), (high, text_high, ORANGE, k - 0.19)):
-                ax.barh(place, value - middle, left=middle, color=colour, height=0.38)
-                right = value >= middle
+            for end, colour, place in zip(ends[factor], (BLUE, ORANGE), (k + 0.19, k - 0.19), strict=True):
+                ax.barh(place, end.mean - middle, left=middle, color=colour, height=0.38)
+                if end.reach > 0.0:
+                    ax.errorbar(end.mean, place, xerr=end.reach, fmt="none", ecolor=BLACK, elinewidth=0.8, capsize=2)
+                right = end.mean >= middle
                 ax.annotate(
-                    text, (value, place), (3 if right else -3, 0), textcoords="offset points", fontsize=7,
+                    end.where, (end.mean + (1 if right else -1) * np.nan_to_num(end.reach), place),
+                    (3 if right else -3, 0), textcoords="offset points", fontsize=7,
                     ha="left" if right else "right", va="center",
                 )  # fmt: skip
         ax.axvline(middle, color=BLACK, lw=0.8)
@@ -158,7 +160,8 @@ def _tornado(table: pd.DataFrame, results: list[str], factors: list[str], units:
         ax.tick_params(axis="x", labelsize=8)
         ax.margins(x=0.15)
         ax.grid(axis="y", visible=False)
-    title = f"Means over the lowest (blue) and the highest {TAIL:.0%} (orange) of each factor, or over its levels"
+    title = f"Means over the lowest (blue) and the highest {TAIL:.0%} (orange) of each factor, or over its levels,\n"
+    title += "with 95 % intervals: bars within them may be scatter of the other factors"
     picture.suptitle(title, fontsize=9, x=0.01, ha="left")
     return picture
 
@@ -275,21 +278,32 @@ def _levels(column: pd.Series) -> tuple[np.ndarray, list[str] | None, np.ndarray
     return np.array([x[group == k].mean() for k in range(used.size)]), None, group
 
 
-def _ends(column: pd.Series, y: np.ndarray) -> tuple[float, float, str, str]:
-    """Return the means of a result at both ends of a factor, and what the factor is there."""
+class _End(NamedTuple):
+    """Mean of a result at an end of a factor, half of its 95 % interval, and what the factor is there."""
+
+    mean: float
+    reach: float
+    where: str
+
+
+def _ends(column: pd.Series, y: np.ndarray) -> tuple[_End, _End]:
+    """Return a result at both ends of a factor."""
+
+    def end(inside: np.ndarray, where: str) -> _End:
+        count = np.isfinite(y[inside]).sum()
+        return _End(mean(y[inside]), NORMAL * deviation(y[inside]) / math.sqrt(count) if count > 1 else 0.0, where)
+
     if column.dtype.kind not in "biuf" or column.nunique() <= FEW:
         place, names, group = _levels(column)
-        means = np.array([mean(y[group == k]) for k in range(len(place))])
+        first, last = 0, len(place) - 1
         if names is not None:
-            k, m = (
-                int(f(np.where(np.isnan(means), worst, means)))
-                for f, worst in ((np.argmin, np.inf), (np.argmax, -np.inf))
-            )
-            return float(means[k]), float(means[m]), names[k], names[m]
-        return float(means[0]), float(means[-1]), f"{place[0]:.4g}", f"{place[-1]:.4g}"
+            means = np.array([mean(y[group == k]) for k in range(len(place))])
+            first, last = int(np.nanargmin(means)), int(np.nanargmax(means))
+        texts = names if names is not None else [f"{value:.4g}" for value in place]
+        return end(group == first, texts[first]), end(group == last, texts[last])
     x = column.to_numpy(dtype=float)
     low, high = np.quantile(x, [TAIL, 1.0 - TAIL])
-    return mean(y[x <= low]), mean(y[x >= high]), f"≤ {low:.4g}", f"≥ {high:.4g}"
+    return end(x <= low, f"≤ {low:.4g}"), end(x >= high, f"≥ {high:.4g}")
 
 
 def _as_numbers(column: pd.Series) -> tuple[np.ndarray, list[str] | None]:

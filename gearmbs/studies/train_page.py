@@ -275,7 +275,12 @@ class TrainPage:
             for c in ranked_crossings(self.campbell).head(CROSSINGS).itertuples()
         ]
         header = ["speed of the first drive, rpm", "Hz", "order", "mode", "gain"]
-        return [*lines, "Crossings, by how far the excitation moves the mode:", "", markdown_table(header, found), ""]
+        by = (
+            "Crossings, by how far the transmission error moves the mode. Friction of the teeth, which acts across the "
+            "line of action and changes its way at the pitch point, moves modes as well: bending in that plane has a "
+            "gain of nothing here, and may lead the spectrum all the same."
+        )
+        return [*lines, by, "", markdown_table(header, found), ""]
 
     def _sources(self) -> list[str]:
         return [

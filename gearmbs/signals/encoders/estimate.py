@@ -68,6 +68,14 @@ def estimate(rows: Sequence[Row], levels: Mapping[str, float]) -> Found:
     return Found(names, values, covariance)
 
 
+MEDIAN = math.sqrt(2.0 * math.log(2.0))
+"""Median amplitude of a line of noise alone, in standard deviations of each part: that of Rayleigh's distribution.
+Upper ends that are not let below its own are the power-constrained limits of [1]_.
+
+.. [1] G. Cowan, K. Cranmer, E. Gross, O. Vitells, "Power-Constrained Limits", arXiv:1105.3166, 2011.
+"""
+
+
 def amplitude_interval(size: float, variance: float, freedom: float, probability: float) -> tuple[float, float]:
     """Return the interval of an amplitude whose line was measured with a variance (of each part) of some freedom.
 
@@ -90,13 +98,15 @@ def amplitude_interval(size: float, variance: float, freedom: float, probability
     by = np.ones(1) if math.isinf(freedom) else 0.5 * freedom / special.gammaincinv(0.5 * freedom, VARIANCES)
     weights = np.ones(1) if math.isinf(freedom) else VARIANCE_WEIGHTS
 
-    def beyond(true: float, target: float) -> float:
-        return float(weights @ special.chndtr(x * x / by, 2.0, true * true / by)) - target
+    def beyond(true: float, target: float, measured: float) -> float:
+        return float(weights @ special.chndtr(measured**2 / by, 2.0, true * true / by)) - target
 
     ends = []
-    for target in (1.0 - tail, tail):
-        far = x + 4.0 * reach
-        low_enough = beyond(0.0, target) <= 0.0
-        ends.append(0.0 if low_enough else sd * optimize.brentq(beyond, 0.0, far, args=(target,), xtol=1e-6))
-    # of a line weaker than noise would be in all but few records the upper end is zero: it holds the measured one still
+    # of a line weaker than noise is in most records the upper end would fall to nothing by luck of the noise: it is
+    # that of the median of what noise alone gives at least
+    for target, measured in ((1.0 - tail, x), (tail, max(x, MEDIAN))):
+        far = measured + 4.0 * reach
+        low_enough = beyond(0.0, target, measured) <= 0.0
+        end = 0.0 if low_enough else sd * optimize.brentq(beyond, 0.0, far, args=(target, measured), xtol=1e-6)
+        ends.append(end)
     return ends[0], max(ends[1], size)

@@ -385,8 +385,9 @@ class MeasuredTransmissionError(Shown):
         if self.turns % meeting == 0:
             return None
         return (
-            f"The wheels meet again after {meeting} turns of the driver, of which the record holds {self.turns:.3g}: "
-            "until then errors of teeth of one wheel are seen in part as such of the other. Record "
+            f"The wheels meet again after {meeting} turns of the driver, of which the record holds {self.turns:.3g}, "
+            "less those at its ends that windows take: until then errors of teeth of one wheel are seen in part as "
+            "such of the other. Record "
             f"{math.ceil(meeting + ENDS * max(1.0, float(self.gearing.ratio)))} turns or more."
         )
 

@@ -204,6 +204,10 @@ def test_intervals_of_amplitudes_cover_them(freedom):
         ends = [amplitude_interval(y, v, freedom, 0.9) for y, v in zip(seen, variances)]
         # of 60 draws at 90 %, fewer than 46 are seen once in 1000 times
         assert sum(low <= true <= high for low, high in ends) >= 46, true
+    # a line that noise has all but cancelled is not known any better for that
+    lucky, usual = (amplitude_interval(size, 1.0, freedom, 0.95) for size in (0.02, math.sqrt(2.0 * math.log(2.0))))
+    assert lucky == (0.0, pytest.approx(usual[1]))
+    assert lucky[1] > 1.0
     low, high = amplitude_interval(29.0, 1.0, freedom, 0.95)
     reach = stats.t.ppf(0.975, freedom)
     assert abs(low - 29.0 + reach) < 0.1
