@@ -23,9 +23,8 @@ from gearmbs.campaigns.plans.factors import (
     Specimens,
     factor_from,
     factor_table,
-    get_path,
-    set_path,
 )
+from gearmbs.campaigns.plans.paths import get_path, set_path
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, make_subject
 from gearmbs.files import python_scalar
