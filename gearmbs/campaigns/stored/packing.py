@@ -164,6 +164,11 @@ def _write_unit(folder: Folder, packed: Folder, unit: int) -> None:
         "started": min(part["started"] for part in parts),
         "digests": digests,
     }
+    # ledgers of earlier versions do not say it, and then nobody knows it of all
+    if all("tightened" in part for part in parts):
+        entry["tightened"] = [index for part in parts for index in part["tightened"]]
+    else:
+        entry.pop("tightened", None)
     write_whole(packed.ledger(unit), sealed(entry), durable=store)
 
 
