@@ -99,6 +99,7 @@ class CaseRunner:
         impossible."""
         try:
             thing = self.subject.check(self.plan.data(row), f"case {row['index']}")
+            thing = self.subject.as_simulated(thing, self.plan.keep)
             key = content_key(self.subject.kind, self.subject.canonical(thing), self.code)
             return thing, CaseResult(Outcome(), key=key)
         except Exception as error:

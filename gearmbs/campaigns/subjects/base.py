@@ -156,6 +156,10 @@ class Subject(ABC):
         """Return the unit of a number that is kept, "" where it has none or the subject does not know it."""
         return ""
 
+    def as_simulated(self, thing: Any, keep: Sequence[str]) -> Any:
+        """Return the thing as it is simulated for ``keep``: whatever changes the numbers belongs to its content."""
+        return thing
+
     # what is simulated, and what a run of it leaves for `reduce`, are each subject's own
     @abstractmethod
     def check(self, data: dict[str, Any], name: str) -> Any:
@@ -175,7 +179,7 @@ class Subject(ABC):
     def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Simulate and return a record; ``progress`` is called often and may raise to stop the run.
 
-        What `reduce` does not need for ``keep`` may be left out of the record.
+        What `reduce` does not need for ``keep`` may be left out of the record; the rest is the same whatever is kept.
         """
 
     @abstractmethod

@@ -147,6 +147,12 @@ class PairSubject(Subject):
         check_record(case, name)
         return case
 
+    def as_simulated(self, thing: Case, keep: Sequence[str]) -> Case:
+        """Return the case with the length of its record where that is not as its motion takes."""
+        if thing.is_auto and not PERIODIC.issuperset(keep):
+            return thing.changed(operation={"duration": thing.operation.longest})
+        return thing
+
     def canonical(self, thing: Case) -> dict[str, Any]:
         """Return the content of a case; see `canonical_case`."""
         return canonical_case(thing)
@@ -155,9 +161,8 @@ class PairSubject(Subject):
         """Return the record of a case."""
         from gearmbs.studies.run.simulation import run_case
 
+        thing = self.as_simulated(thing, keep)
         operation = thing.operation
-        if thing.is_auto and not PERIODIC.issuperset(keep):
-            thing = thing.changed(operation={"duration": operation.longest})
         span = operation.run_up + operation.settling + operation.longest
         return run_case(thing, lambda t: progress(t / span), variables=variables_for(keep))
 
