@@ -222,7 +222,8 @@ def in_si(tree: Any) -> Any:
 class DrivetrainSubject(TablesSubject):
     """Drivetrains of a TOML file, rolling bearings and faults of teeth included.
 
-    Keeps ``harmonics`` (``SIGNAL.MESH.K``: RMS of the mesh harmonics of mesh forces, bearing forces and sensors),
+    Keeps ``harmonics`` (``SIGNAL.MESH.K``: RMS of the mesh harmonics of mesh forces, bearing forces and sensors; none
+    where the speed changes),
     ``forces`` (mean, RMS, least and largest normal force, transmission error and pairs in contact of each mesh, and
     force of each bearing), ``signal:NAME`` of a sensor, and ``record``.
     """
@@ -276,7 +277,8 @@ class DrivetrainSubject(TablesSubject):
     def reduce(self, thing: Description, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
         kept = kept_by_functions(keep, record)
-        if "harmonics" in keep:
+        # of changing speed, at which it has no one frequency, a record has other harmonics at each moment
+        if "harmonics" in keep and "mesh_rms" in record:
             levels = record["mesh_rms"].transpose("signal", "mesh", "harmonic")
             for (i, j, k), value in np.ndenumerate(levels.values):
                 name = f"{levels.signal.values[i]}.{levels.mesh.values[j]}.{k + 1}"
