@@ -280,7 +280,25 @@ class Choice:
                             )
                         set_entry(table, key, _range_in_si(value, unit, f"{self.path}.{name}.{key}"))
             options[name] = list(table) if isinstance(table, tuple) else table
-        return Choice(self.path, options, self.crossed, self.name, section)
+        made = Choice(self.path, options, self.crossed, self.name, section)
+        made.check_severity()
+        return made
+
+    def check_severity(self) -> None:
+        """Refuse a choice of which another column has the name of that of the severity.
+
+        Raises
+        ------
+        CampaignError
+        """
+        mine = {self.name, *(f"{self.name}.{key}" for keys in self.ranges.values() for key in keys)}
+        if self.severity in mine:
+            which = "its own" if self.severity == self.name else f"that of its range {self.severity!r}"
+            remedy = "give it another name, name='...'" if self.name == self.path else "leave its name out"
+            raise CampaignError(
+                f"choice {self.name!r}: its column {self.severity!r}, where in its range the first of an option lies, "
+                f"has the name of {which}; {remedy}, or rename what is called severity"
+            )
 
     def unit_of_entry(self, subject: Subject, table: Mapping[str, Any], key: str) -> str:
         """Return the SI unit of an entry of an option's table, by its key, or by the path to it in tables within."""
