@@ -33,7 +33,7 @@ from gearmbs.campaigns.limits import TimeLimitReached, last, limited
 from gearmbs.campaigns.reuse import Reuse
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
-from gearmbs.campaigns.subjects.base import DIED, DONE, FAILED, MEMORY, TIME, Kept, Outcome
+from gearmbs.campaigns.subjects.base import DIED, DONE, FAILED, MEMORY, TIME, Kept, Outcome, check_real
 from gearmbs.campaigns.surroundings import DISK, MOST_TRIED, Lacking, carries_out, refusal
 from gearmbs.files import arrow_column, whole_file, write_whole
 from gearmbs.studies.run.claims import Claim, Claimed, claimed
@@ -140,7 +140,8 @@ class CaseRunner:
                 kept = self.subject.reduce(thing, record, plan.keep)
             check_signals(self.folder.specs, kept.signals)
             taken = self.folder.taken
-            for name in kept.numbers:
+            for name, value in kept.numbers.items():
+                check_real(value, f"results: {name!r}")
                 if name in taken and f"result.{name}" in kept.numbers:
                     raise CampaignError(f"results: {name!r} is called 'result.{name}', as another one is; rename one")
         except TimeLimitReached as error:

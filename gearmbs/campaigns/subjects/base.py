@@ -266,11 +266,26 @@ def as_numbers(found: Mapping[Any, Any], item: str) -> dict[str, float]:
     """
     numbers = {}
     for name, value in found.items():
+        check_real(value, f"{item} returned {name}")
         try:
             numbers[str(name)] = float(value)
         except (TypeError, ValueError):
             raise CampaignError(f"{item} returned {name} = {value!r:.60}, which is no number; return one") from None
     return numbers
+
+
+def check_real(value: Any, what: str) -> None:
+    """Refuse complex numbers, of which the real part alone would be kept.
+
+    Raises
+    ------
+    CampaignError
+    """
+    if np.iscomplexobj(value):
+        raise CampaignError(
+            f"{what}: complex, and no complex numbers are kept; return its amplitude, or its real and imaginary parts "
+            "by names of their own"
+        )
 
 
 def check_keep(subject: Subject, keep: Sequence[str]) -> None:
