@@ -282,9 +282,10 @@ def check_real(value: Any, what: str) -> None:
     CampaignError
     """
     if np.iscomplexobj(value):
+        shown = f" = {complex(value)}" if np.ndim(value) == 0 else ""
         raise CampaignError(
-            f"{what}: complex, and no complex numbers are kept; return its amplitude, or its real and imaginary parts "
-            "by names of their own"
+            f"{what}{shown}: complex, which no number that is kept may be; return its amplitude, or its real and imaginary "
+            "parts by names of their own"
         )
 
 
