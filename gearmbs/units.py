@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+from contextlib import suppress
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -282,8 +283,8 @@ def si_unit(text: Any) -> str | None:
 
     Examples
     --------
-    >>> si_unit("0.1 mm"), si_unit("1500 rpm"), si_unit("20 N m"), si_unit("pump"), si_unit(3.0)
-    ('m', 'rad/s', 'N m', None, None)
+    >>> si_unit("0.1 mm"), si_unit("1500 rpm"), si_unit("20 N m"), si_unit("3 kgf"), si_unit("pump"), si_unit(3.0)
+    ('m', 'rad/s', 'N m', 'N', None, None)
     """
     if not isinstance(text, str):
         return None
@@ -297,18 +298,52 @@ def si_unit(text: Any) -> str | None:
     known = _common(unit)
     if known is None:
         try:
-            return f"{_registry().Quantity(1.0, unit).to_base_units().units}"
+            units = _registry().Quantity(1.0, unit).to_base_units().units
         except Exception:
             return None
-    powers = dict(zip(("m", "kg", "s", "rad"), known[1]))
-    if powers == {"m": 0.0, "kg": 0.0, "s": -1.0, "rad": 0.0}:
-        return "Hz"
-    named = NAMED.get((powers["m"], powers["kg"], powers["s"]))
-    if named is not None and powers["rad"] in (0.0, -1.0):
-        return named + ("/rad" if powers["rad"] else "")
-    above = "*".join(_power(base, p) for base, p in powers.items() if p > 0.0)
-    below = "".join(f"/{_power(base, -p)}" for base, p in powers.items() if p < 0.0)
-    return (above or "1") + below
+        # those of mechanics have the same names however they are written: kgf as N, 1/s as Hz
+        known = _common(re.sub(r"^1(?=/)", "", f"{units:~C}"))
+        if known is None:
+            return f"{units}"
+    *others, angle = known[1]
+    named = NAMED.get(tuple(others))
+    if named is not None and angle in (0.0, -1.0):
+        return named + ("/rad" if angle else "")
+    return _named(known[1])
+
+
+def readings(text: Any) -> dict[str, float]:
+    """Return a text's number by each unit of SI in which a field that takes it may have its plain numbers.
+
+    The first is that of `si_unit`. Others differ by powers of the radian: 25 Hz are 157 rad/s where angles count.
+
+    Examples
+    --------
+    >>> {unit: round(number, 1) for unit, number in readings("25 Hz").items()}, readings("10 N m"), readings("pump")
+    ({'Hz': 25.0, 'rad/s': 157.1}, {'N m': 10.0}, {})
+    """
+    unit = si_unit(text)
+    if unit is None:
+        return {}
+    found = {unit: float(to_si(text, unit))}
+    if (known := _common(unit)) is None:
+        return found
+    *others, angle = known[1]
+    for power in (-2.0, -1.0, 1.0, 2.0):
+        with suppress(ValueError):
+            name = _named((*others, angle + power))
+            number = float(to_si(text, name))
+            if not any(math.isclose(number, other) for other in found.values()):
+                found[name] = number
+    return found
+
+
+def _named(powers: tuple[float, ...]) -> str:
+    """Return the unit of powers of m, kg, s and rad."""
+    bases = dict(zip(("m", "kg", "s", "rad"), powers))
+    above = "*".join(_power(base, p) for base, p in bases.items() if p > 0.0)
+    below = "".join(f"/{_power(base, -p)}" for base, p in bases.items() if p < 0.0)
+    return "Hz" if above + below == "/s" else (above or "1") + below
 
 
 def _power(base: str, power: float) -> str:

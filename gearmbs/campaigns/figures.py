@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -373,9 +374,12 @@ def _condition_map(
     done = table[table["status"] == "done"]
     columns = {str(name): done[name].to_numpy() for name in done.columns}
     results = result_names(campaign.folder, done)
-    held = satisfied(condition, columns, campaign.plan.unit_of, results)
+    asked = partial(
+        satisfied, given=columns, unit_of=campaign.plan.unit_of, results=results, empty=campaign.plan.empty(columns)
+    )
+    held = asked(condition)
     # of what is compared with no number neither the condition holds nor its opposite
-    known = held | satisfied(f"not ({condition})", columns, campaign.plan.unit_of, results)
+    known = held | asked(f"not ({condition})")
     left = say_left_out(campaign.folder, table, "map", unknown=int((~known).sum()), stacklevel=4)
     table, held = done[known], held[known]
     bins = whole(bins, "bins", 1)

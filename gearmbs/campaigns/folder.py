@@ -212,7 +212,8 @@ class Folder:
             If there is none, or it is not what the ledger says.
         """
         entry = self.entry(unit) if self.result(unit) else {"files": {}}
-        for name in entry["files"]:
+        # a case that was done at its second attempt may have left a file of the first, which is none of its record
+        for name in sorted(entry["files"], key=is_record, reverse=True):
             if not name.endswith(f"/{index:07d}.nc"):
                 continue
             try:
@@ -297,6 +298,11 @@ def _planned(path: Path, digest: str, _written: int, _inode: int) -> pa.Table:
     if hashlib.sha256(content).hexdigest() != digest:
         raise CampaignError(f"{path}: is edited or damaged, its cases are not those that were planned; {REMEDY}")
     return pq.ParquetFile(pa.BufferReader(content)).read()
+
+
+def is_record(name: str) -> bool:
+    """Whether a file of a campaign is the record of a case that is done, not what a failed one had computed."""
+    return name.startswith("records/")
 
 
 def _block_name(extent: int, block: int) -> str:

@@ -49,7 +49,7 @@ def read_table(
         # names that are none are told with all that there are
         satisfied(where, _with_missing(folder.unit_table(chosen_units[0]), known), folder.plan.unit_of)
         results = set(known) - {*ABOUT, *factor_names(folder)}
-        asked = names_in(where, known)
+        asked = [*names_in(where, known), "point"]
     # of what is not wanted nothing is read
     read = None if wanted is None else ["index", *wanted, *asked]
     tables = []
@@ -57,7 +57,8 @@ def read_table(
         table = folder.unit_table(unit, read)
         if where is not None:
             columns_here = _with_missing(table, known if read is None else ["index", *asked])
-            table = table.filter(pa.array(satisfied(where, columns_here, folder.plan.unit_of, results)))
+            empty = folder.plan.empty(columns_here)
+            table = table.filter(pa.array(satisfied(where, columns_here, folder.plan.unit_of, results, empty)))
         tables.append(table)
     table = pa.concat_tables(tables, promote_options="permissive")
     missing = [name for name in wanted or () if name not in table.column_names]

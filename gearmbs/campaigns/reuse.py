@@ -28,6 +28,14 @@ class Reuse:
         What the new campaign keeps.
     specs : sequence of SignalSpec
         Its arrays of signals.
+    on_failure : str
+        What it does with a case that fails. Results at a tighter tolerance than the case's own are taken over where it
+        would have come to them itself.
+
+    Attributes
+    ----------
+    tightened : set of str
+        Keys of cases with such results.
 
     Raises
     ------
@@ -36,8 +44,11 @@ class Reuse:
         no harm; of numbers nothing says which of the entries they come from.
     """
 
-    def __init__(self, paths: tuple[str, ...], keep: tuple[str, ...], specs: Sequence[SignalSpec]) -> None:
+    def __init__(
+        self, paths: tuple[str, ...], keep: tuple[str, ...], specs: Sequence[SignalSpec], on_failure: str = "record"
+    ) -> None:
         self._specs = specs
+        self.tightened: set[str] = set()
         self._at: dict[str, tuple[Folder, int, int]] = {}
         self._tables: dict[tuple[Path, int], list[dict[str, Any]]] = {}
         self.folders = [Folder(path) for path in paths]
@@ -52,13 +63,18 @@ class Reuse:
                 )
             for unit in folder.done():
                 try:
-                    ids = folder.unit_table(unit, ["id", "status"]).to_pydict()
+                    ids = folder.unit_table(unit, ["id", "status", "index"]).to_pydict()
+                    tighter = _tightened(folder, unit)
                 except CampaignError as error:
                     warnings.warn(f"reuse: {path}: {error}; its cases are simulated", CampaignWarning, stacklevel=2)
                     continue
-                for k, (key, status) in enumerate(zip(ids["id"], ids["status"])):
-                    if status == DONE:
-                        self._at.setdefault(key, (folder, unit, k))
+                for k, (key, status, index) in enumerate(zip(*(ids[name] for name in ("id", "status", "index")))):
+                    of_another = tighter is None or index in tighter
+                    if status != DONE or key in self._at or (of_another and on_failure != "tighter"):
+                        continue
+                    self._at[key] = folder, unit, k
+                    if of_another:
+                        self.tightened.add(key)
 
     @classmethod
     def of(cls, folder: Folder) -> Reuse | None:
@@ -70,7 +86,7 @@ class Reuse:
         known = _known.get(key)
         # folders may be made anew under the same names
         if known is None or known[0] is not folder or any(source.changed for source in known[1].folders):
-            _known[key] = known = folder, cls(plan.reuse, plan.keep, folder.specs)
+            _known[key] = known = folder, cls(plan.reuse, plan.keep, folder.specs, plan.on_failure)
         return known[1]
 
     def record(self, key: str) -> bytes | None:
@@ -107,6 +123,14 @@ class Reuse:
         except CampaignError as error:
             warnings.warn(f"reuse: {folder.path}: {error}; the case is simulated", CampaignWarning, stacklevel=2)
             return None
+
+
+def _tightened(folder: Folder, unit: int) -> set[int] | None:
+    """Return which cases of a unit were done at a tighter tolerance than their own; None if that is not known."""
+    entry = folder.entry(unit)
+    if "tightened" in entry:
+        return set(entry["tightened"])
+    return None if folder.plan.on_failure == "tighter" else set()
 
 
 def _apart(item: str) -> bool:

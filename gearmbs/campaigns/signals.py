@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.campaigns.settings import CampaignError
-from gearmbs.campaigns.subjects.base import SignalSpec
+from gearmbs.campaigns.subjects.base import SignalSpec, check_real
 from gearmbs.files import write_whole
 
 
@@ -113,6 +113,7 @@ def check_signals(specs: Sequence[SignalSpec], signals: Mapping[str, np.ndarray]
     for spec in specs:
         if spec.name not in signals:
             continue
+        check_real(signals[spec.name], f"signal {spec.name!r}")
         shape = signals[spec.name].shape
         if len(shape) != 2 or shape[0] != len(spec.channels):
             raise CampaignError(f"signal {spec.name!r}: shape {shape}, planned for {len(spec.channels)} channels")

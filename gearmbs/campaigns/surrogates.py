@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from gearmbs.campaigns.campaign import Campaign
+    from gearmbs.campaigns.plans.plan import Plan
 
 HIGHEST = 6
 WELL = 0.9
@@ -399,6 +400,8 @@ class ResponseSurface:
         Points.
     alone : int
         Points without which the others do not determine the coefficients: their leverage is 1.
+    plan : Plan, optional
+        Whose coordinates `predict` takes; terms are of the places of values in their ranges, see `response_surface`.
     """
 
     names: list[str]
@@ -410,6 +413,7 @@ class ResponseSurface:
     error: float
     count: int
     alone: int = 0
+    plan: Plan | None = field(default=None, repr=False, compare=False)
 
     def terms(self) -> list[str]:
         """Return the names of the terms."""
@@ -427,8 +431,12 @@ class ResponseSurface:
         return pd.DataFrame(data, index=pd.Index(self.terms(), name="term"))
 
     def predict(self, u: np.ndarray) -> np.ndarray:
-        """Return the surface at points of the unit cube, shape (n, d)."""
-        return design_matrix(2.0 * np.atleast_2d(u) - 1.0, self.degree) @ self.coefficients
+        """Return the surface at points of the unit cube, shape (n, d), as ``plan.points()`` gives them."""
+        points = np.atleast_2d(u)
+        if points.shape[1] != len(self.names):
+            raise CampaignError(f"response surface: points have {points.shape[1]} coordinates; give {self.names}")
+        places = points if self.plan is None else _places(self.plan, points)
+        return design_matrix(2.0 * places - 1.0, self.degree) @ self.coefficients
 
 
 def design_matrix(x: np.ndarray, degree: int) -> np.ndarray:
@@ -502,10 +510,33 @@ def _alternatives(factor: AnyFactor) -> Sequence[Any]:
     return list(factor.options) if isinstance(factor, Choice) else range(factor.draws)
 
 
-def response_surface(campaign: Campaign, result: str, degree: int = 2) -> ResponseSurface:
-    """Return the response surface of a campaign's result over the coordinates of its plan.
+def _places(plan: Plan, points: np.ndarray) -> np.ndarray:
+    """Return where points of a plan lie in the ranges of its factors, 0 to 1, of two alternatives at one or the other.
 
-    Numbers have the place of their value in the range, and not that of the coordinate that chose them, where they are
+    Raises
+    ------
+    CampaignError
+        If a factor has more than two alternatives without order.
+    """
+    at, found = 0, plan.places(points)
+    for factor in plan.factors:
+        mine = points[:, at : at + factor.width]
+        if factor.width and np.isnan(found[:, at]).any():
+            alternatives = _alternatives(factor)
+            if len(alternatives) > 2:
+                raise CampaignError(
+                    f"response surface: {factor.name} has {len(alternatives)} alternatives, which have no order; ask "
+                    "sensitivity, or fit the cases of each by fit_surface"
+                )
+            found[:, at] = [value == alternatives[-1] for value in factor.columns(mine)[factor.name]]
+        at += factor.width
+    return found
+
+
+def response_surface(campaign: Campaign, result: str, degree: int = 2) -> ResponseSurface:
+    """Return the response surface of a campaign's result, which predicts at points of its plan.
+
+    Its terms are of the places of numbers in their range, and not of the coordinates that chose them, where they are
     whole or a few; of two alternatives the first is 0 and the other 1.
 
     Raises
@@ -532,19 +563,7 @@ def response_surface(campaign: Campaign, result: str, degree: int = 2) -> Respon
             CampaignWarning,
             stacklevel=3,
         )
-    at, found = 0, campaign.plan.places(points)
-    for factor in campaign.plan.factors:
-        mine = points[:, at : at + factor.width]
-        if factor.width and np.isnan(found[:, at]).any():
-            alternatives = _alternatives(factor)
-            if len(alternatives) > 2:
-                raise CampaignError(
-                    f"response surface: {factor.name} has {len(alternatives)} alternatives, which have no order; ask "
-                    "sensitivity, or fit the cases of each by fit_surface"
-                )
-            found[:, at] = [value == alternatives[-1] for value in factor.columns(mine)[factor.name]]
-        at += factor.width
-    surface = fit_surface(found, values, names, degree)
+    surface = replace(fit_surface(_places(campaign.plan, points), values, names, degree), plan=campaign.plan)
     if surface.alone:
         warnings.warn(f"{result}: {untold(surface)}", CampaignWarning, stacklevel=3)
     return surface

@@ -28,12 +28,12 @@ from typing import Any
 
 import gearmbs
 from gearmbs.campaigns.codes import admit, folder_code, has_grown, known_code, loaded_since, note
-from gearmbs.campaigns.folder import Folder, sealed
+from gearmbs.campaigns.folder import Folder, is_record, sealed
 from gearmbs.campaigns.limits import TimeLimitReached, last, limited
 from gearmbs.campaigns.reuse import Reuse
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.signals import check_signals, write_signals
-from gearmbs.campaigns.subjects.base import DIED, DONE, FAILED, MEMORY, TIME, Kept, Outcome
+from gearmbs.campaigns.subjects.base import DIED, DONE, FAILED, MEMORY, TIME, Kept, Outcome, check_real
 from gearmbs.campaigns.surroundings import DISK, MOST_TRIED, Lacking, carries_out, refusal
 from gearmbs.files import arrow_column, whole_file, write_whole
 from gearmbs.studies.run.claims import Claim, Claimed, claimed
@@ -58,8 +58,8 @@ _folders: dict[str, Folder] = {}
 
 @dataclass
 class CaseResult:
-    """What came of a case: how it ended, what is kept, its key, processor seconds inside the simulation, files, and the
-    modules that it has loaded, with their files."""
+    """What came of a case: how it ended, what is kept, its key, processor seconds inside the simulation, files, the
+    modules that it has loaded, with their files, and whether it took a tighter tolerance than its own."""
 
     outcome: Outcome
     kept: Kept = field(default_factory=Kept)
@@ -68,6 +68,12 @@ class CaseResult:
     reused: bool = False
     files: list[str] = field(default_factory=list)
     loaded: dict[str, str] = field(default_factory=dict)
+    tightened: bool = False
+
+    @property
+    def record(self) -> str | None:
+        """The file of its record, None without one."""
+        return next((name for name in self.files if is_record(name)), None)
 
 
 class CaseRunner:
@@ -93,6 +99,7 @@ class CaseRunner:
         impossible."""
         try:
             thing = self.subject.check(self.plan.data(row), f"case {row['index']}")
+            thing = self.subject.as_simulated(thing, self.plan.keep)
             key = content_key(self.subject.kind, self.subject.canonical(thing), self.code)
             return thing, CaseResult(Outcome(), key=key)
         except Exception as error:
@@ -119,6 +126,7 @@ class CaseRunner:
             tighter = self.subject.tightened(thing)
             if tighter is not None:
                 self._attempt(tighter, result, row)
+                result.tightened = result.outcome.status == DONE
         result.seconds = time.thread_time() - start
         if len(sys.modules) > len(before):
             result.loaded = loaded_since(before)
@@ -132,7 +140,8 @@ class CaseRunner:
                 kept = self.subject.reduce(thing, record, plan.keep)
             check_signals(self.folder.specs, kept.signals)
             taken = self.folder.taken
-            for name in kept.numbers:
+            for name, value in kept.numbers.items():
+                check_real(value, f"results: {name!r}")
                 if name in taken and f"result.{name}" in kept.numbers:
                     raise CampaignError(f"results: {name!r} is called 'result.{name}', as another one is; rename one")
         except TimeLimitReached as error:
@@ -158,11 +167,17 @@ class CaseRunner:
                     # a record that NetCDF does not take; what the disk does not take ends the run
                     result.outcome = self.subject.explain(error)
                     return
+            # what an attempt before had computed when it failed is no record of what is done
+            for name in [name for name in result.files if not is_record(name)]:
+                result.files.remove(name)
+                (self.folder.path / name).unlink(missing_ok=True)
             result.outcome, result.kept = Outcome(), kept
 
-    def taken_over(self, row: dict[str, Any], kept: Kept, key: str, record: bytes | None) -> CaseResult:
+    def taken_over(
+        self, row: dict[str, Any], kept: Kept, key: str, record: bytes | None, tightened: bool
+    ) -> CaseResult:
         """Return the result of a case as that of an equal one, with the content of its record's file if it has one."""
-        result = CaseResult(Outcome(), kept, key, reused=True)
+        result = CaseResult(Outcome(), kept, key, reused=True, tightened=tightened)
         if record is not None:
             place = self._place("records", row)
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -456,6 +471,7 @@ def enter(
         "cases": len(rows),
         "failed": sum(r.outcome.status != DONE for r in results),
         "reused": sum(r.reused for r in results),
+        "tightened": [row["index"] for row, r in zip(rows, results) if r.tightened],
         "not_numbers": sum(not r.kept.finite for r in results),
         "index": [rows[0]["index"], rows[-1]["index"] + 1],
         "status": {str(row["index"]): r.outcome.status for row, r in zip(rows, results) if r.outcome.status != DONE},
@@ -479,13 +495,13 @@ def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], 
             # keys are rounded, so that units of other campaigns do not matter; here it is the same to the last bit
             content = repr(runner.plan.data(row))
             if (found := known.get(content)) is not None:
-                record = (runner.folder.path / found.files[0]).read_bytes() if found.files else None
-                return runner.taken_over(row, found.kept, found.key, record)
+                record = (runner.folder.path / found.record).read_bytes() if found.record else None
+                return runner.taken_over(row, found.kept, found.key, record, found.tightened)
             if (kept := reuse.find(prepared.key)) is not None:
                 wanted = "record" in runner.plan.keep
                 record = reuse.record(prepared.key) if wanted else None
                 if record is not None or not wanted:
-                    return runner.taken_over(row, kept, prepared.key, record)
+                    return runner.taken_over(row, kept, prepared.key, record, prepared.key in reuse.tightened)
     result = runner.run(row)
     if reuse is not None and result.outcome.status == DONE:
         known[repr(runner.plan.data(row))] = result

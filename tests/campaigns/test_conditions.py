@@ -3,9 +3,18 @@
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import Campaign, CampaignError, Factor, FunctionSubject, make_plan
+from gearmbs.campaigns import (
+    Campaign,
+    CampaignError,
+    CampaignWarning,
+    Choice,
+    Factor,
+    FunctionSubject,
+    condition_map,
+    make_plan,
+)
 from gearmbs.campaigns.plans.conditions import names_in, satisfied
-from tests.campaigns.models import adding, picky
+from tests.campaigns.models import Ringing, adding, picky, told
 from tests.says import says
 
 SUBJECT = FunctionSubject(adding, {"a": 1.0, "b": 2.0, "c": 3.0})
@@ -80,3 +89,60 @@ def test_failed_cases_fulfil_nothing_about_their_results(tmp_path, text, rows):
     wanted |= done & ("negative" not in rows or (table.y < 0).to_numpy()) if "done" in rows else False
     wanted |= ~done if "failed" in rows else False
     assert campaign.read(["index"], text)["index"].tolist() == table["index"][wanted].tolist()
+
+
+ROWS = [{"a": 1.0, "b": 3.0}, {"a": 2.0}, {"a": 3.0, "b": 4.0}, {"a": 4.0, "b": 3.0}]
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("b < 10", [0, 2, 3]),
+        ("b != 3", [2]),
+        ("not b == 3", [2]),
+        ("not (b > 3)", [0, 3]),
+        ("not (b > 3 or a > 3.5)", [0]),
+        ("b != 3 or a < 2.5", [0, 1, 2]),
+        ("not b > 3 and not a > 3.5", [0]),
+        ("2 * a - b != 100", [0, 2, 3]),
+        ("a != 1", [1, 2, 3]),
+    ],
+)
+def test_what_a_row_leaves_out_fulfils_nothing(tmp_path, text, rows):
+    campaign = Campaign(tmp_path / "c", make_plan(SUBJECT, [], "list", options={"rows": ROWS}, unit=2))
+    campaign.run(workers=0)
+    assert campaign.read(["index"], text)["index"].tolist() == rows
+    assert campaign.read(where=text)["index"].tolist() == rows
+    plan = make_plan(SUBJECT, [], "list", options={"rows": ROWS}, constraints=[text])
+    assert np.flatnonzero(plan.allowed(plan.columns(plan.points()))).tolist() == rows
+
+
+def test_maps_leave_out_what_a_row_leaves_out(tmp_path):
+    campaign = Campaign(tmp_path / "c", make_plan(SUBJECT, [], "list", options={"rows": ROWS}, unit=2))
+    campaign.run(workers=0)
+    with pytest.warns(CampaignWarning, match="1 without a number"):
+        share, counts, *_ = condition_map(campaign, "b != 3", "a", "s", bins=1)
+    assert (share.tolist(), counts.tolist()) == ([[1.0 / 3.0]], [[3.0]])
+
+
+def test_none_that_a_row_gives_is_a_value():
+    subject = FunctionSubject(told, {"p": 5.0, "i": 3})
+    rows = [{"p": None}, {"i": 4}, {"p": 2.0}]
+    plan = make_plan(subject, [], "list", options={"rows": rows}, constraints=["p != 3"])
+    assert plan.allowed(plan.columns(plan.points())).tolist() == [True, False, True]
+
+
+def test_a_range_that_an_option_has_not_fulfils_nothing():
+    states = Choice("fault.teeth", {"healthy": [], "faulty": {"size": [0.1, 1.0]}}, name="state")
+    plan = make_plan(Ringing(), [states], n=16)
+    columns = plan.columns(plan.points())
+    healthy = columns["state"] == "healthy"
+    assert 0 < healthy.sum() < 16
+
+    def allowed(text):
+        return make_plan(Ringing(), [states], n=16, constraints=[text]).allowed(columns).tolist()
+
+    large = columns["state.size"] > 0.5
+    assert allowed("not state.size > 0.5") == (~large & ~healthy).tolist()
+    assert allowed("state.size != 2") == (~healthy).tolist()
+    assert allowed("state == 'healthy' or not state.size > 0.5") == (~large).tolist()

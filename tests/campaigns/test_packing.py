@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from benchmarks.campaign_faults import recorded
-from gearmbs.campaigns import Campaign, CampaignError, FunctionSubject, make_plan
-from tests.campaigns.models import picky
+from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, FunctionSubject, make_plan
+from gearmbs.campaigns.folder import write_cases
+from gearmbs.campaigns.stored import packing
+from tests.campaigns.models import Ringing, picky
 from tests.campaigns.support import function, ranges, small
 from tests.says import says
 
@@ -104,6 +108,37 @@ def test_what_cannot_be_packed_is_told(tmp_path):
 
 class Killed(BaseException):
     """Ends a packing where it stands."""
+
+
+def without_ranges(path) -> Campaign:
+    """Return a campaign with columns that are empty in some rows: ranges that an option lacks."""
+    options = {"healthy": [], "faulty": {"size": [0.1, 1.0]}}
+    factors = [Factor("operation.speed", 90.0, 110.0), Choice("fault.teeth", options, name="state")]
+    campaign = Campaign(path, make_plan(Ringing(), factors, n=7, unit=2, keep=["numbers", "signal:housing"]))
+    campaign.run(workers=0)
+    return campaign
+
+
+def test_columns_that_are_empty_in_some_rows(tmp_path):
+    campaign = without_ranges(tmp_path / "c")
+    before = campaign.table.drop(columns=["unit", "slot"])
+    assert 0 < before["state.size"].isna().sum() < 7
+    packed = campaign.pack(4)
+    pd.testing.assert_frame_equal(packed.table.drop(columns=["unit", "slot"]), before)
+    assert packed.check() == []
+    rows = [{"x1": 1.0, "x2": 2.0}, {"x1": 0.5}, {"x1": 0.2}]
+    plan = make_plan(function(), [], "list", options={"rows": rows}, keep=["numbers"], unit=1)
+    listed = Campaign(tmp_path / "d", plan)
+    listed.run(workers=0)
+    assert listed.pack(2).folder.unit_count == 2
+
+
+def test_other_cases_than_were_done_are_refused(tmp_path, monkeypatch):
+    campaign = without_ranges(tmp_path / "c")
+    seeded = lambda store, plan, *rest: write_cases(store, replace(plan, seed=plan.seed + 1), *rest)  # noqa: E731
+    monkeypatch.setattr(packing, "write_cases", seeded)
+    with pytest.raises(CampaignError, match="gives other cases"):
+        campaign.pack(4)
 
 
 def at(step: int, monkeypatch) -> list[int]:

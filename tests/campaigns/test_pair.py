@@ -114,6 +114,25 @@ def test_a_deck_with_parameters(tmp_path):
         DeckSubject(deck, {}, end=1.0)
 
 
+def test_a_request_that_is_zero_is_a_result(tmp_path):
+    """Of a mass without a spring the speed is 0; what a request does not ask for is no result."""
+    deck = DECK.replace("${mass}", "1").replace("K=100", "K=${k}").replace("I=2, J=4", "I=5, J=4")
+    assert "REQUEST/1, F2=" in deck
+    request = "REQUEST/2, VELOCITY, I=2, J=1\nREQUEST/3, DISPLACEMENT, I=2, J=1\nREQUEST/1, F2="
+    subject = DeckSubject(deck.replace("REQUEST/1, F2=", request), {"k": 100.0}, end=0.1, steps=5)
+    plan = make_plan(subject, [Factor("k", values=[0.0, 100.0])], "grid", unit=2)
+    campaign = Campaign(tmp_path / "c", plan)
+    assert campaign.run(workers=0).failed == 0, campaign.failed().message.tolist()
+    table = campaign.table
+    assert table["request_2.VX.rms"][0] == table["request_2.VX.max"][0] == 0.0
+    assert table["request_2.VX.rms"][1] > 0.1
+    assert campaign.read(["k"], "request_2.VX.rms < 0.1")["k"].tolist() == [0.0]
+    columns = {name.rpartition(".")[0] for name in table if name.startswith("request_")}
+    velocities = {"VM", "VX", "VY", "VZ", "WM", "WX", "WY", "WZ"}
+    places = {"DM", "DX", "DY", "DZ", "PSI", "THETA", "PHI"}
+    assert columns == {"request_1.F2", *(f"request_2.{n}" for n in velocities), *(f"request_3.{n}" for n in places)}
+
+
 def test_impossible_values_of_a_deck_come_before_any_case(tmp_path):
     plan = make_plan(DeckSubject(DECK, {"mass": 1.0}, end=1.0), [Factor("mass", -1.0, 4.0)], "grid", unit=2)
     with pytest.raises(CampaignError, match=says("2", "mass = -1", "0", "MASS = -1.0")):

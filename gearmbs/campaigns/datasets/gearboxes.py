@@ -195,10 +195,10 @@ class Gearbox:
         """Return the individuals: flanks and run-out of all wheels, backlash, and the housing's modes."""
         errors: dict[str, Any] = {}
         for name, mesh in self.tables["meshes"].items():
-            errors |= _spread(mesh, f"meshes.{name}")
+            errors |= self._spread(mesh, f"meshes.{name}")
         for name, housing in self.tables.get("housings", {}).items():
             for mode, table in housing.get("modes", {}).items():
-                errors |= _spread(table, f"housings.{name}.modes.{mode}")
+                errors |= self._spread(table, f"housings.{name}.modes.{mode}")
         faults = []
         for name in self.tables["meshes"]:
             for wheel in ("driver", "driven"):
@@ -207,15 +207,15 @@ class Gearbox:
                 faults.append({**where, "kind": "eccentricity", "amount": RUN_OUT, "phase": (0.0, 6.283)})
         return Specimens(count, errors, tuple(faults), seed=seed)
 
-
-def _spread(table: Mapping[str, Any], path: str) -> dict[str, tuple[float, float]]:
-    """Return the ranges of those entries of a table that vary from specimen to specimen, in SI."""
-    found = {}
-    for name, (low, high) in SPREAD.items():
-        if name in table:
-            value = float(to_si(table[name], "length" if name == "backlash" else "1"))
-            found[f"{path}.{name}"] = (low * value, high * value)
-    return found
+    def _spread(self, table: Mapping[str, Any], path: str) -> dict[str, tuple[float, float]]:
+        """Return the ranges of those entries of a table that vary from specimen to specimen, in SI."""
+        found, subject = {}, DrivetrainSubject(self.tables)
+        for name, (low, high) in SPREAD.items():
+            if name in table:
+                field = f"{path}.{name}"
+                value = float(to_si(table[name], subject.unit_of(field), field))
+                found[field] = (low * value, high * value)
+        return found
 
 
 GEARBOXES = {

@@ -56,6 +56,7 @@ def satisfied(
     given: Mapping[str, np.ndarray],
     unit_of: Callable[[str], str] = lambda name: "",
     results: Iterable[str] = (),
+    empty: Mapping[str, np.ndarray] | None = None,
 ) -> np.ndarray:
     """Return which rows of a table satisfy a constraint.
 
@@ -68,6 +69,8 @@ def satisfied(
         Returns the unit of a column by its name, "" or "1" where it has none, in which quantities are read.
     results : iterable of str, optional
         Columns of which NaN stands for a number that is not known: what is compared with it is neither so nor not so.
+    empty : mapping of str to ndarray, optional
+        In which rows a column is empty, whatever stands there: the same is true of it.
 
     Raises
     ------
@@ -78,7 +81,7 @@ def satisfied(
         raise CampaignError(f"constraint {text!r}: give a text, as 'operation.torque <= 100'")
     written, columns = _as_names(text, given)
     names = {stand_in: name for stand_in, values in columns.items() for name in given if given[name] is values}
-    results = set(results)
+    results, empty = set(results), empty or {}
     try:
         tree = ast.parse(written, mode="eval").body
     except SyntaxError as error:
@@ -92,6 +95,7 @@ def satisfied(
             for stand_in, values in columns.items()
             if names.get(stand_in) in results and _is_number(values)
         }
+        missing |= {stand_in: empty[name] for stand_in, name in names.items() if name in empty}
         result = np.asarray(_value(_in_units(tree, columns, names, unit_of, text), columns, text, missing))
     except TypeError:
         about = ", ".join(f"{name} has {_kind(given[name]) or 'neither'}" for name in names_in(text, given))

@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gearmbs.campaigns.plans.paths import entries_of, entry_of, get_path, holds_several, set_entry, set_path
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.settings import whole as whole_number
 from gearmbs.campaigns.subjects.base import Subject
@@ -222,7 +223,7 @@ class Choice:
     def ranges(self) -> dict[str, list[str]]:
         """Names of the entries of each option that are ranges."""
         return {
-            name: [k for k, v in _entries(table) if _is_range(v) and not _are_words(v)]
+            name: [k for k, v in entries_of(table) if _is_range(v) and not _are_words(v)]
             if isinstance(table, Mapping)
             else []
             for name, table in self.options.items()
@@ -268,7 +269,7 @@ class Choice:
                 )
             if isinstance(table, Mapping):
                 table = copy.deepcopy(dict(table))
-                for key, value in _entries(table):
+                for key, value in entries_of(table):
                     if section:
                         subject.unit_of(f"{self.path}.{key.partition('.')[0]}")
                     if _is_range(value):
@@ -277,9 +278,27 @@ class Choice:
                             raise CampaignError(
                                 f"{self.path}.{name}.{key} = {value!r}: it has no unit here; give two numbers"
                             )
-                        _set_entry(table, key, _range_in_si(value, unit, f"{self.path}.{name}.{key}"))
+                        set_entry(table, key, _range_in_si(value, unit, f"{self.path}.{name}.{key}"))
             options[name] = list(table) if isinstance(table, tuple) else table
-        return Choice(self.path, options, self.crossed, self.name, section)
+        made = Choice(self.path, options, self.crossed, self.name, section)
+        made.check_severity()
+        return made
+
+    def check_severity(self) -> None:
+        """Refuse a choice of which another column has the name of that of the severity.
+
+        Raises
+        ------
+        CampaignError
+        """
+        mine = {self.name, *(f"{self.name}.{key}" for keys in self.ranges.values() for key in keys)}
+        if self.severity in mine:
+            which = "its own" if self.severity == self.name else f"that of its range {self.severity!r}"
+            remedy = "give it another name, name='...'" if self.name == self.path else "leave its name out"
+            raise CampaignError(
+                f"choice {self.name!r}: its column {self.severity!r}, where in its range the first of an option lies, "
+                f"has the name of {which}; {remedy}, or rename what is called severity"
+            )
 
     def unit_of_entry(self, subject: Subject, table: Mapping[str, Any], key: str) -> str:
         """Return the SI unit of an entry of an option's table, by its key, or by the path to it in tables within."""
@@ -338,7 +357,7 @@ class Choice:
             places = [0.5] * (self.width - 1)
             for place, key in enumerate(keys):
                 low, high = get_path(self.options[name], key)
-                given = _entry(table, key)
+                given = entry_of(table, key)
                 if not (all(isinstance(v, (int, float)) for v in (given, low, high)) and low <= given <= high):
                     break
                 whole = isinstance(low, int) and isinstance(high, int)
@@ -356,12 +375,12 @@ class Choice:
             for key in self.ranges[name]:
                 value = float(row[f"{self.name}.{key}"])
                 low, high = get_path(table, key)
-                _set_entry(chosen, key, int(value) if isinstance(low, int) and isinstance(high, int) else value)
+                set_entry(chosen, key, int(value) if isinstance(low, int) and isinstance(high, int) else value)
             for path, found in {f"{self.path}.{k}": v for k, v in chosen.items()}.items() if self.section else ():
-                several = isinstance(found, Mapping) and _holds_several(data, path)
+                several = isinstance(found, Mapping) and holds_several(data, path)
                 set_path(data, path, [found] if several else found)
             if not self.section:
-                set_path(data, self.path, [chosen] if _holds_several(data, self.path) else chosen)
+                set_path(data, self.path, [chosen] if holds_several(data, self.path) else chosen)
         else:
             set_path(data, self.path, table)
 
@@ -499,58 +518,6 @@ def choose(path: str, *, crossed: bool = False, name: str = "", **options: Any) 
     2
     """
     return Choice(path, options, crossed, name)
-
-
-def get_path(data: Mapping[str, Any], path: str) -> Any:
-    """Return a field of nested data by its path; None where there is none."""
-    *sections, name = path.split(".")
-    for section in sections:
-        data = data.get(section, {})
-    return data.get(name)
-
-
-def _entries(table: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Return the entries of a table and of tables within it, these by paths."""
-    found = []
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            found += [(f"{key}.{inner}", entry) for inner, entry in _entries(value)]
-        else:
-            found.append((key, value))
-    return found
-
-
-def _entry(table: Any, key: str) -> Any:
-    """Return an entry of a table, or of one within, alone in a list or not, by its path; None where there is none."""
-    for name in key.split("."):
-        table = table[0] if isinstance(table, list | tuple) and len(table) == 1 else table
-        table = table.get(name) if isinstance(table, Mapping) else None
-    return table
-
-
-def _set_entry(table: dict[str, Any], key: str, value: Any) -> None:
-    """Set an entry of a table, or of a table within, by its path."""
-    *outer, last = key.split(".")
-    for name in outer:
-        table = table[name]
-    table[last] = value
-
-
-def _holds_several(data: Mapping[str, Any], path: str) -> bool:
-    """Whether a field of nested data is a list, as that of faults is, which may not be there where there are none."""
-    *sections, name = path.split(".")
-    for section in sections:
-        data = data.get(section, {})
-    return name not in data or isinstance(data[name], list | tuple)
-
-
-def set_path(data: dict[str, Any], path: str, value: Any) -> None:
-    """Set a field of nested data by its path; the sections on the way are copied, not changed."""
-    *sections, name = path.split(".")
-    for section in sections:
-        data[section] = dict(data.get(section, {}))
-        data = data[section]
-    data[name] = value
 
 
 def check_kinds(values: Sequence[Any], where: str) -> None:

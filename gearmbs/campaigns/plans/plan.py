@@ -23,9 +23,8 @@ from gearmbs.campaigns.plans.factors import (
     Specimens,
     factor_from,
     factor_table,
-    get_path,
-    set_path,
 )
+from gearmbs.campaigns.plans.paths import get_path, set_path
 from gearmbs.campaigns.settings import CampaignError, content_key
 from gearmbs.campaigns.subjects.base import SignalSpec, Subject, make_subject
 from gearmbs.files import python_scalar
@@ -324,8 +323,18 @@ class Plan:
         """Return which rows satisfy all constraints."""
         good = np.ones(len(columns["point"]), dtype=bool)
         for text in self.constraints:
-            good &= satisfied(text, columns, self.unit_of)
+            good &= satisfied(text, columns, self.unit_of, empty=self.empty(columns))
         return good
+
+    def empty(self, columns: Columns) -> dict[str, np.ndarray]:
+        """Return in which rows columns of the plan are empty: what a row leaves out, ranges that an option has not."""
+        if self.design == "list":
+            here = [self.options["rows"][int(point)] for point in columns["point"]]
+            names = {name for row in self.options["rows"] for name in row} & {*columns}
+            return {name: np.array([name not in row for row in here]) for name in names}
+        choices = [factor for factor in self.factors if isinstance(factor, Choice)]
+        ranges = [f"{choice.name}.{key}" for choice in choices for keys in choice.ranges.values() for key in keys]
+        return {name: np.isnan(columns[name]) for name in ranges if name in columns}
 
     def unit_of(self, name: str) -> str:
         """Return the unit of a column, "1" or "" where it has none."""

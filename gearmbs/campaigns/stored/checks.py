@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import shutil
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
+from contextlib import suppress
 from pathlib import Path
 
-from gearmbs.campaigns.folder import FOLDERS, Folder, sound_plan, write_cases, write_plan
+from gearmbs.campaigns.folder import FOLDERS, Folder, is_record, sound_plan, write_cases, write_plan
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.signals import check_store, shard, write_store
 from gearmbs.studies.run.claims import owner
@@ -30,10 +31,11 @@ def check_folder(folder: Folder, units: Iterable[int] | None = None, *, sweep: b
     """
     found = _check_plan(folder, sweep)
     wanted = None if units is None else set(units)
+    partial = _partial(folder)
     for unit in folder.done():
         if wanted is not None and unit not in wanted:
             continue
-        wrong = check_unit(folder, unit)
+        wrong = check_unit(folder, unit, partial)
         if wrong:
             found.append(f"unit {unit}: {wrong}")
             if sweep:
@@ -77,8 +79,11 @@ def _check_plan(folder: Folder, sweep: bool) -> list[str]:
     return found
 
 
-def check_unit(folder: Folder, unit: int) -> str:
-    """Return what is wrong with the files of a unit, nothing if they are as the ledger says."""
+def check_unit(folder: Folder, unit: int, partial: Set[str] = frozenset()) -> str:
+    """Return what is wrong with the files of a unit, nothing if they are as the ledger says.
+
+    No record may have one of the digests ``partial``: those of what failed attempts had computed.
+    """
     try:
         entry = folder.entry(unit)
     except CampaignError:
@@ -86,7 +91,24 @@ def check_unit(folder: Folder, unit: int) -> str:
     places = {name: shard(folder.signals, name, unit) for name in entry["digests"]} | {"table": folder.table(unit)}
     wrong = [name for name, digest in entry["digests"].items() if file_digest(places[name]) != digest]
     wrong += [name for name, digest in entry["files"].items() if file_digest(folder.path / name) != digest]
+    if broken := [name for name, digest in entry["files"].items() if is_record(name) and digest in partial]:
+        return f"{', '.join(broken)} is what a failed attempt had computed"
     return f"{', '.join(wrong)} not as the ledger says" if wrong else ""
+
+
+def _partial(folder: Folder) -> set[str]:
+    """Return the digests of what failed attempts had computed, here and in the campaigns whose results may be here."""
+    if "record" not in folder.plan.keep or not folder.plan.reuse:
+        return set()
+    found = set()
+    for path in [str(folder.path), *folder.plan.reuse]:
+        with suppress(CampaignError):
+            source = Folder(path)
+            for unit in source.done():
+                with suppress(CampaignError):
+                    files = source.entry(unit)["files"]
+                    found |= {digest for name, digest in files.items() if not is_record(name)}
+    return found
 
 
 def file_digest(path: Path) -> str:

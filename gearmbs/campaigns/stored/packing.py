@@ -164,6 +164,11 @@ def _write_unit(folder: Folder, packed: Folder, unit: int) -> None:
         "started": min(part["started"] for part in parts),
         "digests": digests,
     }
+    # ledgers of earlier versions do not say it, and then nobody knows it of all
+    if all("tightened" in part for part in parts):
+        entry["tightened"] = [index for part in parts for index in part["tightened"]]
+    else:
+        entry.pop("tightened", None)
     write_whole(packed.ledger(unit), sealed(entry), durable=store)
 
 
@@ -179,7 +184,7 @@ def _verify(folder: Folder, packed: Folder) -> None:
         units = _sources(folder, packed, unit)
         wrong = check_unit(packed, unit)
         planned = [row for former in units for row in folder.cases(former)]
-        if not wrong and [row | {"unit": 0} for row in packed.cases(unit)] != [row | {"unit": 0} for row in planned]:
+        if not wrong and _told(packed.cases(unit)) != _told(planned):
             wrong = "the plan gives other cases with this version"
         if not wrong and not packed.unit_table(unit).to_pandas().equals(_table(folder, packed, unit).to_pandas()):
             wrong = "the table differs"
@@ -193,3 +198,8 @@ def _verify(folder: Folder, packed: Folder) -> None:
                 f"pack: {packed.store}: unit {unit}: {wrong} when it is read back; the former units stand as they are, "
                 "pack again where the disk is sound"
             )
+
+
+def _told(rows: list[dict[str, Any]]) -> list[str]:
+    """Return rows as texts that tell all but their units: what an option has no range for is NaN, which equals none."""
+    return [repr(row | {"unit": 0}) for row in rows]

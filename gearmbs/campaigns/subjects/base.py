@@ -156,6 +156,10 @@ class Subject(ABC):
         """Return the unit of a number that is kept, "" where it has none or the subject does not know it."""
         return ""
 
+    def as_simulated(self, thing: Any, keep: Sequence[str]) -> Any:
+        """Return the thing as it is simulated for ``keep``: whatever changes the numbers belongs to its content."""
+        return thing
+
     # what is simulated, and what a run of it leaves for `reduce`, are each subject's own
     @abstractmethod
     def check(self, data: dict[str, Any], name: str) -> Any:
@@ -175,7 +179,7 @@ class Subject(ABC):
     def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Simulate and return a record; ``progress`` is called often and may raise to stop the run.
 
-        What `reduce` does not need for ``keep`` may be left out of the record.
+        What `reduce` does not need for ``keep`` may be left out of the record; the rest is the same whatever is kept.
         """
 
     @abstractmethod
@@ -262,11 +266,27 @@ def as_numbers(found: Mapping[Any, Any], item: str) -> dict[str, float]:
     """
     numbers = {}
     for name, value in found.items():
+        check_real(value, f"{item} returned {name}")
         try:
             numbers[str(name)] = float(value)
         except (TypeError, ValueError):
             raise CampaignError(f"{item} returned {name} = {value!r:.60}, which is no number; return one") from None
     return numbers
+
+
+def check_real(value: Any, what: str) -> None:
+    """Refuse complex numbers, of which the real part alone would be kept.
+
+    Raises
+    ------
+    CampaignError
+    """
+    if np.iscomplexobj(value):
+        shown = f" = {complex(value)}" if np.ndim(value) == 0 else ""
+        raise CampaignError(
+            f"{what}{shown}: complex, which no number that is kept may be; return its amplitude, or its real and imaginary "
+            "parts by names of their own"
+        )
 
 
 def check_keep(subject: Subject, keep: Sequence[str]) -> None:

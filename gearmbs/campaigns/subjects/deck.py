@@ -308,15 +308,19 @@ def _number(text: str) -> bool:
 
 
 def requests_of(result: Any) -> dict[str, np.ndarray]:
-    """Return the columns of the requests of a deck's result, by ``request_NUMBER.COLUMN``; those that are zero are
-    left out."""
-    data = result.to_dataset()
+    """Return the columns of the requests of a deck's result, by ``request_NUMBER.COLUMN``: those that are asked for,
+    and others that are not zero throughout."""
+    from gearmbs.adams.parse.statements import Request
+    from gearmbs.adams.results.requests import request_texts
+
+    data, requests = result.to_dataset(), result.deck.of(Request)
     found = {}
     for name in data.data_vars:
         if not str(name).startswith("request_"):
             continue
+        asked = request_texts(requests[int(str(name).removeprefix("request_"))])
         for k, column in enumerate(data[f"{name}_column"].values):
             values = np.asarray(data[name].values[:, k], dtype=float)
-            if values.any():
+            if asked[k] is not None or values.any():
                 found[f"{name}.{column}"] = values
     return found

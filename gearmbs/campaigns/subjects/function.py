@@ -16,6 +16,7 @@ from gearmbs.campaigns.subjects.base import (
     SignalSpec,
     Subject,
     as_numbers,
+    check_real,
     imported,
     kept_by_functions,
 )
@@ -169,6 +170,7 @@ class FunctionSubject(Subject):
                 name = item.removeprefix("signal:")
                 if name not in items:
                     raise CampaignError(f"{self.function} returned no {name!r}, which is to be kept as a signal")
+                check_real(items[name], f"{self.function} returned the signal {name}")
                 kept.signals[name] = np.atleast_2d(np.asarray(items[name], dtype=float))
         if not (kept.numbers or kept.signals or "record" in keep):
             told = ", ".join(f"{k} is {_described(v)}" for k, v in items.items()) or "it is empty"

@@ -147,6 +147,12 @@ class PairSubject(Subject):
         check_record(case, name)
         return case
 
+    def as_simulated(self, thing: Case, keep: Sequence[str]) -> Case:
+        """Return the case with the length of its record where that is not as its motion takes."""
+        if thing.is_auto and not PERIODIC.issuperset(keep):
+            return thing.changed(operation={"duration": thing.operation.longest})
+        return thing
+
     def canonical(self, thing: Case) -> dict[str, Any]:
         """Return the content of a case; see `canonical_case`."""
         return canonical_case(thing)
@@ -155,9 +161,8 @@ class PairSubject(Subject):
         """Return the record of a case."""
         from gearmbs.studies.run.simulation import run_case
 
+        thing = self.as_simulated(thing, keep)
         operation = thing.operation
-        if thing.is_auto and not PERIODIC.issuperset(keep):
-            thing = thing.changed(operation={"duration": operation.longest})
         span = operation.run_up + operation.settling + operation.longest
         return run_case(thing, lambda t: progress(t / span), variables=variables_for(keep))
 
@@ -295,18 +300,11 @@ def contact_numbers(case: Case, record: Any) -> dict[str, float]:
     """Return numbers of contact and transmission error.
 
     ``force.mean``, ``force.max`` (N), ``penetration.max`` (m), ``two_flanks`` (share of the time with contact on the
-    coast flank), ``error.mean``, ``error.peak_to_peak`` and its mesh harmonics' amplitudes ``error.K`` (m).
+    coast flank), ``error.mean``, ``error.peak_to_peak`` and its mesh harmonics' amplitudes ``error.K`` (m), which a
+    record of changing speed has not.
     """
     force, error = record["normal_force"].values, record["transmission_error"].values
-    rate, gmf = case.output_rate, case.mesh_frequency
-    # a record of whole periods may be a sample short of the last one
-    count = int(np.floor((error.size + 1) * gmf / rate) / gmf * rate)
-    t = np.arange(count) / rate
-    swing = error[:count] - error[:count].mean()
-    amplitudes = {
-        f"error.{k}": float(2.0 * np.abs(np.mean(swing * np.exp(-2j * np.pi * k * gmf * t))))
-        for k in range(1, FIRST_ORDERS + 1)
-    }
+    amplitudes = {} if case.operation.speed_curve else error_harmonics(case, error)
     return {
         "force.mean": float(force.mean()),
         "force.max": float(force.max()),
@@ -315,6 +313,19 @@ def contact_numbers(case: Case, record: Any) -> dict[str, float]:
         "error.mean": float(error.mean()),
         "error.peak_to_peak": float(np.ptp(error)),
         **amplitudes,
+    }
+
+
+def error_harmonics(case: Case, error: np.ndarray) -> dict[str, float]:
+    """Return the amplitudes of the mesh harmonics of a transmission error at one speed, m."""
+    rate, gmf = case.output_rate, case.mesh_frequency
+    # a record of whole periods may be a sample short of the last one
+    count = int(np.floor((error.size + 1) * gmf / rate) / gmf * rate)
+    t = np.arange(count) / rate
+    swing = error[:count] - error[:count].mean()
+    return {
+        f"error.{k}": float(2.0 * np.abs(np.mean(swing * np.exp(-2j * np.pi * k * gmf * t))))
+        for k in range(1, FIRST_ORDERS + 1)
     }
 
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from gearmbs.campaigns.settings import CampaignError, by_name
+from gearmbs.campaigns.plans.paths import set_path
+from gearmbs.campaigns.settings import CampaignError, by_name, content_key
 from gearmbs.campaigns.subjects.base import (
     FAILED,
     Kept,
@@ -23,7 +24,7 @@ from gearmbs.campaigns.subjects.base import (
     tooth_fault_unit,
 )
 from gearmbs.schema.described import check_keys, chosen, measures_of, read_toml
-from gearmbs.units import si_unit, to_si
+from gearmbs.units import readings, si_unit, to_si
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +36,8 @@ if TYPE_CHECKING:
 class TablesSubject(Subject):
     """Nested tables, as of a TOML file, whose entries factors change: ``"meshes.stage 1.backlash"``.
 
-    A factor has the unit of the table's own entry; entries that are plain numbers, or not there, take numbers in SI.
+    A factor has a unit if the table's own entry is a text with one: that in which the part takes plain numbers, rad/s
+    for a speed of "25 Hz". Entries that are plain numbers, or not there, take numbers in SI.
 
     Parameters
     ----------
@@ -45,6 +47,7 @@ class TablesSubject(Subject):
 
     def __init__(self, tables: Mapping[str, Any]) -> None:
         self.tables = copy.deepcopy(by_name(tables, "tables"))
+        self._units: dict[str, str] = {}
 
     @classmethod
     def from_file(cls, path: str | Path) -> TablesSubject:
@@ -79,7 +82,39 @@ class TablesSubject(Subject):
             place = place[section]
         if not isinstance(place, Mapping):
             raise CampaignError(f"{path}: {'.'.join(sections)} has no {name!r}; it is no table")
-        return si_unit(place.get(name)) or "1"
+        return self._unit_of_numbers(path, place.get(name))
+
+    def _unit_of_numbers(self, path: str, given: Any) -> str:
+        """Return in which unit the part takes plain numbers for an entry that has a text, "1" for others.
+
+        Raises
+        ------
+        CampaignError
+            If the text may be read in several, and the tables cannot tell in which.
+        """
+        found = readings(given)
+        if len(found) < 2:
+            return next(iter(found), "1")
+        if (name := path.rpartition(".")[2]) in AS_THEY_ARE:
+            return AS_THEY_ARE[name]
+        if path not in self._units:
+            keys, wrong = {}, ""
+            for reading, value in {"": given, **found}.items():
+                tables = self.base()
+                set_path(tables, path, value)
+                try:
+                    keys[reading] = content_key(self.kind, self.canonical(self.check(tables, "base")))
+                except (ValueError, TypeError) as error:
+                    wrong = wrong or f": {error}"
+            own = keys.pop("", None)
+            unit = next((unit for unit, key in keys.items() if key == own), None)
+            if unit is None:
+                raise CampaignError(
+                    f"{path} = {given!r}: may stand for {' or '.join(found)}, and the base does not tell which{wrong}; "
+                    "give it a plain number in SI"
+                )
+            self._units[path] = unit
+        return self._units[path]
 
     def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
         """Return the SI unit of a parameter of a fault of a tooth."""
@@ -142,6 +177,9 @@ class TablesSubject(Subject):
         return super().explain(error)
 
 
+AS_THEY_ARE = {"slow_speed": "rad/s", "mount_frequency": "Hz"}
+"""Units of plain numbers of entries that the content of a thing may hold as they were given."""
+
 RESULT_UNITS = {
     "transmission_error": "m",
     "normal_force": "N",
@@ -184,7 +222,8 @@ def in_si(tree: Any) -> Any:
 class DrivetrainSubject(TablesSubject):
     """Drivetrains of a TOML file, rolling bearings and faults of teeth included.
 
-    Keeps ``harmonics`` (``SIGNAL.MESH.K``: RMS of the mesh harmonics of mesh forces, bearing forces and sensors),
+    Keeps ``harmonics`` (``SIGNAL.MESH.K``: RMS of the mesh harmonics of mesh forces, bearing forces and sensors; none
+    where the speed changes),
     ``forces`` (mean, RMS, least and largest normal force, transmission error and pairs in contact of each mesh, and
     force of each bearing), ``signal:NAME`` of a sensor, and ``record``.
     """
@@ -238,7 +277,8 @@ class DrivetrainSubject(TablesSubject):
     def reduce(self, thing: Description, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
         kept = kept_by_functions(keep, record)
-        if "harmonics" in keep:
+        # of changing speed, at which it has no one frequency, a record has other harmonics at each moment
+        if "harmonics" in keep and "mesh_rms" in record:
             levels = record["mesh_rms"].transpose("signal", "mesh", "harmonic")
             for (i, j, k), value in np.ndenumerate(levels.values):
                 name = f"{levels.signal.values[i]}.{levels.mesh.values[j]}.{k + 1}"
