@@ -8,6 +8,7 @@ manual's pages on the dialog boxes of the simplified method.
 from __future__ import annotations
 
 import math
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.adams.view.deckmaker import Deckmaker, Made
@@ -194,13 +195,22 @@ def _pair(m: Deckmaker, item: Item, wheels: list[Item]) -> GearPair:
             play = m.radian * _number(m.values, item, "backlash_angle", 0.0) * driver.base_radius
         else:
             play = m.db.units.si("length") * _number(m.values, item, "backlash_length", 0.0)
-        contact_ratio = GearPair(driver, driven, backlash=play).contact_ratio
+        # what the first of them warns of is said of the second
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            contact_ratio = GearPair(driver, driven, backlash=play).contact_ratio
         law = ContactLaw.linear(
             stiffness / contact_ratio, ratio * stiffness / contact_ratio, driver.base_radius / sharpness
         )
-        return GearPair(driver, driven, backlash=play, contact=law)
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            pair = GearPair(driver, driven, backlash=play, contact=law)
     except ValueError as error:
         raise ViewError(f"its wheels: {error}; give others, or build the pair in Python") from error
+    for one in warned:
+        if issubclass(one.category, UserWarning):
+            m.remark(item, str(one.message))
+    return pair
 
 
 def make_force(m: Deckmaker, item: Item) -> None:

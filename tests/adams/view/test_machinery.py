@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -170,3 +172,14 @@ def test_wheels_too_far_apart_are_refused():
     text = wheels().replace("location = 60, 0, 5", "location = 61, 0, 5")
     with pytest.raises(DeckError, match=says("61 mm", "60 mm")):
         run_deck(parse_view(text), end=1e-4, steps=1, check=False)
+
+
+def test_what_the_pair_warns_of_is_a_remark_at_its_line():
+    """Not a warning of Python, from a line that the user did not write; stiffer teeth have none."""
+    text = wheels().replace("contact_stiffness real_value = 1.0E+05", "contact_stiffness real_value = 100")
+    at = 1 + text[: text.index("instance_name = .m.TEETH")].count("\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        said = [d.line for d in parse_view(text).deck.diagnostics if "foul" in d.message]
+        assert not [d for d in parse_view(wheels()).deck.diagnostics if "foul" in d.message]
+    assert said == [at]
