@@ -269,7 +269,9 @@ class Values:
             if key in item.fields:
                 values = self.values(item, key)
                 if key == "object_value":
-                    values = [one if isinstance(one, Item) else self.db.find(one) or one for one in values if one != ""]
+                    values = [
+                        (self.db.find(one) or one) if isinstance(one, str) else one for one in values if one != ""
+                    ]
                 return values[0] if len(values) == 1 else values
         return 0
 

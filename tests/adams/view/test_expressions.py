@@ -262,3 +262,11 @@ def test_limits_without_a_value_are_remarked():
     view = parse_view(PENDULUM + text, variables={"Q": 2.0})
     assert view.variables[".swing.Q"] == 2.0
     assert any("NOPE" in d.message and "limits" in d.message for d in view.deck.diagnostics)
+
+
+@pytest.mark.parametrize("held", ["3.5", "(3.5)", "(eval(7))", "{1, 2}"])
+def test_an_object_that_is_a_number_is_refused_where_an_object_is_needed(held):
+    text = f"variable create variable_name = .swing.WHICH object_value = {held}\n"
+    assert not parse_view(PENDULUM + text).deck.unsupported
+    marker = "marker create marker_name = .swing.ROD.M location = (LOC_RELATIVE_TO({0, 0, 0}, .swing.WHICH))\n"
+    assert len(parse_view(PENDULUM + text + marker).deck.unsupported) == 1
