@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_view, run_deck
+from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.parse import statements as st
 from tests.says import says
 
@@ -178,8 +179,14 @@ def test_what_the_pair_warns_of_is_a_remark_at_its_line():
     """Not a warning of Python, from a line that the user did not write; stiffer teeth have none."""
     text = wheels().replace("contact_stiffness real_value = 1.0E+05", "contact_stiffness real_value = 100")
     at = 1 + text[: text.index("instance_name = .m.TEETH")].count("\n")
+
+    def fouling(diagnostics):
+        return [d.line for d in diagnostics if "foul" in d.message]
+
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        said = [d.line for d in parse_view(text).deck.diagnostics if "foul" in d.message]
-        assert not [d for d in parse_view(wheels()).deck.diagnostics if "foul" in d.message]
-    assert said == [at]
+        view, deck = parse_view(text), parse_deck(parse_view(text).text)
+        assert not fouling(parse_view(wheels()).deck.diagnostics)
+        assert fouling(view.deck.diagnostics) == [at]
+        assert fouling(bound(view.deck).diagnostics) == [at]
+        assert fouling(bound(deck).diagnostics) == [next(iter(deck.of(st.Gforce).values())).line]
