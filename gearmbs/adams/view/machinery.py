@@ -189,24 +189,24 @@ def _pair(m: Deckmaker, item: Item, wheels: list[Item]) -> GearPair:
         )
     stiffness *= m.db.units.si("force") / m.db.units.si("length")
     ratio *= m.db.units.si("time")
-    try:
-        driver, driven = (_wheel(m, one) for one in wheels)
-        if str(_held(m.values, item, "backlash_type", "angle")).lower() == "angle":
-            play = m.radian * _number(m.values, item, "backlash_angle", 0.0) * driver.base_radius
-        else:
-            play = m.db.units.si("length") * _number(m.values, item, "backlash_length", 0.0)
-        # what the first of them warns of is said of the second
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            contact_ratio = GearPair(driver, driven, backlash=play).contact_ratio
-        law = ContactLaw.linear(
-            stiffness / contact_ratio, ratio * stiffness / contact_ratio, driver.base_radius / sharpness
-        )
-        with warnings.catch_warnings(record=True) as warned:
-            warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        try:
+            driver, driven = (_wheel(m, one) for one in wheels)
+            if str(_held(m.values, item, "backlash_type", "angle")).lower() == "angle":
+                play = m.radian * _number(m.values, item, "backlash_angle", 0.0) * driver.base_radius
+            else:
+                play = m.db.units.si("length") * _number(m.values, item, "backlash_length", 0.0)
+            # of a law of its own: what is warned of is said of that of the file
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                contact_ratio = GearPair(driver, driven, backlash=play).contact_ratio
+            law = ContactLaw.linear(
+                stiffness / contact_ratio, ratio * stiffness / contact_ratio, driver.base_radius / sharpness
+            )
             pair = GearPair(driver, driven, backlash=play, contact=law)
-    except ValueError as error:
-        raise ViewError(f"its wheels: {error}; give others, or build the pair in Python") from error
+        except ValueError as error:
+            raise ViewError(f"its wheels: {error}; give others, or build the pair in Python") from error
     for one in warned:
         if issubclass(one.category, UserWarning):
             m.remark(item, str(one.message))
