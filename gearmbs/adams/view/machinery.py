@@ -230,6 +230,14 @@ def make_force(m: Deckmaker, item: Item) -> None:
         wheels.append(one)
     pair = _pair(m, item, wheels)
     parts = [m.db.items[f"{one.path}.gear_part".lower()] for one in wheels]
+    (turned, place), (_, other) = (m.values.pose(part) for part in parts)
+    apart = m.db.units.si("length") * abs(float(turned[:, 2] @ (other - place)))
+    # whichever end of its face the marker of a wheel is at
+    if not apart < pair.driver.face_width + pair.driven.face_width:
+        raise ViewError(
+            f"its wheels are {apart * 1e3:.4g} mm apart along the axis of the first one, more than they are wide; move "
+            "their ref_marker"
+        )
     ends = [m.new_marker(item, part, *m.values.pose(part)) for part in parts]
     floating = m.fresh("MARKER")
     m.statements.append(Made(f"MARKER/{floating}", (m.owner_argument(parts[1]), "FLOATING"), "", item.line))

@@ -175,6 +175,14 @@ def test_wheels_too_far_apart_are_refused():
         run_deck(parse_view(text), end=1e-4, steps=1, check=False)
 
 
+def test_wheels_that_have_no_face_in_common_are_refused():
+    """Along the axes the program has both wheels where the first one is."""
+    text = wheels().replace("location = 60, 0, 5", "location = 60, 0, {}")
+    with pytest.raises(DeckError, match=says("30 mm", "ref_marker")):
+        run_deck(parse_view(text.format(35)), end=1e-4, steps=1, check=False)
+    assert run_deck(parse_view(text.format(15)), end=1e-4, steps=1, check=False).success
+
+
 def test_what_the_pair_warns_of_is_a_remark_at_its_line():
     """Not a warning of Python, from a line that the user did not write; stiffer teeth have none."""
     text = wheels().replace("contact_stiffness real_value = 1.0E+05", "contact_stiffness real_value = 100")
