@@ -7,6 +7,7 @@ import importlib
 import inspect
 import runpy
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from gearmbs.adams.builders.forces import bind_mforce
 from gearmbs.adams.builders.machinery import is_gear_force, is_pair
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall, callable_with_call
-from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck, without_refused
 from gearmbs.mechanism.language.syntax import Call, Negative, Node, Number, parse
@@ -209,10 +210,16 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
         refused = f"{statement.label()}: FUNCTION is not supported"
         made.diagnostics = [d for d in made.diagnostics if not d.message.startswith(refused)]
         try:
-            found, missing = _found(use, known)
+            with warnings.catch_warnings(record=True) as warned:
+                warnings.simplefilter("always")
+                found, missing = _found(use, known)
         except ValueError as error:
             problems.append(_wrong(deck, statement, error))
             continue
+        for told in (str(one.message) for one in warned):
+            # a command file has said it at a line of its own
+            if not any(d.message.endswith(told) for d in made.diagnostics):
+                made.diagnostics.append(Diagnostic(WARNING, f"{statement.label()}: {told}", deck.file, statement.line))
         if missing:
             word, are = ("routine", "is") if len(missing) == 1 else ("routines", "are")
             message = f"{statement.label()}: its {word} {', '.join(missing)} {are} missing; give it in routines"

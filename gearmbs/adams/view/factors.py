@@ -8,6 +8,7 @@ from typing import Any
 
 from gearmbs.adams.errors import ERROR, WARNING, DeckError, Diagnostic
 from gearmbs.adams.view.interpreter import Interpreter
+from gearmbs.adams.view.lexer import ViewError
 from gearmbs.adams.view.model import Item
 
 ROUNDING = 1e-9
@@ -36,15 +37,26 @@ def checked(variables: Mapping[str, Any] | None, file: str) -> dict[str, float]:
     return found
 
 
-def listed(run: Interpreter) -> dict[str, float]:
-    """Return the variables of one number each, real or whole, by their full names."""
-    values = {}
+def listed(run: Interpreter, file: str) -> tuple[dict[str, float], list[Diagnostic]]:
+    """Return the variables of one number each, real or whole, by their full names, and a remark on each without one.
+
+    A variable whose expression has no value may stand in a file: it is refused where something of the model needs it.
+    """
+    values: dict[str, float] = {}
+    remarks = []
     for item in run.database.of("variable"):
-        numeric = item.line and item.fields.keys() & {"real_value", "integer_value"}
-        value = run.values.variable(item) if numeric else None
+        key = next((key for key in ("real_value", "integer_value") if key in item.fields), None)
+        if not item.line or key is None:
+            continue
+        try:
+            value = run.values.variable(item)
+        except ViewError as error:
+            line = error.line or item.fields[key].line
+            remarks.append(Diagnostic(WARNING, f"variable {item.path} has no value: {error}", file, line))
+            continue
         if isinstance(value, (int, float)):
             values[item.path] = float(value)
-    return values
+    return values, remarks
 
 
 def outside(run: Interpreter, file: str) -> list[Diagnostic]:
@@ -53,7 +65,11 @@ def outside(run: Interpreter, file: str) -> list[Diagnostic]:
     for name, paths in run.overridden.items():
         for path in sorted(paths):
             item, value = run.database.items.get(path.lower()), run.overrides[name]
-            if item is not None and (limits := _limits(run, item, value)):
+            try:
+                limits = "" if item is None else _limits(run, item, value)
+            except ViewError as error:
+                limits = f"taken without its limits, which have no value: {error}"
+            if item is not None and limits:
                 found.append(Diagnostic(WARNING, f"variables: {path} = {value:g} is {limits}", file, item.line))
     return found
 

@@ -16,6 +16,7 @@ from gearmbs.adams.parse.files import LONGEST_NAME, named_file
 from gearmbs.adams.parse.reader import read_text
 from gearmbs.adams.view.edits import Editor
 from gearmbs.adams.view.expressions import text_of
+from gearmbs.adams.view.functions.defined import defined
 from gearmbs.adams.view.lexer import BARE, EXPRESSION, TEXT, Command, Value, ViewError, commands
 from gearmbs.adams.view.model import PARTS, UNREAD, Item
 from gearmbs.adams.view.values import Stored, fixed, is_ground
@@ -56,6 +57,7 @@ class Block:
 class Macro:
     """Commands that a name stands for, with their parameters and defaults."""
 
+    name: str
     text: str
     line: int
     parameters: dict[str, str]
@@ -282,11 +284,11 @@ class Interpreter(Editor):
         given = self._arguments(command, row)
         if row.verb == "attributes":
             self._attributes(row, given, command.line)
+        elif row.words[0] in ("function", "macro"):
+            (self._function if row.words[0] == "function" else self._macro)(row, given, command.line)
         elif row.verb == "delete":
             for item in self._named(row, given, command.line):
                 self.database.remove(item)
-        elif row.kind == "macro":
-            self._macro(row, given, command.line)
         elif row.kind == "variable":
             self._variable(row, given, command.line)
         elif row.kind:
@@ -373,6 +375,12 @@ class Interpreter(Editor):
         name = self._name(row, given, line)
         if name is None:
             raise ViewError("a macro needs macro_name", line)
+        if row.verb == "delete":
+            gone = [words for words, macro in self.macros.items() if _same_name(macro.name, name)]
+            if not gone:
+                raise ViewError(f"macro delete: there is no macro {name[:80]}", line)
+            del self.macros[gone[0]]
+            return
         if row.verb == "read":
             text = self._text_of_file(
                 text_of((self._now(given["file_name"]) or [""])[0]) if "file_name" in given else "", line
@@ -392,7 +400,26 @@ class Interpreter(Editor):
             key = (match["quoted"] or match["plain"]).lower()
             if key != "_self" and (key not in parameters or default is not None):
                 parameters[key] = default if default is not None else parameters.get(key, "")
-        self.macros[words] = Macro(text, line, parameters)
+        self.macros[words] = Macro(name, text, line, parameters)
+
+    def _function(self, row: Row, given: dict[str, Stored], line: int) -> None:
+        """Take note of a function of the file, change one, or forget it."""
+        what, known = " ".join(row.words), self.values.functions
+        name = self._name(row, given, line)
+        if name is None:
+            raise ViewError(f"{what} needs function_name", line)
+        key = name.rpartition(".")[2].lower()
+        if row.verb != "create" and key not in known:
+            raise ViewError(f"{what}: there is no function {name[:80]}", line)
+        self.database.version += 1
+        if row.verb == "delete":
+            del known[key]
+            return
+        now = {word: [text_of(one) for one in self._now(value)] for word, value in given.items()}
+        function = defined(what, now, known.get(key) if row.verb == "modify" else None, self.database.units, line)
+        if row.verb == "modify":
+            del known[key]
+        known[function.name.lower()] = function
 
     def _called(self, command: Command) -> bool:
         """Carry a macro out if a command calls one."""
@@ -418,6 +445,11 @@ class Interpreter(Editor):
         if value.kind == EXPRESSION and "eval" in value.text.lower():
             return self.values.called_with(value.text, value.line)
         return _written(value)
+
+
+def _same_name(one: str, other: str) -> bool:
+    """Return whether two names are of the same object at the root, with or without its point."""
+    return one.lower().lstrip(".") == other.lower().lstrip(".")
 
 
 def _written(value: Value) -> str:

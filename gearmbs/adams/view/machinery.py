@@ -8,6 +8,7 @@ manual's pages on the dialog boxes of the simplified method.
 from __future__ import annotations
 
 import math
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.adams.view.deckmaker import Deckmaker, Made
@@ -188,19 +189,28 @@ def _pair(m: Deckmaker, item: Item, wheels: list[Item]) -> GearPair:
         )
     stiffness *= m.db.units.si("force") / m.db.units.si("length")
     ratio *= m.db.units.si("time")
-    try:
-        driver, driven = (_wheel(m, one) for one in wheels)
-        if str(_held(m.values, item, "backlash_type", "angle")).lower() == "angle":
-            play = m.radian * _number(m.values, item, "backlash_angle", 0.0) * driver.base_radius
-        else:
-            play = m.db.units.si("length") * _number(m.values, item, "backlash_length", 0.0)
-        contact_ratio = GearPair(driver, driven, backlash=play).contact_ratio
-        law = ContactLaw.linear(
-            stiffness / contact_ratio, ratio * stiffness / contact_ratio, driver.base_radius / sharpness
-        )
-        return GearPair(driver, driven, backlash=play, contact=law)
-    except ValueError as error:
-        raise ViewError(f"its wheels: {error}; give others, or build the pair in Python") from error
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        try:
+            driver, driven = (_wheel(m, one) for one in wheels)
+            if str(_held(m.values, item, "backlash_type", "angle")).lower() == "angle":
+                play = m.radian * _number(m.values, item, "backlash_angle", 0.0) * driver.base_radius
+            else:
+                play = m.db.units.si("length") * _number(m.values, item, "backlash_length", 0.0)
+            # of a law of its own: what is warned of is said of that of the file
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                contact_ratio = GearPair(driver, driven, backlash=play).contact_ratio
+            law = ContactLaw.linear(
+                stiffness / contact_ratio, ratio * stiffness / contact_ratio, driver.base_radius / sharpness
+            )
+            pair = GearPair(driver, driven, backlash=play, contact=law)
+        except ValueError as error:
+            raise ViewError(f"its wheels: {error}; give others, or build the pair in Python") from error
+    for one in warned:
+        if issubclass(one.category, UserWarning):
+            m.remark(item, str(one.message))
+    return pair
 
 
 def make_force(m: Deckmaker, item: Item) -> None:
@@ -220,6 +230,14 @@ def make_force(m: Deckmaker, item: Item) -> None:
         wheels.append(one)
     pair = _pair(m, item, wheels)
     parts = [m.db.items[f"{one.path}.gear_part".lower()] for one in wheels]
+    (turned, place), (_, other) = (m.values.pose(part) for part in parts)
+    apart = m.db.units.si("length") * abs(float(turned[:, 2] @ (other - place)))
+    # whichever end of its face the marker of a wheel is at
+    if not apart < pair.driver.face_width + pair.driven.face_width:
+        raise ViewError(
+            f"its wheels are {apart * 1e3:.4g} mm apart along the axis of the first one, more than they are wide; move "
+            "their ref_marker"
+        )
     ends = [m.new_marker(item, part, *m.values.pose(part)) for part in parts]
     floating = m.fresh("MARKER")
     m.statements.append(Made(f"MARKER/{floating}", (m.owner_argument(parts[1]), "FLOATING"), "", item.line))

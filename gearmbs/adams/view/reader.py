@@ -196,7 +196,8 @@ def parse_view(
     for name, wrong_there in refused.items():
         said = f"{wrong_there[0].message}; it is left out of what can be run ({name})"
         deck.diagnostics.append(Diagnostic(WARNING, said, file, wrong_there[0].line))
-    values = factors.listed(run)
+    values, valueless = factors.listed(run, file)
+    deck.diagnostics += valueless
     view = ViewModel(deck, written, variables=values, name=chosen.name, own=tuple(own), refused=refused)
     view.left_out[""] = _lacking(maker.problems)
     for name, analysis in (scripts | own).items():

@@ -16,6 +16,7 @@ import numpy as np
 
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import Evaluator, Tree, parse, text_of
+from gearmbs.adams.view.functions.defined import DEEPEST, MOST_CALLS, Defined, Scope, checked
 from gearmbs.adams.view.functions.known import FUNCTIONS
 from gearmbs.adams.view.lexer import BARE, EXPRESSION, Value, ViewError, closed
 from gearmbs.adams.view.model import PARTS, PLACED, Database, Item
@@ -103,6 +104,8 @@ class Values:
         self.busy: dict[tuple[int, str], Item] = {}
         self._deep: dict[tuple[int, str, int], list[Any]] = {}
         self.loops: dict[str, Item] = {}
+        self.functions: dict[str, Defined] = {}
+        self._depth = self._calls = 0
         self._poses: dict[int, Pose] = {}
         self._rotations: dict[int, np.ndarray] = {}
         self._version = self._deep_version = -1
@@ -158,20 +161,52 @@ class Values:
 
     def evaluate(self, tree: Tree, line: int = 0, frame: Item | None = None) -> Any:
         """Return the value of an expression; places come in a frame."""
-        return Evaluator(self.lookup, lambda name, args, ev: self.call(name, args, ev, frame), line)(tree)
+        return self.evaluator(line, frame)(tree)
 
-    def call(self, name: str, args: tuple[Tree, ...], evaluator: Evaluator, frame: Item | None) -> Any:
+    def evaluator(self, line: int, frame: Item | None, scope: Scope | None = None) -> Evaluator:
+        """Return what evaluates expressions; in a function of the file, with what it was called with."""
+
+        def lookup(name: str) -> Any:
+            return self.lookup(name) if scope is None else scope.lookup(name, frame)
+
+        return Evaluator(lookup, lambda name, args, ev: self.call(name, args, ev, frame, scope), line)
+
+    def call(
+        self, name: str, args: tuple[Tree, ...], evaluator: Evaluator, frame: Item | None, scope: Scope | None = None
+    ) -> Any:
         """Return the value of a function."""
         function = FUNCTIONS.get(name)
         if function is None:
-            raise evaluator.error(f"the function {name[:40]} is not evaluated here")
+            if (defined := self.functions.get(name.lower())) is None:
+                raise evaluator.error(f"the function {name[:40]} is not evaluated here")
+            return self._defined(defined, args, evaluator, frame, scope)
         if not function.least <= len(args) <= function.most:
             raise evaluator.error(f"{name} has {function.least} to {function.most} arguments, not {len(args)}")
         if function.placing:
             # what a function of places gets is global; what it gives is in the frame that it is asked in
-            inner = Evaluator(self.lookup, lambda n, a, e: self.call(n, a, e, None), evaluator.line)
+            inner = self.evaluator(evaluator.line, None, scope)
             return function.run(self, inner, [inner(one) for one in args], frame)
         return function.run(self, evaluator, [evaluator(one) for one in args], frame)
+
+    def _defined(
+        self, one: Defined, args: tuple[Tree, ...], evaluator: Evaluator, frame: Item | None, outer: Scope | None
+    ) -> Any:
+        """Return the value of a function that the file defines."""
+        if len(args) != len(one.arguments):
+            raise evaluator.error(f"{one.name} has {len(one.arguments)} arguments, not {len(args)}")
+        self._calls = self._calls + 1 if self._depth else 1
+        if self._depth >= DEEPEST or self._calls > MOST_CALLS:
+            often = f"{DEEPEST} deep" if self._depth >= DEEPEST else f"more than {MOST_CALLS} times for one value"
+            raise evaluator.error(f"{one.name}: functions call each other, {often}; give parts of them values")
+        line = evaluator.line
+        scope = Scope(dict(zip(one.arguments, args)), lambda home: self.evaluator(line, home, outer), self.lookup)
+        self._depth += 1
+        try:
+            return checked(one, self.evaluator(line, frame, scope)(one.body), evaluator)
+        except RecursionError:
+            raise evaluator.error(f"{one.name}: its expressions are nested too deeply") from None
+        finally:
+            self._depth -= 1
 
     def lookup(self, name: str) -> Any:
         """Return what a name stands for in an expression: the value of a variable, an object or an attribute.
@@ -234,7 +269,9 @@ class Values:
             if key in item.fields:
                 values = self.values(item, key)
                 if key == "object_value":
-                    values = [one if isinstance(one, Item) else self.db.find(one) or one for one in values if one != ""]
+                    values = [
+                        (self.db.find(one) or one) if isinstance(one, str) else one for one in values if one != ""
+                    ]
                 return values[0] if len(values) == 1 else values
         return 0
 

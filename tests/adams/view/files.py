@@ -124,3 +124,17 @@ simulation single_run transient duration = 0.1 step_size = 0.01 type = dynamic
 """
 )
 """Simulations between changes of the model."""
+
+LIVE = (
+    PENDULUM
+    + """\
+function create function_name = .away text_of_expression = "LOC_RELATIVE_TO({D, 0, 0}, M)" argument_names = "D", "M" &
+   type = location_orientation
+function create function_name = .half text_of_expression = "P1 / 2" argument_names = "P1" type = real
+variable create variable_name = .swing.WIDE real_value = (half(.swing.LENGTH) * 1mm)
+variable create variable_name = .swing.DEEP real_value = (MAX(.swing.WIDE, 40)) range = (half(.swing.WIDE)), 900
+marker create marker_name = .swing.ROD.SIDE location = (away(.swing.WIDE, .swing.ROD.cm)) relative_to = .swing.ROD
+marker create marker_name = .swing.ROD.FAR location = (.swing.ROD.SIDE.loc_x + .swing.DEEP), 0, 0
+"""
+)
+"""Variables and places of expressions that stay alive, with functions of the file."""

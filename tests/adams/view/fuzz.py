@@ -23,7 +23,8 @@ from gearmbs.adams import DeckError, build_mechanism, read_view, run_deck
 
 from ..fuzz import Slow, limited
 from ..mutations import characters
-from .files import CHAIN, PENDULUM, RUNS, WHOLE
+from . import test_machinery
+from .files import CHAIN, LIVE, PENDULUM, RUNS, WHOLE
 from .generator import made
 
 SECONDS = 20.0
@@ -61,7 +62,7 @@ def watched(event: str, given: tuple[object, ...]) -> None:
 @cache
 def corpus() -> list[str]:
     """Return files that run, of all kinds of commands."""
-    return [PENDULUM, CHAIN, WHOLE, RUNS, *(made(seed)[0] for seed in range(5))]
+    return [PENDULUM, CHAIN, WHOLE, RUNS, LIVE, test_machinery.wheels(), *(made(seed)[0] for seed in range(5))]
 
 
 def mutated(text: str, rng: random.Random) -> str:

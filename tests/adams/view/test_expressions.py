@@ -8,12 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as hs
 from scipy.spatial.transform import Rotation
 
+from gearmbs.adams import parse_view
 from gearmbs.adams.view import frames
 from gearmbs.adams.view.expressions import parse
 from gearmbs.adams.view.interpreter import Interpreter
 from gearmbs.adams.view.lexer import ViewError
 
 from ...says import says
+from .files import PENDULUM
 
 MODEL = """\
 model create model_name = m
@@ -241,3 +243,30 @@ def test_variables_in_a_row_are_no_deep_recursion():
     run.run("variable modify variable_name = .m.r0 real_value = (.m.r499)\n")
     with pytest.raises(ViewError, match=says("real_value", "depends on itself")):
         evaluated(run.values, ".m.r499")
+
+
+VALUELESS = "variable create variable_name = .swing.Q real_value = (.swing.NOPE * 2)\n"
+
+
+def test_a_variable_without_a_value_is_remarked_and_refused_where_it_is_needed():
+    view = parse_view(PENDULUM + VALUELESS)
+    assert list(view.variables) == list(parse_view(PENDULUM).variables)
+    assert not view.deck.unsupported
+    assert [d.line for d in view.deck.diagnostics if "NOPE" in d.message] == [PENDULUM.count("\n") + 1]
+    needed = parse_view(PENDULUM + VALUELESS + "marker create marker_name = .swing.ROD.M location = (.swing.Q), 0, 0\n")
+    assert ["NOPE" in d.message for d in needed.deck.unsupported] == [True]
+
+
+def test_limits_without_a_value_are_remarked():
+    text = "variable create variable_name = .swing.Q real_value = 3 range = (.swing.NOPE), 3\n"
+    view = parse_view(PENDULUM + text, variables={"Q": 2.0})
+    assert view.variables[".swing.Q"] == 2.0
+    assert any("NOPE" in d.message and "limits" in d.message for d in view.deck.diagnostics)
+
+
+@pytest.mark.parametrize("held", ["3.5", "(3.5)", "(eval(7))", "{1, 2}"])
+def test_an_object_that_is_a_number_is_refused_where_an_object_is_needed(held):
+    text = f"variable create variable_name = .swing.WHICH object_value = {held}\n"
+    assert not parse_view(PENDULUM + text).deck.unsupported
+    marker = "marker create marker_name = .swing.ROD.M location = (LOC_RELATIVE_TO({0, 0, 0}, .swing.WHICH))\n"
+    assert len(parse_view(PENDULUM + text + marker).deck.unsupported) == 1

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_view, run_deck
+from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.parse import statements as st
 from tests.says import says
 
@@ -170,3 +173,28 @@ def test_wheels_too_far_apart_are_refused():
     text = wheels().replace("location = 60, 0, 5", "location = 61, 0, 5")
     with pytest.raises(DeckError, match=says("61 mm", "60 mm")):
         run_deck(parse_view(text), end=1e-4, steps=1, check=False)
+
+
+def test_wheels_that_have_no_face_in_common_are_refused():
+    """Along the axes the program has both wheels where the first one is."""
+    text = wheels().replace("location = 60, 0, 5", "location = 60, 0, {}")
+    with pytest.raises(DeckError, match=says("30 mm", "ref_marker")):
+        run_deck(parse_view(text.format(35)), end=1e-4, steps=1, check=False)
+    assert run_deck(parse_view(text.format(15)), end=1e-4, steps=1, check=False).success
+
+
+def test_what_the_pair_warns_of_is_a_remark_at_its_line():
+    """Not a warning of Python, from a line that the user did not write; stiffer teeth have none."""
+    text = wheels().replace("contact_stiffness real_value = 1.0E+05", "contact_stiffness real_value = 100")
+    at = 1 + text[: text.index("instance_name = .m.TEETH")].count("\n")
+
+    def fouling(diagnostics):
+        return [d.line for d in diagnostics if "foul" in d.message]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        view, deck = parse_view(text), parse_deck(parse_view(text).text)
+        assert not fouling(parse_view(wheels()).deck.diagnostics)
+        assert fouling(view.deck.diagnostics) == [at]
+        assert fouling(bound(view.deck).diagnostics) == [at]
+        assert fouling(bound(deck).diagnostics) == [next(iter(deck.of(st.Gforce).values())).line]

@@ -144,6 +144,21 @@ def test_mass_from_density(material, density):
     assert np.allclose(part.ip, np.array([2.0, 5.0, 5.0]) * 2.0 * density / 12.0)
 
 
+@pytest.mark.parametrize(
+    "marker", ["", "marker create marker_name = .m.P.cm location = 9, 9, 9 orientation = 90, 0, 0\n"]
+)
+def test_a_part_without_a_density_has_no_mass_whatever_its_solids(marker):
+    """As View exported one: nemesis5324/DL---Dong-luc-hoc-Robot, Link1 of Controls_Plant_1.adm."""
+    given = MASSES % ("density = 2", "")
+    deck = parse_view(PART + marker + given[given.index("geometry") :]).deck
+    part = deck.of(st.Part)[2]
+    assert (part.mass, part.ip) == (0.0, None)
+    assert [d.line for d in deck.diagnostics if "material_type" in d.message] == [4]
+    twin = parse_view(PART + marker + given).deck
+    assert twin.of(st.Part)[2].mass == pytest.approx(4.0, rel=1e-12)
+    assert not [d for d in twin.diagnostics if "material_type" in d.message]
+
+
 def test_a_cm_marker_goes_to_the_centre():
     marker = "marker create marker_name = .m.P.cm location = 9, 9, 9 orientation = 90, 0, 0\n"
     deck = parse_view(PART + marker + MASSES % ("density = 1", "")).deck

@@ -47,16 +47,13 @@ def density_of(m: Deckmaker, item: Item) -> float:
     density = m.values.number(item, "density")
     if density is not None:
         return density
-    if "material_type" in item.fields:
-        name = str(m.values.text(item, "material_type"))
-        found = m.db.find(name, ("material",))
-        if found is not None:
-            return need(m, found, "density")
-        standard = STANDARD.get(name.rsplit(".", 1)[-1].lower())
-        if standard is None:
-            raise ViewError(f"{item.path}: there is no material {name[:60]}", item.line)
-    else:
-        standard = STANDARD["steel"]
+    name = str(m.values.text(item, "material_type"))
+    found = m.db.find(name, ("material",))
+    if found is not None:
+        return need(m, found, "density")
+    standard = STANDARD.get(name.rsplit(".", 1)[-1].lower())
+    if standard is None:
+        raise ViewError(f"{item.path}: there is no material {name[:60]}", item.line)
     units = m.db.units
     return standard * units.si("length") ** 3 / units.si("mass")
 
@@ -207,7 +204,16 @@ def _apart(m: Deckmaker, found: Moments, marker: Item | None) -> float:
 
 
 def mass_of_geometry(m: Deckmaker, item: Item, marker: Item | None) -> list[str | None]:
-    """Return mass, centre and inertia of a part as arguments, from its solids; none of a part without any."""
+    """Return mass, centre and inertia of a part as arguments, from its solids; none of a part without any.
+
+    View computes them only where a density or a material is given: of a solid that was read from a file and given
+    neither, it exported a part without mass.
+    """
+    unread = any(one.kind == UNREAD and m.active(one) for one in item.children.values())
+    if not unread and not item.fields.keys() & {"density", "material_type"}:
+        if m.parasolids or any(one.kind in (*SHAPES, *UNKNOWN, "csg", "shell") for one in item.children.values()):
+            m.remark(item, "no mass, density or material_type is given: it has none; give one for that of its solids")
+        return [] if marker is None else [f"CM = {m.id(marker)}"]
     found = moments_of(m, item, marker)
     if found is None:
         return [] if marker is None else [f"CM = {m.id(marker)}"]
