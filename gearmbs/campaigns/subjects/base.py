@@ -284,8 +284,8 @@ def check_real(value: Any, what: str) -> None:
     if np.iscomplexobj(value):
         shown = f" = {complex(value)}" if np.ndim(value) == 0 else ""
         raise CampaignError(
-            f"{what}{shown}: complex, which no number that is kept may be; return its amplitude, or its real and imaginary "
-            "parts by names of their own"
+            f"{what}{shown}: complex, which no number that is kept may be; return its amplitude, or its real and "
+            "imaginary parts by names of their own"
         )
 
 
