@@ -247,7 +247,7 @@ def run(
 ) -> None:
     """Simulate a case, a planetary set or a whole drivetrain, and write its record as NetCDF."""
     kind = kind_of(case_file)
-    if accuracy is not None and kind != "case":
+    if accuracy is not None and kind in ("planetary set", "drivetrain"):
         raise typer.BadParameter(
             f"{case_file} is a {kind}, whose errors are not estimated; leave it out and compare two tolerances",
             param_hint="--accuracy",
@@ -370,6 +370,9 @@ def _level_table(data: Any) -> str:
         row = levels.sel(component=component).transpose("harmonic", "track_time").values
         best = [int(v.argmax()) for v in row]
         lines.append(f"{component!s:<18}" + "".join(f"{v[k]:14.4g}{float(at[k]):9.4g}" for v, k in zip(row, best)))
+        if "order_rms_error" in data:
+            off = data["order_rms_error"].sel(component=component).transpose("harmonic", "track_time").values
+            lines.append(f"{'  +/- numerically':<18}" + "".join(f"{v[k]:14.2g}{'':9}" for v, k in zip(off, best)))
     return "\n".join(lines)
 
 

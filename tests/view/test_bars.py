@@ -74,7 +74,7 @@ def test_order_of_dimensions_does_not_matter(table):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda t: t.isel(state=0), "dims are"),
+        (lambda t: t.isel(harmonic=0), "dims are"),
         (lambda t: t - 1.0, says("table", "-0.7", "'healthy'", "RMS")),
         (lambda t: t * np.inf, says("table", "inf", "'healthy'", "RMS")),
         (lambda t: t.values, "ndarray"),

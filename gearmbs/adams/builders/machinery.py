@@ -98,8 +98,8 @@ def _check_digits(pair: GearPair, *places: np.ndarray) -> None:
     far = float(np.abs(places).max())
     if not np.spacing(far) < ROUNDED * pair.driver.module:
         raise ValueError(
-            f"its wheels are {far:.3g} m from the origin, where double precision has no digits left for teeth of module "
-            f"{1e3 * pair.driver.module:.4g} mm; move the model to the origin"
+            f"its wheels are {far:.3g} m from the origin, where double precision has no digits left for teeth of "
+            f"module {1e3 * pair.driver.module:.4g} mm; move the model to the origin"
         )
 
 

@@ -7,18 +7,19 @@ What the two differ by is mostly the error of the twin. That of the run itself i
 
     tolerance   ten times with a method of order one in the tolerance; the harmonics of meshing wheels, whose steps are
                 cut by kinks, were found to follow its power of 0.6 to 1: four times at least
-    slices      four times, as the sum is a trapezoidal rule of pieces with kinks: order two
+    slices      by the square of their ratio r, as the sum is a trapezoidal rule of pieces with kinks: r^2/(1 - r^2) of
+                the difference
 
-With `SHARE` = 1/2 of the difference as the error of the run there is room for both in one. Single harmonics of the two
-may agree by chance: the largest difference among those of a component counts for all of them. To this comes the part by
-which the motion does not repeat itself.
+With `SHARE` = 1/2 of the difference as the error of the run, or the part that the slices ask for, there is room for
+both in one. Single harmonics of the two may agree by chance: the largest difference among those of a component counts
+for all of them. To this comes the part by which the motion does not repeat itself.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Collection
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -32,6 +33,8 @@ from gearmbs.units import QuantityLike, to_si
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from gearmbs.mechanism import Mechanism
 
 COARSER = 10.0
 """Tolerance of the twin over that of the run: a decade. The twin costs 0.7 of the run, with half the slices 0.65."""
@@ -57,6 +60,9 @@ small power of the tolerance, and by chance."""
 
 SMALLEST, LARGEST = 2.0 * FLOOR, 0.5
 """Accuracies that can be asked for; beyond the second there is no digit left."""
+
+FEWEST_SLICES = 3
+"""Slices of a face along which flanks vary that can be judged: the twin has two of them at least."""
 
 ATTEMPTS = 3
 """Runs at most, each at a tolerance of a tenth or less of the one before, which is its twin."""
@@ -100,8 +106,30 @@ def asked_accuracy(accuracy: QuantityLike) -> float:
     return wanted
 
 
+def check_accurate(case: Case, accuracy: QuantityLike) -> float:
+    """Return the accuracy asked for as a part, if a case can be simulated to one.
+
+    Raises
+    ------
+    CaseError
+        If it is none, or the case has a tolerance of its own or too few slices.
+    """
+    wanted = asked_accuracy(accuracy)
+    if case.solver.tolerance is not None:
+        raise CaseError(
+            f"case '{case.name}': accuracy = {accuracy!r}: the tolerance is chosen for it, but the case has "
+            f"solver.tolerance = {case.solver.tolerance:g}; leave one of the two out"
+        )
+    if case.contact.slices == FEWEST_SLICES - 1:
+        raise CaseError(
+            f"case '{case.name}': accuracy = {accuracy!r}: what contact.slices = {case.contact.slices} are good for "
+            f"cannot be told from fewer; give {FEWEST_SLICES} or more, or leave slices out"
+        )
+    return wanted
+
+
 def accurate_record(
-    run: Run, case: Case, accuracy: QuantityLike, variables: Collection[str] | None, *, own_mechanism: bool
+    run: Run, case: Case, accuracy: QuantityLike, variables: Collection[str] | None, mechanism: Mechanism | None = None
 ) -> xr.Dataset:
     """Return the record of a case whose mesh harmonics are as accurate as asked, and what they are known to.
 
@@ -115,8 +143,8 @@ def accurate_record(
         Of the mesh harmonics, as a part of the largest of their component; see `asked_accuracy`.
     variables : collection of str or None
         As of `gearmbs.studies.run_case`.
-    own_mechanism : bool
-        Whether another mechanism is simulated than that of the case, whose slices stay.
+    mechanism : Mechanism, optional
+        What is simulated instead of that of the case, whose slices stay.
 
     Returns
     -------
@@ -129,23 +157,19 @@ def accurate_record(
     Raises
     ------
     CaseError
-        If the case has a tolerance of its own, or a mechanism of one's own has slices.
+        See `check_accurate`; and if a mechanism of one's own has slices.
 
     Warns
     -----
     CaseWarning
-        If the accuracy was not reached.
+        If the accuracy was not reached, or flanks came apart, so that other motions may exist.
     """
-    wanted = asked_accuracy(accuracy)
-    slices = case.pair().face_slices
-    if case.solver.tolerance is not None:
+    wanted = check_accurate(case, accuracy)
+    slices, given = case.pair().face_slices, case.contact.slices is not None
+    own = _slices_of(mechanism)
+    if own > 1:
         raise CaseError(
-            f"accuracy = {accuracy!r}: the tolerance is chosen for it, but the case has solver.tolerance = "
-            f"{case.solver.tolerance:g}; leave one of the two out"
-        )
-    if own_mechanism and slices > 1:
-        raise CaseError(
-            f"accuracy = {accuracy!r}: what the {slices} slices of the face of a mechanism of one's own are good for "
+            f"accuracy = {accuracy!r}: what the {own} slices of the face of a mechanism of one's own are good for "
             "is not known; run the case without the mechanism, or leave accuracy out"
         )
     level = LEVELS[0 if case.operation.speed_curve is None else 1]
@@ -155,47 +179,81 @@ def accurate_record(
     usual = min(case.tolerance, INTEGRATORS[case.solver.integrator].largest_tolerance / COARSER)
     fine = _at(case, max(LEAST_TOLERANCE, usual * min(1.0, wanted / USUAL[case.is_auto])), slices)
     found = run(fine, kept | {level}, precision)
-    coarse = _at(case, min(COARSER * fine.tolerance, usual * COARSER), slices // 2 | 1 if slices > 1 else 1)
-    twin = run(coarse, both, Precision(like=found.found)).record
+    coarse, twin = _twin(run, fine, found, both)
     for attempt in range(ATTEMPTS):
         record = found.record
-        error = _errors(record, twin, level)
+        share = _share(fine, coarse)
+        error = _errors(record, twin, level, share)
         worst = _worst(record[level], error)
         if worst <= wanted or attempt == ATTEMPTS - 1 or fine.tolerance <= LEAST_TOLERANCE:
             break
-        twin, coarse = record, fine
-        slices = slices if slices == 1 or case.contact.slices is not None else 2 * slices - 1
-        fine = _at(
-            case,
-            max(LEAST_TOLERANCE, fine.tolerance * float(np.clip(0.5 * wanted / worst, 1e-3, 1.0 / COARSER))),
-            slices,
-        )
+        tighter = fine.tolerance * float(np.clip(0.5 * wanted / worst, 1e-3, 1.0 / COARSER))
+        last = coarse, twin = fine, record
+        slices = slices if slices == 1 or given else 2 * slices - 1
+        fine = _at(case, max(LEAST_TOLERANCE, tighter), slices)
         found = run(fine, kept | {level}, precision)
+        # the run before is a twin only if it has fewer slices, too
+        coarse, twin = _twin(run, fine, found, both) if given and slices > 1 else last
     if level in kept:
         record[f"{level}_error"] = error
     for name in kept & {*SERIES} & {*record.data_vars} & {*twin.data_vars}:
-        for what in ("mean", "std"):
-            one, other = (getattr(r[name].astype(float), what)("time").values for r in (record, twin))
-            record[name].attrs[f"error_of_{what}"] = (SHARE * np.abs(one - other)).tolist()
-    record = _told(record.drop_vars(level) if level not in kept else record, wanted, worst, fine, coarse)
+        _add_errors(record[name], twin[name], share, worst)
+    if level not in kept:
+        record = record.drop_vars(level)
+        left = {dim for one in record.data_vars.values() for dim in one.dims}
+        record = record.drop_vars([name for name, one in record.coords.items() if not left.issuperset(one.dims)])
+    record = _told(record, wanted, worst, fine, coarse)
     # the case as it was asked for: its tolerance is that of its accuracy, and is told beside it
     record.attrs["case_json"] = case.model_dump_json()
     return record
 
 
+def _slices_of(mechanism: Mechanism | None) -> int:
+    """Return the most slices of the face that a mesh of a mechanism has."""
+    elements = () if mechanism is None else mechanism.elements.values()
+    return max((getattr(getattr(one, "pair", None), "face_slices", 1) for one in elements), default=1)
+
+
+def _twin(run: Run, fine: Case, found: Recorded, variables: Collection[str]) -> tuple[Case, xr.Dataset]:
+    """Return a coarser case and its record over the same stretch of the motion."""
+    slices = fine.pair().face_slices
+    largest = INTEGRATORS[fine.solver.integrator].largest_tolerance
+    coarse = _at(fine, min(COARSER * fine.tolerance, largest), max(FEWEST_SLICES - 1, slices // 2) if slices > 1 else 1)
+    return coarse, run(coarse, variables, Precision(like=found.found)).record
+
+
+def _share(fine: Case, coarse: Case) -> float:
+    """Return the part of the difference of two runs that the error of the finer one is at most."""
+    ratio = coarse.pair().face_slices / fine.pair().face_slices
+    return max(SHARE, ratio**2 / (1.0 - ratio**2)) if ratio < 1.0 else SHARE
+
+
+def _add_errors(series: xr.DataArray, other: xr.DataArray, share: float, worst: float) -> None:
+    """Add the errors of its mean and standard deviation to a variable over time.
+
+    They are single differences, which may be small by chance: of the larger one, and what the harmonics are off by as
+    parts, of the standard deviation.
+    """
+    one, two = (v.astype(float).values.reshape(v.sizes["time"], -1) for v in (series, other))
+    apart = np.maximum(np.abs(one.mean(axis=0) - two.mean(axis=0)), np.abs(one.std(axis=0) - two.std(axis=0)))
+    error = (share * apart + worst * one.std(axis=0)).squeeze()
+    for what in ("mean", "std"):
+        series.attrs[f"error_of_{what}"] = error.tolist()
+
+
 def _at(case: Case, tolerance: float, slices: int) -> Case:
     """Return a case at a tolerance and with so many slices of the face, one as lumped as the given one."""
-    contact = {} if slices == case.pair().face_slices else {"slices": slices}
+    contact: dict[str, Any] = {} if slices == case.pair().face_slices else {"slices": slices}
     return case.changed(solver={"tolerance": tolerance, "lump": case.lump}, contact=contact)
 
 
-def _errors(record: xr.Dataset, twin: xr.Dataset, level: str) -> xr.DataArray:
+def _errors(record: xr.Dataset, twin: xr.Dataset, level: str, share: float) -> xr.DataArray:
     """Return the numerical errors of the levels of a record from those of its twin."""
     import xarray as xr
 
     values = record[level]
     apart, largest = abs(values - twin[level]).max("harmonic"), values.max("harmonic")
-    error = xr.where(apart > APART * largest, 1.0, SHARE) * apart
+    error = xr.where(apart > APART * largest, 1.0, share) * apart
     error = np.maximum(error, FLOOR * largest) + 0.0 * values
     if record.attrs.get("record_status") == "periodic":
         returned = record.attrs["record_deviation"] * np.maximum(values, LEAST_LEVEL * largest)
@@ -227,6 +285,14 @@ def _told(record: xr.Dataset, wanted: float, worst: float, fine: Case, coarse: C
         said += f"; {_per_cent(wanted)} was asked for"
         if record.attrs.get("record_status", "periodic") != "periodic":
             said += ", but the motion does not repeat itself: a longer duration averages more of it"
+    apart = record.attrs.get("record_apart", 0.0)
+    if apart > 0.0:
+        said += (
+            f"; the flanks were apart in {100 * apart:.2g} % of the time behind the run-up: other motions may exist "
+            "beside this one, of which this is no error; compare duration = 'auto', and a tolerance of "
+            f"{0.01 * fine.tolerance:.1g}"
+        )
+    if worst > wanted or apart > 0.0:
         warnings.warn(CaseWarning(f"case '{fine.name}': {said}"), stacklevel=4)
     record.attrs |= {"accuracy_asked": wanted, "accuracy_found": worst, "accuracy_by": said}
     return record

@@ -14,7 +14,7 @@ from gearmbs.files import check_place
 from gearmbs.progress import bars
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
-from gearmbs.studies.run.accuracy import asked_accuracy
+from gearmbs.studies.run.accuracy import asked_accuracy, check_accurate
 from gearmbs.studies.run.claims import Claim, claimed
 from gearmbs.studies.run.engine import available_cores, processes, run_jobs, threads
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
@@ -100,6 +100,8 @@ def run_cases(
     for case in cases:
         try:
             check_record(case)
+            if wanted is not None:
+                check_accurate(case, wanted)
         except CaseError as error:
             if errors == "raise":
                 raise

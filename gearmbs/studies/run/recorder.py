@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -177,6 +178,36 @@ def span_of(case: Case) -> Span:
 def span_begin(case: Case) -> float:
     """Return the time at which the span of a record's filters begins, s."""
     return span_of(case).start - edge(case) - (MARGIN + 1) / case.output_rate
+
+
+class Separations:
+    """Adds up the time behind the run-up in which no drive flanks touch, where a record does not show all of it.
+
+    Parameters
+    ----------
+    case : Case
+    """
+
+    def __init__(self, case: Case) -> None:
+        self._begin = case.operation.run_up
+        self._apart = self._whole = 0.0
+        self._last = math.nan
+
+    def take(self, part: Solution) -> None:
+        """Take the next steps of a run."""
+        t = part.t
+        later = t > self._begin
+        if later.any():
+            steps = np.diff(t, prepend=self._last if self._last == self._last else t[0])
+            touching = part.contact(rig.MESH)["pairs_drive"] > 0.0
+            self._whole += float(steps[later].sum())
+            self._apart += float(steps[later & ~touching].sum())
+        self._last = float(t[-1]) if t.size else self._last
+
+    @property
+    def share(self) -> float:
+        """Part of that time."""
+        return self._apart / self._whole if self._whole > 0.0 else 0.0
 
 
 class Recorder:

@@ -29,7 +29,7 @@ from gearmbs.studies.run.record import (
     evaluate,
     time_series,
 )
-from gearmbs.studies.run.recorder import WATCHED, Measured, Recorder, measure, rows_of_record
+from gearmbs.studies.run.recorder import WATCHED, Measured, Recorder, Separations, measure, rows_of_record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -254,7 +254,7 @@ def run_case(
         return _recorded(case, progress, mechanism, variables, precision)
 
     if accuracy is not None:
-        return accurate_record(run, case, accuracy, variables, own_mechanism=mechanism is not None)
+        return accurate_record(run, case, accuracy, variables, mechanism)
     return run(case, variables).record
 
 
@@ -269,7 +269,14 @@ def _recorded(
     load_kernels(case.solver.integrator, case.lump)
     periodic = PeriodicRecorder(case, mechanism is None, precision=precision) if case.is_auto else None
     recorder = Recorder(case) if periodic is None else periodic.recorder
-    options: dict[str, Any] = {"every_step": True, "consumer": recorder.take, "watch": WATCHED}
+    apart = Separations(case) if precision is not None and periodic is None else None
+
+    def take(part: Solution) -> None:
+        recorder.take(part)
+        if apart is not None:
+            apart.take(part)
+
+    options: dict[str, Any] = {"every_step": True, "consumer": take, "watch": WATCHED}
     if periodic is not None and INTEGRATORS[case.solver.integrator].can("pause"):
         options["pause"] = periodic.pause
     solution = simulate_case(case, progress, mechanism=mechanism, **options)
@@ -289,6 +296,8 @@ def _recorded(
     dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
     if periodic is not None:
         dataset.attrs |= periodic.attributes()
+    if apart is not None:
+        dataset.attrs["record_apart"] = apart.share
     return Recorded(dataset, None if periodic is None else periodic.found or Found(0, 0))
 
 
