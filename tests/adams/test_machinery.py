@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -130,6 +132,15 @@ def test_wheels_elsewhere_than_those_of_the_pair_are_refused(old, new, message):
     )
     with pytest.raises(DeckError, match=message):
         run(text, {"GFORCE/1": OUTER}, 0.1, 1)
+
+
+@pytest.mark.parametrize("far", ["1E16", "1E27"])
+def test_wheels_where_no_digits_are_left_for_teeth_are_refused(far):
+    """Any number of teeth is near there by rounding: it was searched for without end."""
+    deck = re.sub(r"(Q[GP])=(0\.0|50\.0),0,0", rf"\1=\2,0,{far}", PAIR)
+    assert deck.count(far) == 4
+    with pytest.raises(DeckError, match=says("GFORCE/1", "digits", "origin")):
+        run(deck, {"GFORCE/1": OUTER}, 1e-4, 1)
 
 
 def test_a_file_of_routines_may_define_pairs(tmp_path):

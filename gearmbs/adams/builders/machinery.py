@@ -29,6 +29,8 @@ APART = 0.25
 """Modules by which a centre distance may differ from the pair's: beyond, the deck has other wheels, or another axis."""
 REMARKED = 1e-3
 """Modules by which it may differ without a remark."""
+ROUNDED = 1e-3
+"""Modules that the last digit of a place may be: flanks yield by less, and farther away any number of teeth is near."""
 
 Frame = tuple[np.ndarray, np.ndarray]
 """Origin, m, and axes as columns."""
@@ -74,6 +76,7 @@ def add_gears(b: Builder, s: st.Gforce, pair: GearPair) -> None:
         angle = np.degrees(np.arcsin(min(across, 1.0)))
         raise ValueError(f"the axes of its wheels are {angle:.4g} deg apart; those of a pair are parallel")
     one, two = (point + ((here - point) @ z) * z for point in points)
+    _check_digits(pair, one, two, *(_pose(deck, part, b.units.length)[0] for part in owners))
     _check_distance(b, s, pair, float(np.linalg.norm(two - one)))
     x = (two - one) / np.linalg.norm(two - one)
     frame = np.column_stack([x, np.cross(z, x), z])
@@ -88,6 +91,16 @@ def add_gears(b: Builder, s: st.Gforce, pair: GearPair) -> None:
     b.mechanism.gear_contact(b.model.names["gforce", s.id], wheels[0], wheels[1], pair)
     teeth = f"{pair.driver.teeth} teeth on PART/{first}, {pair.driven.teeth} on PART/{second}"
     b.remark(WARNING, s, f"in place of its own law, the exact contact of a pair: {teeth}")
+
+
+def _check_digits(pair: GearPair, *places: np.ndarray) -> None:
+    """Refuse wheels that are so far from the origin that rounding moves their teeth."""
+    far = float(np.abs(places).max())
+    if not np.spacing(far) < ROUNDED * pair.driver.module:
+        raise ValueError(
+            f"its wheels are {far:.3g} m from the origin, where double precision has no digits left for teeth of "
+            f"module {1e3 * pair.driver.module:.4g} mm; move the model to the origin"
+        )
 
 
 def _check_distance(b: Builder, s: st.Gforce, pair: GearPair, distance: float) -> None:
