@@ -39,7 +39,7 @@ def test_of_a_function(tmp_path, what, name):
 
 
 def test_of_a_function_of_a_record(tmp_path):
-    keep = ["numbers", "tests.campaigns.test_complex_numbers:phasor"]
+    keep = ["numbers", f"tests.campaigns.test_complex_numbers:{phasor.__name__}"]
     subject = FunctionSubject(returning, {"x": 1.0, "what": "real"})
     campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("x", values=[2.0, 3.0])], "grid", keep=keep, unit=2))
     campaign.run(workers=0)

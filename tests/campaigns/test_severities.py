@@ -18,7 +18,7 @@ SUBJECT = FunctionSubject(taking, {"defect": {}, "severity": {}})
 
 
 def test_a_range_that_is_called_severity():
-    with pytest.raises(CampaignError, match=says("state", "state.severity", "leave its name out", "rename")):
+    with pytest.raises(CampaignError, match=says("state", "state.severity")):
         make_plan(SUBJECT, Choice("defect", RANGES, name="state"), n=8)
     # without a name the column of severities is another one
     plan = make_plan(SUBJECT, Choice("defect", RANGES), n=8)
