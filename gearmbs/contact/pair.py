@@ -423,6 +423,8 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
     if sign < 0:
         mirror(scratch.sums, want)
     first, last = teeth_in_reach(wheels, side, depth, wander)
+    # there are no more, whatever reach follows from a pose without meaning, as of a wheel that has flown away
+    last = min(last, first + options.teeth[0] + options.teeth[1])
     for i in range(first, last + 1):
         set_pair(options, scratch, sign, i)
         if side.pitch_mismatch_bound != 0.0:
