@@ -14,7 +14,8 @@ import numpy as np
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import BLOCK
-from gearmbs.signals.signal.signal import DIMENSIONS, common_unit, like, rate_of, unit_dimension, units_of
+from gearmbs.signals.signal.signal import common_unit, like, rate_of, units_of
+from gearmbs.signals.signal.units import DIMENSIONS, unit_dimension
 from gearmbs.units import to_si
 
 if TYPE_CHECKING:

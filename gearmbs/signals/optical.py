@@ -22,7 +22,8 @@ from gearmbs.progress import waiting
 from gearmbs.signals.encoders.estimate import amplitude_interval
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
-from gearmbs.signals.signal.signal import DIMENSIONS, like, rate_of, unit_dimension, units_of
+from gearmbs.signals.signal.signal import like, rate_of, units_of
+from gearmbs.signals.signal.units import DIMENSIONS, unit_dimension
 from gearmbs.units import Quantity, to_si
 
 MEMORY = 100

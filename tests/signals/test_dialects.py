@@ -25,7 +25,7 @@ from gearmbs.signals import (
     write_signal,
 )
 from gearmbs.signals.signal.labels import name_and_unit, role_of
-from gearmbs.signals.signal.signal import unit_dimension
+from gearmbs.signals.signal.units import unit_dimension
 from tests.says import says
 
 RATE = 12800.0

@@ -19,7 +19,7 @@ from gearmbs.signals import (
     units_of,
 )
 from gearmbs.signals.conversion import band_window
-from gearmbs.signals.signal.signal import unit_dimension
+from gearmbs.signals.signal.units import unit_dimension
 from tests.says import says
 
 RATE = 12800.0

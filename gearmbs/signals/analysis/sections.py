@@ -28,7 +28,8 @@ from gearmbs.signals.signal.arguments import DataKeywords
 from gearmbs.signals.signal.given import given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.inputs import to_signal
 from gearmbs.signals.signal.record import Record, checked_gaps, columns_asked, record_of, signal_from
-from gearmbs.signals.signal.signal import check_units, rate_of
+from gearmbs.signals.signal.signal import rate_of
+from gearmbs.signals.signal.units import check_units
 from gearmbs.units import to_si
 
 Progress = Callable[[float, str], None]

@@ -36,7 +36,8 @@ from gearmbs.signals.rotation.order_tracking import order_track
 from gearmbs.signals.rotation.rate import MIXED, other_rate
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, refined_speed, remark_plausibility
 from gearmbs.signals.rotation.sweep import remark_sweep
-from gearmbs.signals.signal.signal import rate_of, unit_dimension, units_of
+from gearmbs.signals.signal.signal import rate_of, units_of
+from gearmbs.signals.signal.units import unit_dimension
 from gearmbs.signals.spectra import envelope, spectrum
 
 # What was found in a record of which no teeth are known, as data, tables and Markdown.

@@ -43,7 +43,8 @@ from gearmbs.signals.rotation.separation import level_lines, prewhiten
 from gearmbs.signals.rotation.shaft import shaft_phase
 from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
-from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, unit_dimension, units_of
+from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, units_of
+from gearmbs.signals.signal.units import unit_dimension
 from gearmbs.signals.spectra import kurtogram
 from gearmbs.units import to_si
 

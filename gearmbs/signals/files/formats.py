@@ -18,7 +18,8 @@ from gearmbs.signals.files.csv import CUT
 from gearmbs.signals.files.table import TABLE, Asked, Content, format_of, known_endings
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.record import Progress, Record, checked_gaps, columns_asked, record_of, signal_from
-from gearmbs.signals.signal.signal import as_signal, check_units
+from gearmbs.signals.signal.signal import as_signal
+from gearmbs.signals.signal.units import check_units
 from gearmbs.wording import warn
 
 FORMATS = tuple(TABLE)

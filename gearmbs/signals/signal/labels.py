@@ -17,7 +17,8 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError
-from gearmbs.signals.signal.signal import UNKNOWN_UNITS, is_usual, shaft_coords, units_of, with_metadata
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, shaft_coords, units_of, with_metadata
+from gearmbs.signals.signal.units import is_usual
 
 BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")

@@ -16,15 +16,7 @@ import xarray as xr
 from gearmbs.files import json_value
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
 from gearmbs.signals.signal.labels import RPM_UNITS, key_of
-from gearmbs.signals.signal.signal import (
-    SHAFT,
-    check_teeth,
-    make_signal,
-    rate_of,
-    shaft_coords,
-    uniform_rate,
-    units_of,
-)
+from gearmbs.signals.signal.signal import SHAFT, check_teeth, make_signal, rate_of, shaft_coords, uniform_rate, units_of
 
 # What headers say, by the names that real files use: sampling rates and speeds, and which to believe.
 
